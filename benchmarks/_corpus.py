@@ -13,6 +13,8 @@ def unpacked(folder: Path, into: Path) -> list[Path]:
     files = []
     for path in sorted(folder.glob("*.osim*")):
         target = into / path.name.removesuffix(".gz")
-        target.write_bytes(gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes())
+        target.write_bytes(
+            gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
+        )
         files.append(target)
     return files

@@ -1,6 +1,7 @@
 """What a piece of work takes, in numbers that no machine changes: calls of Python functions, modules, bytes.
 
-This runs in a Python that has just begun, and imports next to nothing: what it loads, the work need not load any more.
+This runs in a Python that has just begun, and imports next to nothing: what it loads, the work need
+not load any more.
 
     python -S _counted.py RESULT PATH PACKAGE [WORD ...]    a command, or without WORDs the calls of cost.py
 """
@@ -35,7 +36,8 @@ class Opened:
         if not self.on or event != "open" or not isinstance(given[0], str):
             return
         name, mode, flags = given
-        # Of the flags, 1 and 2 are about writing. What `open` has an opener of ours open is told twice.
+        # Of the flags, 1 and 2 are about writing. What `open` has an opener of ours open is told
+        # twice.
         if not (flags or 0) & 3 and not (mode is None and self.names[-1:] == [name]):
             self.names.append(name)
 
@@ -43,8 +45,8 @@ class Opened:
 class Counter:
     """Counts work, one piece after the other.
 
-    Args:
-        package: the folder of the package whose own functions, modules and files are told from those of others.
+    Args: package: the folder of the package whose own functions, modules and files are told from
+        those of others.
     """
 
     def __init__(self, package: str) -> None:
@@ -75,7 +77,9 @@ class Counter:
             if file.startswith(IMPORTING):
                 continue
             ours = file.startswith(self.package)
-            name = f"{file.removeprefix(self.package)}: {code.co_qualname}" if ours else _library(file)
+            name = (
+                f"{file.removeprefix(self.package)}: {code.co_qualname}" if ours else _library(file)
+            )
             counts = own if ours else libraries
             counts[name] = counts.get(name, 0) + entry.callcount + entry.reccallcount
         loaded = sorted(name for name in modules if _top(name) == "osimlite")
@@ -100,9 +104,13 @@ class Counter:
         for name in self.opened.names:
             file = os.path.abspath(name).replace("\\", "/")
             # Byte code is counted by the module; machine code is another for each processor.
-            if file.startswith((self.package, here)) and not file.endswith((".py", ".pyc", ".code")):
+            if file.startswith((self.package, here)) and not file.endswith(
+                (".py", ".pyc", ".code")
+            ):
                 told = file.removeprefix(self.package).removeprefix(here)
-                found[told] = found.get(told, 0) + (os.path.getsize(file) if os.path.exists(file) else 0)
+                found[told] = found.get(told, 0) + (
+                    os.path.getsize(file) if os.path.exists(file) else 0
+                )
         return found
 
 
@@ -124,7 +132,12 @@ def _library(file: str) -> str:
 def _size_of_code(module: str) -> int:
     """Bytes of a module's byte code, without the path of its file, which it holds once."""
     spec = sys.modules[module].__spec__
-    if spec is None or spec.cached is None or spec.origin is None or not os.path.exists(spec.cached):
+    if (
+        spec is None
+        or spec.cached is None
+        or spec.origin is None
+        or not os.path.exists(spec.cached)
+    ):
         return 0
     return os.path.getsize(spec.cached) - len(os.fsencode(spec.origin))
 

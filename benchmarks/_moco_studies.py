@@ -1,7 +1,7 @@
 """Studies that osimlite and Moco 4.6 both solve: each maker writes files that both read into a folder.
 
-A folder has either ``study.omoco``, or ``track.xml`` or ``inverse.xml`` of a tool, and goals and bounds that are added
-to what the tool makes in ``more.omoco``.
+A folder has either ``study.omoco``, or ``track.xml`` or ``inverse.xml`` of a tool, and goals and
+bounds that are added to what the tool makes in ``more.omoco``.
 """
 
 from __future__ import annotations
@@ -42,20 +42,28 @@ def kept(name: str) -> Callable[[Path, Path], None]:
 def sources(core: Path, part: str, names: tuple[str, ...], folder: Path) -> None:
     """Copy files of opensim-core, which is a folder or a git directory."""
     if not core.is_dir():
-        raise SystemExit(f"there is no folder {core}: name the sources of opensim-core by --core FOLDER")
+        raise SystemExit(
+            f"there is no folder {core}: name the sources of opensim-core by --core FOLDER"
+        )
     for name in names:
         if (core / "objects").is_dir():
             command = ["git", f"--git-dir={core}", "show", f"HEAD:{part}/{name}"]
-            (folder / name).write_bytes(subprocess.run(command, check=True, capture_output=True).stdout)
+            (folder / name).write_bytes(
+                subprocess.run(command, check=True, capture_output=True).stdout
+            )
         else:
             shutil.copy(core / part / name, folder)
 
 
-def _study(folder: Path, model: osimlite.Model, phase: osimlite.MocoPhase, **solver: object) -> None:
+def _study(
+    folder: Path, model: osimlite.Model, phase: osimlite.MocoPhase, **solver: object
+) -> None:
     osimlite.write(model, folder / "model.osim")
     phase.model = osimlite.ModelProcessor(name="model", filepath="model.osim")
     problem = osimlite.MocoProblem(name="problem", phases=phase)
-    study = osimlite.MocoStudy(name="study", problem=problem, solver=osimlite.MocoCasADiSolver(**solver))
+    study = osimlite.MocoStudy(
+        name="study", problem=problem, solver=osimlite.MocoCasADiSolver(**solver)
+    )
     osimlite.write(study, folder / "study.omoco")
 
 
@@ -72,12 +80,18 @@ def parabola(folder: Path, _: Path) -> None:
     model = osimlite.Model(name="planar_point_mass")
     parent = "/ground"
     for name, mass, turn in (("tx", 0.0, 0.0), ("ty", 1.0, 0.5 * math.pi)):
-        body = osimlite.Body(name=f"body_{name}", mass=mass, mass_center=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
+        body = osimlite.Body(
+            name=f"body_{name}", mass=mass, mass_center=(0.0, 0.0, 0.0), inertia=(0.0,) * 6
+        )
         model.add(body)
-        joint = osimlite.SliderJoint(name=name, socket_parent_frame="before", socket_child_frame="after")
+        joint = osimlite.SliderJoint(
+            name=name, socket_parent_frame="before", socket_child_frame="after"
+        )
         for frame, owner in (("before", parent), ("after", body.path)):
             joint.frames.append(
-                osimlite.PhysicalOffsetFrame(name=frame, socket_parent=owner, orientation=(0.0, 0.0, turn))
+                osimlite.PhysicalOffsetFrame(
+                    name=frame, socket_parent=owner, orientation=(0.0, 0.0, turn)
+                )
             )
         joint.coordinates[0].name = name
         model.add(joint)
@@ -94,7 +108,9 @@ def parabola(folder: Path, _: Path) -> None:
     phase.default_speed_bounds = osimlite.MocoBounds(bounds=(-5.0, 5.0))
     for name, start in (("tx", -1.0), ("ty", 1.0)):
         path = f"/jointset/{name}/{name}/value"
-        phase.state_infos.append(osimlite.MocoVariableInfo(name=path, bounds=(-2.0, 2.0), initial_bounds=(start,)))
+        phase.state_infos.append(
+            osimlite.MocoVariableInfo(name=path, bounds=(-2.0, 2.0), initial_bounds=(start,))
+        )
     _study(folder, model, phase)
 
 
@@ -102,12 +118,18 @@ def markers(folder: Path, _: Path) -> None:
     """Two links whose markers are followed."""
     model, parent = osimlite.Model(name="double_pendulum"), "/ground"
     for k in range(2):
-        body = osimlite.Body(name=f"b{k}", mass=1.0, mass_center=(0.0,) * 3, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+        body = osimlite.Body(
+            name=f"b{k}", mass=1.0, mass_center=(0.0,) * 3, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+        )
         model.add(body)
         model.add(osimlite.Marker(name=f"m{k}", socket_parent_frame=body.path))
-        joint = osimlite.PinJoint(name=f"j{k}", socket_parent_frame=parent, socket_child_frame="end")
+        joint = osimlite.PinJoint(
+            name=f"j{k}", socket_parent_frame=parent, socket_child_frame="end"
+        )
         joint.frames.append(
-            osimlite.PhysicalOffsetFrame(name="end", socket_parent=body.path, translation=(-1.0, 0.0, 0.0))
+            osimlite.PhysicalOffsetFrame(
+                name="end", socket_parent=body.path, translation=(-1.0, 0.0, 0.0)
+            )
         )
         joint.coordinates[0].name, joint.coordinates[0].range = f"q{k}", (-10.0, 10.0)
         model.add(joint)
@@ -125,8 +147,8 @@ def markers(folder: Path, _: Path) -> None:
         reference.marker_weights.objects.append(osimlite.MarkerWeight(name=name, weight=weight))
     phase = _between(0.0, 1.0)
     phase.goals = [osimlite.MocoMarkerTrackingGoal(name="markers", markers_reference=reference)]
-    # Without the second derivatives neither ends; Moco takes them by differences, and more than six minutes for the
-    # 50 intervals of opensim-core's example.
+    # Without the second derivatives neither ends; Moco takes them by differences, and more than six
+    # minutes for the 50 intervals of opensim-core's example.
     _study(folder, model, phase, num_mesh_intervals=10, optim_hessian_approximation="exact")
 
 
@@ -140,7 +162,9 @@ def track(intervals: int) -> Callable[[Path, Path], None]:
         tool = osimlite.MocoTrack(
             name="gait",
             model=osimlite.ModelProcessor(filepath="2D_gait.osim"),
-            states_reference=osimlite.TableProcessor(filepath="referenceCoordinates.sto", operators=[lowpass]),
+            states_reference=osimlite.TableProcessor(
+                filepath="referenceCoordinates.sto", operators=[lowpass]
+            ),
             allow_unused_references=True,
             track_reference_position_derivatives=True,
             apply_tracked_states_to_guess=True,
@@ -176,7 +200,9 @@ def walk3d(folder: Path, core: Path) -> None:
     for coordinate in pelvis.coordinates:
         name = f"residual_jointset_ground_pelvis_{coordinate.name}"
         force = 50.0 if coordinate.name[-3:] in ("_tx", "_ty", "_tz") else 250.0
-        actuator = osimlite.CoordinateActuator(name=name, coordinate=coordinate.name, optimal_force=force)
+        actuator = osimlite.CoordinateActuator(
+            name=name, coordinate=coordinate.name, optimal_force=force
+        )
         actuator.min_control, actuator.max_control = -1.0, 1.0
         model.force_set.objects.append(actuator)
         weights.append(osimlite.MocoWeight(name=f"/forceset/{name}", weight=10.0))
@@ -204,14 +230,24 @@ def walk3d(folder: Path, core: Path) -> None:
     osimlite.write(tool, folder / "track.xml")
     functions = osimlite.casadi(model, folder=folder)
     repeats = osimlite.MocoPeriodicityGoal(name="periodicity")
-    for pairs, known in ((repeats.state_pairs, functions.states), (repeats.control_pairs, functions.controls)):
+    for pairs, known in (
+        (repeats.state_pairs, functions.states),
+        (repeats.control_pairs, functions.controls),
+    ):
         repeated = (name for name in known if "_tx/value" not in name)
-        pairs += [osimlite.MocoPeriodicityGoalPair(initial_variable=name, final_variable=name) for name in repeated]
-    more = osimlite.MocoProblem(name="problem", phases=osimlite.MocoPhase(name="phases", goals=[repeats]))
+        pairs += [
+            osimlite.MocoPeriodicityGoalPair(initial_variable=name, final_variable=name)
+            for name in repeated
+        ]
+    more = osimlite.MocoProblem(
+        name="problem", phases=osimlite.MocoPhase(name="phases", goals=[repeats])
+    )
     solver = osimlite.MocoCasADiSolver(
         optim_convergence_tolerance=1e-3, optim_constraint_tolerance=1e-4, optim_max_iterations=1000
     )
-    osimlite.write(osimlite.MocoStudy(name="more", problem=more, solver=solver), folder / "more.omoco")
+    osimlite.write(
+        osimlite.MocoStudy(name="more", problem=more, solver=solver), folder / "more.omoco"
+    )
 
 
 def predict(intervals: int) -> Callable[[Path, Path], None]:
@@ -229,7 +265,9 @@ def predict(intervals: int) -> Callable[[Path, Path], None]:
 
 def squat_inverse(folder: Path, _: Path) -> None:
     """What nine muscles with implicit tendons do in a squat; the study that is kept has six digits of the motion."""
-    model = osimlite.read_document(_unpacked("squat_inverse-20.omoco", folder, "kept.omoco")).problem.phases.model.model
+    model = osimlite.read_document(
+        _unpacked("squat_inverse-20.omoco", folder, "kept.omoco")
+    ).problem.phases.model.model
     for motion in list(model.components(osimlite.PositionMotion)):
         model.remove(motion)
     osimlite.write(model, folder / "model.osim")
@@ -257,7 +295,9 @@ def gait_tool() -> osimlite.MocoInverse:
     """MocoInverse of a measured gait with 18 muscles, in the folder of `GAIT`."""
     model, coordinates, loads, _ = GAIT
     operators = [
-        osimlite.ModOpReplaceJointsWithWelds(joint_paths=("subtalar_r", "subtalar_l", "mtp_r", "mtp_l")),
+        osimlite.ModOpReplaceJointsWithWelds(
+            joint_paths=("subtalar_r", "subtalar_l", "mtp_r", "mtp_l")
+        ),
         osimlite.ModOpReplaceMusclesWithDeGrooteFregly2016(),
         osimlite.ModOpIgnorePassiveFiberForcesDGF(),
         osimlite.ModOpTendonComplianceDynamicsModeDGF(mode="implicit"),
@@ -275,7 +315,11 @@ def gait_tool() -> osimlite.MocoInverse:
     )
 
 
-_LOOSE = {"kinematics_allow_extra_columns": True, "convergence_tolerance": 1e-4, "constraint_tolerance": 1e-4}
+_LOOSE = {
+    "kinematics_allow_extra_columns": True,
+    "convergence_tolerance": 1e-4,
+    "constraint_tolerance": 1e-4,
+}
 STUDIES: dict[str, Callable[[Path, Path], None]] = {
     "sliding mass": kept("sliding-100"),
     "hanging muscle": kept("hanging-25"),

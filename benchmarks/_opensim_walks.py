@@ -1,7 +1,7 @@
 """Walks by OpenSim itself: foot strikes from its own contact forces, judged by the rules of `osimlite.studies.gait`.
 
-``python benchmarks/_opensim_walks.py FILE SECONDS ACCURACY`` makes one and prints it as JSON, which is how several walk
-at a time.
+``python benchmarks/_opensim_walks.py FILE SECONDS ACCURACY`` makes one and prints it as JSON, which
+is how several walk at a time.
 """
 
 from __future__ import annotations
@@ -49,14 +49,17 @@ def opensim_walks(orders: Mapping[str, Order]) -> dict[str, tuple[Walk, float]]:
                 process.wait()
     for name, process in running.items():
         if process.returncode:
-            raise RuntimeError(f"OpenSim did not walk with '{name}': it ended with {process.returncode}")
+            raise RuntimeError(
+                f"OpenSim did not walk with '{name}': it ended with {process.returncode}"
+            )
     return {name: _from_json(text) for name, text in printed.items()}
 
 
 def opensim_walk(path: Path, to: float, accuracy: float) -> tuple[Walk, float]:
     """What OpenSim makes of a file, and the processor time that it took (s).
 
-    A touch-down is known to a step of its integrator; where the feet are then is computed from its states.
+    A touch-down is known to a step of its integrator; where the feet are then is computed from its
+    states.
     """
     import opensim
 

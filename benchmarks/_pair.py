@@ -1,7 +1,7 @@
 """Fair timing of osimlite against OpenSim: the two run in turn (A B A B ...) and meet the same machine.
 
-A ratio is taken inside each pair and summarised after; a slow second of the machine spoils one pair, not the
-result. A benchmark script is then one screen::
+A ratio is taken inside each pair and summarised after; a slow second of the machine spoils one
+pair, not the result. A benchmark script is then one screen::
 
     from _pair import pair, report
 
@@ -56,7 +56,9 @@ def pair(
         clock: seconds that only grow.
     """
     if rounds < 1 or warmup < 0:
-        raise ValueError(f"a pair needs at least 1 round and no negative warm-up, not {rounds} and {warmup}")
+        raise ValueError(
+            f"a pair needs at least 1 round and no negative warm-up, not {rounds} and {warmup}"
+        )
 
     def timed(work: Callable[[], object]) -> float:
         start = clock()
@@ -95,8 +97,11 @@ def pair_commands(
 
 def _run(command: str | Sequence[str]) -> None:
     arguments = shlex.split(command) if isinstance(command, str) else list(command)
-    # With this variable Python compiles every module again in every process, which users do not have.
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    # With this variable Python compiles every module again in every process, which users do not
+    # have.
+    environment = {
+        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
+    }
     done = subprocess.run(
         arguments,
         stdin=subprocess.DEVNULL,
@@ -107,12 +112,16 @@ def _run(command: str | Sequence[str]) -> None:
     )
     if done.returncode != 0:
         said = done.stderr.decode(errors="replace").strip()
-        raise RuntimeError(f"{shlex.join(arguments)} ended with exit code {done.returncode}: {said}")
+        raise RuntimeError(
+            f"{shlex.join(arguments)} ended with exit code {done.returncode}: {said}"
+        )
 
 
 def report(title: str, pairs: Iterable[Pair], *, console: Console | None = None) -> None:
     """Print the table: least and median time of each side; median, least and greatest ratio per pair."""
-    table = Table(title=title, caption="time in ms, least / median; ratio = ours / OpenSim, per pair")
+    table = Table(
+        title=title, caption="time in ms, least / median; ratio = ours / OpenSim, per pair"
+    )
     table.add_column("")
     for column in ("osimlite", "OpenSim", "ratio", "least", "greatest", "pairs"):
         table.add_column(column, justify="right")

@@ -1,8 +1,8 @@
 """Checks a kit of docs/adoption once more: python benchmarks/adoption.py opensim-org-opensim-models CLONE
 
-Counts what the linter finds by the settings of the kit, applies its patches one by one, tells which findings each
-takes away, and asks OpenSim what it reads before and after. The clone must be at the commit of the kit; in the end it
-is as it was.
+Counts what the linter finds by the settings of the kit, applies its patches one by one, tells which
+findings each takes away, and asks OpenSim what it reads before and after. The clone must be at the
+commit of the kit; in the end it is as it was.
 """
 
 from __future__ import annotations
@@ -35,12 +35,16 @@ NEAR = 1e-12
 
 def git(*arguments: object) -> str:
     """Run git in the working folder; returns what it prints."""
-    return subprocess.run(["git", *map(str, arguments)], check=True, capture_output=True, text=True).stdout.strip()
+    return subprocess.run(
+        ["git", *map(str, arguments)], check=True, capture_output=True, text=True
+    ).stdout.strip()
 
 
 def findings_of(kit: Path) -> list[Finding]:
     """What the workflow of a kit checks, without its baseline."""
-    paths = re.findall(r"^ +paths: (.+)$", (kit / "models.yml").read_text(encoding="utf-8"), re.MULTILINE)
+    paths = re.findall(
+        r"^ +paths: (.+)$", (kit / "models.yml").read_text(encoding="utf-8"), re.MULTILINE
+    )
     return list(check_files(project_files(paths[0].split(), only_ours=True), Config()).findings)
 
 
@@ -74,13 +78,21 @@ def read(file: str) -> dict[str, Any]:
         markers = opensim.MarkerData(file)
         frames = [markers.getFrame(i) for i in range(markers.getNumFrames())]
         seen = [frame.getMarker(i) for frame in frames for i in range(markers.getNumMarkers())]
-        return {"print": len(frames), "numbers": [marker.get(axis) for marker in seen for axis in range(3)]}
+        return {
+            "print": len(frames),
+            "numbers": [marker.get(axis) for marker in seen for axis in range(3)],
+        }
     if file.lower().endswith(TABLES):
         table = opensim.Storage(file)
         labels = [table.getColumnLabels().get(i) for i in range(table.getColumnLabels().size())]
         rows = [table.getStateVector(i) for i in range(table.getSize())]
-        cells = [[row.getTime(), *(row.getData().get(i) for i in range(row.getSize()))] for row in rows]
-        return {"print": [labels, [len(row) for row in cells]], "numbers": [cell for row in cells for cell in row]}
+        cells = [
+            [row.getTime(), *(row.getData().get(i) for i in range(row.getSize()))] for row in rows
+        ]
+        return {
+            "print": [labels, [len(row) for row in cells]],
+            "numbers": [cell for row in cells for cell in row],
+        }
     if not file.lower().endswith(".osim"):
         found = opensim.OpenSimObject.makeObjectFromFile(file)
         return {"print": None if found is None else found.dump()}
@@ -98,7 +110,9 @@ def read_apart(file: str) -> dict[str, Any]:
     with TemporaryDirectory() as folder:
         copy = shutil.copytree(Path(file).parent, Path(folder) / "copy") / Path(file).name
         command = [sys.executable, __file__, "--read", str(copy)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=SECONDS, cwd=copy.parent)
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=False, timeout=SECONDS, cwd=copy.parent
+        )
     if done.returncode:
         return {"print": f"refused: {' '.join(done.stderr.strip().splitlines()[-2:])}"}
     return json.loads(done.stdout)
@@ -107,7 +121,9 @@ def read_apart(file: str) -> dict[str, Any]:
 def differences(before: dict[str, Any], after: dict[str, Any]) -> tuple[int, int]:
     """How many lines of OpenSim's print are others, and how many numbers by more than 1e-12; NaN is as good as NaN."""
     was, now = (Counter(str(found["print"]).splitlines()) for found in (before, after))
-    lines = 0 if before["print"] == after["print"] else max((was - now).total(), (now - was).total(), 1)
+    lines = (
+        0 if before["print"] == after["print"] else max((was - now).total(), (now - was).total(), 1)
+    )
     one, other = (np.array(found.get("numbers", [])) for found in (before, after))
     if one.shape != other.shape:
         return lines, max(one.size, other.size)
@@ -117,7 +133,9 @@ def differences(before: dict[str, Any], after: dict[str, Any]) -> tuple[int, int
 def main(name: str, clone: str) -> int:
     kit = (KITS / name).resolve()
     os.chdir(clone)
-    (commit,) = set(re.findall(r"\b[0-9a-f]{40}\b", (kit / "README.md").read_text(encoding="utf-8")))
+    (commit,) = set(
+        re.findall(r"\b[0-9a-f]{40}\b", (kit / "README.md").read_text(encoding="utf-8"))
+    )
     assert git("rev-parse", "HEAD") == commit, f"the kit is for {commit}"
     wrong = 0
     applied: list[Path] = []
@@ -128,19 +146,27 @@ def main(name: str, clone: str) -> int:
         print(shown(counted(findings)))
         try:
             for patch in sorted(kit.glob("*.patch")):
-                files = [line.split("\t")[2] for line in git("apply", "--numstat", patch).splitlines()]
+                files = [
+                    line.split("\t")[2] for line in git("apply", "--numstat", patch).splitlines()
+                ]
                 before = [read_apart(file) for file in files]
                 git("apply", "--check", patch)
                 git("apply", patch)
                 applied.append(patch)
-                lines, numbers = map(sum, zip(*map(differences, before, map(read_apart, files)), strict=True))
+                lines, numbers = map(
+                    sum, zip(*map(differences, before, map(read_apart, files)), strict=True)
+                )
                 same = lines == numbers == 0
                 as_told = same == (AS_BEFORE in patch.read_text(encoding="utf-8", errors="replace"))
                 wrong += not as_told
                 earlier, findings = findings, findings_of(kit)
                 change = counted(findings)
                 change.subtract(counted(earlier))
-                how = "read as before" if same else f"{lines} lines and {numbers} numbers are read otherwise"
+                how = (
+                    "read as before"
+                    if same
+                    else f"{lines} lines and {numbers} numbers are read otherwise"
+                )
                 print(f"{patch.name}: {len(files)} files, {shown(change, '+d')}; {how}", end="")
                 print("" if as_told else ", WHICH IT DOES NOT SAY")
             print(f"left: {shown(counted(findings))}")

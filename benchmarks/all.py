@@ -2,10 +2,11 @@
 
     python benchmarks/all.py [--quick] [FOLDER]
 
-FOLDER holds Rajagopal2016.osim, gait2392.osim and gait10dof18musc.osim; without one the shared corpus is used, and
-where that is absent the walker alone. It takes up to ten minutes, with --quick (three rounds of each) two. What OpenSim
-has no counterpart of is timed alone, and has an aim in milliseconds. The whole processes are those of users: byte code
-and machine code are there already. What is counted instead of timed is in cost.py.
+FOLDER holds Rajagopal2016.osim, gait2392.osim and gait10dof18musc.osim; without one the shared
+corpus is used, and where that is absent the walker alone. It takes up to ten minutes, with --quick
+(three rounds of each) two. What OpenSim has no counterpart of is timed alone, and has an aim in
+milliseconds. The whole processes are those of users: byte code and machine code are there already.
+What is counted instead of timed is in cost.py.
 """
 
 from __future__ import annotations
@@ -63,20 +64,41 @@ def measured(rounds: int, folder: Path, place: Path) -> Iterator[Aimed]:
         aim = 1.0 if name == "walker" else 0.6
         ours, theirs = partial(osimlite.validate, file), partial(initialized, file)
         yield Aimed(pair(f"validate({name})", ours=ours, theirs=theirs, rounds=rounds), aim)
-    small = [file for file in (unpacked(CORPUS, place) if CORPUS.is_dir() else [MODEL]) if file.stat().st_size < SMALL]
+    small = [
+        file
+        for file in (unpacked(CORPUS, place) if CORPUS.is_dir() else [MODEL])
+        if file.stat().st_size < SMALL
+    ]
     reading = [
-        pair(file.stem, ours=partial(osimlite.read, file), theirs=partial(opensim.Model, str(file)), rounds=rounds)
+        pair(
+            file.stem,
+            ours=partial(osimlite.read, file),
+            theirs=partial(opensim.Model, str(file)),
+            rounds=rounds,
+        )
         for file in small
     ]
-    whole = (tuple(map(sum, zip(*(getattr(row, side) for row in reading), strict=True))) for side in ("ours", "theirs"))
+    whole = (
+        tuple(map(sum, zip(*(getattr(row, side) for row in reading), strict=True)))
+        for side in ("ours", "theirs")
+    )
     yield Aimed(Pair(f"read {len(small)} small files", *whole), 1.2)
     for name, file in files.items():
         opened = [sys.executable, "-c", INITIALIZED.format(model=str(file))]
         checked = whole_process("validate", "--no-cache", str(file))
-        yield Aimed(pair_commands(f"osimlite validate {name}, first", ours=checked, theirs=opened, rounds=few), 0.8)
+        yield Aimed(
+            pair_commands(
+                f"osimlite validate {name}, first", ours=checked, theirs=opened, rounds=few
+            ),
+            0.8,
+        )
     walked = [sys.executable, "-c", THEIRS.format(model=str(MODEL), to=TO, accuracy=ACCURACY)]
-    simulated = whole_process("simulate", str(MODEL), "--to", f"{TO:g}", "-o", str(place / "results"))
-    yield Aimed(pair_commands("osimlite simulate walker", ours=simulated, theirs=walked, rounds=rounds), 1.0)
+    simulated = whole_process(
+        "simulate", str(MODEL), "--to", f"{TO:g}", "-o", str(place / "results")
+    )
+    yield Aimed(
+        pair_commands("osimlite simulate walker", ours=simulated, theirs=walked, rounds=rounds), 1.0
+    )
     for name, words, aim in (
         ("info walker", ("info", str(MODEL)), 100),
         ("validate walker, first", ("validate", "--no-cache", str(MODEL)), 90),
@@ -84,7 +106,10 @@ def measured(rounds: int, folder: Path, place: Path) -> Iterator[Aimed]:
     ):
         # Beside a Python that does nothing, which tells how quick the machine is.
         alone = pair_commands(
-            f"osimlite {name}", ours=whole_process(*words), theirs=[sys.executable, "-c", NOTHING], rounds=rounds
+            f"osimlite {name}",
+            ours=whole_process(*words),
+            theirs=[sys.executable, "-c", NOTHING],
+            rounds=rounds,
         )
         yield Aimed(alone, aim, "ms")
 
@@ -96,13 +121,23 @@ def motions(rounds: int) -> Iterator[Aimed]:
     model = osimlite.read(MODEL)
     with Simulation(model, "compiled") as ready:
         works: list[tuple[str, Callable[[], object], float]] = [
-            ("simulate(walker), PyBullet", partial(osimlite.simulate, model, to=TO, engine="bullet"), 0.5),
-            ("simulate(walker), compiled", partial(osimlite.simulate, model, to=TO, engine="compiled"), 1 / 12),
+            (
+                "simulate(walker), PyBullet",
+                partial(osimlite.simulate, model, to=TO, engine="bullet"),
+                0.5,
+            ),
+            (
+                "simulate(walker), compiled",
+                partial(osimlite.simulate, model, to=TO, engine="compiled"),
+                1 / 12,
+            ),
             ("motion of the walker, compiled", run_ours(ready, ACCURACY), 1 / 30),
         ]
         for name, ours, aim in works:
             run = run_opensim(theirs, ACCURACY, rounds + 1)
-            yield Aimed(pair(name, ours=ours, theirs=run, rounds=rounds, clock=time.process_time), aim)
+            yield Aimed(
+                pair(name, ours=ours, theirs=run, rounds=rounds, clock=time.process_time), aim
+            )
 
 
 def models(folder: Path, place: Path) -> dict[str, Path]:
@@ -119,7 +154,9 @@ def models(folder: Path, place: Path) -> dict[str, Path]:
 
 
 def table(rows: list[Aimed]) -> Table:
-    made = Table(title="Everyday use", caption="medians; ratio = osimlite / OpenSim, median of the pairs")
+    made = Table(
+        title="Everyday use", caption="medians; ratio = osimlite / OpenSim, median of the pairs"
+    )
     made.add_column("")
     for column in ("osimlite (ms)", "OpenSim (ms)", "ratio", "least", "greatest", "aim", ""):
         made.add_column(column, justify="right")
@@ -127,8 +164,14 @@ def table(rows: list[Aimed]) -> Table:
         ours, theirs, ratios = row.pair.ours, row.pair.theirs, row.pair.ratios
         beside: list[Any] = ["", "", "", ""]
         if not row.unit:
-            beside = [f"{1e3 * median(theirs):.4g}", *(f"{v:.2g}" for v in (median(ratios), min(ratios), max(ratios)))]
-        aim, kept = f"{row.aim:.3g} {row.unit}".strip(), "kept" if row.found <= row.aim else "missed"
+            beside = [
+                f"{1e3 * median(theirs):.4g}",
+                *(f"{v:.2g}" for v in (median(ratios), min(ratios), max(ratios))),
+            ]
+        aim, kept = (
+            f"{row.aim:.3g} {row.unit}".strip(),
+            "kept" if row.found <= row.aim else "missed",
+        )
         made.add_row(row.pair.name, f"{1e3 * median(ours):.4g}", *beside, aim, kept)
     return made
 

@@ -3,8 +3,8 @@
     python benchmarks/clients.py perfanalytics-pose2sim CLONE TRIAL.trc
     python benchmarks/clients.py stanfordnmbl-opencap-core CLONE TRIAL.trc --static STATIC.trc
 
-The clone must be at the commit of the kit, and what the client imports installed; in the end it is as it was. Each step
-scales the model and fits the trial in a process of its own; both run in turn.
+The clone must be at the commit of the kit, and what the client imports installed; in the end it is
+as it was. Each step scales the model and fits the trial in a process of its own; both run in turn.
 """
 
 from __future__ import annotations
@@ -61,13 +61,21 @@ def opencap(folder: Path, trial: Path, static: Path | None) -> Step:
     # The step uses nothing of this module, whose import logs in to a server.
     sys.modules["utils"] = types.SimpleNamespace(storage2numpy=None)  # type: ignore[assignment]
     sys.path.insert(0, os.getcwd())
-    times, tools = import_module("utilsDataman").TRCFile(str(static)).time, import_module("utilsOpenSim")
+    times, tools = (
+        import_module("utilsDataman").TRCFile(str(static)).time,
+        import_module("utilsOpenSim"),
+    )
     here = Path.cwd() / "opensimPipeline"
-    setups = [here / "Scaling" / "Setup_scaling_LaiUhlrich2022_Mocap.xml", here / "Models" / "LaiUhlrich2022.osim"]
+    setups = [
+        here / "Scaling" / "Setup_scaling_LaiUhlrich2022_Mocap.xml",
+        here / "Models" / "LaiUhlrich2022.osim",
+    ]
     span = [float(times[0]), float(times[-1])]
 
     def take() -> tuple[str, str]:
-        scaled = tools.runScaleTool(*map(str, setups), MASS, str(static), span, str(folder), subjectHeight=HEIGHT)
+        scaled = tools.runScaleTool(
+            *map(str, setups), MASS, str(static), span, str(folder), subjectHeight=HEIGHT
+        )
         tools.runIKTool(str(here / "IK" / "Setup_IK_Mocap.xml"), scaled, str(trial), str(folder))
         return f"{trial.stem}.mot", f"Setup_IK_{trial.stem}.xml"
 
@@ -120,12 +128,16 @@ def compare(name: str, trial: Path, static: Path | None, rounds: int) -> None:
             finally:
                 git("apply", "-R", patch)
         times = min(theirs)[0], min(ours)[0]
-        print(f"OpenSim {times[0]:.2f} s, osimlite {times[1]:.2f} s of the processor: {times[0] / times[1]:.1f} times")
+        print(
+            f"OpenSim {times[0]:.2f} s, osimlite {times[1]:.2f} s of the processor: {times[0] / times[1]:.1f} times"
+        )
         print(f"marker errors: OpenSim {errors(theirs[0][1])}, osimlite {errors(ours[0][1])}")
         known = read_sto(theirs[0][1])
         print(f"scaled and fitted: {apart(read_sto(ours[0][1]), known)}")
         osimlite.run(theirs[0][2], here / "same", check=False)
-        print(f"fitted to the model that OpenSim scaled: {apart(read_sto(here / 'same' / theirs[0][1].name), known)}")
+        print(
+            f"fitted to the model that OpenSim scaled: {apart(read_sto(here / 'same' / theirs[0][1].name), known)}"
+        )
 
 
 def main() -> None:
@@ -145,7 +157,11 @@ def main() -> None:
         found = take()
         print(sum(os.times()[:4]) - start, *found, sep="\t")
         return
-    (commit,) = set(re.findall(r"\b[0-9a-f]{40}\b", (KITS / asked.client / "README.md").read_text(encoding="utf-8")))
+    (commit,) = set(
+        re.findall(
+            r"\b[0-9a-f]{40}\b", (KITS / asked.client / "README.md").read_text(encoding="utf-8")
+        )
+    )
     assert git("rev-parse", "HEAD") == commit, f"the kit is for {commit}"
     compare(asked.client, trial, static, asked.rounds)
 

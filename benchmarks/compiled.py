@@ -1,9 +1,9 @@
 """The compiled engine on the Dynamic Walker, two seconds: many walkers beside OpenSim, and whole processes.
 
-One walker is in simulate.py. A sweep starts from a little beside the default pose, and keeps the ends and the contacts
-of every run; OpenSim runs some of the same starts one by one on one core, in its quickest way: the model built once,
-the state copied, nothing recorded. Both count processor time. Whole process: a new Python that imports, reads the file,
-simulates, and ends.
+One walker is in simulate.py. A sweep starts from a little beside the default pose, and keeps the
+ends and the contacts of every run; OpenSim runs some of the same starts one by one on one core, in
+its quickest way: the model built once, the state copied, nothing recorded. Both count processor
+time. Whole process: a new Python that imports, reads the file, simulates, and ends.
 """
 
 from __future__ import annotations
@@ -59,7 +59,9 @@ def sweep(simulation: Any) -> Table:
     model = opensim.Model(str(MODEL))
     state = model.initSystem()
     for accuracy in ACCURACIES:
-        work = partial(run_many, simulation.engine, rows, TO, accuracy=accuracy, most_events=40, threads=1)
+        work = partial(
+            run_many, simulation.engine, rows, TO, accuracy=accuracy, most_events=40, threads=1
+        )
         work()
         ours = WALKERS / min(timed(work, time.process_time) for _ in range(ROUNDS))
         ends = work().states
@@ -67,15 +69,28 @@ def sweep(simulation: Any) -> Table:
         for row, end in zip(rows[:SAMPLE], ends, strict=False):
             found: list[float] = []
             theirs.append(
-                timed(partial(opensim_run, model, state, simulation, row, accuracy, found), time.process_time)
+                timed(
+                    partial(opensim_run, model, state, simulation, row, accuracy, found),
+                    time.process_time,
+                )
             )
-            differences.append(np.abs(np.subtract(found, simulation.state.values(end.tolist()))).max())
+            differences.append(
+                np.abs(np.subtract(found, simulation.state.values(end.tolist()))).max()
+            )
         rate = 1.0 / median(theirs)
-        table.add_row(f"{accuracy:g}", f"{ours:.0f}", f"{rate:.1f}", f"{ours / rate:.1f}", f"{max(differences):.1g}")
+        table.add_row(
+            f"{accuracy:g}",
+            f"{ours:.0f}",
+            f"{rate:.1f}",
+            f"{ours / rate:.1f}",
+            f"{max(differences):.1g}",
+        )
     return table
 
 
-def opensim_run(model: Any, base: Any, simulation: Any, row: Any, accuracy: float, found: list[float]) -> None:
+def opensim_run(
+    model: Any, base: Any, simulation: Any, row: Any, accuracy: float, found: list[float]
+) -> None:
     """One run of OpenSim; the values of all coordinates at the end go into `found`."""
     coordinates, state = model.getCoordinateSet(), opensim.State(base)
     values, speeds = simulation.state.values(row.tolist()), simulation.state.speeds(row.tolist())
@@ -119,9 +134,15 @@ def whole_processes() -> Table:
             ("second", "compiled"),
             ("PyBullet", "bullet"),
         ):
-            command = [sys.executable, "-c", PROCESS.format(model=str(Path(MODEL)), to=TO, engine=engine)]
+            command = [
+                sys.executable,
+                "-c",
+                PROCESS.format(model=str(Path(MODEL)), to=TO, engine=engine),
+            ]
             environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
-            work = partial(subprocess.run, command, env=environment, check=True, capture_output=True)
+            work = partial(
+                subprocess.run, command, env=environment, check=True, capture_output=True
+            )
             seconds = timed(work, time.perf_counter)
             table.add_row(name, f"{seconds:.2f} s")
     return table

@@ -3,12 +3,14 @@
     python benchmarks/cost.py [WORD ...]     the table, beside the numbers that stand in cost.json; WORDs choose actions
     python benchmarks/cost.py --accept       writes cost.json; say in the commit why an action became dearer
 
-A command is counted in a process of its own, from before the first import; a call of the library in a process with
-others, the second time it is made. Byte code and machine code are there already, results of earlier runs only where the
-action says so; nothing is a terminal, hashes of texts are the same in every run.
+A command is counted in a process of its own, from before the first import; a call of the library in
+a process with others, the second time it is made. Byte code and machine code are there already,
+results of earlier runs only where the action says so; nothing is a terminal, hashes of texts are
+the same in every run.
 
-Calls and modules of osimlite's own are one thing, those of libraries and of Python another: the latter, and the size of
-byte code, are compared only where the versions are those that stand in cost.json.
+Calls and modules of osimlite's own are one thing, those of libraries and of Python another: the
+latter, and the size of byte code, are compared only where the versions are those that stand in
+cost.json.
 """
 
 from __future__ import annotations
@@ -105,7 +107,9 @@ class Cost:
         totals: the sums.
     """
 
-    def __init__(self, parts: Mapping[str, Mapping[str, int]], totals: Mapping[str, int] | None = None) -> None:
+    def __init__(
+        self, parts: Mapping[str, Mapping[str, int]], totals: Mapping[str, int] | None = None
+    ) -> None:
         self.parts = parts
         self.totals = totals or {kind: sum(parts[kind].values()) for kind in KINDS}
 
@@ -118,15 +122,25 @@ def measured(wanted: Iterable[str] = ()) -> dict[str, Cost]:
         sys.exit("osimlite is not installed here, and not on the path")
     package = Path(spec.origin).parent.as_posix()
     words = [*wanted]
-    commands = {name: line.split() for name, line in COMMANDS.items() if not words or any(w in name for w in words)}
+    commands = {
+        name: line.split()
+        for name, line in COMMANDS.items()
+        if not words or any(w in name for w in words)
+    }
     with tempfile.TemporaryDirectory() as place, ThreadPoolExecutor(os.cpu_count()) as pool:
         folder = Path(place)
         _run([sys.executable, __file__, "--prepare"], folder, package)
-        found = {name: pool.submit(_counts, folder, package, line) for name, line in commands.items()}
+        found = {
+            name: pool.submit(_counts, folder, package, line) for name, line in commands.items()
+        }
         called = pool.submit(_counts, folder, package, [])
         costs = {name: Cost(run.result()[""]) for name, run in found.items()}
         costs |= {name: Cost(count) for name, count in called.result().items()}
-    return {name: cost for name, cost in costs.items() if not words or any(word in name for word in words)}
+    return {
+        name: cost
+        for name, cost in costs.items()
+        if not words or any(word in name for word in words)
+    }
 
 
 def prepare() -> None:
@@ -145,7 +159,11 @@ def prepare() -> None:
     osimlite.simulate(osimlite.read("legs.osim"), to=0.01, engine="compiled")
     for name in ("legs.osim", "human.osim"):
         osimlite.validate(name)
-    subprocess.run([sys.executable, "-m", "osimlite", "validate", "walker.osim"], check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, "-m", "osimlite", "validate", "walker.osim"],
+        check=True,
+        capture_output=True,
+    )
 
 
 def _counts(folder: Path, package: str, words: list[str]) -> dict[str, Any]:
@@ -153,7 +171,9 @@ def _counts(folder: Path, package: str, words: list[str]) -> dict[str, Any]:
     from osimlite.simulation.engines.kernel_library import load_library
 
     result = folder / f"{'-'.join(words).replace('/', '') or 'calls'}.json"
-    path = os.pathsep.join((str(HERE), Path(package).parent.as_posix(), *map(os.path.abspath, filter(None, sys.path))))
+    path = os.pathsep.join(
+        (str(HERE), Path(package).parent.as_posix(), *map(os.path.abspath, filter(None, sys.path)))
+    )
     command = [sys.executable, "-S", str(HERE / "_counted.py"), str(result), path, package, *words]
     for _ in range(2 if load_library() is None else 1):
         _run(command, folder, package)
@@ -162,17 +182,30 @@ def _counts(folder: Path, package: str, words: list[str]) -> dict[str, Any]:
 
 
 def _run(command: list[str], folder: Path, package: str) -> None:
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "OSIMLITE", "COV_"))}
-    path = os.pathsep.join((str(Path(package).parent), *map(os.path.abspath, filter(None, sys.path))))
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("PYTHON", "OSIMLITE", "COV_"))
+    }
+    path = os.pathsep.join(
+        (str(Path(package).parent), *map(os.path.abspath, filter(None, sys.path)))
+    )
     fixed = {
         "PYTHONHASHSEED": "0", "PYTHONPATH": path, "HOME": str(folder), "XDG_CACHE_HOME": str(folder / "cache"),
         "NO_COLOR": "1", "TERM": "dumb", "COLUMNS": "80", "LC_ALL": "C.UTF-8",
     }  # fmt: skip
     done = subprocess.run(
-        command, cwd=folder, env={**kept, **fixed}, stdin=subprocess.DEVNULL, capture_output=True, check=False
+        command,
+        cwd=folder,
+        env={**kept, **fixed},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        check=False,
     )
     if done.returncode:
-        raise RuntimeError(f"{command} ended with {done.returncode}: {done.stderr.decode(errors='replace')}")
+        raise RuntimeError(
+            f"{command} ended with {done.returncode}: {done.stderr.decode(errors='replace')}"
+        )
 
 
 # ------------------------------------------------------------------------------------------------------- comparing
@@ -203,7 +236,9 @@ def compared(old: Mapping[str, Cost], new: Mapping[str, Cost], *, same_versions:
                 f"{name} became {'dearer' if change > 0 else 'cheaper'}: {after:,} {words}, not {before:,} ({share})"
             ]
             parts = old[name].parts[kind], cost.parts[kind]
-            lines += _loaded(*parts) if kind == "modules" else _where(*parts, 1 if change > 0 else -1)
+            lines += (
+                _loaded(*parts) if kind == "modules" else _where(*parts, 1 if change > 0 else -1)
+            )
             said.append("\n".join(lines))
     return said
 
@@ -211,7 +246,9 @@ def compared(old: Mapping[str, Cost], new: Mapping[str, Cost], *, same_versions:
 def _where(old: Mapping[str, int], new: Mapping[str, int], sign: int) -> Iterator[str]:
     """The parts that changed most in the direction of the whole."""
     folded, most = _folded(new, old) if "others" in old else (new, {})
-    changes = Counter({name: sign * (folded.get(name, 0) - old.get(name, 0)) for name in {**old, **folded}})
+    changes = Counter(
+        {name: sign * (folded.get(name, 0) - old.get(name, 0)) for name in {**old, **folded}}
+    )
     for name, change in changes.most_common(TOLD):
         if change > 0:
             which = f" (most in {most[name]})" if name in most else ""
@@ -220,13 +257,18 @@ def _where(old: Mapping[str, int], new: Mapping[str, int], sign: int) -> Iterato
 
 def _loaded(old: Mapping[str, int], new: Mapping[str, int]) -> Iterator[str]:
     """The modules that are loaded now, and that are not any more."""
-    for words, names in (("loads", new.keys() - old.keys()), ("no longer loads", old.keys() - new.keys())):
+    for words, names in (
+        ("loads", new.keys() - old.keys()),
+        ("no longer loads", old.keys() - new.keys()),
+    ):
         if names:
             more = f" and {len(names) - TOLD} more" if len(names) > TOLD else ""
             yield f"    {words} {', '.join(sorted(names)[:TOLD])}{more}"
 
 
-def _folded(parts: Mapping[str, int], named: Container[str]) -> tuple[dict[str, int], dict[str, str]]:
+def _folded(
+    parts: Mapping[str, int], named: Container[str]
+) -> tuple[dict[str, int], dict[str, str]]:
     """Parts with those added up that are not named, by file if that is named; and the greatest in each such sum."""
     found: dict[str, int] = {}
     most: dict[str, str] = {}
@@ -276,7 +318,9 @@ def accept(costs: Mapping[str, Cost]) -> None:
     """Write the file: the sums, what they are sums of as far as it is more than 1 %, and which actions load what."""
     parts, loads = {}, dict[str, list[str]]()
     for name, cost in costs.items():
-        folded = {kind: _folded(cost.parts[kind], _worth_naming(cost.parts[kind]))[0] for kind in DETAILED}
+        folded = {
+            kind: _folded(cost.parts[kind], _worth_naming(cost.parts[kind]))[0] for kind in DETAILED
+        }
         parts[name] = {kind: dict(sorted(table.items())) for kind, table in folded.items()}
         for module in cost.parts["modules"]:
             loads.setdefault(module, []).append(name)
@@ -291,7 +335,9 @@ def accept(costs: Mapping[str, Cost]) -> None:
     lines = [f' "{title}": {{\n{_members(table)}\n }}' for title, table in tables.items()]
     inner = [
         f'  "{name}": {{\n'
-        + ",\n".join(f'   "{kind}": {{\n{_members(table, 4)}\n   }}' for kind, table in kinds.items())
+        + ",\n".join(
+            f'   "{kind}": {{\n{_members(table, 4)}\n   }}' for kind, table in kinds.items()
+        )
         + "\n  }"
         for name, kinds in parts.items()
     ]
@@ -301,7 +347,9 @@ def accept(costs: Mapping[str, Cost]) -> None:
 
 def _members(table: Mapping[str, object], depth: int = 2) -> str:
     """A JSON object with a line for each member."""
-    return ",\n".join(f"{' ' * depth}{json.dumps(name)}: {json.dumps(value)}" for name, value in table.items())
+    return ",\n".join(
+        f"{' ' * depth}{json.dumps(name)}: {json.dumps(value)}" for name, value in table.items()
+    )
 
 
 def show(costs: Mapping[str, Cost], old: Mapping[str, Cost]) -> None:

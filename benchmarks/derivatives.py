@@ -1,11 +1,13 @@
 """Functions of CasADi beside the kernels: values, Jacobians, Hessians, and what each takes.
 
-``python benchmarks/derivatives.py FILE.osim ...`` prints a row for each model: kind of the expressions, states, how
-many instructions the derivative of the state takes, seconds to make the functions; then the largest difference, at
-random states and controls, of that derivative from the kernels', of the Jacobian and of the Hessian of a random
-combination from those that the kernels have themselves when they run on numbers that carry derivatives
-(`tests/derivatives/jets.py`), each over the size of the numbers that it is made of; and microseconds of machine code,
-value, Jacobian and Hessian. With ``--opensim`` OpenSim's value, and a Jacobian by forward differences, in microseconds.
+``python benchmarks/derivatives.py FILE.osim ...`` prints a row for each model: kind of the
+expressions, states, how many instructions the derivative of the state takes, seconds to make the
+functions; then the largest difference, at random states and controls, of that derivative from the
+kernels', of the Jacobian and of the Hessian of a random combination from those that the kernels
+have themselves when they run on numbers that carry derivatives (`tests/derivatives/jets.py`), each
+over the size of the numbers that it is made of; and microseconds of machine code, value, Jacobian
+and Hessian. With ``--opensim`` OpenSim's value, and a Jacobian by forward differences, in
+microseconds.
 """
 
 from __future__ import annotations
@@ -55,7 +57,10 @@ def measured(path: Path) -> dict[str, Any]:
     both = Beside(osimlite.read(path))
     f = both.functions
     dynamics = f.dynamics
-    row: dict[str, Any] = {"kind": "SX" if dynamics.is_a("SXFunction") else "MX", "states": len(f.states)}
+    row: dict[str, Any] = {
+        "kind": "SX" if dynamics.is_a("SXFunction") else "MX",
+        "states": len(f.states),
+    }
     row["made"] = time.perf_counter() - before
     row["size"] = dynamics.n_instructions()
     for seed in range(STATES):
@@ -72,7 +77,9 @@ def measured(path: Path) -> dict[str, Any]:
     }
     if row["kind"] == "SX" and len(x) <= LARGE:
         push = np.random.default_rng(9).normal(size=len(x))
-        hessian = casadi.Function("H", [symbol], [casadi.hessian(casadi.dot(casadi.DM(push), xdot), symbol)[0]])
+        hessian = casadi.Function(
+            "H", [symbol], [casadi.hessian(casadi.dot(casadi.DM(push), xdot), symbol)[0]]
+        )
         timed["curved"] = lambda: hessian(x)
     for name, function in timed.items():
         function()
@@ -85,7 +92,9 @@ def measured(path: Path) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("files", nargs="+", type=Path)
     parser.add_argument("--opensim", action="store_true")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
@@ -111,7 +120,9 @@ def main() -> None:
     for path in chosen.files:
         command = [sys.executable, __file__, "--one", str(path)]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE)
+            done = subprocess.run(
+                command, capture_output=True, text=True, check=False, timeout=PATIENCE
+            )
             said = done.stdout.splitlines()[-1] if done.returncode == 0 and done.stdout else ""
             reason = (done.stderr.strip().splitlines() or ["?"])[-1]
         except subprocess.TimeoutExpired:
@@ -122,14 +133,20 @@ def main() -> None:
             continue
         row = json.loads(said)
         cells = [row["kind"], row["states"], row["size"], f"{row['made']:.2f}"]
-        cells += [f"{row[key]:.1e}" if key in row else "-" for key in ("value", "jacobian", "hessian")]
         cells += [
-            f"{row[f'us_{key}']:.0f}" if f"us_{key}" in row else "-" for key in ("machine", "one", "all", "curved")
+            f"{row[key]:.1e}" if key in row else "-" for key in ("value", "jacobian", "hessian")
+        ]
+        cells += [
+            f"{row[f'us_{key}']:.0f}" if f"us_{key}" in row else "-"
+            for key in ("machine", "one", "all", "curved")
         ]
         text = "".join(f"{cell:>9}" for cell in cells)
         if chosen.opensim:
             theirs = subprocess.run(
-                [sys.executable, "-c", OPENSIM, str(path)], capture_output=True, text=True, check=False
+                [sys.executable, "-c", OPENSIM, str(path)],
+                capture_output=True,
+                text=True,
+                check=False,
             )
             if theirs.returncode == 0:
                 value, size = map(float, theirs.stdout.split())

@@ -1,11 +1,12 @@
 """Muscles of arm26 fitted to a noisy motion: exact derivatives of the motion beside differences of runs.
 
-Nine numbers, the strength, optimal fiber length and tendon slack length of three muscles, are found from the two
-angles of the arm over a second, 101 moments, by scipy's least_squares from a start that is up to 15 % off. Its Jacobian
-is that of `osimlite.sensitivity`, or differences: with scipy's own step; with one that was tried out for the accuracy
-of the motion; and with one for motions 1000 times as accurate. The motion is made by the model itself, so that the
-numbers are known; without noise and with noise of 0.002 rad. Paths around surfaces jump; polynomials are in their
-places (`osimlite.modify`).
+Nine numbers, the strength, optimal fiber length and tendon slack length of three muscles, are found
+from the two angles of the arm over a second, 101 moments, by scipy's least_squares from a start
+that is up to 15 % off. Its Jacobian is that of `osimlite.sensitivity`, or differences: with scipy's
+own step; with one that was tried out for the accuracy of the motion; and with one for motions 1000
+times as accurate. The motion is made by the model itself, so that the numbers are known; without
+noise and with noise of 0.002 rad. Paths around surfaces jump; polynomials are in their places
+(`osimlite.modify`).
 
     python benchmarks/fit_arm26.py [ARM26.osim] [SEED ...]
 """
@@ -47,7 +48,9 @@ class Fit:
 
     def __init__(self, model: Any, tangents: Any, initial: Any, accuracy: float = ACCURACY) -> None:
         self.model, self.tangents = model.copy_deep(), tangents
-        self._setters = [place.setter(self.model) for name in NAMES for place in places(self.model, name)]
+        self._setters = [
+            place.setter(self.model) for name in NAMES for place in places(self.model, name)
+        ]
         self._true = np.array([setter.get() for setter in self._setters])
         self._choices = {"accuracy": accuracy, "controls": CONTROLS, "initial": initial}
         self.motions, self.measured = 0, np.zeros(0)
@@ -87,7 +90,9 @@ def main(words: list[str]) -> None:
         "differences, step 1e-3": (ACCURACY, {"jac": "2-point", "diff_step": 1e-3}),
         "differences, step 1e-4, accuracy 1e-9": (1e-9, {"jac": "2-point", "diff_step": 1e-4}),
     }
-    print("| seed | noise | Jacobian | steps of the search | motions | time, s | residual, sd | off, % | largest, % |")
+    print(
+        "| seed | noise | Jacobian | steps of the search | motions | time, s | residual, sd | off, % | largest, % |"
+    )
     print("|---|---|---|---|---|---|---|---|---|")
     for seed in [int(word) for word in words] or [1, 2]:
         rng = np.random.default_rng(seed)
@@ -100,7 +105,10 @@ def main(words: list[str]) -> None:
                 fit.measured = measured + size * NOISE * noise
                 started = time.process_time()
                 found = least_squares(
-                    fit.angles, start, bounds=(1.0 - WITHIN, 1.0 + WITHIN), **{"jac": fit.slopes, **more}
+                    fit.angles,
+                    start,
+                    bounds=(1.0 - WITHIN, 1.0 + WITHIN),
+                    **{"jac": fit.slopes, **more},
                 )
                 seconds = time.process_time() - started
                 off = 100.0 * np.abs(found.x - 1.0)

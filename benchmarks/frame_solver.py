@@ -2,9 +2,10 @@
 
     python benchmarks/frame_solver.py [MODEL] [--frames N]
 
-The motion and its data are made here: every joint swings, markers are a centimetre off, sensors five degrees; in a
-tenth of the frames some are missing, and once a second all of them leap to another pose. Each frame is timed by the
-clock and by the processor, whose time does not count what else the machine does.
+The motion and its data are made here: every joint swings, markers are a centimetre off, sensors
+five degrees; in a tenth of the frames some are missing, and once a second all of them leap to
+another pose. Each frame is timed by the clock and by the processor, whose time does not count what
+else the machine does.
 """
 
 from __future__ import annotations
@@ -54,7 +55,9 @@ def solvers(model: osimlite.Model, frames: int) -> Iterator[tuple[str, Callable[
     turning = np.array([info.motion_type == "rotational" for info in mechanism.coordinates])
     paths = [marker.path for marker in model.components(osimlite.Marker)]
     stations = [mechanism.stations[path] for path in paths]
-    frames_of = [frame for path, frame in mechanism.frames.items() if path.rpartition("/")[2] in standing]
+    frames_of = [
+        frame for path, frame in mechanism.frames.items() if path.rpartition("/")[2] in standing
+    ]
     numbers = np.arange(frames)[:, None]
     phases = 5.0 * numbers / RATE + np.arange(len(turning)) + 0.5 * (numbers % RATE == RATE - 1)
     poses = mechanism.values({}) + 0.15 * np.sin(phases) * turning
@@ -62,7 +65,9 @@ def solvers(model: osimlite.Model, frames: int) -> Iterator[tuple[str, Callable[
     for number, q in enumerate(poses):
         state = mechanism.at(q)
         places[number] = [state.point(*station) for station in stations]
-        turns[number] = [(state.transform(frame.body) @ frame.transform)[:3, :3] for frame in frames_of]
+        turns[number] = [
+            (state.transform(frame.body) @ frame.transform)[:3, :3] for frame in frames_of
+        ]
     places += rng.normal(0.0, NOISE, places.shape)
     off = rng.normal(0.0, TURN, (frames, len(frames_of), 3)).reshape(-1, 3)
     turns = np.array([rotation_xyz(angles) for angles in off]).reshape(turns.shape) @ turns
@@ -77,8 +82,12 @@ def solvers(model: osimlite.Model, frames: int) -> Iterator[tuple[str, Callable[
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("model", nargs="?", type=Path, help="with markers; one of the shared folder if left out")
-    parser.add_argument("--frames", type=int, default=10_000, metavar="N", help="10,000 if left out")
+    parser.add_argument(
+        "model", nargs="?", type=Path, help="with markers; one of the shared folder if left out"
+    )
+    parser.add_argument(
+        "--frames", type=int, default=10_000, metavar="N", help="10,000 if left out"
+    )
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         path = options.model
@@ -86,14 +95,29 @@ def main() -> None:
             path = Path(folder) / "model.osim"
             path.write_bytes(gzip.decompress((CORPUS / "m0954.osim.gz").read_bytes()))
         model = osimlite.read(path)
-    table = Table(title=f"A frame of {model.name} (ms), {options.frames:,} frames", caption=f"aim: {1e3 * AIM:g} ms")
-    for column in ("", "clock: median", "1 of 1000", "worst", "processor: median", "1 of 1000", "worst", ""):
+    table = Table(
+        title=f"A frame of {model.name} (ms), {options.frames:,} frames",
+        caption=f"aim: {1e3 * AIM:g} ms",
+    )
+    for column in (
+        "",
+        "clock: median",
+        "1 of 1000",
+        "worst",
+        "processor: median",
+        "1 of 1000",
+        "worst",
+        "",
+    ):
         table.add_column(column, justify="right")
     for name, step in solvers(model, options.frames + WARM):
         cells, worst = [name], 0.0
         for times in timed(step, options.frames + WARM):
             worst = max(times)
-            cells += [f"{1e3 * value:.3g}" for value in (median(times), float(np.quantile(times, 0.999)), worst)]
+            cells += [
+                f"{1e3 * value:.3g}"
+                for value in (median(times), float(np.quantile(times, 0.999)), worst)
+            ]
         table.add_row(*cells, "kept" if worst <= AIM else "missed")
     Console(width=120).print(table)
 

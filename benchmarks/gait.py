@@ -1,8 +1,9 @@
 """The walking models of the library, confirmed by OpenSim itself, and how much they put up with.
 
-OpenSim reads the file that `osimlite build` writes and walks for 60 s; what touches the slope is read off the contact
-forces that it reports at every step of its integrator. Then osimlite: Floquet multipliers, random starts near the
-cycle, and how far each property that was changed may move, alone, while the walk goes on for 60 s.
+OpenSim reads the file that `osimlite build` writes and walks for 60 s; what touches the slope is
+read off the contact forces that it reports at every step of its integrator. Then osimlite: Floquet
+multipliers, random starts near the cycle, and how far each property that was changed may move,
+alone, while the walk goes on for 60 s.
 """
 
 from __future__ import annotations
@@ -48,8 +49,19 @@ def main() -> None:
 
 def confirmation(names: list[str]) -> Table:
     table = Table(title=f"Walking for {TO:g} s")
-    for heading in ("model", "accuracy", "program", "steps", "scuffs", "way (m)", "ends", "time taken (s)"):
-        table.add_column(heading, justify="left" if heading in ("model", "program", "ends") else "right")
+    for heading in (
+        "model",
+        "accuracy",
+        "program",
+        "steps",
+        "scuffs",
+        "way (m)",
+        "ends",
+        "time taken (s)",
+    ):
+        table.add_column(
+            heading, justify="left" if heading in ("model", "program", "ends") else "right"
+        )
     with tempfile.TemporaryDirectory() as folder:
         orders = {name: Order(Path(folder) / f"{name}.osim", TO, CONFIRMED[name]) for name in names}
         for name, order in orders.items():
@@ -74,7 +86,16 @@ def our_walk(model: osimlite.Model, to: float, accuracy: float) -> Walk:
 
 def near(names: list[str]) -> Table:
     table = Table(title="The cycle, and 60 random starts near the model's own")
-    headings = ("model", "step (m)", "period (s)", "speed (m/s)", "fixed to", "largest multipliers", "5 %", "10 %")
+    headings = (
+        "model",
+        "step (m)",
+        "period (s)",
+        "speed (m/s)",
+        "fixed to",
+        "largest multipliers",
+        "5 %",
+        "10 %",
+    )
     for heading in headings:
         table.add_column(heading, justify="left" if heading == "model" else "right")
     for name in names:
@@ -83,7 +104,10 @@ def near(names: list[str]) -> Table:
             start = simulation.initial_state({}, {})
             step_map = StepMap(engine, start, accuracy=1e-12)
             cycle = find_cycle(step_map)
-            walks = [walks_from(step_map, cycle, perturbed(step_map, start, part, 60, 0), 20) for part in (0.05, 0.1)]
+            walks = [
+                walks_from(step_map, cycle, perturbed(step_map, start, part, 60, 0), 20)
+                for part in (0.05, 0.1)
+            ]
             table.add_row(
                 name,
                 f"{cycle.length:.6f}",
@@ -97,14 +121,19 @@ def near(names: list[str]) -> Table:
 
 
 def margins(names: list[str]) -> Table:
-    table = Table(title=f"How far each changed property may move alone, from the same start, for {TO:g} s")
+    table = Table(
+        title=f"How far each changed property may move alone, from the same start, for {TO:g} s"
+    )
     for heading in ("model", "property", "least", "value", "most"):
         table.add_column(heading, justify="left" if heading in ("model", "property") else "right")
     for name in names:
         for parameter, value in parameters_of(name).items():
 
             def walks(number: float, name: str = name, parameter: str = parameter) -> bool:
-                return len(our_walk(make_model(name, {parameter: repr(number)}), TO, 1e-6).steps) >= MANY
+                return (
+                    len(our_walk(make_model(name, {parameter: repr(number)}), TO, 1e-6).steps)
+                    >= MANY
+                )
 
             least, most = (_edge(walks, value, side) for side in (-1.0, 1.0))
             table.add_row(name, parameter, f"{least:.4g}", f"{value:g}", f"{most:.4g}")

@@ -1,9 +1,9 @@
 """Paths along geodesics: are speeds and moment arms derivatives, are lengths continuous, what does a path cost?
 
-Two ends at random places on either side of surfaces. A jump is counted where a length changes on a short way by more
-than the ends move. Where a surface is met, or another way gets shorter, within the step of a difference, smaller steps
-are taken. OpenSim's own times are those of one PathWrap on the machine of shared/oracle/muscles, and of
-two on that of the table.
+Two ends at random places on either side of surfaces. A jump is counted where a length changes on a
+short way by more than the ends move. Where a surface is met, or another way gets shorter, within
+the step of a difference, smaller steps are taken. OpenSim's own times are those of one PathWrap on
+the machine of shared/oracle/muscles, and of two on that of the table.
 """
 
 from __future__ import annotations
@@ -62,9 +62,13 @@ def made(kinds: list[str]) -> osimlite.Model:
         force.geometry_path.path_point_set.objects.append(point)
     for number, (kind, side) in enumerate(words.split() for words in kinds):
         place: dict[str, Any] = APART if number else {}
-        surface = getattr(osimlite, f"Wrap{kind}")(name=f"w{number}", quadrant=side, **SIZES[kind], **place)
+        surface = getattr(osimlite, f"Wrap{kind}")(
+            name=f"w{number}", quadrant=side, **SIZES[kind], **place
+        )
         model.ground.wrap_object_set.objects.append(surface)
-        force.geometry_path.path_wrap_set.objects.append(PathWrap(name=f"w{number}", wrap_object=surface.name))
+        force.geometry_path.path_wrap_set.objects.append(
+            PathWrap(name=f"w{number}", wrap_object=surface.name)
+        )
     model.add(force)
     return model
 
@@ -87,12 +91,16 @@ def jumps(length: Callable[[Ends], float], one: Ends, two: Ends) -> int:
     """How often a length jumps on the way."""
     step = (two - one) / STEPS
     lengths = np.diff([length(one + k * step) for k in range(STEPS + 1)])
-    return int(np.sum(np.abs(lengths) > 1.01 * np.linalg.norm(step[:3]) + 1.01 * np.linalg.norm(step[3:])))
+    return int(
+        np.sum(np.abs(lengths) > 1.01 * np.linalg.norm(step[:3]) + 1.01 * np.linalg.norm(step[3:]))
+    )
 
 
 def slope(length: Callable[[Ends], float], ends: Ends, way: Ends, h: float) -> float:
     """The rate of a length on a way, by differences, extrapolated."""
-    one, two, four = ((length(ends + h / k * way) - length(ends - h / k * way)) * k / (2 * h) for k in (1, 2, 4))
+    one, two, four = (
+        (length(ends + h / k * way) - length(ends - h / k * way)) * k / (2 * h) for k in (1, 2, 4)
+    )
     return (64 * four - 20 * two + one) / 45
 
 
@@ -110,7 +118,9 @@ def cost(paths: osimlite.simulation.paths.Paths, poses: list[Ends]) -> float:
 def measured(case: str, kinds: list[str], opensim: str) -> list[str]:
     """A row of the table."""
     model, rng = made(kinds), np.random.default_rng(1)
-    ways = {wrapping: osimlite.paths(model, wrapping=wrapping) for wrapping in ("geodesic", "opensim")}
+    ways = {
+        wrapping: osimlite.paths(model, wrapping=wrapping) for wrapping in ("geodesic", "opensim")
+    }
     paths, (owner,) = ways["geodesic"], ways["geodesic"].names
     coordinates = [info.path for info in paths.mechanism.coordinates]
 
@@ -120,8 +130,13 @@ def measured(case: str, kinds: list[str], opensim: str) -> list[str]:
     poses, errors = [drawn(rng, case) for _ in range(POSES)], []
     for ends in poses:
         way = rng.normal(size=6) / 3.0
-        arms, speed = paths.moment_arms(pose(ends))[owner], paths.speeds(pose(ends), pose(way))[owner]
-        by_arms = -sum(arms.get(coordinates[k], 0.0) * part for k, part in zip(MOVING, way, strict=True))
+        arms, speed = (
+            paths.moment_arms(pose(ends))[owner],
+            paths.speeds(pose(ends), pose(way))[owner],
+        )
+        by_arms = -sum(
+            arms.get(coordinates[k], 0.0) * part for k, part in zip(MOVING, way, strict=True)
+        )
         error = np.inf
         for h in H:
             if error > EXACT:
@@ -134,11 +149,31 @@ def measured(case: str, kinds: list[str], opensim: str) -> list[str]:
     costs = [cost(each, bent) - cost(each, straight) for each in ways.values()]
     bad = sum(error > EXACT for error in errors)
     quantiles = (f"{value:.0e}" for value in np.quantile(errors, (0.5, 0.999)))
-    return [case, f"{len(bent)}", *quantiles, f"{bad}", f"{torn}", *(f"{each:.1f}" for each in costs), opensim]
+    return [
+        case,
+        f"{len(bent)}",
+        *quantiles,
+        f"{bad}",
+        f"{torn}",
+        *(f"{each:.1f}" for each in costs),
+        opensim,
+    ]
 
 
-table = Table(title=f"{POSES} poses and {SWEEPS} sweeps each; errors of speeds and moment arms in m/s, m; times in us")
-for label in ("surfaces", "bent", "median", "99.9 %", "> 1e-9", "jumps", "geodesic", "as OpenSim", "OpenSim"):
+table = Table(
+    title=f"{POSES} poses and {SWEEPS} sweeps each; errors of speeds and moment arms in m/s, m; times in us"
+)
+for label in (
+    "surfaces",
+    "bent",
+    "median",
+    "99.9 %",
+    "> 1e-9",
+    "jumps",
+    "geodesic",
+    "as OpenSim",
+    "OpenSim",
+):
     table.add_column(label, justify="right")
 for case, (kinds, opensim) in CASES.items():
     table.add_row(*measured(case, kinds, opensim))

@@ -26,14 +26,18 @@ def main() -> None:
         envs = gymnasium.make_vec(f"osimlite/{name}", num_envs=count)
         rng = np.random.default_rng(0)
         envs.reset(seed=0)
-        actions = [0.3 * rng.random(envs.action_space.shape, dtype=np.float32) for _ in range(STEPS)]
+        actions = [
+            0.3 * rng.random(envs.action_space.shape, dtype=np.float32) for _ in range(STEPS)
+        ]
         envs.step(actions[0])
         start, spent = time.perf_counter(), time.process_time()
         for action in actions:
             envs.step(action)
         took, spent = time.perf_counter() - start, time.process_time() - spent
         rate, own = count * STEPS / took, count * STEPS / spent
-        print(f"{name:12s} {rate:10,.0f} steps/s, {count} copies, {cores()} cores; {own:,.0f} of one core")
+        print(
+            f"{name:12s} {rate:10,.0f} steps/s, {count} copies, {cores()} cores; {own:,.0f} of one core"
+        )
         envs.close()
 
 

@@ -2,12 +2,12 @@
 
     python benchmarks/integrators.py [--picture FILE] [--cpodes] [NAME=FILE ...]
 
-Without files: models of the shared corpus, if that stands beside the repository; the first with DeGrooteFregly2016
-muscles and elastic tendons too, once with low excitations. Muscles start in equilibrium, are excited by 0.05 to 0.25,
-and move the model for 0.1 s.
-The error is the largest difference of any state at the end from a converged run (accuracy 1e-9), relative to states
-above 1. Times are of the steps alone, the median of several runs in turn. What is told at one error is interpolated
-between the accuracies that were tried. OpenSim's CPodes takes minutes.
+Without files: models of the shared corpus, if that stands beside the repository; the first with
+DeGrooteFregly2016 muscles and elastic tendons too, once with low excitations. Muscles start in
+equilibrium, are excited by 0.05 to 0.25, and move the model for 0.1 s. The error is the largest
+difference of any state at the end from a converged run (accuracy 1e-9), relative to states above 1.
+Times are of the steps alone, the median of several runs in turn. What is told at one error is
+interpolated between the accuracies that were tried. OpenSim's CPodes takes minutes.
 """
 
 from __future__ import annotations
@@ -60,7 +60,9 @@ def main() -> None:
     opensim.Logger.setLevelString("off")
     words = sys.argv[1:]
     picture = Path(words.pop(words.index("--picture") + 1)) if "--picture" in words else None
-    table = Table(title=f"{TO:g} s of motion at an error of {ERROR:g}: processor time, ms (evaluations)")
+    table = Table(
+        title=f"{TO:g} s of motion at an error of {ERROR:g}: processor time, ms (evaluations)"
+    )
     found: dict[str, dict[str, list[Run]]] = {}
     with tempfile.TemporaryDirectory() as folder:
         for name, path in models([word for word in words if "=" in word], Path(folder)):
@@ -69,8 +71,16 @@ def main() -> None:
                 for heading in ("model", *runs, "times faster"):
                     table.add_column(heading, justify="left" if heading == "model" else "right")
             costs = [at_error(row) for row in runs.values()]
-            ours = min(cost[0] for name, cost in zip(runs, costs, strict=True) if not name.startswith("OpenSim"))
-            theirs = min(cost[0] for name, cost in zip(runs, costs, strict=True) if name.startswith("OpenSim"))
+            ours = min(
+                cost[0]
+                for name, cost in zip(runs, costs, strict=True)
+                if not name.startswith("OpenSim")
+            )
+            theirs = min(
+                cost[0]
+                for name, cost in zip(runs, costs, strict=True)
+                if name.startswith("OpenSim")
+            )
             told = [
                 f"{1e3 * seconds:.{0 if seconds > 0.1 else 1}f}" + f" ({count:.0f})" * (count > 0)
                 for seconds, count in costs
@@ -90,8 +100,13 @@ def models(given: list[str], folder: Path) -> Iterator[tuple[str, Path]]:
         if path.exists():
             paths[name] = folder / f"{number}.osim"
             paths[name].write_bytes(gzip.decompress(path.read_bytes()))
-    for name in (*paths, *(f"{name}{DEGROOTE}{low}" for name in list(paths)[:1] for low in ("", LOW))):
-        processor = opensim.ModelProcessor(str(paths[name.removesuffix(LOW).removesuffix(DEGROOTE)]))
+    for name in (
+        *paths,
+        *(f"{name}{DEGROOTE}{low}" for name in list(paths)[:1] for low in ("", LOW)),
+    ):
+        processor = opensim.ModelProcessor(
+            str(paths[name.removesuffix(LOW).removesuffix(DEGROOTE)])
+        )
         if DEGROOTE in name:
             processor.append(opensim.ModOpReplaceMusclesWithDeGrooteFregly2016())
         model = processor.process()
@@ -101,10 +116,13 @@ def models(given: list[str], folder: Path) -> Iterator[tuple[str, Path]]:
             muscle = model.getMuscles().get(k)
             if DEGROOTE in name:
                 muscle.set_ignore_tendon_compliance(False)
-                opensim.DeGrooteFregly2016Muscle.safeDownCast(muscle).set_tendon_compliance_dynamics_mode("explicit")
+                opensim.DeGrooteFregly2016Muscle.safeDownCast(
+                    muscle
+                ).set_tendon_compliance_dynamics_mode("explicit")
             brain.addActuator(muscle)
             brain.prescribeControlForActuator(
-                muscle.getAbsolutePathString(), opensim.Constant(0.02 if LOW in name else 0.05 + 0.1 * (k % 3))
+                muscle.getAbsolutePathString(),
+                opensim.Constant(0.02 if LOW in name else 0.05 + 0.1 * (k % 3)),
             )
         model.addController(brain)
         model.finalizeConnections()
@@ -120,7 +138,8 @@ def measured(path: Path) -> dict[str, list[Run]]:
     with Simulation(osimlite.read(path), "compiled", opensim_derivatives=True) as simulation:
         exact = our_motion(simulation, "merson", CONVERGED)()[0]
         found = {
-            shown: tried(partial(our_motion, simulation, name), exact, ROUNDS) for name, shown in INTEGRATORS.items()
+            shown: tried(partial(our_motion, simulation, name), exact, ROUNDS)
+            for name, shown in INTEGRATORS.items()
         }
         paths = simulation_paths(simulation)
     asked = {"OpenSim, RungeKuttaMerson": opensim.Manager.IntegratorMethod_RungeKuttaMerson}
@@ -131,7 +150,9 @@ def measured(path: Path) -> dict[str, list[Run]]:
     return found
 
 
-def tried(motion: Callable[[float], Callable[[], tuple[Any, float, int]]], exact: Any, rounds: int) -> list[Run]:
+def tried(
+    motion: Callable[[float], Callable[[], tuple[Any, float, int]]], exact: Any, rounds: int
+) -> list[Run]:
     """Runs at ever more accuracy, until one errs much less than what is asked."""
     found: list[Run] = []
     for accuracy in ACCURACIES:
@@ -147,10 +168,14 @@ def run(motion: Callable[[], tuple[Any, float, int]], exact: Any, rounds: int) -
     while len(ends) < rounds and len(ends) * ends[0][1] < ENOUGH:
         ends.append(motion())
     error = float(np.max(np.abs(ends[0][0] - exact) / np.maximum(np.abs(exact), 1.0)))
-    return Run(error if error == error else float("inf"), median(end[1] for end in ends), ends[0][2])
+    return Run(
+        error if error == error else float("inf"), median(end[1] for end in ends), ends[0][2]
+    )
 
 
-def our_motion(simulation: Simulation, integrator: str, accuracy: float) -> Callable[[], tuple[Any, float, int]]:
+def our_motion(
+    simulation: Simulation, integrator: str, accuracy: float
+) -> Callable[[], tuple[Any, float, int]]:
     start = simulation.initial_state({}, {}, equilibrate=True)
 
     def motion() -> tuple[Any, float, int]:
@@ -159,7 +184,11 @@ def our_motion(simulation: Simulation, integrator: str, accuracy: float) -> Call
         stepper = simulation.engine.stepper(0.0, start, settings, lambda t, y: None)
         stepper.table([TO])
         took = time.process_time() - began
-        return np.array(stepper.state if stepper.ended is None else [np.nan] * len(start)), took, stepper.evaluations
+        return (
+            np.array(stepper.state if stepper.ended is None else [np.nan] * len(start)),
+            took,
+            stepper.evaluations,
+        )
 
     return motion
 
@@ -167,10 +196,14 @@ def our_motion(simulation: Simulation, integrator: str, accuracy: float) -> Call
 def simulation_paths(simulation: Simulation) -> list[str]:
     """The states in the engine's order, as OpenSim calls them."""
     infos = [simulation.mechanism.coordinates[place].path for place in simulation.state.order]
-    return [f"{path}/{what}" for what in ("value", "speed") for path in infos] + list(simulation.state.paths)
+    return [f"{path}/{what}" for what in ("value", "speed") for path in infos] + list(
+        simulation.state.paths
+    )
 
 
-def their_motion(model: Any, paths: list[str], method: int, accuracy: float) -> Callable[[], tuple[Any, float, int]]:
+def their_motion(
+    model: Any, paths: list[str], method: int, accuracy: float
+) -> Callable[[], tuple[Any, float, int]]:
     def motion() -> tuple[Any, float, int]:
         state = opensim.State(model.initializeState())
         state.setTime(0.0)
@@ -196,7 +229,9 @@ def at_error(runs: list[Run]) -> tuple[float, float]:
     if not better:
         return float("inf"), 0.0
     best = min(better, key=lambda item: item.seconds)
-    worse = [item for item in runs if ERROR < item.error < float("inf") and item.seconds < best.seconds]
+    worse = [
+        item for item in runs if ERROR < item.error < float("inf") and item.seconds < best.seconds
+    ]
     if not worse:
         return best.seconds, float(best.evaluations)
     last = max(worse, key=lambda item: item.seconds)
@@ -213,7 +248,9 @@ def draw(found: dict[str, dict[str, list[Run]]], path: Path) -> None:
     from matplotlib import pyplot
 
     rows = (len(found) + 2) // 3
-    figure, axes = pyplot.subplots(rows, 3, figsize=(9.6, 3.4 * rows), layout="constrained", squeeze=False)
+    figure, axes = pyplot.subplots(
+        rows, 3, figsize=(9.6, 3.4 * rows), layout="constrained", squeeze=False
+    )
     places = list(axes.flat)
     for axis, (name, runs) in zip(places, found.items(), strict=False):
         for method, row in runs.items():
@@ -231,7 +268,9 @@ def draw(found: dict[str, dict[str, list[Run]]], path: Path) -> None:
         axis.set_ylabel("error at the end")
     for axis in places[len(found) :]:
         axis.axis("off")
-    figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
+    figure.legend(
+        *places[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8
+    )
     figure.savefig(path)
 
 

@@ -1,9 +1,10 @@
 """How the jumper of the library was taught to jump, and what OpenSim makes of its jump.
 
-Three searches by cma, each from where the one before ended. They look for the excitations of eight muscles, equal in
-both legs, at some moments: the mass center is to rise as high as it can; then the feet are to come back under it as
-well; then, with the excitations of the landing, it is to stand. OpenSim makes the jump that was found, at the same
-accuracies, and some runs of the searches, in turn with osimlite.
+Three searches by cma, each from where the one before ended. They look for the excitations of eight
+muscles, equal in both legs, at some moments: the mass center is to rise as high as it can; then the
+feet are to come back under it as well; then, with the excitations of the landing, it is to stand.
+OpenSim makes the jump that was found, at the same accuracies, and some runs of the searches, in
+turn with osimlite.
 
     python benchmarks/jump.py                     # the search that the shipped excitations are from
     python benchmarks/jump.py --seed 2 -o other   # another one
@@ -50,13 +51,10 @@ STANDING = 1.5
 class Lesson(NamedTuple):
     """A search.
 
-    Attributes:
-        name: of its folder.
-        objective: what is made small.
-        to: when a run ends (s).
-        nodes: when the excitations have nodes that are looked for (s); between nodes are lines, and the last one holds.
-        budget: how many runs.
-        keeps: whether the nodes of earlier lessons stay as they are.
+    Attributes: name: of its folder. objective: what is made small. to: when a run ends (s). nodes:
+        when the excitations have nodes that are looked for (s); between nodes are lines, and the
+        last one holds. budget: how many runs. keeps: whether the nodes of earlier lessons stay as
+        they are.
     """
 
     name: str
@@ -132,7 +130,12 @@ def opensim_motion(file: Path, to: float, accuracy: float) -> np.ndarray:
 def confirm(file: Path) -> Table:
     """The jump of a file in both programs."""
     table = Table(title="The jump, by both programs", title_justify="left")
-    for column in ("accuracy", "highest, osimlite, m", "OpenSim, m", "mass center apart at most, m"):
+    for column in (
+        "accuracy",
+        "highest, osimlite, m",
+        "OpenSim, m",
+        "mass center apart at most, m",
+    ):
         table.add_column(column, justify="right")
     with Simulation(osimlite.read(file), "compiled") as simulation:
         for accuracy in (1e-3, 1e-5, 1e-7):
@@ -140,12 +143,19 @@ def confirm(file: Path) -> Table:
             ours = np.array([simulation.mechanism.center_of_mass(q) for q in motion.values[1:]])
             theirs = opensim_motion(file, STANDING, accuracy)
             apart = np.abs(ours - theirs).max()
-            table.add_row(f"{accuracy:g}", f"{ours[:, 1].max():.7f}", f"{theirs[:, 1].max():.7f}", f"{apart:.1e}")
+            table.add_row(
+                f"{accuracy:g}",
+                f"{ours[:, 1].max():.7f}",
+                f"{theirs[:, 1].max():.7f}",
+                f"{apart:.1e}",
+            )
     return table
 
 
 def main() -> None:
-    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     words.add_argument("--seed", type=int, default=1)
     words.add_argument("-o", type=Path, default=Path("jump"), help="folder of the results")
     given = words.parse_args()

@@ -1,10 +1,10 @@
 """Gaits whose rigid limits are published, under compliant contact: the stiffer the contact, the closer.
 
-The rimless wheel rolls down a slope on its spokes; every impact is plastic, so that its speed is known in closed form.
-The simplest walking model (Garcia, Chatterjee, Ruina and Coleman, J. Biomech. Eng. 120, 1998) has a point mass at the
-hip and feet of no mass; the compass gait (Goswami, Thuilot and Espiau, Int. J. Robotics Research 17, 1998) has legs
-of mass. Their straight legs would scuff: as in these papers the foot that swings does not feel the ground until it has
-passed the other leg.
+The rimless wheel rolls down a slope on its spokes; every impact is plastic, so that its speed is
+known in closed form. The simplest walking model (Garcia, Chatterjee, Ruina and Coleman, J. Biomech.
+Eng. 120, 1998) has a point mass at the hip and feet of no mass; the compass gait (Goswami, Thuilot
+and Espiau, Int. J. Robotics Research 17, 1998) has legs of mass. Their straight legs would scuff:
+as in these papers the foot that swings does not feel the ground until it has passed the other leg.
 """
 
 from __future__ import annotations
@@ -43,16 +43,26 @@ MASSLESS = 5e-3
 
 def ground(model: Model, slope: float) -> ContactHalfSpace:
     plane = model.add(
-        ContactHalfSpace(name="slope", socket_frame=model.ground, orientation=(0.0, 0.0, -pi / 2 - slope))
+        ContactHalfSpace(
+            name="slope", socket_frame=model.ground, orientation=(0.0, 0.0, -pi / 2 - slope)
+        )
     )
     assert isinstance(plane, ContactHalfSpace)
     return plane
 
 
 def touch(
-    model: Model, plane: ContactHalfSpace, body: Body, at: tuple[float, float, float], name: str, K: float, vt: float
+    model: Model,
+    plane: ContactHalfSpace,
+    body: Body,
+    at: tuple[float, float, float],
+    name: str,
+    K: float,
+    vt: float,
 ) -> None:
-    sphere = model.add(ContactSphere(name=f"{name}_sphere", socket_frame=body, location=at, radius=FOOT))
+    sphere = model.add(
+        ContactSphere(name=f"{name}_sphere", socket_frame=body, location=at, radius=FOOT)
+    )
     material = HuntCrossleyForce.ContactParameters(
         geometry=(sphere, plane), stiffness=K, dissipation=10.0, static_friction=1.0, dynamic_friction=1.0,
         viscous_friction=0.0,
@@ -90,7 +100,9 @@ def wheel(K: float, vt: float, spokes: int, slope: float, inertia: float) -> Mod
     return model
 
 
-def wheel_speed(K: float, vt: float, spokes: int = 8, slope: float = 0.08, inertia: float = 0.1) -> tuple[float, float]:
+def wheel_speed(
+    K: float, vt: float, spokes: int = 8, slope: float = 0.08, inertia: float = 0.1
+) -> tuple[float, float]:
     """Mean speed of the wheel between two impacts far down the slope, as it is and rigid, in rad/s just before one."""
     half = pi / spokes
     kept = 1.0 - (1.0 - cos(2.0 * half)) / (1.0 + inertia)
@@ -99,7 +111,8 @@ def wheel_speed(K: float, vt: float, spokes: int = 8, slope: float = 0.08, inert
         engine: Any = simulation.engine
         # It stands on spoke 0 and rolls towards +x.
         y = simulation.initial_state(
-            {"tx": sin(slope), "ty": cos(slope)}, {"rz": -rigid, "tx": rigid * cos(slope), "ty": -rigid * sin(slope)}
+            {"tx": sin(slope), "ty": cos(slope)},
+            {"rz": -rigid, "tx": rigid * cos(slope), "ty": -rigid * sin(slope)},
         )
         runs = run_many(engine, [y], 20.0, accuracy=ACCURACY, most_events=4000, event_states=True)
         speeds = []
@@ -121,7 +134,11 @@ def two_legs(K: float, vt: float, slope: float, hip: float, leg: float, above: f
     plane = ground(model, slope)
     for name in ("right", "left"):
         body = model.add(Body(name=name, mass=leg, mass_center=(0.0, -above, 0.0)))
-        model.add(PinJoint(name=f"{name}_hip", coordinates=[Coordinate(name=f"{name}_rz")]).between(pelvis, body))
+        model.add(
+            PinJoint(name=f"{name}_hip", coordinates=[Coordinate(name=f"{name}_rz")]).between(
+                pelvis, body
+            )
+        )
         touch(model, plane, body, (0.0, -(1.0 - FOOT), 0.0), f"{name}_foot", K, vt)
     return model
 
@@ -129,16 +146,23 @@ def two_legs(K: float, vt: float, slope: float, hip: float, leg: float, above: f
 class Legs:
     """Two straight legs walking, with the ground under the foot that swings taken away until it has passed."""
 
-    def __init__(self, K: float, vt: float, slope: float, hip: float, leg: float, above: float) -> None:
+    def __init__(
+        self, K: float, vt: float, slope: float, hip: float, leg: float, above: float
+    ) -> None:
         self.simulation = Simulation(two_legs(K, vt, slope, hip, leg, above), "compiled")
         self.engine: Any = self.simulation.engine
         self.slope = slope
         infos = self.simulation.mechanism.coordinates
         self.names = [infos[place].name for place in self.engine.order]
-        self.without = [self._without(foot, K, vt, slope, hip, leg, above) for foot in ("right_foot", "left_foot")]
+        self.without = [
+            self._without(foot, K, vt, slope, hip, leg, above)
+            for foot in ("right_foot", "left_foot")
+        ]
         self.normal = (sin(slope), cos(slope), 0.0)
 
-    def _without(self, foot: str, K: float, vt: float, slope: float, hip: float, leg: float, above: float) -> Any:
+    def _without(
+        self, foot: str, K: float, vt: float, slope: float, hip: float, leg: float, above: float
+    ) -> Any:
         """The numbers of a model one foot of which is so soft that it does not feel the ground."""
         model = two_legs(K, vt, slope, hip, leg, above)
         for force in model.components(HuntCrossleyForce):
@@ -155,15 +179,23 @@ class Legs:
     def start(self, angle: float, rate: float, swing: float) -> Any:
         """Just after a heel strike: the right leg in front stands, the left one is about to swing.
 
-        Args:
-            angle: of the leg that stands to the normal of the slope, and half of the angle between the legs.
-            rate: of the leg that stands.
-            swing: of the leg that swings.
+        Args: angle: of the leg that stands to the normal of the slope, and half of the angle
+            between the legs. rate: of the leg that stands. swing: of the leg that swings.
         """
         from_normal = -self.slope
         standing, behind = from_normal + angle, from_normal - angle
-        values = {"right_rz": standing, "left_rz": behind, "tx": -sin(standing), "ty": cos(standing)}
-        speeds = {"right_rz": rate, "left_rz": swing, "tx": -rate * cos(standing), "ty": -rate * sin(standing)}
+        values = {
+            "right_rz": standing,
+            "left_rz": behind,
+            "tx": -sin(standing),
+            "ty": cos(standing),
+        }
+        speeds = {
+            "right_rz": rate,
+            "left_rz": swing,
+            "tx": -rate * cos(standing),
+            "ty": -rate * sin(standing),
+        }
         return np.array(self.simulation.initial_state(values, speeds))
 
     def step(self, y: Any, standing: int) -> tuple[float, Any] | None:
@@ -177,7 +209,9 @@ class Legs:
             y, passed = runs.states[0], float(runs.times[0])
         # The rate of the leg, as far as it moves the hip: its foot may slip a little.
         angle, n = float(y[self.place(f"{legs[standing]}_rz")]), len(self.names)
-        self.rate = -float(y[n + self.place("tx")] * cos(angle) + y[n + self.place("ty")] * sin(angle))
+        self.rate = -float(
+            y[n + self.place("tx")] * cos(angle) + y[n + self.place("ty")] * sin(angle)
+        )
         # It swings through until it is ahead.
         ahead = Watch("ahead", coordinate=f"{legs[swing]}_rz", level=-self.slope, stops=1)
         runs = self._run(y, self.without[swing], 5.0, [ahead])
@@ -186,7 +220,12 @@ class Legs:
         y, passed = runs.states[0], passed + float(runs.times[0])
         # And on until it comes down on the slope.
         down = Watch(
-            "down", body=legs[swing], station=(0.0, -(1.0 - FOOT), 0.0), direction=self.normal, level=FOOT, stops=-1
+            "down",
+            body=legs[swing],
+            station=(0.0, -(1.0 - FOOT), 0.0),
+            direction=self.normal,
+            level=FOOT,
+            stops=-1,
         )
         runs = self._run(y, self.without[swing], 5.0, [down])
         if runs.endings[0] != STOPPED:
@@ -194,7 +233,9 @@ class Legs:
         return passed + float(runs.times[0]), runs.states[0]
 
     def _run(self, y: Any, numbers: Any, to: float, watches: list[Watch]) -> Any:
-        return run_many(self.engine, [y], to, numbers=numbers, accuracy=ACCURACY, watches=watches, most_events=4)
+        return run_many(
+            self.engine, [y], to, numbers=numbers, accuracy=ACCURACY, watches=watches, most_events=4
+        )
 
 
 def walk(legs: Legs, y: Any) -> dict[str, float] | None:
@@ -208,7 +249,12 @@ def walk(legs: Legs, y: Any) -> dict[str, float] | None:
     assert found is not None
     right, left = (float(y[legs.place(f"{name}_rz")]) for name in ("right", "left"))
     between = abs(right - left)
-    return {"period": found[0], "step": 2.0 * sin(between / 2.0), "angle": between / 2.0, "rate": legs.rate}
+    return {
+        "period": found[0],
+        "step": 2.0 * sin(between / 2.0),
+        "angle": between / 2.0,
+        "rate": legs.rate,
+    }
 
 
 def main() -> None:
@@ -218,10 +264,21 @@ def main() -> None:
         table.add_column(heading, justify="right")
     for K, vt in GROUNDS:
         speed, rigid = wheel_speed(K, vt)
-        table.add_row(f"{K:.0e}", f"{vt:g}", f"{speed:.6f}", f"{rigid:.6f}", f"{speed / rigid - 1.0:+.2%}")
+        table.add_row(
+            f"{K:.0e}", f"{vt:g}", f"{speed:.6f}", f"{rigid:.6f}", f"{speed / rigid - 1.0:+.2%}"
+        )
     console.print(table)
-    table = Table(title="Simplest walking model, slope 0.009 (published: 0.200310901, -0.199832473)")
-    for heading in ("stiffness (Pa)", "slip (m/s)", "step angle", "rate", "difference", "of the rate"):
+    table = Table(
+        title="Simplest walking model, slope 0.009 (published: 0.200310901, -0.199832473)"
+    )
+    for heading in (
+        "stiffness (Pa)",
+        "slip (m/s)",
+        "step angle",
+        "rate",
+        "difference",
+        "of the rate",
+    ):
         table.add_column(heading, justify="right")
     for K, vt in GROUNDS:
         legs = Legs(K, vt, SIMPLEST["gamma"], hip=1.0, leg=MASSLESS, above=1.0)
@@ -241,7 +298,9 @@ def main() -> None:
         legs = Legs(K, vt, radians(3.0), hip=10.0, leg=5.0, above=0.5)
         found = walk(legs, legs.start(0.2708, -1.0923, -0.3772))
         table.add_row(
-            f"{K:.0e}", f"{vt:g}", *((f"{found['period']:.5f}", f"{found['step']:.5f}") if found else ("falls", ""))
+            f"{K:.0e}",
+            f"{vt:g}",
+            *((f"{found['period']:.5f}", f"{found['step']:.5f}") if found else ("falls", "")),
         )
     console.print(table)
 

@@ -1,9 +1,10 @@
 """One evaluation of the accelerations, from chains of pendulums to whole bodies: osimlite's ways and OpenSim's.
 
-What is timed is one call from Python: state in, accelerations out, under gravity and constraints alone. All ways run
-in turn in one process; what counts is the median of the rounds, each the mean of some calls. "Bullet" is what a
-simulation takes by itself, "recursion" osimlite's own kinematics and dynamics in numpy, "compiled" the machine code.
-OpenSim is made to compute everything again by setting the time of its state.
+What is timed is one call from Python: state in, accelerations out, under gravity and constraints
+alone. All ways run in turn in one process; what counts is the median of the rounds, each the mean
+of some calls. "Bullet" is what a simulation takes by itself, "recursion" osimlite's own kinematics
+and dynamics in numpy, "compiled" the machine code. OpenSim is made to compute everything again by
+setting the time of its state.
 
 The models of the second table are those of the shared corpus, if that stands beside the repository.
 """
@@ -63,9 +64,15 @@ def main() -> None:
         small, large = times[LENGTHS.index(10)][way], times[LENGTHS.index(80)][way]
         if small and large:
             slope = math.log(large / small) / math.log(8.0)
-            console.print(f"{way}: from 10 to 80 degrees of freedom the time grows with their power {slope:.2f}")
+            console.print(
+                f"{way}: from 10 to 80 degrees of freedom the time grows with their power {slope:.2f}"
+            )
     if CORPUS.is_dir():
-        table("Models of the corpus, forces left out", {name: real(name_of) for name_of, name in REAL.items()}, console)
+        table(
+            "Models of the corpus, forces left out",
+            {name: real(name_of) for name_of, name in REAL.items()},
+            console,
+        )
 
 
 def chain(count: int) -> Model:
@@ -73,10 +80,21 @@ def chain(count: int) -> Model:
     model, carrier = Model(name="chain"), None
     for number in range(count):
         inertia = (0.02, 0.03, 0.025, 0.001, 0.0, 0.0)
-        body = model.add(Body(name=f"b{number}", mass=1.0, mass_center=(0.02, -0.1, 0.01), inertia=inertia))
-        joint = PinJoint(name=f"j{number}", coordinates=[Coordinate(name=f"q{number}", default_value=0.1)])
+        body = model.add(
+            Body(name=f"b{number}", mass=1.0, mass_center=(0.02, -0.1, 0.01), inertia=inertia)
+        )
+        joint = PinJoint(
+            name=f"j{number}", coordinates=[Coordinate(name=f"q{number}", default_value=0.1)]
+        )
         turned = ((0.0, 0.0, 0.0), (1.2, 0.0, 0.0), (0.0, 1.1, 0.3))[number % 3]
-        model.add(joint.between(carrier or model.ground, body, at=(0.0, -0.2 if carrier else 0.0, 0.0), turned=turned))
+        model.add(
+            joint.between(
+                carrier or model.ground,
+                body,
+                at=(0.0, -0.2 if carrier else 0.0, 0.0),
+                turned=turned,
+            )
+        )
         carrier = body
     return model
 
@@ -99,7 +117,9 @@ def table(title: str, models: dict[str, Model], console: Console) -> list[dict[s
     for name, model in models.items():
         mechanism = build_mechanism(model)
         times = timed(model, mechanism)
-        kept = sum(len(item.velocity_equations(mechanism.at({}))[1]) for item in mechanism.constraints)
+        kept = sum(
+            len(item.velocity_equations(mechanism.at({}))[1]) for item in mechanism.constraints
+        )
         cells = ["-" if seconds is None else f"{1e6 * seconds:.0f}" for seconds in times.values()]
         ours, theirs = times["Bullet"], times["OpenSim"]
         ratio = f"{ours / theirs:.1f}" if ours and theirs else "-"

@@ -7,8 +7,8 @@ Give a folder with clones of the repositories of the others; those that are not 
     git clone https://github.com/MyoHub/myo_sim
     git clone https://github.com/opensim-org/opensim-models
 
-Their files are older than MuJoCo 4, which gives side sites another meaning: compare with MuJoCo 3 installed. Seconds
-are of processors, not of the clock.
+Their files are older than MuJoCo 4, which gives side sites another meaning: compare with MuJoCo 3
+installed. Seconds are of processors, not of the clock.
 """
 
 from __future__ import annotations
@@ -25,9 +25,17 @@ import osimlite
 from osimlite.translate.mjcf.check import Check, check_mjcf
 from osimlite.translate.mjcf.draft import Version
 
-MYO, O2M, SIM, OPENSIM = "myoconverter/models", "O2MConverter/models", "myo_sim", "opensim-models/Models"
+MYO, O2M, SIM, OPENSIM = (
+    "myoconverter/models",
+    "O2MConverter/models",
+    "myo_sim",
+    "opensim-models/Models",
+)
 FILES = {
-    f"{MYO}/osim/Arm26/arm26.osim": [f"{MYO}/mjc/Arm26/arm26_cvt3.xml", f"{SIM}/elbow/myoelbow_2dof6muscles.xml"],
+    f"{MYO}/osim/Arm26/arm26.osim": [
+        f"{MYO}/mjc/Arm26/arm26_cvt3.xml",
+        f"{SIM}/elbow/myoelbow_2dof6muscles.xml",
+    ],
     f"{MYO}/osim/Gait10dof18musc/gait10dof18musc.osim": [
         f"{MYO}/mjc/Gait10dof18musc/gait10dof18musc_cvt3.xml",
         f"{O2M}/converted/gait10dof18musc_converted/gait10dof18musc_converted.xml",
@@ -45,9 +53,7 @@ FILES = {
 """Models, and the files that others have made of them."""
 
 HEAD = f"{'':24} {'s':>5} {'length, mm':>16} {'moment arm, mm':>24} {'force':>6} {'fiber':>8} {'worst':>6}"
-UNDER = (
-    f"{'':24} {'':>5} {'median':>8}{'worst':>8} {'mean':>8}{'90 %':>8}{'worst':>8} {'/ Fmax':>6} {'> 10 %':>8} {'x':>6}"
-)
+UNDER = f"{'':24} {'':>5} {'median':>8}{'worst':>8} {'mean':>8}{'90 %':>8}{'worst':>8} {'/ Fmax':>6} {'> 10 %':>8} {'x':>6}"
 
 
 def row(name: str, seconds: float | None, check: Check) -> str:
@@ -89,10 +95,22 @@ def main(base: Path) -> None:
                 start = time.process_time()
                 made = osimlite.to_mjcf(model, mujoco=version, visuals=False, fit=fit)
                 seconds = time.process_time() - start
-                print(row(f"  osimlite --fit {fit}", seconds, check_mjcf(model, made.write(folder)[0])), flush=True)
+                print(
+                    row(
+                        f"  osimlite --fit {fit}", seconds, check_mjcf(model, made.write(folder)[0])
+                    ),
+                    flush=True,
+                )
         for other in others:
             if (base / other).exists():
-                print(row(f"  {other.partition('/')[0]}", None, check_mjcf(model, loadable(base / other))), flush=True)
+                print(
+                    row(
+                        f"  {other.partition('/')[0]}",
+                        None,
+                        check_mjcf(model, loadable(base / other)),
+                    ),
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":

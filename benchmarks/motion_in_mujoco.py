@@ -1,9 +1,11 @@
 """How fast models move in MuJoCo, by the plain file and by the driver, beside OpenSim: simulated seconds per second.
 
-From the default pose, in processor time, in turn; the least of three. OpenSim takes the steps that its accuracy asks
-for; the plain file has other laws (see docs/mujoco.md). Give the model files; the walker is always among them:
+From the default pose, in processor time, in turn; the least of three. OpenSim takes the steps that
+its accuracy asks for; the plain file has other laws (see docs/mujoco.md). Give the model files; the
+walker is always among them:
 
-    python benchmarks/motion_in_mujoco.py opensim-models/Models/*/{gait10dof18musc,Rajagopal2016}.osim
+    python benchmarks/motion_in_mujoco.py
+    opensim-models/Models/*/{gait10dof18musc,Rajagopal2016}.osim
 """
 
 from __future__ import annotations
@@ -30,7 +32,9 @@ def main() -> None:
         runs = {f"plain file, {step:g} s": plain(model, step) for step in STEPS}
         runs |= {f"driver, {step:g} s": driven(model, step) for step in STEPS}
         runs |= {f"OpenSim, {accuracy:g}": in_opensim(path, accuracy) for accuracy in ACCURACIES}
-        times = {name: min(turn[name] for turn in [timed(runs) for _ in range(ROUNDS)]) for name in runs}
+        times = {
+            name: min(turn[name] for turn in [timed(runs) for _ in range(ROUNDS)]) for name in runs
+        }
         for name, seconds in times.items():
             print(f"{path.stem:24} {name:20} {TO / seconds:8.2f} s/s")
 

@@ -2,9 +2,10 @@
 
     python benchmarks/motions.py [FILE ...]
 
-Without files: a double pendulum, a block on four balls, and real models of the shared corpus if that stands beside the
-repository. Muscles and paths that wrap act in neither program. Times are of the processor, warm; "apart" is the largest
-difference (rad or m) between the two programs at the end, at the same accuracy.
+Without files: a double pendulum, a block on four balls, and real models of the shared corpus if
+that stands beside the repository. Muscles and paths that wrap act in neither program. Times are of
+the processor, warm; "apart" is the largest difference (rad or m) between the two programs at the
+end, at the same accuracy.
 """
 
 from __future__ import annotations
@@ -41,7 +42,12 @@ from osimlite.simulation.elements.kind import kind_of_class
 from simulate import run_opensim, run_ours
 
 CORPUS = Path(__file__).resolve().parents[2] / "shared" / "corpus" / "converted"
-REAL = {"m0005": "gait10dof18musc", "m0013": "gait2392", "m0954": "Rajagopal", "m0161": "a shoulder"}
+REAL = {
+    "m0005": "gait10dof18musc",
+    "m0013": "gait2392",
+    "m0954": "Rajagopal",
+    "m0161": "a shoulder",
+}
 TO, ACCURACY, ROUNDS = 0.5, 1e-6, 5
 
 
@@ -71,9 +77,15 @@ def main() -> None:
                     other = dict(zip(names, theirs(), strict=True))
                     cells[title] = f"{max(abs(mine[key] - other[key]) for key in mine):.1e}"
                     words = f"{name}, {title}"
-                    times.append(pair(words, ours=ours, theirs=theirs, rounds=ROUNDS, clock=time.process_time))
+                    times.append(
+                        pair(
+                            words, ours=ours, theirs=theirs, rounds=ROUNDS, clock=time.process_time
+                        )
+                    )
                     size = len(simulation.engine.order)
-            apart.add_row(name, str(size), cells.get("PyBullet", "refused"), cells.get("compiled", "refused"))
+            apart.add_row(
+                name, str(size), cells.get("PyBullet", "refused"), cells.get("compiled", "refused")
+            )
     console.print(apart)
     report(f"{TO:g} s, warm, accuracy {ACCURACY:g}", times, console=console)
 
@@ -104,10 +116,15 @@ def pendulum() -> Model:
     above = model.ground
     for name in ("upper", "lower"):
         rod = model.add(Body(name=name, mass=1.0, inertia=(0.1, 0.01, 0.1, 0.0, 0.0, 0.0)))
-        pin = PinJoint(name=f"pin_{name}", coordinates=[Coordinate(name=f"angle_{name}", default_value=1.0)])
+        pin = PinJoint(
+            name=f"pin_{name}", coordinates=[Coordinate(name=f"angle_{name}", default_value=1.0)]
+        )
         model.add(
             pin.between(
-                above, rod, at=(0.0, -0.5, 0.0) if name == "lower" else (0.0, 0.0, 0.0), child_at=(0.0, 0.5, 0.0)
+                above,
+                rod,
+                at=(0.0, -0.5, 0.0) if name == "lower" else (0.0, 0.0, 0.0),
+                child_at=(0.0, 0.5, 0.0),
             )
         )
         above = rod
@@ -125,9 +142,15 @@ def block() -> Model:
     floor = model.add(ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=turned))
     for number, (x, z) in enumerate(((-1, -1), (-1, 1), (1, -1), (1, 1))):
         place = (0.15 * x, -0.1, 0.15 * z)
-        ball = model.add(ContactSphere(name=f"ball{number}", socket_frame=body, location=place, radius=0.05))
+        ball = model.add(
+            ContactSphere(name=f"ball{number}", socket_frame=body, location=place, radius=0.05)
+        )
         one = HuntCrossleyForce.ContactParameters(
-            geometry=(ball, floor), stiffness=1e6, dissipation=1.0, static_friction=0.6, dynamic_friction=0.5
+            geometry=(ball, floor),
+            stiffness=1e6,
+            dissipation=1.0,
+            static_friction=0.6,
+            dynamic_friction=0.5,
         )
         parameters = HuntCrossleyForce.ContactParametersSet(objects=[one])
         model.add(HuntCrossleyForce(name=f"contact{number}", contact_parameters=parameters))

@@ -1,8 +1,9 @@
 """Runs of a muscle-driven model under other controls each: `osimlite sweep` with one worker, beside OpenSim's Manager.
 
-gait10dof18musc for half a second from equilibrium, at accuracy 1e-3. Each muscle, alike on both sides, has six nodes of
-its control. osimlite's time is that of the whole sweep: samples, models, simulations, an expression of the mass centre,
-the file. OpenSim's model is made once, and only the ordinates of its functions change. Times of the processor, in turn.
+gait10dof18musc for half a second from equilibrium, at accuracy 1e-3. Each muscle, alike on both
+sides, has six nodes of its control. osimlite's time is that of the whole sweep: samples, models,
+simulations, an expression of the mass centre, the file. OpenSim's model is made once, and only the
+ordinates of its functions change. Times of the processor, in turn.
 
     python benchmarks/muscle_sweep.py
 """
@@ -35,7 +36,13 @@ TO, NODES, RUNS, ROUNDS, HEIGHT = 0.5, 6, 100, 3, "end(center_of_mass_Y)"
 
 def main() -> None:
     model = osimlite.read(MODEL)
-    made = plan(model, {f"{{*}}_?/control@0:{TO:g}:{NODES}": "0.01:1"}, measures=(HEIGHT,), to=TO, equilibrate=True)
+    made = plan(
+        model,
+        {f"{{*}}_?/control@0:{TO:g}:{NODES}": "0.01:1"},
+        measures=(HEIGHT,),
+        to=TO,
+        equilibrate=True,
+    )
     chosen = samples(made.variables, "sobol", RUNS)
     rows, variants = chosen.block(0, RUNS), Variants(made)
     variants.put(rows[0].tolist())
@@ -47,9 +54,15 @@ def main() -> None:
         name = f"{RUNS} runs of {TO:g} s, {len(made.variables)} nodes"
         times = pair(name, ours=ours, theirs=theirs, rounds=ROUNDS, clock=time.process_time)
     console = Console()
-    report("gait10dof18musc under other controls each, accuracy 1e-3, processor time", [times], console=console)
+    report(
+        "gait10dof18musc under other controls each, accuracy 1e-3, processor time",
+        [times],
+        console=console,
+    )
     apart = np.abs(Runner(made).run(rows).measures[HEIGHT] - np.array(theirs()))
-    console.print(f"heights differ by {np.median(apart):.2g} m in the middle, {apart.max():.2g} at most")
+    console.print(
+        f"heights differ by {np.median(apart):.2g} m in the middle, {apart.max():.2g} at most"
+    )
 
 
 def by_opensim(path: Path, names: list[str], rows: Floats) -> Callable[[], list[float]]:

@@ -2,11 +2,12 @@
 
     python benchmarks/muscles.py [NAME=FILE ...]
 
-Without files: models of the shared corpus, if that stands beside the repository. An evaluation is that of the
-derivative of a state, in turn of 16 poses; OpenSim's goes through its Python binding, which adds about a microsecond.
-Motions start from the equilibrium of the muscles and go 0.1 s at accuracy 1e-5. "apart" is the largest difference of a
-coordinate (rad or m) between the programs at the end of the motion, "steps" how many each took. "First use" is a new
-process with an empty cache of machine code, then one that has it, less what reading the model takes.
+Without files: models of the shared corpus, if that stands beside the repository. An evaluation is
+that of the derivative of a state, in turn of 16 poses; OpenSim's goes through its Python binding,
+which adds about a microsecond. Motions start from the equilibrium of the muscles and go 0.1 s at
+accuracy 1e-5. "apart" is the largest difference of a coordinate (rad or m) between the programs at
+the end of the motion, "steps" how many each took. "First use" is a new process with an empty cache
+of machine code, then one that has it, less what reading the model takes.
 """
 
 from __future__ import annotations
@@ -63,7 +64,12 @@ def main() -> None:
     ends = Table(title=f"After {TO:g} s at accuracy {ACCURACY:g}")
     for heading in ("model", "muscles", "engine", "steps", "OpenSim's", "apart"):
         ends.add_column(heading, justify="left" if heading in ("model", "engine") else "right")
-    times: dict[str, list[Pair]] = {"evaluation": [], "motion": [], "moment arms": [], "equilibrium": []}
+    times: dict[str, list[Pair]] = {
+        "evaluation": [],
+        "motion": [],
+        "moment arms": [],
+        "equilibrium": [],
+    }
     with tempfile.TemporaryDirectory() as folder:
         for name, path in models(Path(folder)):
             theirs = opensim.Model(str(path))
@@ -73,7 +79,12 @@ def main() -> None:
                 with Simulation(model, engine, opensim_derivatives=True) as simulation:
                     title = f"{name}, {engine}"
                     times["evaluation"].append(
-                        compared(title, evaluations(simulation), in_poses(theirs, theirs.realizeAcceleration), POSES)
+                        compared(
+                            title,
+                            evaluations(simulation),
+                            in_poses(theirs, theirs.realizeAcceleration),
+                            POSES,
+                        )
                     )
                     ours, other = motions(simulation), their_motions(theirs, ROUNDS + 2)
                     row = apart(simulation, ours(), other())
@@ -81,8 +92,12 @@ def main() -> None:
                     times["motion"].append(compared(title, ours, other))
                     if engine == "compiled":
                         asked = in_poses(theirs, theirs.equilibrateMuscles)
-                        times["equilibrium"].append(compared(name, equilibria(simulation), asked, POSES))
-            times["moment arms"].append(compared(name, moment_arms(model, theirs), their_moment_arms(theirs)))
+                        times["equilibrium"].append(
+                            compared(name, equilibria(simulation), asked, POSES)
+                        )
+            times["moment arms"].append(
+                compared(name, moment_arms(model, theirs), their_moment_arms(theirs))
+            )
             console.print(f"{name}: first use {first_use(path)}", highlight=False)
         console.print(ends)
         for title, pairs in times.items():
@@ -101,9 +116,13 @@ def models(folder: Path) -> Iterator[tuple[str, Path]]:
             yield name, folder / f"{number}.osim"
 
 
-def compared(name: str, ours: Callable[[], object], theirs: Callable[[], object], count: int = 1) -> Pair:
+def compared(
+    name: str, ours: Callable[[], object], theirs: Callable[[], object], count: int = 1
+) -> Pair:
     found = pair(name, ours=ours, theirs=theirs, rounds=ROUNDS, clock=time.process_time)
-    return Pair(name, *(tuple(value / count for value in row) for row in (found.ours, found.theirs)))
+    return Pair(
+        name, *(tuple(value / count for value in row) for row in (found.ours, found.theirs))
+    )
 
 
 # ---------------------------------------------------------------------------------------------- one evaluation
@@ -185,7 +204,9 @@ def moment_arms(model: Any, theirs: Any) -> Callable[[], object]:
 def their_moment_arms(model: Any) -> Callable[[], None]:
     state = opensim.State(model.initializeState())
     muscles = [model.getMuscles().get(k) for k in range(model.getMuscles().getSize())]
-    coordinates = [model.getCoordinateSet().get(k) for k in range(model.getCoordinateSet().getSize())]
+    coordinates = [
+        model.getCoordinateSet().get(k) for k in range(model.getCoordinateSet().getSize())
+    ]
 
     def run() -> None:
         state.setQ(state.getQ())
@@ -213,7 +234,11 @@ def first_use(path: Path) -> str:
         environment = {**os.environ, "NUMBA_CACHE_DIR": cache}
         command = [sys.executable, "-c", FIRST, str(path)]
         seconds = [
-            float(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
+            float(
+                subprocess.run(
+                    command, env=environment, check=True, capture_output=True, text=True
+                ).stdout
+            )
             for _ in range(2)
         ]
     return f"{seconds[0]:.2f} s the first time, {seconds[1]:.2f} s the second"
@@ -240,7 +265,11 @@ def sweep(path: Path | None, console: Console) -> None:
             manager.integrate(TO)
 
     found = pair(
-        f"{RUNS} runs of {SWEPT}", ours=lambda: runner.run(rows), theirs=theirs, rounds=3, clock=time.process_time
+        f"{RUNS} runs of {SWEPT}",
+        ours=lambda: runner.run(rows),
+        theirs=theirs,
+        rounds=3,
+        clock=time.process_time,
     )
     report(
         "A sweep, processor time",

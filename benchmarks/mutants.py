@@ -1,14 +1,16 @@
 """Mutation check: how many small faults in the package the tests find.
 
-A mutant is one operator, constant or branch of the source changed at random. For each one the tests that run its line
-are called, in a copy of the repository, until the first failure. ``--record`` runs the quick suite once under coverage
-and writes which tests run which lines. Without such a record the tests of the package's own folder are called, which
-take longer and may miss those elsewhere.
+A mutant is one operator, constant or branch of the source changed at random. For each one the tests
+that run its line are called, in a copy of the repository, until the first failure. ``--record``
+runs the quick suite once under coverage and writes which tests run which lines. Without such a
+record the tests of the package's own folder are called, which take longer and may miss those
+elsewhere.
 
-    python benchmarks/mutants.py --record lines.sqlite
-    python benchmarks/mutants.py --lines lines.sqlite --count 60 --seed 1 [--full] [--packages lint,schema]
+    python benchmarks/mutants.py --record lines.sqlite python benchmarks/mutants.py --lines
+    lines.sqlite --count 60 --seed 1 [--full] [--packages lint,schema]
 
-A mutant of a kernel changes its digest: it is compiled anew, or runs as Python where no compiler is found.
+A mutant of a kernel changes its digest: it is compiled anew, or runs as Python where no compiler is
+found.
 """
 
 from __future__ import annotations
@@ -31,7 +33,17 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = (
     "schema", "io", "lint", "mechanics", "simulation", "tools", "optimal", "translate"
 )  # fmt: skip
-COPIED = ("osimlite", "tests", "fixtures", "schemas", "benchmarks", "docs", "pyproject.toml", "README.md", "editors")
+COPIED = (
+    "osimlite",
+    "tests",
+    "fixtures",
+    "schemas",
+    "benchmarks",
+    "docs",
+    "pyproject.toml",
+    "README.md",
+    "editors",
+)
 OPERATORS: dict[type[ast.AST], tuple[str, str]] = {
     ast.Add: ("+", "-"), ast.Sub: ("-", "+"), ast.Mult: ("*", "/"), ast.Div: ("/", "*"), ast.Lt: ("<", "<="),
     ast.LtE: ("<=", "<"), ast.Gt: (">", ">="), ast.GtE: (">=", ">"), ast.Eq: ("==", "!="), ast.NotEq: ("!=", "=="),
@@ -84,13 +96,19 @@ def find_mutants(file: str, text: str) -> Iterator[Mutant]:
             yield from between(node.values[0], node.values[1], node.op)
         elif isinstance(node, ast.Constant) and isinstance(node.value, int | float):
             assert node.end_lineno is not None and node.end_col_offset is not None
-            start, end = offset(node.lineno, node.col_offset), offset(node.end_lineno, node.end_col_offset)
+            start, end = (
+                offset(node.lineno, node.col_offset),
+                offset(node.end_lineno, node.end_col_offset),
+            )
             new = str(not node.value) if isinstance(node.value, bool) else repr(node.value + 1)
             yield Mutant(file, node.lineno, start, end, data[start:end].decode(), new)
         elif isinstance(node, ast.If | ast.IfExp | ast.While):
             test = node.test
             assert test.end_lineno is not None and test.end_col_offset is not None
-            start, end = offset(test.lineno, test.col_offset), offset(test.end_lineno, test.end_col_offset)
+            start, end = (
+                offset(test.lineno, test.col_offset),
+                offset(test.end_lineno, test.end_col_offset),
+            )
             old = data[start:end].decode()
             yield Mutant(file, test.lineno, start, end, old, f"(not ({old}))")
 
@@ -103,7 +121,9 @@ def _code_nodes(node: ast.AST) -> Iterator[ast.AST]:
                 yield from ast.walk(statement)
 
 
-def choose_mutants(packages: Sequence[str], count: int, seed: int, lines: Lines | None) -> list[Mutant]:
+def choose_mutants(
+    packages: Sequence[str], count: int, seed: int, lines: Lines | None
+) -> list[Mutant]:
     """Return mutants in equal shares of the packages; with a record, of lines that some test runs."""
     draw, result = random.Random(seed), []
     for number in range(count):
@@ -130,7 +150,10 @@ class Lines:
 
         self.data = CoverageData(str(file))
         self.data.read()
-        self.files = {Path(name).as_posix().rpartition("/osimlite/")[2]: name for name in self.data.measured_files()}
+        self.files = {
+            Path(name).as_posix().rpartition("/osimlite/")[2]: name
+            for name in self.data.measured_files()
+        }
 
     def tests_of(self, mutant: Mutant) -> list[str]:
         """Return the tests that run the line of a mutant, those of its package first."""
@@ -150,7 +173,9 @@ def neighbours(mutant: Mutant) -> list[str]:
     return sorted(names, key=lambda name: (parts[-1] not in name, name))[:8]
 
 
-def try_mutant(mutant: Mutant, tests: Sequence[str], folder: Path, *, full: bool, seconds: float) -> str:
+def try_mutant(
+    mutant: Mutant, tests: Sequence[str], folder: Path, *, full: bool, seconds: float
+) -> str:
     """Call tests with a mutant in place, and return `killed`, `survived` or `untested`."""
     if not tests:
         return "untested"
@@ -174,20 +199,34 @@ def try_mutant(mutant: Mutant, tests: Sequence[str], folder: Path, *, full: bool
 
 def record(file: Path) -> int:
     """Run the quick suite under coverage, with the name of each test as context."""
-    command = [sys.executable, "-m", "pytest", "-q", "--cov=osimlite", "--cov-context=test", "--cov-report="]
-    return subprocess.run(command, cwd=ROOT, env={**os.environ, "COVERAGE_FILE": str(file)}, check=False).returncode
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "--cov=osimlite",
+        "--cov-context=test",
+        "--cov-report=",
+    ]
+    return subprocess.run(
+        command, cwd=ROOT, env={**os.environ, "COVERAGE_FILE": str(file)}, check=False
+    ).returncode
 
 
 def main() -> int:
     """Print a line for each mutant, and the share that the tests kill."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--record", type=Path, help="write which tests run which lines (needs pytest-cov), and stop")
+    parser.add_argument(
+        "--record", type=Path, help="write which tests run which lines (needs pytest-cov), and stop"
+    )
     parser.add_argument("--lines", type=Path, help="such a record")
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--packages", default=",".join(PACKAGES))
     parser.add_argument("--full", action="store_true", help="call the tests of the full suite too")
-    parser.add_argument("--seconds", type=float, default=300.0, help="a mutant whose tests take longer is killed")
+    parser.add_argument(
+        "--seconds", type=float, default=300.0, help="a mutant whose tests take longer is killed"
+    )
     words = parser.parse_args()
     if words.record:
         return record(words.record)
@@ -197,7 +236,9 @@ def main() -> int:
         folder = Path(place)
         for name in COPIED:
             if (ROOT / name).is_dir():
-                shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+                shutil.copytree(
+                    ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__")
+                )
             elif (ROOT / name).exists():
                 shutil.copy(ROOT / name, folder / name)
         for mutant in choose_mutants(words.packages.split(","), words.count, words.seed, lines):
@@ -206,7 +247,10 @@ def main() -> int:
             fate = try_mutant(mutant, tests, folder, full=words.full, seconds=words.seconds)
             counts[fate] += 1
             taken = f"{time.monotonic() - start:5.0f} s  {len(tests):2d} tests"
-            print(f"{fate:9}{taken}  {mutant.file}:{mutant.line}  {mutant.old} -> {mutant.new}", flush=True)
+            print(
+                f"{fate:9}{taken}  {mutant.file}:{mutant.line}  {mutant.old} -> {mutant.new}",
+                flush=True,
+            )
     tried = counts["killed"] + counts["survived"]
     print(f"{counts['killed']} of {tried} killed, {counts['untested']} untested")
     return 0

@@ -5,11 +5,12 @@
 FOLDER: sources of opensim-core, or its git directory (``git clone --bare``), for walks and gaits.
 ``benchmarks/refinement.py`` shows what meshes save that are refined where it is needed.
 
-Seconds are those of the processor, medians of the rounds. *Set-up and solve* begins with the files, in a process that
-has loaded its libraries and solved another small study; the *process* is a whole one from its start, which solves one.
-Moco uses one thread (``OPENSIM_MOCO_PARALLEL=0``), as we do: more make its processor time larger. The violation is what
-Moco says of each solution file: its own largest constraint violation where it is the guess, before the first step.
-Studies that Moco takes most of an hour for are solved here alone, and only by name.
+Seconds are those of the processor, medians of the rounds. *Set-up and solve* begins with the files,
+in a process that has loaded its libraries and solved another small study; the *process* is a whole
+one from its start, which solves one. Moco uses one thread (``OPENSIM_MOCO_PARALLEL=0``), as we do:
+more make its processor time larger. The violation is what Moco says of each solution file: its own
+largest constraint violation where it is the guess, before the first step. Studies that Moco takes
+most of an hour for are solved here alone, and only by name.
 """
 
 from __future__ import annotations
@@ -109,13 +110,17 @@ print(json.dumps([success, solution.getNumIterations(), solution.getObjective(),
 
 def main(names: list[str], core: Path, rounds: int) -> None:
     """Print a table in Markdown."""
-    print("| study | | iterations | objective | violation | set-up and solve, s | times | process, s | times |")
+    print(
+        "| study | | iterations | objective | violation | set-up and solve, s | times | process, s | times |"
+    )
     print("|---|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as place:
         warm = Path(place) / "study.omoco"
         kept("sliding-100")(Path(place), core)
         text = warm.read_text(encoding="utf-8")
-        warm.write_text(text.replace("<num_mesh_intervals>100<", "<num_mesh_intervals>5<"), encoding="utf-8")
+        warm.write_text(
+            text.replace("<num_mesh_intervals>100<", "<num_mesh_intervals>5<"), encoding="utf-8"
+        )
         for name in names or STUDIES:
             folder = Path(place) / name.replace(" ", "_")
             folder.mkdir()
@@ -153,18 +158,35 @@ def _study(name: str, folder: Path, warm: str, rounds: int) -> None:
             spent[side].append(said[side][3])
             if side == "Moco":
                 # A second one would take minutes; its libraries are loaded before it begins.
-                cold, _ = _run("import json, time, opensim\nprint(json.dumps([time.process_time()]))", [], folder)
+                cold, _ = _run(
+                    "import json, time, opensim\nprint(json.dumps([time.process_time()]))",
+                    [],
+                    folder,
+                )
                 whole[side].append(cold[0] + said[side][3])
             else:
                 whole[side].append(_run(code, [choice, ""], folder)[0][4])
-            missed[side] = "-" if name in LONG else _violation(folder, "theirs.sto" if side == "Moco" else "ours.sto")
+            missed[side] = (
+                "-"
+                if name in LONG
+                else _violation(folder, "theirs.sto" if side == "Moco" else "ours.sto")
+            )
     for number, side in enumerate(sides):
         success, iterations, objective, *_ = said[side]
         note = "" if success else " (not solved)"
-        cells = ["" if number else name, side + note, f"{iterations}", f"{objective:.7g}", missed[side]]
+        cells = [
+            "" if number else name,
+            side + note,
+            f"{iterations}",
+            f"{objective:.7g}",
+            missed[side],
+        ]
         for kind in (spent, whole):
             own = median(kind[side])
-            cells += [f"{own:.3g}", "" if side == "Moco" or name in LONG else f"{median(kind['Moco']) / own:.1f}"]
+            cells += [
+                f"{own:.3g}",
+                "" if side == "Moco" or name in LONG else f"{median(kind['Moco']) / own:.1f}",
+            ]
         print("|", *(f"{cell} |" for cell in cells), flush=True)
 
 
@@ -199,7 +221,9 @@ def _violation(folder: Path, solution: str) -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("studies", nargs="*", choices=[[], *STUDIES, *LONG], default=[])
     parser.add_argument("--core", type=Path, default=CORE)
     parser.add_argument("--rounds", type=int, default=1)

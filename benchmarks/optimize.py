@@ -1,18 +1,20 @@
 """OpenSim's own example of an optimisation, the walker that is to get far in ten seconds, done by both programs.
 
-The example varies nine numbers of the start: the angles of hips and knees, the forward speed of the pelvis, and the
-angular speeds of hips and knees. It makes the distance large, less 10 times the square of what the forward speed lies
-outside 0 to 2 m/s, by cma with populations of 20, a step of 0.5, tolerances of 1e-3 and 100 evaluations. Both programs
-do so on the same model with the same random numbers; OpenSim by a loop over its Manager, as in the example, osimlite by
-`optimize` with an objective in Python. Both ask for the same points, and put them into the same order.
+The example varies nine numbers of the start: the angles of hips and knees, the forward speed of the
+pelvis, and the angular speeds of hips and knees. It makes the distance large, less 10 times the
+square of what the forward speed lies outside 0 to 2 m/s, by cma with populations of 20, a step of
+0.5, tolerances of 1e-3 and 100 evaluations. Both programs do so on the same model with the same
+random numbers; OpenSim by a loop over its Manager, as in the example, osimlite by `optimize` with
+an objective in Python. Both ask for the same points, and put them into the same order.
 
-In ten seconds of contacts the last bit of a number grows to millimetres, so that no two programs agree on a distance
-more closely than one of them with itself: the table shows what OpenSim makes of its best start when one of the nine
-numbers, each in turn, is moved to the floating-point number next to it.
+In ten seconds of contacts the last bit of a number grows to millimetres, so that no two programs
+agree on a distance more closely than one of them with itself: the table shows what OpenSim makes of
+its best start when one of the nine numbers, each in turn, is moved to the floating-point number
+next to it.
 
-Then `osimlite optimize` with the numbers within bounds: with as many evaluations by sobol-cma, which is made for few,
-and with twenty times as many by cma. In turn; times by the clock are of all that follows once the model is read, and
-osimlite writes history and model within its.
+Then `osimlite optimize` with the numbers within bounds: with as many evaluations by sobol-cma,
+which is made for few, and with twenty times as many by cma. In turn; times by the clock are of all
+that follows once the model is read, and osimlite writes history and model within its.
 
     python benchmarks/optimize.py 1 2 3        # these seeds
     python benchmarks/optimize.py --ours 20    # twenty seeds, osimlite alone
@@ -78,11 +80,29 @@ def side_by_side(first: Floats, seeds: Sequence[int], folder: Path) -> list[Tabl
     import opensim
 
     opensim.Logger.setLevelString("off")
-    example = Table(title=f"The example's settings, {BUDGET} evaluations of {TO:g} s", caption=UNITS)
-    for heading in ("seed", "OpenSim", "its last bits: least", "most", "s", "osimlite", "s", "times as fast"):
+    example = Table(
+        title=f"The example's settings, {BUDGET} evaluations of {TO:g} s", caption=UNITS
+    )
+    for heading in (
+        "seed",
+        "OpenSim",
+        "its last bits: least",
+        "most",
+        "s",
+        "osimlite",
+        "s",
+        "times as fast",
+    ):
         example.add_column(heading, justify="right")
     own = Table(title="osimlite's own settings, within bounds", caption=UNITS)
-    for heading in ("seed", f"{BUDGET} evaluations", "less OpenSim's", "s", f"{LONGER * BUDGET} evaluations", "s"):
+    for heading in (
+        "seed",
+        f"{BUDGET} evaluations",
+        "less OpenSim's",
+        "s",
+        f"{LONGER * BUDGET} evaluations",
+        "s",
+    ):
         own.add_column(heading, justify="right")
     for seed in seeds:
         (theirs, moved), slow = timed(partial(by_opensim, opensim, first, seed))
@@ -91,11 +111,26 @@ def side_by_side(first: Floats, seeds: Sequence[int], folder: Path) -> list[Tabl
         ours, fast = timed(partial(as_the_example, first, seed, where / "same", BUDGET))
         spread = (f"{min(moved.distances):.4f}", f"{max(moved.distances):.4f}")
         example.add_row(
-            str(seed), f"{theirs:.4f}", *spread, f"{slow:.2f}", f"{ours:.4f}", f"{fast:.3f}", f"{slow / fast:.1f}"
+            str(seed),
+            f"{theirs:.4f}",
+            *spread,
+            f"{slow:.2f}",
+            f"{ours:.4f}",
+            f"{fast:.3f}",
+            f"{slow / fast:.1f}",
         )
-        few, took = timed(partial(within_bounds, first, seed, where / "few", BUDGET, method="sobol-cma"))
+        few, took = timed(
+            partial(within_bounds, first, seed, where / "few", BUDGET, method="sobol-cma")
+        )
         many, longer = timed(partial(within_bounds, first, seed, where / "many", LONGER * BUDGET))
-        own.add_row(str(seed), f"{few:.4f}", f"{few - theirs:+.4f}", f"{took:.3f}", f"{many:.4f}", f"{longer:.3f}")
+        own.add_row(
+            str(seed),
+            f"{few:.4f}",
+            f"{few - theirs:+.4f}",
+            f"{took:.3f}",
+            f"{many:.4f}",
+            f"{longer:.3f}",
+        )
     return [example, own]
 
 
@@ -103,11 +138,24 @@ def ours_alone(first: Floats, seeds: Sequence[int], folder: Path) -> Table:
     """How far each way of searching gets, over many seeds."""
     ways: dict[str, Callable[[int, Path], float]] = {
         "the example's settings": lambda seed, where: as_the_example(first, seed, where, BUDGET),
-        "cma within bounds": lambda seed, where: within_bounds(first, seed, where, BUDGET, method="cma"),
-        "sobol-cma within bounds": lambda seed, where: within_bounds(first, seed, where, BUDGET, method="sobol-cma"),
+        "cma within bounds": lambda seed, where: within_bounds(
+            first, seed, where, BUDGET, method="cma"
+        ),
+        "sobol-cma within bounds": lambda seed, where: within_bounds(
+            first, seed, where, BUDGET, method="sobol-cma"
+        ),
     }
     table = Table(title=f"{BUDGET} evaluations of {TO:g} s, {len(seeds)} seeds", caption=UNITS)
-    for heading in ("", "least", "quarter", "median", "three quarters", "most", "farther than the example's", "s"):
+    for heading in (
+        "",
+        "least",
+        "quarter",
+        "median",
+        "three quarters",
+        "most",
+        "farther than the example's",
+        "s",
+    ):
         table.add_column(heading, justify="right" if heading else "left")
     example: list[float] = []
     for name, way in ways.items():
@@ -117,7 +165,12 @@ def ours_alone(first: Floats, seeds: Sequence[int], folder: Path) -> Table:
         example = example or found
         farther = sum(a > b for a, b in zip(found, example, strict=True))
         quartiles = (f"{x:.3f}" for x in np.quantile(found, (0.0, 0.25, 0.5, 0.75, 1.0)))
-        table.add_row(name, *quartiles, f"{farther} of {len(seeds)}" if found is not example else "", f"{took:.3f}")
+        table.add_row(
+            name,
+            *quartiles,
+            f"{farther} of {len(seeds)}" if found is not example else "",
+            f"{took:.3f}",
+        )
     return table
 
 
@@ -134,7 +187,8 @@ def starting_point() -> Floats:
 
 
 def as_the_example(first: Floats, seed: int, folder: Path, budget: int) -> float:
-    # Ranges of length one, which may be left, make a fraction of the ranges the step in rad and m/s.
+    # Ranges of length one, which may be left, make a fraction of the ranges the step in rad and
+    # m/s.
     vary = {name: (x - 0.5, x + 0.5) for name, x in zip(NAMES, first.tolist(), strict=True)}
     found = optimize(
         plan(osimlite.read(MODEL), vary, measures=(), to=TO),
@@ -153,7 +207,9 @@ def as_the_example(first: Floats, seed: int, folder: Path, budget: int) -> float
 
 
 def within_bounds(first: Floats, seed: int, folder: Path, budget: int, **choices: Any) -> float:
-    vary: dict[str, Range] = {name: (x - WITHIN, x + WITHIN) for name, x in zip(NAMES, first.tolist(), strict=True)}
+    vary: dict[str, Range] = {
+        name: (x - WITHIN, x + WITHIN) for name, x in zip(NAMES, first.tolist(), strict=True)
+    }
     vary |= {FORWARD: (0.0, 2.0), "LKnee_rz": (-1.0, 0.0), "RKnee_rz": (-1.0, 0.0)}
     made = plan(osimlite.read(MODEL), vary, measures=(), to=TO)
     return optimize(made, Objective("distance"), folder, budget=budget, seed=seed, **choices).value
@@ -195,7 +251,10 @@ def by_opensim(opensim: Any, first: Floats, seed: int) -> tuple[float, Moved]:
         return np.array([price for price, _, _ in found[-len(points) :]])
 
     with suppress(StopIteration):
-        cma(costs, Search(np.full(len(first), 0.5), STEP, POPULATION, seed, False, BUDGET, TOLERANCE))
+        cma(
+            costs,
+            Search(np.full(len(first), 0.5), STEP, POPULATION, seed, False, BUDGET, TOLERANCE),
+        )
     _, farthest, best = min(found)
     started = time.perf_counter()
     moved = []

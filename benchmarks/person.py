@@ -3,9 +3,10 @@
     python benchmarks/person.py FOLDER        a person as AddBiomechanics publishes it
     python benchmarks/person.py FOLDER 10     and so many made-up ones, who move as that one
 
-A folder has `generic.osim`, what an expert made of it, `hand_scaled.osim`, trials `NAME.trc` and what was published of
-them, `NAME.mot`; `static*.trc` is the static trial. All markers weigh the same. Made-up persons have random sizes and
-markers, the bony ones where the model has them, and 5 mm of noise.
+A folder has `generic.osim`, what an expert made of it, `hand_scaled.osim`, trials `NAME.trc` and
+what was published of them, `NAME.mot`; `static*.trc` is the static trial. All markers weigh the
+same. Made-up persons have random sizes and markers, the bony ones where the model has them, and 5
+mm of noise.
 """
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ def rms(errors: Array) -> float:
 
 def of_people(folder: Path) -> list[Array]:
     """Print the errors of each trial, fitted, the expert's, and published; returns the poses of the fitted model."""
-    generic, expert = (osimlite.read(folder / name) for name in ("generic.osim", "hand_scaled.osim"))
+    generic, expert = (
+        osimlite.read(folder / name) for name in ("generic.osim", "hand_scaled.osim")
+    )
     static = sorted(folder.glob("static*.trc"))
     trials = [path for path in sorted(folder.glob("*.trc")) if path not in static]
     start, used = time.perf_counter(), time.process_time()
@@ -52,19 +55,30 @@ def of_people(folder: Path) -> list[Array]:
     poses = []
     for path in trials:
         data = MarkerData.of(path)
-        shared = [name for name in person.markers if name in data.names and expert_has(expert, name)]
-        weights = {name: float(name in shared) for name in data.shared([marker.name for marker in markers(generic)])}
+        shared = [
+            name for name in person.markers if name in data.names and expert_has(expert, name)
+        ]
+        weights = {
+            name: float(name in shared)
+            for name in data.shared([marker.name for marker in markers(generic)])
+        }
         row = []
         for model in (person.model, expert):
             own = {name: weight for name, weight in weights.items() if expert_has(model, name)}
             motion = osimlite.inverse_kinematics(model, data, weights=own)
-            row.append(rms(motion.marker_errors[:, [motion.markers.index(name) for name in shared]]))
+            row.append(
+                rms(motion.marker_errors[:, [motion.markers.index(name) for name in shared]])
+            )
             if model is person.model:
                 poses.append(motion.values)
         published = path.with_suffix(".mot")
         if published.exists():
             row.append(as_published(expert, data, shared, published))
-        print(f"{path.stem:16} " + " ".join(f"{value:7.2f}" for value in row) + ("  WORSE" * (row[0] > row[1])))
+        print(
+            f"{path.stem:16} "
+            + " ".join(f"{value:7.2f}" for value in row)
+            + ("  WORSE" * (row[0] > row[1]))
+        )
     told(person)
     return poses
 
@@ -90,10 +104,17 @@ def as_published(model: osimlite.Model, data: MarkerData, names: list[str], path
         for k, info in enumerate(infos):
             if info.name in table.columns:
                 value = table[info.name][row]
-                q[k] = np.deg2rad(value) if table.in_degrees and info.motion_type == "rotational" else value
+                q[k] = (
+                    np.deg2rad(value)
+                    if table.in_degrees and info.motion_type == "rotational"
+                    else value
+                )
         state = mechanism.at(q)
         errors.append(
-            [np.linalg.norm(state.point(*stations[name]) - at) for name, at in zip(names, places, strict=True)]
+            [
+                np.linalg.norm(state.point(*stations[name]) - at)
+                for name, at in zip(names, places, strict=True)
+            ]
         )
     return rms(np.array(errors))
 
@@ -110,10 +131,18 @@ def made_up(generic: osimlite.Model, poses: Array, seed: int) -> None:
     rng, model = np.random.default_rng(seed), generic.copy_deep()
     bony = {marker.name for marker in markers(model) if any(part in marker.name for part in BONY)}
     sizes: dict[str, float] = {}
-    groups = {"talus": "calcn", "toes": "calcn", "ulna": "radius", "hand": "radius", "patella": "femur"}
+    groups = {
+        "talus": "calcn",
+        "toes": "calcn",
+        "ulna": "radius",
+        "hand": "radius",
+        "patella": "femur",
+    }
     for body in model.components(Body):
         name = body.name.split("_")[0]
-        sizes[body.name] = sizes.setdefault(groups.get(name, name), float(np.clip(rng.normal(1.0, 0.08), 0.8, 1.2)))
+        sizes[body.name] = sizes.setdefault(
+            groups.get(name, name), float(np.clip(rng.normal(1.0, 0.08), 0.8, 1.2))
+        )
     sizes = {body.name: sizes[body.name] for body in model.components(Body)}
     scale_model(model, {name: (size,) * 3 for name, size in sizes.items()})
     offsets = {}
@@ -129,7 +158,9 @@ def made_up(generic: osimlite.Model, poses: Array, seed: int) -> None:
         for name, place in stations.items():
             rows[name].append(state.point(*place) + rng.normal(0.0, NOISE, 3))
     used = time.process_time()
-    person = osimlite.fit(generic, {"moving": {name: np.array(row) for name, row in rows.items()}}, held=bony)
+    person = osimlite.fit(
+        generic, {"moving": {name: np.array(row) for name, row in rows.items()}}, held=bony
+    )
     size = max(abs(person.factors[name][0] / own - 1.0) for name, own in sizes.items())
     off = max(float(np.linalg.norm(person.offsets[name] - by)) for name, by in offsets.items())
     print(

@@ -2,9 +2,9 @@
 
     python benchmarks/predicted_walk.py
 
-The study is solved on the mesh that it has, and refined to 1e-2 and 1e-3; then OpenSim integrates the model from the
-first state, stride after stride. A walk without reflexes falls in the end: what the mesh was too coarse for grows with
-each step.
+The study is solved on the mesh that it has, and refined to 1e-2 and 1e-3; then OpenSim integrates
+the model from the first state, stride after stride. A walk without reflexes falls in the end: what
+the mesh was too coarse for grows with each step.
 """
 
 from __future__ import annotations
@@ -43,20 +43,29 @@ def forward(osim: Any, model_file: Path, table: Any, to: float, strides: int = 1
     model.addController(brain)
     period, muscles = float(table.times[-1]), model.getMuscles()
     for k in range(muscles.getSize()):
-        lines, column = osim.PiecewiseLinearFunction(), table[f"/forceset/{muscles.get(k).getName()}"]
+        lines, column = (
+            osim.PiecewiseLinearFunction(),
+            table[f"/forceset/{muscles.get(k).getName()}"],
+        )
         known = np.isfinite(column)
         for stride in range(strides):
-            for time, value in zip(table.times[known][stride > 0 :], column[known][stride > 0 :], strict=True):
+            for time, value in zip(
+                table.times[known][stride > 0 :], column[known][stride > 0 :], strict=True
+            ):
                 lines.addPoint(float(stride * period + time), float(value))
         brain.addActuator(muscles.get(k))
         brain.prescribeControlForActuator(muscles.get(k).getName(), lines)
     state = model.initSystem()
-    for name in (name for name in table.columns if name.endswith(("/value", "/speed", "/activation"))):
+    for name in (
+        name for name in table.columns if name.endswith(("/value", "/speed", "/activation"))
+    ):
         model.setStateVariableValue(state, name, float(table[name][0]))
     manager = osim.Manager(model)
     manager.setIntegratorAccuracy(ACCURACY)
     manager.initialize(state)
-    all_times = np.concatenate([[0.0], *(stride * period + table.times[1:] for stride in range(strides))])
+    all_times = np.concatenate(
+        [[0.0], *(stride * period + table.times[1:] for stride in range(strides))]
+    )
     times = all_times[all_times <= to]
     found: dict[str, list[float]] = {name: [] for name in table.columns if name.endswith("/value")}
     for time in times.tolist():
@@ -71,13 +80,18 @@ def main() -> None:
     """Print a table in Markdown."""
     from osimlite.io.tables.storage import read_sto
 
-    print("| mesh | intervals | all, s | after a step, off by | off by 0.001, at | 0.01 | 0.1 | falls |")
+    print(
+        "| mesh | intervals | all, s | after a step, off by | off by 0.001, at | 0.01 | 0.1 | falls |"
+    )
     print("|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         model = folder / "human-walks.osim"
         _run("build", "human-walks", "-o", str(model))
-        found_of = {refine: _solved(model.with_suffix(".omoco"), folder, refine) for refine in ("", "1e-2", "1e-3")}
+        found_of = {
+            refine: _solved(model.with_suffix(".omoco"), folder, refine)
+            for refine in ("", "1e-2", "1e-3")
+        }
         # It changes where programs that are started look for libraries.
         import opensim as osim
 
@@ -98,7 +112,9 @@ def main() -> None:
             falls = f"{times[np.argmax(height < 0.7)]:.2f} s" if (height < 0.7).any() else "not"
             print(
                 f"| {f'refined to {refine}' if refine else 'as it is'} | {many // 4} | {seconds:.3g} | "
-                f"{off[many // 2]:.2g} | " + " | ".join(f"{time:.2f} s" for time in passed) + f" | {falls} |",
+                f"{off[many // 2]:.2g} | "
+                + " | ".join(f"{time:.2f} s" for time in passed)
+                + f" | {falls} |",
                 flush=True,
             )
 
@@ -109,11 +125,16 @@ def _solved(study: Path, folder: Path, refine: str) -> tuple[float, Path]:
     own = folder / f"out{refine}"
     _run("run", str(study), *(["--refine", refine] if refine else []), "-o", str(own))
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, own / "human-walks_stride.sto"
+    return (
+        after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
+        own / "human-walks_stride.sto",
+    )
 
 
 def _run(*words: str) -> None:
-    subprocess.run([sys.executable, "-m", "osimlite", *words], cwd=ROOT, capture_output=True, check=True)
+    subprocess.run(
+        [sys.executable, "-m", "osimlite", *words], cwd=ROOT, capture_output=True, check=True
+    )
 
 
 if __name__ == "__main__":

@@ -28,7 +28,9 @@ from _corpus import CORPUS
 
 REFERENCE = CORPUS.parents[1] / "oracle" / "tools" / "reference"
 WALKER = Path(__file__).resolve().parent.parent / "fixtures/walker/DynamicWalkerModel.osim"
-TOOL = "import opensim; opensim.Logger.setLevelString('off'); assert opensim.{tool}('{setup}').run()"
+TOOL = (
+    "import opensim; opensim.Logger.setLevelString('off'); assert opensim.{tool}('{setup}').run()"
+)
 SIMULATION = """
 import opensim
 opensim.Logger.setLevelString("off")
@@ -71,7 +73,9 @@ def list_cases(folder: Path) -> list[Case]:
         ("ScaleTool", "scale_gait2354", "scale.xml"),
     ):
         theirs = [sys.executable, "-c", TOOL.format(tool=name, setup=setup)]
-        cases.append(Case(name, unpack(folder, source), [*osimlite, "run", setup, "--overwrite"], theirs))
+        cases.append(
+            Case(name, unpack(folder, source), [*osimlite, "run", setup, "--overwrite"], theirs)
+        )
     walker = folder / "walker"
     walker.mkdir()
     shutil.copy(WALKER, walker)
@@ -86,21 +90,32 @@ def measure_process(command: list[str], folder: Path) -> float:
     Raises:
         RuntimeError: it failed; the message ends with what it wrote to standard error.
     """
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environment = {
+        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
+    }
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode:
-        raise RuntimeError(f"{command} ended with exit code {done.returncode}: {done.stderr.strip()}")
+        raise RuntimeError(
+            f"{command} ended with exit code {done.returncode}: {done.stderr.strip()}"
+        )
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("names", nargs="*", metavar="NAME", help="only these cases")
-    parser.add_argument("--rounds", type=int, default=5, metavar="N", help="how many pairs, 5 by default")
+    parser.add_argument(
+        "--rounds", type=int, default=5, metavar="N", help="how many pairs, 5 by default"
+    )
     options = parser.parse_args()
-    table = Table(title="Whole processes", caption="processor time in s, medians; ratio = ours / OpenSim, per pair")
+    table = Table(
+        title="Whole processes",
+        caption="processor time in s, medians; ratio = ours / OpenSim, per pair",
+    )
     table.add_column("")
     for column in ("osimlite", "OpenSim", "ratio", "least", "greatest"):
         table.add_column(column, justify="right")
@@ -113,7 +128,12 @@ def main() -> None:
                 for _ in range(1 + options.rounds)
             ][1:]
             ratios = [ours / theirs for ours, theirs in pairs]
-            numbers = (*(median(times) for times in zip(*pairs, strict=True)), median(ratios), min(ratios), max(ratios))
+            numbers = (
+                *(median(times) for times in zip(*pairs, strict=True)),
+                median(ratios),
+                min(ratios),
+                max(ratios),
+            )
             table.add_row(case.name, *(f"{number:.3f}" for number in numbers))
     Console().print(table)
 

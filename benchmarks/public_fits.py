@@ -3,9 +3,10 @@
     python benchmarks/public_fits.py setups FOLDER...
     python benchmarks/public_fits.py people FOLDER...
 
-Setups are all below a folder, which is copied first; OpenSim runs them with an accuracy of 1e-9, and with a larger one
-where that takes too long. A folder of people has `hand_scaled.osim` and trials, `NAME.trc` and what was published of
-it, `NAME.mot`, as AddBiomechanics has them; there all markers weigh the same, and OpenSim has its default accuracy.
+Setups are all below a folder, which is copied first; OpenSim runs them with an accuracy of 1e-9,
+and with a larger one where that takes too long. A folder of people has `hand_scaled.osim` and
+trials, `NAME.trc` and what was published of it, `NAME.mot`, as AddBiomechanics has them; there all
+markers weigh the same, and OpenSim has its default accuracy.
 """
 
 from __future__ import annotations
@@ -49,7 +50,9 @@ def opensim_runs(tool: Any, setup: Path, seconds: float = SECONDS) -> float | No
     """Let OpenSim run a setup in its folder: processor seconds, None if it crashes or does not come to an end."""
     command = [sys.executable, "-c", RUN.format(type(tool).__name__, setup.name)]
     try:
-        done = subprocess.run(command, cwd=setup.parent, capture_output=True, text=True, timeout=seconds, check=False)
+        done = subprocess.run(
+            command, cwd=setup.parent, capture_output=True, text=True, timeout=seconds, check=False
+        )
     except subprocess.TimeoutExpired:
         return None
     return None if done.returncode else float(done.stdout.split()[-1])
@@ -77,14 +80,20 @@ def errors(motion: FittedMotion, poses: Array, frames: Iterable[int]) -> Array:
     stations, rows = marker_stations(motion.model, motion.mechanism), []
     for q, frame in zip(poses, frames, strict=True):
         state = motion.mechanism.at(q)
-        rows.append(np.array([state.point(*stations[name]) for name in motion.markers]) - motion.measured[frame])
+        rows.append(
+            np.array([state.point(*stations[name]) for name in motion.markers])
+            - motion.measured[frame]
+        )
     return np.asarray(np.linalg.norm(rows, axis=2))
 
 
 def costs(motion: FittedMotion, tasks: Any, poses: Array) -> Array:
     """What inverse kinematics minimises, in poses (t, n) that were found elsewhere."""
     assert motion.model is not None
-    data, infos = MarkerData(motion.markers, motion.times, motion.measured), motion.mechanism.coordinates
+    data, infos = (
+        MarkerData(motion.markers, motion.times, motion.measured),
+        motion.mechanism.coordinates,
+    )
     asked = tasks_of(motion.model, motion.mechanism, tasks, data, None)
     squares = errors(motion, poses, range(len(poses))) ** 2
     weights = np.where(np.isfinite(squares), [asked.weights[name] for name in motion.markers], 0.0)
@@ -118,14 +127,18 @@ def kinematics(tool: Any, setup: Path) -> Iterator[str]:
     off = degrees(ours, apart).max(axis=1)
     yield f"{len(poses)} compared at {accuracy:g}"
     yield f"{off.max():.1e} deg at most, {np.median(off):.1e} in the median ({ours.coordinates[place]}, frame {frame})"
-    # OpenSim's constraints hold to a tenth of the accuracy, ours to rounding: pull its poses onto them.
+    # OpenSim's constraints hold to a tenth of the accuracy, ours to rounding: pull its poses onto
+    # them.
     if any(not isinstance(item, Lock) for item in ours.mechanism.constraints):
         poses = np.array([ours.mechanism.assemble(q) for q in poses])
     more = ours.costs - costs(ours, tool.ik_task_set.objects, poses)
     yield f"cost of {np.median(ours.costs):.1e} larger by {more.max():.1e} at most, smaller by {-more.min():.1e}"
     infos = enumerate(ours.mechanism.coordinates)
     ranges = [(place, *info.range) for place, info in infos if info.clamped and not info.locked]
-    ends = [np.abs(ours.values[:, [place]] - (low, high)).min(axis=1) < 1e-9 for place, low, high in ranges]
+    ends = [
+        np.abs(ours.values[:, [place]] - (low, high)).min(axis=1) < 1e-9
+        for place, low, high in ranges
+    ]
     yield f"clamped coordinates at an end in {int(np.any(ends, axis=0).sum()) if ends else 0} frames"
 
 
@@ -135,14 +148,18 @@ def numbers_of(item: Object, path: str = "") -> dict[str, Any]:
     for spec in type(item).field_specs().values():
         value, place = getattr(item, spec.name), f"{path}/{spec.name}"
         for number, one in enumerate(value if isinstance(value, list) else [value]):
-            found |= numbers_of(one, f"{place}[{number}]") if isinstance(one, Object) else {place: one}
+            found |= (
+                numbers_of(one, f"{place}[{number}]") if isinstance(one, Object) else {place: one}
+            )
     return found
 
 
 def otherwise(ours: Object, theirs: Object) -> list[str]:
     """Where models differ by more than 1e-9, of points of splines 1e-5: OpenSim prints six digits of these."""
     one, other = numbers_of(ours), numbers_of(theirs)
-    wrong = [f"{key} is only {'here' if key in one else 'there'}" for key in one.keys() ^ other.keys()]
+    wrong = [
+        f"{key} is only {'here' if key in one else 'there'}" for key in one.keys() ^ other.keys()
+    ]
     for key in one.keys() & other.keys():
         a, b = one[key], other[key]
         numbers = isinstance(b, float) or (isinstance(b, tuple) and b and isinstance(b[0], float))

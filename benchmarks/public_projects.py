@@ -23,7 +23,11 @@ def commit_of(folder: Path) -> str:
 def kinds_of(files: Iterable[str]) -> Counter[str]:
     """How many of some files are models, setups, tables."""
     return Counter(
-        "tables" if file.lower().endswith(TABLES) else "models" if file.lower().endswith(".osim") else "setups"
+        "tables"
+        if file.lower().endswith(TABLES)
+        else "models"
+        if file.lower().endswith(".osim")
+        else "setups"
         for file in files
     )
 
@@ -38,7 +42,9 @@ def by_project(found: dict[str, tuple[str, Counter[str], list[Finding]]]) -> lis
     lines = [row("project", "commit", *KINDS, "errors", "warnings", "infos"), row(*["---"] * 8)]
     for name, (commit, kinds, findings) in found.items():
         severities = Counter(str(finding.severity) for finding in findings)
-        counts = [kinds[kind] for kind in KINDS] + [severities[key] for key in ("error", "warning", "info")]
+        counts = [kinds[kind] for kind in KINDS] + [
+            severities[key] for key in ("error", "warning", "info")
+        ]
         lines.append(row(name, commit, *counts))
     return lines
 
@@ -54,14 +60,20 @@ def by_rule(found: dict[str, tuple[str, Counter[str], list[Finding]]]) -> list[s
             files[rule].add(finding.file)
             projects[rule].add(name)
     lines = [row("rule", "", "findings", "files", "projects"), row(*["---"] * 5)]
-    return lines + [row(*rule, counts[rule], len(files[rule]), len(projects[rule])) for rule in sorted(counts)]
+    return lines + [
+        row(*rule, counts[rule], len(files[rule]), len(projects[rule])) for rule in sorted(counts)
+    ]
 
 
 def main(folders: list[str]) -> None:
     found = {}
     for folder in map(Path, folders):
         report = validate(folder)
-        found[folder.resolve().name] = (commit_of(folder), kinds_of(project_files([folder])), list(report.findings))
+        found[folder.resolve().name] = (
+            commit_of(folder),
+            kinds_of(project_files([folder])),
+            list(report.findings),
+        )
     print("\n".join([*by_project(found), "", *by_rule(found)]))
 
 

@@ -1,8 +1,9 @@
 """A reach of arm26 with least effort, found by exact derivatives and by populations.
 
-What six muscles are told at five moments of 0.4 s, thirty numbers, is to bend the elbow to 1.5 rad and to stop there
-with little activation. Paths around surfaces jump; polynomials are in their places (`osimlite.modify`). Prints a table
-in Markdown: the cost that is reached, and seconds of the processor.
+What six muscles are told at five moments of 0.4 s, thirty numbers, is to bend the elbow to 1.5 rad
+and to stop there with little activation. Paths around surfaces jump; polynomials are in their
+places (`osimlite.modify`). Prints a table in Markdown: the cost that is reached, and seconds of the
+processor.
 
     python benchmarks/reach.py [ARM26.osim]
 """
@@ -23,7 +24,13 @@ MUSCLES = "TRIlong", "TRIlat", "TRImed", "BIClong", "BICshort", "BRA"
 EFFORT = " + ".join(f"integral({muscle}/activation^2)" for muscle in MUSCLES)
 COST = f"100*(end(r_elbow_flex) - 1.5)^2 + end(r_elbow_flex/speed)^2 + end(r_shoulder_elev/speed)^2 + {EFFORT}"
 TO, ACCURACY = 0.4, 1e-5
-SEARCHES = ("gradient", 100), ("cma", 300), ("cma", 3000), ("sobol-cma", 3000), ("differential-evolution", 3000)
+SEARCHES = (
+    ("gradient", 100),
+    ("cma", 300),
+    ("cma", 3000),
+    ("sobol-cma", 3000),
+    ("differential-evolution", 3000),
+)
 
 
 def main(words: list[str]) -> None:
@@ -37,8 +44,17 @@ def main(words: list[str]) -> None:
         optimize(made, Objective(COST), Path(folder) / "first", method="gradient", budget=2)
         for number, (method, budget) in enumerate(SEARCHES):
             started = time.process_time()
-            found = optimize(made, Objective(COST), Path(folder) / str(number), method=method, budget=budget, workers=1)
-            print(f"| `{method}` | {found.evaluations} | {found.value:.4f} | {time.process_time() - started:.1f} |")
+            found = optimize(
+                made,
+                Objective(COST),
+                Path(folder) / str(number),
+                method=method,
+                budget=budget,
+                workers=1,
+            )
+            print(
+                f"| `{method}` | {found.evaluations} | {found.value:.4f} | {time.process_time() - started:.1f} |"
+            )
 
 
 if __name__ == "__main__":

@@ -2,8 +2,9 @@
 
     python benchmarks/read.py [FOLDER] [--rounds N] [--processes]
 
-FOLDER holds `.osim` or `.osim.gz` files; without one the shared corpus is used. Ratios are taken inside each pair
-(see `_pair`); the last lines give the median and the worst over all files, and how time grows with size.
+FOLDER holds `.osim` or `.osim.gz` files; without one the shared corpus is used. Ratios are taken
+inside each pair (see `_pair`); the last lines give the median and the worst over all files, and how
+time grows with size.
 """
 
 from __future__ import annotations
@@ -44,12 +45,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("folder", nargs="?", type=Path, default=CORPUS)
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--processes", action="store_true", help="also time whole processes on the largest file")
+    parser.add_argument(
+        "--processes", action="store_true", help="also time whole processes on the largest file"
+    )
     options = parser.parse_args()
     try:
         import opensim
     except ImportError:
-        sys.exit("this benchmark compares with OpenSim; install it with: pip install -e '.[oracle]'")
+        sys.exit(
+            "this benchmark compares with OpenSim; install it with: pip install -e '.[oracle]'"
+        )
     import osimlite
 
     opensim.Logger.setLevelString("off")
@@ -71,13 +76,19 @@ def main() -> None:
         report("Reading a model", rows)
         ratios = [median(row.ratios) for row in rows]
         print(f"ratio over {len(rows)} files: median {median(ratios):.2f}, worst {max(ratios):.2f}")
-        big = [(path.stat().st_size, median(row.ours)) for path, row in zip(files, rows, strict=True)]
+        big = [
+            (path.stat().st_size, median(row.ours)) for path, row in zip(files, rows, strict=True)
+        ]
         big = [(size, time) for size, time in big if size > 50_000]
         if len(big) > 2:
-            print(f"our time grows as size to the power {exponent([s for s, _ in big], [t for _, t in big]):.2f}")
+            print(
+                f"our time grows as size to the power {exponent([s for s, _ in big], [t for _, t in big]):.2f}"
+            )
         largest = max(files, key=lambda path: path.stat().st_size)
         size = largest.stat().st_size / 1e6
-        print(f"{largest.stem}: peak memory {peak_memory(largest):.1f} MB for {size:.2f} MB of text")
+        print(
+            f"{largest.stem}: peak memory {peak_memory(largest):.1f} MB for {size:.2f} MB of text"
+        )
         if options.processes:
             read = f"import osimlite; osimlite.read({str(largest)!r})"
             load = f"import opensim; opensim.Logger.setLevelString('off'); opensim.Model({str(largest)!r})"

@@ -2,8 +2,9 @@
 
     python benchmarks/refinement.py [STUDY ...]
 
-STUDY: sliding, pendulum, predicted (``osimlite build human-walks``), walking (needs opensim-core's sources beside this
-repository, as tests/optimal/check_tracking.py). Each search has a process of its own; seconds are of the processor.
+STUDY: sliding, pendulum, predicted (``osimlite build human-walks``), walking (needs opensim-core's
+sources beside this repository, as tests/optimal/check_tracking.py). Each search has a process of
+its own; seconds are of the processor.
 """
 
 from __future__ import annotations
@@ -90,7 +91,10 @@ def _row(title: str, name: str, intervals: int, refine: str, file: Path) -> floa
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     success, many, error, iterations, objective, search = json.loads(done.stdout.splitlines()[-1])
     note = "" if success else " (not solved)"
-    print(f"| | {title}{note} | {many} | {error:.2g} | {iterations} | {objective:.7g} | {search:.3g} |", flush=True)
+    print(
+        f"| | {title}{note} | {many} | {error:.2g} | {iterations} | {objective:.7g} | {search:.3g} |",
+        flush=True,
+    )
     return float(error)
 
 

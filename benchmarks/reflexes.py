@@ -2,8 +2,9 @@
 
     python benchmarks/reflexes.py [SCENARIO.scone] [SECONDS]
 
-Without a scenario our own human walks. Each is run three times in turn; the medians of processor time count. OpenSim
-moves the model by a PrescribedController that holds what the reflexes said, with the same integrator and start.
+Without a scenario our own human walks. Each is run three times in turn; the medians of processor
+time count. OpenSim moves the model by a PrescribedController that holds what the reflexes said,
+with the same integrator and start.
 """
 
 from __future__ import annotations
@@ -66,7 +67,10 @@ def main(file: Path, seconds: float) -> None:
             "step": scenario.step,
             "rows": rows,
             "start": {name: walked.states[name][0] for name in walked.states.columns},
-            "excitations": {name: walked.excitations[name][:rows].tolist() for name in walked.excitations.columns},
+            "excitations": {
+                name: walked.excitations[name][:rows].tolist()
+                for name in walked.excitations.columns
+            },
         }
         given.write_text(json.dumps(told))
         for _ in range(TIMES):
@@ -77,12 +81,17 @@ def main(file: Path, seconds: float) -> None:
             scenario.walk(best, CANDIDATES, duration=seconds)
             many.append(time.process_time() - before)
             done = subprocess.run(
-                [sys.executable, "-c", OPENSIM, str(given)], capture_output=True, text=True, check=True
+                [sys.executable, "-c", OPENSIM, str(given)],
+                capture_output=True,
+                text=True,
+                check=True,
             )
             theirs.append(float(done.stdout.split()[-1]))
     took = walked.times[0]
     speed, each = walked.report["speed"][0], evaluations / took
-    print(f"{file.stem}: walks {took:g} s at {speed:.3f} m/s, {each:.0f} evaluations of the forces a second")
+    print(
+        f"{file.stem}: walks {took:g} s at {speed:.3f} m/s, {each:.0f} evaluations of the forces a second"
+    )
     print("| | seconds of walking per second of one core | beside OpenSim |")
     print("|---|---|---|")
     opensim = statistics.median(theirs)

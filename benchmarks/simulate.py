@@ -1,9 +1,9 @@
 """The Dynamic Walker, two seconds: osimlite's engines and OpenSim's Manager, side by side in one run.
 
-Warm: the model is read and made ready once; what is timed is the motion alone, from the default pose, in processor
-time. Both integrate with Runge-Kutta-Merson, OpenSim records its states at every step, osimlite every 10 ms. Whole
-processes are in all.py. The error is the largest difference of any coordinate (rad or m) from the converged motion, at
-t = 2 s.
+Warm: the model is read and made ready once; what is timed is the motion alone, from the default
+pose, in processor time. Both integrate with Runge-Kutta-Merson, OpenSim records its states at every
+step, osimlite every 10 ms. Whole processes are in all.py. The error is the largest difference of
+any coordinate (rad or m) from the converged motion, at t = 2 s.
 """
 
 from __future__ import annotations
@@ -45,7 +45,9 @@ def main() -> None:
     model = opensim.Model(str(MODEL))
     model.initSystem()
     console = Console()
-    simulations = {name: Simulation(osimlite.read(MODEL), engine) for name, engine in ENGINES.items()}
+    simulations = {
+        name: Simulation(osimlite.read(MODEL), engine) for name, engine in ENGINES.items()
+    }
     exact = run_ours(simulations["compiled"], CONVERGED)()
     errors = Table(title="Error at 2 s")
     for heading in ("accuracy", *ENGINES, "OpenSim"):
@@ -54,11 +56,16 @@ def main() -> None:
     for accuracy in ACCURACIES:
         theirs = run_opensim(model, accuracy, 1 + len(ENGINES) * (WARM_UP + ROUNDS))
         runs = {name: run_ours(simulation, accuracy) for name, simulation in simulations.items()}
-        ends = [max(abs(a - b) for a, b in zip(run(), exact, strict=True)) for run in (*runs.values(), theirs)]
+        ends = [
+            max(abs(a - b) for a, b in zip(run(), exact, strict=True))
+            for run in (*runs.values(), theirs)
+        ]
         errors.add_row(f"{accuracy:g}", *(f"{end:.2g}" for end in ends))
         for name, run in runs.items():
             title, clock = f"{name}, {accuracy:g}", time.process_time
-            warm.append(pair(title, ours=run, theirs=theirs, rounds=ROUNDS, warmup=WARM_UP, clock=clock))
+            warm.append(
+                pair(title, ours=run, theirs=theirs, rounds=ROUNDS, warmup=WARM_UP, clock=clock)
+            )
     for simulation in simulations.values():
         simulation.close()
     console.print(errors)
@@ -73,7 +80,9 @@ def run_ours(simulation: Simulation, accuracy: float, to: float = TO) -> Callabl
     return run
 
 
-def run_opensim(model: Any, accuracy: float, runs: int, to: float = TO) -> Callable[[], list[float]]:
+def run_opensim(
+    model: Any, accuracy: float, runs: int, to: float = TO
+) -> Callable[[], list[float]]:
     coordinates = model.getCoordinateSet()
     # A manager starts once. All are made ready here, so that only the motion is timed.
     ready = []

@@ -1,12 +1,15 @@
 """A thousand walkers from starts apart: `osimlite sweep` beside a loop over OpenSim's Manager, in one run.
 
-Both simulate two seconds at accuracy 1e-3 from the same starts, and keep the distance. OpenSim's model and state are
-made once, and each walker has a manager of its own, as in OpenSim's examples. osimlite's time is that of the whole
-sweep: samples, simulations, measures and the file. Times of processors are compared, per walker, since other programs
-may run beside; the walkers per second of one and of two workers are by the clock, in turn, beside those of one and of
-two processes that share nothing: what more the machine does with two at a time.
+Both simulate two seconds at accuracy 1e-3 from the same starts, and keep the distance. OpenSim's
+model and state are made once, and each walker has a manager of its own, as in OpenSim's examples.
+osimlite's time is that of the whole
+sweep: samples, simulations, measures and the file. Times of processors are compared, per walker,
+since other programs may run beside; the walkers per second of one and of two workers are by the
+clock, in turn, beside those of one and of two processes that share nothing: what more the machine
+does with two at a time.
 
-With `--workers`, only that. With `--many`, a hundred thousand walkers, and the memory that this takes.
+With `--workers`, only that. With `--many`, a hundred thousand walkers, and the memory that this
+takes.
 """
 
 from __future__ import annotations
@@ -62,16 +65,29 @@ def main() -> None:
         name = f"{WALKERS} walkers, processor time"
         report(
             f"Dynamic Walkers, {TO:g} s, accuracy 1e-3",
-            [pair(name, ours=by_sweep(starts, path), theirs=theirs, rounds=ROUNDS, warmup=0, clock=time.process_time)],
+            [
+                pair(
+                    name,
+                    ours=by_sweep(starts, path),
+                    theirs=theirs,
+                    rounds=ROUNDS,
+                    warmup=0,
+                    clock=time.process_time,
+                )
+            ],
             console=console,
         )
         console.print(kinds(path))
         ours = Runner(starts).run(rows).measures["distance"]
         apart = np.abs(ours - np.array(theirs()))
-        console.print(f"distances differ by {np.median(apart):.2g} m in the middle, {apart.max():.2g} m at most")
+        console.print(
+            f"distances differ by {np.median(apart):.2g} m in the middle, {apart.max():.2g} m at most"
+        )
 
 
-def by_sweep(made: Plan, path: Path, count: int = WALKERS, workers: int = 1) -> Callable[[], object]:
+def by_sweep(
+    made: Plan, path: Path, count: int = WALKERS, workers: int = 1
+) -> Callable[[], object]:
     chosen = samples(made.variables, "sobol", count)
     return lambda: sweep(made, chosen, path, workers=workers)
 
@@ -102,19 +118,28 @@ def run_opensim(opensim: Any, rows: Any) -> Callable[[], list[float]]:
 
 def workers(made: Plan, path: Path) -> Table:
     """Walkers per second by the clock, one worker and two in turn, and what the machine itself allows."""
-    table = Table(title=f"{WALKERS} walkers", caption="median of the rounds; speed-up within each round")
+    table = Table(
+        title=f"{WALKERS} walkers", caption="median of the rounds; speed-up within each round"
+    )
     for heading in ("", "one", "two", "speed-up", "least", "most"):
         table.add_column(heading, justify="right" if heading else "left")
     alone, swept = [], []
     with separate_processes(made) as together:
         for _ in range(TURNS):
             alone.append([together(count) for count in (1, 2)])
-            swept.append([WALKERS / elapsed(by_sweep(made, path, workers=count)) for count in (1, 2)])
-    for name, rows in (("workers of a sweep", swept), ("separate processes, the machine's bound", alone)):
+            swept.append(
+                [WALKERS / elapsed(by_sweep(made, path, workers=count)) for count in (1, 2)]
+            )
+    for name, rows in (
+        ("workers of a sweep", swept),
+        ("separate processes, the machine's bound", alone),
+    ):
         one, two = zip(*rows, strict=True)
         gains = [b / a for a, b in rows]
         speed = (f"{walkers:.0f}/s" for walkers in (median(one), median(two)))
-        table.add_row(name, *speed, *(f"{gain:.2f}" for gain in (median(gains), min(gains), max(gains))))
+        table.add_row(
+            name, *speed, *(f"{gain:.2f}" for gain in (median(gains), min(gains), max(gains)))
+        )
     return table
 
 
@@ -129,7 +154,10 @@ def separate_processes(made: Plan) -> Iterator[Callable[[int], float]]:
     """What makes one process or two, which share nothing, walk all walkers each; how many walk per second together."""
     context = get_context("spawn")
     ends = [context.Pipe() for _ in range(2)]
-    others = [context.Process(target=walk_when_told, args=(made.packed(), end), daemon=True) for _, end in ends]
+    others = [
+        context.Process(target=walk_when_told, args=(made.packed(), end), daemon=True)
+        for _, end in ends
+    ]
 
     def together(count: int) -> float:
         told = [end for end, _ in ends[:count]]
@@ -187,7 +215,10 @@ def many(path: Path) -> Table:
     for heading in ("runs", "memory, MB", "seconds"):
         table.add_column(heading, justify="right")
     made = plan(osimlite.read(MODEL), VARY, to=TO)
-    started, marks = time.perf_counter(), [MANY // 100, MANY // 10, MANY // 4, MANY // 2, MANY * 3 // 4, MANY]
+    started, marks = (
+        time.perf_counter(),
+        [MANY // 100, MANY // 10, MANY // 4, MANY // 2, MANY * 3 // 4, MANY],
+    )
 
     def progress(done: float, of: float) -> None:
         if marks and done >= marks[0]:
@@ -196,9 +227,7 @@ def many(path: Path) -> Table:
 
     outcome = sweep(made, samples(made.variables, "lhs", MANY), path, progress=progress)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    table.caption = (
-        f"{MANY / outcome.seconds:.0f} walkers/s; at most {peak:.0f} MB; {path.stat().st_size / 1e6:.1f} MB on disk"
-    )
+    table.caption = f"{MANY / outcome.seconds:.0f} walkers/s; at most {peak:.0f} MB; {path.stat().st_size / 1e6:.1f} MB on disk"
     return table
 
 

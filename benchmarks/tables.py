@@ -2,8 +2,9 @@
 
     python benchmarks/tables.py [--megabytes N] [--rounds N]
 
-Many files of usual sizes and a few huge ones, as OpenSim and motion capture programs write them. OpenSim has no check
-to compare with. Seconds are those of the processor, so that other work on the machine counts little.
+Many files of usual sizes and a few huge ones, as OpenSim and motion capture programs write them.
+OpenSim has no check to compare with. Seconds are those of the processor, so that other work on the
+machine counts little.
 """
 
 from __future__ import annotations
@@ -36,7 +37,9 @@ KINDS = {
 def text_of(kind: str, size: int, draw: Random) -> str:
     """A table of about so many bytes."""
     form, separator, columns = KINDS[kind]
-    bodies = [separator.join(form % draw.gauss(0.0, 300.0) for _ in range(columns)) for _ in range(200)]
+    bodies = [
+        separator.join(form % draw.gauss(0.0, 300.0) for _ in range(columns)) for _ in range(200)
+    ]
     rows = max(1, size // len(bodies[0]))
     if kind.endswith(".trc"):
         markers = range(1, columns // 3 + 1)
@@ -51,10 +54,19 @@ def text_of(kind: str, size: int, draw: Random) -> str:
         ]
         starts = (f"{row + 1}\t{row / 100:.3f}\t" for row in range(rows))
     else:
-        header = [kind, "version=1", f"nRows={rows}", f"nColumns={columns + 1}", "inDegrees=no", "endheader"]
+        header = [
+            kind,
+            "version=1",
+            f"nRows={rows}",
+            f"nColumns={columns + 1}",
+            "inDegrees=no",
+            "endheader",
+        ]
         header.append("\t".join(["time", *(f"column{column}" for column in range(columns))]))
         starts = (form % (row / 1000) + separator for row in range(rows))
-    return "\n".join([*header, *(start + body for start, body in zip(starts, cycle(bodies), strict=False)), ""])
+    return "\n".join(
+        [*header, *(start + body for start, body in zip(starts, cycle(bodies), strict=False)), ""]
+    )
 
 
 def fill(folder: Path, size: int) -> tuple[int, int]:
@@ -66,7 +78,11 @@ def fill(folder: Path, size: int) -> tuple[int, int]:
             return written, number
         kind = list(KINDS)[number % len(KINDS)]
         # One table of each kind has a tenth of all bytes.
-        text = text_of(kind, size // 10 if number < len(KINDS) else draw.choice([50_000, 500_000, 3_000_000]), draw)
+        text = text_of(
+            kind,
+            size // 10 if number < len(KINDS) else draw.choice([50_000, 500_000, 3_000_000]),
+            draw,
+        )
         (folder / f"{number:04d}_{kind}").write_text(text)
         written += len(text)
     raise AssertionError
@@ -80,11 +96,17 @@ def validated(folder: Path) -> tuple[float, float, float]:
         "print(used.ru_utime + used.ru_stime, used.ru_maxrss, done.returncode)"
     )
     command = [sys.executable, "-m", "osimlite", "validate", str(folder), "--format", "concise"]
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environment = {
+        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
+    }
     environment["XDG_CACHE_HOME"] = str(folder / ".cache")
     start = time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-c", code, *command], env=environment, capture_output=True, text=True, check=True
+        [sys.executable, "-c", code, *command],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     used, memory, _ = map(float, done.stdout.split())
     return used, time.perf_counter() - start, memory / (1e6 if sys.platform == "darwin" else 1e3)
@@ -99,8 +121,17 @@ def main() -> None:
         folder = Path(place)
         (folder / "osimlite.toml").write_text("")
         size, files = fill(folder, options.megabytes * 1_000_000)
-        table = Table(title=f"{files} tables, {size / 1e6:.0f} MB of text", caption="medians; memory of one process")
-        for column in ("", "processor (s)", "MB/s of one processor", "clock (s)", "peak memory (MB)"):
+        table = Table(
+            title=f"{files} tables, {size / 1e6:.0f} MB of text",
+            caption="medians; memory of one process",
+        )
+        for column in (
+            "",
+            "processor (s)",
+            "MB/s of one processor",
+            "clock (s)",
+            "peak memory (MB)",
+        ):
             table.add_column(column, justify="right" if column else "left")
         for name in ("first run", "unchanged"):
             runs = []
@@ -109,7 +140,9 @@ def main() -> None:
                     rmtree(folder / ".cache", ignore_errors=True)
                 runs.append(validated(folder))
             used, clock, memory = map(median, zip(*runs, strict=True))
-            table.add_row(name, f"{used:.2f}", f"{size / 1e6 / used:.0f}", f"{clock:.2f}", f"{memory:.0f}")
+            table.add_row(
+                name, f"{used:.2f}", f"{size / 1e6 / used:.0f}", f"{clock:.2f}", f"{memory:.0f}"
+            )
         Console().print(table)
 
 

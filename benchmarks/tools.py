@@ -2,10 +2,11 @@
 
     python benchmarks/tools.py [--quick] [--trials N]
 
-Models and trials are those of the reference data in the shared folder, and for the constraints of Rajagopal2016 a
-motion made here, its markers a centimetre off. A whole run reads and checks the setup and all it names and writes its
-files, in a warm process; what a frame more costs is found by running half of them too. With --trials N, N trials are
-run in one command on two workers, and the frames per second are told.
+Models and trials are those of the reference data in the shared folder, and for the constraints of
+Rajagopal2016 a motion made here, its markers a centimetre off. A whole run reads and checks the
+setup and all it names and writes its files, in a warm process; what a frame more costs is found by
+running half of them too. With --trials N, N trials are run in one command on two workers, and the
+frames per second are told.
 """
 
 from __future__ import annotations
@@ -41,7 +42,9 @@ from validate import whole_process
 REFERENCE = CORPUS.parents[1] / "oracle" / "tools" / "reference"
 NOISE = 0.01
 """How far the markers are off that are made here, m (root mean square by axis)."""
-THEIRS = "import opensim; opensim.Logger.setLevelString('off'); assert opensim.{tool}({setup!r}).run()"
+THEIRS = (
+    "import opensim; opensim.Logger.setLevelString('off'); assert opensim.{tool}({setup!r}).run()"
+)
 
 
 class Case(NamedTuple):
@@ -92,7 +95,9 @@ def timed(case: Case, rounds: int) -> Row:
     short = case.shorter()
     half = pair(case.name, ours=short.ours, theirs=short.theirs, rounds=rounds)
     more = case.frames() - short.frames()
-    ours, theirs = ((min(getattr(whole, k)) - min(getattr(half, k))) / more for k in ("ours", "theirs"))
+    ours, theirs = (
+        (min(getattr(whole, k)) - min(getattr(half, k))) / more for k in ("ours", "theirs")
+    )
     return Row(case, whole, (ours, theirs))
 
 
@@ -128,11 +133,15 @@ def cases(place: Path) -> Iterator[Case]:
         output_motion_file="ik.mot",
     )
     yield Case("IK gait10", "InverseKinematicsTool", setup, 10, ("time_range", (0.0, 1.25)))
-    unpack(place / "ik23", "ik_id_gait2354/*_IK.xml", "ik_id_gait2354/*.trc.gz", f"models/{many}.gz")
+    unpack(
+        place / "ik23", "ik_id_gait2354/*_IK.xml", "ik_id_gait2354/*.trc.gz", f"models/{many}.gz"
+    )
     yield Case(
         "IK gait2354",
         "InverseKinematicsTool",
-        changed(place / "ik23", "subject01_Setup_IK.xml", model_file=many, output_motion_file="ik.mot"),
+        changed(
+            place / "ik23", "subject01_Setup_IK.xml", model_file=many, output_motion_file="ik.mot"
+        ),
         10,
         ("time_range", (0.4, 1.0)),
     )
@@ -143,9 +152,18 @@ def cases(place: Path) -> Iterator[Case]:
     setup = dynamics(place / "id10", "walk_Setup_ID.xml", ten)
     yield Case("ID gait10", "InverseDynamicsTool", setup, 10, ("time_range", (0.0, 1.25)))
     unpack(
-        place / "so10", "so_gait10/*.xml", "id_gait10/*_grf.*", "ik_gait10/subject01_walk_IK.mot", f"models/{ten}.gz"
+        place / "so10",
+        "so_gait10/*.xml",
+        "id_gait10/*_grf.*",
+        "ik_gait10/subject01_walk_IK.mot",
+        f"models/{ten}.gz",
     )
-    setup = dynamics(place / "so10", "walk_Setup_SO.xml", ten, force_set_files=("gait10dof_Reserve_Actuators.xml",))
+    setup = dynamics(
+        place / "so10",
+        "walk_Setup_SO.xml",
+        ten,
+        force_set_files=("gait10dof_Reserve_Actuators.xml",),
+    )
     yield Case("StaticOptimization gait10", "AnalyzeTool", setup, 20, ("final_time", 1.0))
     unpack(place / "analyses", "analyses_gait10/*", "id_gait10/*_grf.mot.gz", f"models/{ten}.gz")
     folder = place / "analyses"
@@ -155,7 +173,12 @@ def cases(place: Path) -> Iterator[Case]:
     document.analysis_set.objects = [osimlite.MuscleAnalysis(name="MuscleAnalysis")]
     osimlite.write(document, setup)
     yield Case("MuscleAnalysis gait10", "AnalyzeTool", setup, 30, ("final_time", 0.8))
-    unpack(place / "scale", "scale_gait2354/*.xml", "scale_gait2354/static.trc.gz", "scale_gait2354/gait2354.osim.gz")
+    unpack(
+        place / "scale",
+        "scale_gait2354/*.xml",
+        "scale_gait2354/static.trc.gz",
+        "scale_gait2354/gait2354.osim.gz",
+    )
     yield Case("Scale gait2354", "ScaleTool", place / "scale" / "scale.xml", 5)
 
 
@@ -195,8 +218,15 @@ def worn(folder: Path, frames: int) -> Case:
     rows = []
     for q in motion.values:
         state = motion.mechanism.at(q)
-        found = np.array([(state.transform(placed[name].body) @ placed[name].transform)[:3, :3] for name in names])
-        off = np.array([rotation_xyz(angles) for angles in rng.normal(0.0, np.deg2rad(5.0), (len(names), 3))])
+        found = np.array(
+            [
+                (state.transform(placed[name].body) @ placed[name].transform)[:3, :3]
+                for name in names
+            ]
+        )
+        off = np.array(
+            [rotation_xyz(angles) for angles in rng.normal(0.0, np.deg2rad(5.0), (len(names), 3))]
+        )
         rows.append(quaternion(off @ found).ravel().tolist())
     write_sto(folder / "trial.sto", "trial", motion.times.tolist(), names, rows, kind="Quaternion")
     tool = osimlite.IMUInverseKinematicsTool(
@@ -247,7 +277,16 @@ def table(rows: list[Row]) -> Table:
     caption = "medians of whole runs; the least of a frame more; times as fast as OpenSim"
     made = Table(title="OpenSim's tools", caption=caption)
     made.add_column("")
-    for column in ("osimlite (ms)", "OpenSim (ms)", "faster", "a frame: ours", "OpenSim", "faster", "aim", ""):
+    for column in (
+        "osimlite (ms)",
+        "OpenSim (ms)",
+        "faster",
+        "a frame: ours",
+        "OpenSim",
+        "faster",
+        "aim",
+        "",
+    ):
         made.add_column(column, justify="right")
     for case, whole, frame in rows:
         faster = 1.0 / median(whole.ratios)
@@ -279,7 +318,9 @@ def throughput(case: Case, trials: int, place: Path) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--quick", action="store_true", help="three rounds of each")
-    parser.add_argument("--trials", type=int, default=0, metavar="N", help="run N trials in one command too")
+    parser.add_argument(
+        "--trials", type=int, default=0, metavar="N", help="run N trials in one command too"
+    )
     options = parser.parse_args()
     opensim.Logger.setLevelString("off")
     rounds, rows, console = 3 if options.quick else 9, [], Console(width=120)
@@ -289,9 +330,16 @@ def main() -> None:
             rows.append(timed(case, rounds))
         smallest = rows[0].case
         os.chdir(smallest.setup.parent)
-        command = [sys.executable, "-c", THEIRS.format(tool=smallest.tool, setup=smallest.setup.name)]
+        command = [
+            sys.executable,
+            "-c",
+            THEIRS.format(tool=smallest.tool, setup=smallest.setup.name),
+        ]
         whole = pair_commands(
-            f"{smallest.name}, whole process", ours=whole_process("run", "setup.xml"), theirs=command, rounds=rounds
+            f"{smallest.name}, whole process",
+            ours=whole_process("run", "setup.xml"),
+            theirs=command,
+            rounds=rounds,
         )
         rows.append(Row(smallest._replace(name=whole.name, aim=1), whole))
         console.print(table(rows))

@@ -2,10 +2,11 @@
 
     python benchmarks/validate.py [FOLDER] [--rounds N] [--files N] [--each]
 
-Two tables: read-and-validate within one process for every real model that OpenSim initializes (FOLDER holds `.osim` or
-`.osim.gz` files; without one the shared corpus is used); and a folder of many models, first unknown and then unchanged.
-Whole processes are in all.py. OpenSim says nothing about most faults; it is timed as the only check
-there is without osimlite. Findings kept from earlier runs are used in the last table alone.
+Two tables: read-and-validate within one process for every real model that OpenSim initializes
+(FOLDER holds `.osim` or `.osim.gz` files; without one the shared corpus is used); and a folder of
+many models, first unknown and then unchanged. Whole processes are in all.py. OpenSim says nothing
+about most faults; it is timed as the only check there is without osimlite. Findings kept from
+earlier runs are used in the last table alone.
 """
 
 from __future__ import annotations
@@ -62,10 +63,17 @@ def in_process(rounds: int, files: list[Path], each: bool) -> None:
         except RuntimeError:
             continue
         name = f"{path.stem} {path.stat().st_size / 1e3:.0f} kB"
-        ours, theirs = (lambda path=path: osimlite.validate(path)), (lambda path=path: initialized(path))
+        ours, theirs = (
+            (lambda path=path: osimlite.validate(path)),
+            (lambda path=path: initialized(path)),
+        )
         rows.append((pair(name, ours=ours, theirs=theirs, rounds=rounds), path.stat().st_size))
     ratios = sorted(median(row.ratios) for row, _ in rows)
-    shown = [row for row, _ in rows] if each else [row for row, _ in sorted(rows, key=lambda row: -row[1])[:8]]
+    shown = (
+        [row for row, _ in rows]
+        if each
+        else [row for row, _ in sorted(rows, key=lambda row: -row[1])[:8]]
+    )
     report("Read and validate in one process" + ("" if each else ", the 8 largest"), shown)
     print(
         f"ratio over {len(rows)} models: median {median(ratios):.2f}, nine in ten below "
@@ -103,25 +111,39 @@ def _measured(folder: Path) -> tuple[float, float]:
         "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
     )
     command = [sys.executable, "-m", "osimlite", "validate", str(folder), "--format", "concise"]
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environment = {
+        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
+    }
     start = time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-c", code, *command], env=environment, capture_output=True, text=True, check=True
+        [sys.executable, "-c", code, *command],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
     )
-    return time.perf_counter() - start, int(done.stdout) / (1e6 if sys.platform == "darwin" else 1e3)
+    return time.perf_counter() - start, int(done.stdout) / (
+        1e6 if sys.platform == "darwin" else 1e3
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("folder", nargs="?", type=Path, default=CORPUS)
     parser.add_argument("--rounds", type=int, default=9)
-    parser.add_argument("--files", type=int, default=1000, help="models in the folder of the last table")
-    parser.add_argument("--each", action="store_true", help="show every model, not the largest alone")
+    parser.add_argument(
+        "--files", type=int, default=1000, help="models in the folder of the last table"
+    )
+    parser.add_argument(
+        "--each", action="store_true", help="show every model, not the largest alone"
+    )
     options = parser.parse_args()
     try:
         import opensim  # noqa: F401
     except ImportError:
-        sys.exit("this benchmark compares with OpenSim; install it with: pip install -e '.[oracle]'")
+        sys.exit(
+            "this benchmark compares with OpenSim; install it with: pip install -e '.[oracle]'"
+        )
     with tempfile.TemporaryDirectory() as place:
         files = unpacked(options.folder, Path(place)) if options.folder.is_dir() else []
         if files:

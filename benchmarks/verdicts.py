@@ -4,10 +4,10 @@
     python benchmarks/verdicts.py --pairs 2000 [--before FOLDER]     two random edits at once
     python benchmarks/verdicts.py --faults 8000 [--before FOLDER]    two of the walker's faults at once
 
-`--before` names the folder of another version of osimlite, whose verdicts stand beside those of this
-one. A verdict is *missed* if OpenSim 4.6 does not load or initialise the model, or computes NaN
-accelerations, and the linter has no new error; it is *false* if OpenSim loads and initialises the
-model and an error says that it does not. The models are those of `shared/corpus`.
+`--before` names the folder of another version of osimlite, whose verdicts stand beside those of
+this one. A verdict is *missed* if OpenSim 4.6 does not load or initialise the model, or computes
+NaN accelerations, and the linter has no new error; it is *false* if OpenSim loads and initialises
+the model and an error says that it does not. The models are those of `shared/corpus`.
 
 OpenSim runs each model in a child process. A model that it does not finish within the limit of
 seconds counts for neither side.
@@ -54,7 +54,9 @@ class Linter:
         environment = {**os.environ, "PYTHONPATH": str(folder)}
         command = [sys.executable, "-W", "ignore", "-c", LINTER]
         pipe = subprocess.PIPE
-        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=environment, cwd=folder)
+        self._process = subprocess.Popen(
+            command, stdin=pipe, stdout=pipe, text=True, env=environment, cwd=folder
+        )
 
     def errors(self, path: Path) -> list[tuple[str, str]]:
         """Return code and message of each error of a file."""
@@ -138,7 +140,9 @@ def edit_once(text: str, draw: random.Random) -> tuple[str, str]:
     return edit.text, edit.what
 
 
-def edit_models(texts: dict[Path, str], singles: int, pairs: int, draw: random.Random) -> Iterator[Trial]:
+def edit_models(
+    texts: dict[Path, str], singles: int, pairs: int, draw: random.Random
+) -> Iterator[Trial]:
     """Yield models with one random edit, then others with two."""
     paths = [*texts]
     for number in range(singles + pairs):
@@ -207,7 +211,8 @@ def main() -> None:
         walker = Path(place) / "walker.osim"
         walker.write_bytes((HERE.parent / "fixtures/walker/DynamicWalkerModel.osim").read_bytes())
         known = {
-            name: {path: Counter(linter.errors(path)) for path in [*models, walker]} for name, linter in linters.items()
+            name: {path: Counter(linter.errors(path)) for path in [*models, walker]}
+            for name, linter in linters.items()
         }
         counts: Counter[Any] = Counter()
         trials = chain(

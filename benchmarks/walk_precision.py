@@ -2,10 +2,11 @@
 
     python benchmarks/walk_precision.py [SCENARIO.scone] [SECONDS] [--steps N] [--picture FILE.png]
 
-From each fourth state of a walk the same N control steps are integrated by every method at several accuracies, as a
-walk does: each control step is a run of its own. The error is how far the values and speeds of all coordinates are from
-those of Merson's method at 1e-11 (root mean square over coordinates and states, rad and m, rad/s and m/s); the work is
-processor time over the time that passes. Without a scenario our own human walks.
+From each fourth state of a walk the same N control steps are integrated by every method at several
+accuracies, as a walk does: each control step is a run of its own. The error is how far the values
+and speeds of all coordinates are from those of Merson's method at 1e-11 (root mean square over
+coordinates and states, rad and m, rad/s and m/s); the work is processor time over the time that
+passes. Without a scenario our own human walks.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ USUAL = "euler2", 1e-3
 EVERY, TIMES = 4, 9
 
 
-def measured(scenario: Scenario, seconds: float, steps: int) -> list[tuple[str, float, float, float, float]]:
+def measured(
+    scenario: Scenario, seconds: float, steps: int
+) -> list[tuple[str, float, float, float, float]]:
     """Method, accuracy, errors of values and of speeds, seconds of walking a second."""
     walked = scenario.walk(scenario.best(), duration=seconds)
     walkers = scenario.walkers(1)
@@ -61,13 +64,17 @@ def measured(scenario: Scenario, seconds: float, steps: int) -> list[tuple[str, 
         for accuracy in accuracies:
             result, took = ends(method, accuracy)
             off = result - wanted
-            of_values, of_speeds = (float(np.sqrt(np.mean(part**2))) for part in (off[:, :size], off[:, size:]))
+            of_values, of_speeds = (
+                float(np.sqrt(np.mean(part**2))) for part in (off[:, :size], off[:, size:])
+            )
             found.append((method, accuracy, of_values, of_speeds, passed / took))
     return found
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("scenario", nargs="?", type=Path)
     parser.add_argument("seconds", nargs="?", type=float, default=3.0)
     parser.add_argument("--steps", type=int, default=1, help="control steps from each state")
@@ -76,10 +83,14 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         scenario = Scenario(chosen.scenario or write_scenario(Path(folder)))
         found = measured(scenario, chosen.seconds, chosen.steps)
-    print("| method | accuracy | error of values | of speeds | seconds of walking a second |\n|---|---|---|---|---|")
+    print(
+        "| method | accuracy | error of values | of speeds | seconds of walking a second |\n|---|---|---|---|---|"
+    )
     for method, accuracy, of_values, of_speeds, rate in found:
         mark = " (SCONE)" if (method, accuracy) == USUAL else ""
-        print(f"| {method}{mark} | {accuracy:.0e} | {of_values:.1e} | {of_speeds:.1e} | {rate:.3g} |")
+        print(
+            f"| {method}{mark} | {accuracy:.0e} | {of_values:.1e} | {of_speeds:.1e} | {rate:.3g} |"
+        )
     if chosen.picture:
         import matplotlib.pyplot as plt
 

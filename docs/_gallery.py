@@ -50,7 +50,11 @@ def made(section: str) -> tuple[str, bytes]:
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
     with TemporaryDirectory() as folder:
         for language, code in re.findall(r"^```(sh|python)\n(.*?)^```", section, re.M | re.S):
-            command = [sys.executable, "-c", code] if language == "python" else ["bash", "-euc", code]
+            command = (
+                [sys.executable, "-c", code] if language == "python" else ["bash", "-euc", code]
+            )
             environment = {**os.environ, "PATH": path, "MPLBACKEND": "Agg"}
-            subprocess.run(command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL)
+            subprocess.run(
+                command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL
+            )
         return name, (Path(folder) / name).read_bytes()

@@ -1,6 +1,7 @@
 """Pages of the manual that are made from the program itself when the site is built, so that they cannot differ from it.
 
-A hook of MkDocs: commands from their `--help`, rules from their docstrings, components from their declarations.
+A hook of MkDocs: commands from their `--help`, rules from their docstrings, components from their
+declarations.
 """
 
 from __future__ import annotations
@@ -50,13 +51,18 @@ def pages() -> Iterator[tuple[str, str]]:
         yield f"rules/{rule.code}.md", f"{head}\n\n{rule.page}\n"
     for group in groups():
         members = [rule for rule in all_rules() if rule.group == group.name]
-        listed = "".join(f"- [{rule.code}]({rule.code}.md) {rule.name}: {rule.summary}\n" for rule in members)
+        listed = "".join(
+            f"- [{rule.code}]({rule.code}.md) {rule.name}: {rule.summary}\n" for rule in members
+        )
         yield f"rules/{group.code}.md", f"{group_page(group)}\n\n{listed}"
 
 
 def commands() -> str:
     """What every command says of itself."""
-    parts = ["# Commands", "Exit codes everywhere: 0 done, 1 the answer is no, 2 it could not be carried out."]
+    parts = [
+        "# Commands",
+        "Exit codes everywhere: 0 done, 1 the answer is no, 2 it could not be carried out.",
+    ]
     for command in COMMANDS:
         parts.append(f"## {command}\n\n```text\n{_help(command)}\n```")
     return "\n\n".join(parts) + "\n"
@@ -93,14 +99,18 @@ def _component(cls: type[Object]) -> str:
         lines += ["", "| property | holds | default | meaning |", "|---|---|---|---|"]
         for spec in specs:
             meaning = _cell(meaning_of(spec))
-            lines.append(f"| `{spec.tag}` | {_cell(value_of(spec))} | {_default(spec)} | {meaning} |")
+            lines.append(
+                f"| `{spec.tag}` | {_cell(value_of(spec))} | {_default(spec)} | {meaning} |"
+            )
     return "\n".join(lines)
 
 
 def _default(spec: FieldSpec) -> str:
     if isinstance(spec.kind, Held) or spec.default in (None, "", ()):
         return ""
-    text = " ".join(map(repr, spec.default)) if isinstance(spec.default, tuple) else str(spec.default)
+    text = (
+        " ".join(map(repr, spec.default)) if isinstance(spec.default, tuple) else str(spec.default)
+    )
     if isinstance(spec.kind, Value) and spec.kind.scalar == "bool":
         text = text.lower()
     return f"`{text}`"

@@ -51,7 +51,9 @@ def listed(nav: Navigation, config: MkDocsConfig) -> str:
 
 
 def _entry(page: Page, config: MkDocsConfig) -> str:
-    text = re.sub(r"<!--.*?-->|^```.*?^```|^#.*?$|^[|!].*?$", "", page.markdown or "", flags=re.M | re.S)
+    text = re.sub(
+        r"<!--.*?-->|^```.*?^```|^#.*?$|^[|!].*?$", "", page.markdown or "", flags=re.M | re.S
+    )
     words = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", " ".join(text.split()))
     first = re.match(r".*?[.?](?= |$)|.*", words)
     assert first is not None

@@ -1,8 +1,8 @@
 """The notebooks of the manual as pages with all that they show: executed when the site is built.
 
-A hook of MkDocs. Outputs are put into the pages when these are HTML already: nothing in them is Markdown.
-The environment variable ``OSIMLITE_MANUAL=quick`` builds the site without executing anything, for the checks of every
-push.
+A hook of MkDocs. Outputs are put into the pages when these are HTML already: nothing in them is
+Markdown. The environment variable ``OSIMLITE_MANUAL=quick`` builds the site without executing
+anything, for the checks of every push.
 """
 
 from __future__ import annotations
@@ -43,7 +43,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add a page for each notebook."""
     notebooks = sorted(FOLDER.glob("*.ipynb"))
     with ThreadPoolExecutor(KERNELS) as pool:
-        for path, notebook in zip(notebooks, pool.map(executed if EXECUTE else read, notebooks), strict=True):
+        for path, notebook in zip(
+            notebooks, pool.map(executed if EXECUTE else read, notebooks), strict=True
+        ):
             text = "\n\n".join(parts(path, notebook))
             files.append(File.generated(config, f"notebooks/{path.stem}.md", content=text))
     return files
@@ -74,8 +76,11 @@ def executed(path: Path) -> Any:
     if len(found) == len(needed):
         # Pictures are shown by the backend that a kernel chooses where none is asked for.
         environment = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}
-        # `!osimlite` in a cell runs the command of this environment, also where the environment is not activated.
-        environment["PATH"] = os.pathsep.join([sysconfig.get_path("scripts"), environment.get("PATH", os.defpath)])
+        # `!osimlite` in a cell runs the command of this environment, also where the environment is
+        # not activated.
+        environment["PATH"] = os.pathsep.join(
+            [sysconfig.get_path("scripts"), environment.get("PATH", os.defpath)]
+        )
         with TemporaryDirectory() as folder:
             for file in found:
                 shutil.copy(file, folder)
@@ -116,5 +121,9 @@ def _html(output: Any) -> str:
         return f"<template shadowrootmode='open'>{data['text/html']}</template>"
     if "image/png" in data:
         return f'<img alt="" src="data:image/png;base64,{data["image/png"].strip()}">'
-    text = data.get("text/plain", "") if output.output_type != "stream" or output.name == "stderr" else output.text
+    text = (
+        data.get("text/plain", "")
+        if output.output_type != "stream" or output.name == "stderr"
+        else output.text
+    )
     return f"<pre>{escape(text)}</pre>" if text else ""

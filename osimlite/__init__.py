@@ -1,11 +1,12 @@
 """osimlite: build, check, translate and simulate OpenSim models without OpenSim.
 
-Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
-``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``Feedback``,
-``inverse_kinematics``, ``FrameSolver``, ``scale``, ``fit``, ``kinematics``, ``inverse_dynamics``,
-``static_optimization``, ``casadi``, ``tangents``, ``linearize``, ``sensitivity``, ``modify``, ``run``, ``check_trial``,
-``report``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``).
-Names are imported when first used, so that importing osimlite costs nothing.
+Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``,
+``validate``, ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``,
+``Feedback``, ``inverse_kinematics``, ``FrameSolver``, ``scale``, ``fit``, ``kinematics``,
+``inverse_dynamics``, ``static_optimization``, ``casadi``, ``tangents``, ``linearize``,
+``sensitivity``, ``modify``, ``run``, ``check_trial``, ``report``, the errors, and every component
+class under OpenSim's own name (``osimlite.PinJoint``). Names are imported when first used, so that
+importing osimlite costs nothing.
 """
 
 from __future__ import annotations

@@ -23,7 +23,12 @@ class OsimliteError(Exception):
     """What the command line exits with: 1 if the answer is no, 2 if the command could not be carried out."""
 
     def __init__(
-        self, message: str, *, file: str | None = None, line: int | None = None, column: int | None = None
+        self,
+        message: str,
+        *,
+        file: str | None = None,
+        line: int | None = None,
+        column: int | None = None,
     ) -> None:
         super().__init__(message)
         self.message = brief(message)
@@ -32,7 +37,9 @@ class OsimliteError(Exception):
         self.column = column
 
     def __str__(self) -> str:
-        place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
+        place = ":".join(
+            str(part) for part in (self.file, self.line, self.column) if part is not None
+        )
         return visible(f"{place}: {self.message}" if place else self.message)
 
 
@@ -85,9 +92,9 @@ class ModelError(OsimliteError):
 class MissingNameError(ModelError, AttributeError):
     """A component has no property or member of that name.
 
-    Args:
-        describe: returns the message. It is called when somebody reads the message: to find the nearest name takes
-            milliseconds, and `hasattr` and `getattr` with a default drop the error unread.
+    Args: describe: returns the message. It is called when somebody reads the message: to find the
+        nearest name takes milliseconds, and `hasattr` and `getattr` with a default drop the error
+        unread.
     """
 
     def __init__(self, describe: Callable[[], str]) -> None:

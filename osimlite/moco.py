@@ -1,7 +1,7 @@
 """Studies of OpenSim's Moco, solved: ``osimlite.moco.solve("study.omoco")``; docs/optimal-control.md.
 
-Studies from Python are made of the classes that files are (``osimlite.MocoStudy`` and so on), with OpenSim's names.
-CasADi is loaded with the first name that is asked for.
+Studies from Python are made of the classes that files are (``osimlite.MocoStudy`` and so on), with
+OpenSim's names. CasADi is loaded with the first name that is asked for.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Build hook of hatchling: compiles the library of kernels where a C++ compiler is found.
 
-A wheel gets one library for each level of processors, and a tag of this platform; without a compiler it is pure Python.
-An editable installation gets a library for this very processor, inside the source tree. The source distribution
-contains the C++ text, from which its wheel is built. The environment variable OSIMLITE_LIBRARY=no leaves it out.
+A wheel gets one library for each level of processors, and a tag of this platform; without a
+compiler it is pure Python. An editable installation gets a library for this very processor, inside
+the source tree. The source distribution contains the C++ text, from which its wheel is built. The
+environment variable OSIMLITE_LIBRARY=no leaves it out.
 """
 
 from __future__ import annotations
@@ -65,7 +66,9 @@ class KernelLibraryHook(BuildHookInterface):  # type: ignore[misc]
             if not texts.is_dir():
                 texts = work / TEXTS
                 tools.write_texts(texts)
-            libraries = tools.compile_libraries(texts, work / "libraries", compiler, compiler.targets)
+            libraries = tools.compile_libraries(
+                texts, work / "libraries", compiler, compiler.targets
+            )
         except (OSError, tools.toolchain.CompilationError) as error:
             # The package works without the library, only slower.
             self.app.display_warning(f"the library of kernels is left out: {error}")

@@ -103,7 +103,11 @@ def write_text(folder: Path, part: str) -> None:
         write_file(folder / HEADER, header_text())
         digests = {law: compute_digest(law_of(law)[0]) for law in laws}
         digests |= {law: digests[law.partition("~")[0]] for law in library_laws(DIRECTIONS)}
-        table = {"version": __version__, "sources": describe_sources(ROOT / "osimlite"), "laws": digests}
+        table = {
+            "version": __version__,
+            "sources": describe_sources(ROOT / "osimlite"),
+            "laws": digests,
+        }
         write_file(folder / "table.json", json.dumps(table, indent=1) + "\n")
 
 
@@ -142,7 +146,9 @@ def library_name(target: str, system: str = sys.platform) -> str:
     return f"kernels-{target}{toolchain.library_suffix(system)}"
 
 
-def compile_libraries(texts: Path, results: Path, compiler: toolchain.Compiler, targets: Sequence[str]) -> list[Path]:
+def compile_libraries(
+    texts: Path, results: Path, compiler: toolchain.Compiler, targets: Sequence[str]
+) -> list[Path]:
     """Compile the texts for each target, on as many cores as there are.
 
     Args:
@@ -188,8 +194,8 @@ def compile_libraries(texts: Path, results: Path, compiler: toolchain.Compiler, 
 def table_text(texts: Path, compiler: toolchain.Compiler, target: str) -> str:
     """Return the C++ text of the table that the library carries.
 
-    It names every kernel with the digest of its sources, so that an edited one is noticed, and what the library
-    was made by and for.
+    It names every kernel with the digest of its sources, so that an edited one is noticed, and what
+    the library was made by and for.
     """
     table = json.loads((texts / "table.json").read_text("utf-8"))
     table |= {"target": target, "compiler": compiler.version, "recipe": recipe()}
@@ -253,15 +259,15 @@ def build_in_place(target: str = toolchain.NATIVE) -> str:
     return f"compiled the library of kernels ({compiler.version})"
 
 
-NO_COMPILER = (
-    "no C++ compiler was found: osimlite computes by numba where that is installed, else in Python, much slower"
-)
+NO_COMPILER = "no C++ compiler was found: osimlite computes by numba where that is installed, else in Python, much slower"
 """What the build says where there is no library."""
 
 
 def main() -> None:
     """Run the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     commands = parser.add_subparsers(dest="command", required=True)
     text = commands.add_parser("text", help="write the C++ text")
     text.add_argument("folder", type=Path)

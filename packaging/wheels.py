@@ -3,8 +3,9 @@
     pip install build hatchling pydantic ziglang
     python packaging/wheels.py dist/osimlite-0.1.0.tar.gz dist [PLATFORM ...]
 
-Zig's C++ compiler (the package `ziglang`) compiles for every platform. Each wheel is checked: its libraries are of the
-right format, export every kernel, and ask for no newer glibc than the tag of the wheel says.
+Zig's C++ compiler (the package `ziglang`) compiles for every platform. Each wheel is checked: its
+libraries are of the right format, export every kernel, and ask for no newer glibc than the tag of
+the wheel says.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ PLATFORMS = {
 """Platforms of the wheels, as in their tags, each with Zig's name for it."""
 
 MACHINES = {
-    # Format: where the number of the processor is in the file, and which numbers mean which processor.
+    # Format: where the number of the processor is in the file, and which numbers mean which
+    # processor.
     "linux": (b"\x7fELF", 18, "<H", {62: "x86_64", 183: "aarch64"}),
     "macosx": (b"\xcf\xfa\xed\xfe", 4, "<I", {0x01000007: "x86_64", 0x0100000C: "aarch64"}),
     "win": (b"MZ", None, "<H", {0x8664: "x86_64"}),
@@ -52,7 +54,16 @@ def build_wheel(source: Path, folder: Path, platform: str) -> Path:
     """
     compiler = f"{sys.executable} -m ziglang c++ -target {PLATFORMS[platform]}"
     environment = {**os.environ, "CXX": compiler, "OSIMLITE_PLATFORM": platform}
-    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"]
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "--wheel-dir",
+    ]
     subprocess.run([*command, str(folder), str(source)], env=environment, check=True)
     (wheel,) = folder.glob(f"*-{platform}.whl")
     return wheel
@@ -68,9 +79,15 @@ def check_wheel(wheel: Path) -> list[str]:
         if platform.endswith(("x86_64", "amd64")):
             wanted.add("kernels-x86-64-v3" + suffix)
         found = {Path(name).name for name in names}
-        problems = [] if found == wanted else [f"expected the libraries {sorted(wanted)}, found {sorted(found)}"]
+        problems = (
+            []
+            if found == wanted
+            else [f"expected the libraries {sorted(wanted)}, found {sorted(found)}"]
+        )
         for name in names:
-            problems += [f"{name}: {problem}" for problem in check_library(archive.read(name), platform)]
+            problems += [
+                f"{name}: {problem}" for problem in check_library(archive.read(name), platform)
+            ]
     return problems
 
 
@@ -87,7 +104,8 @@ def check_library(content: bytes, platform: str) -> list[str]:
     if not content.startswith(magic):
         return [f"it is no library of {system}"]
     if offset is None:
-        # The header of Windows' format, whose place is at 60; the processor comes after its four letters.
+        # The header of Windows' format, whose place is at 60; the processor comes after its four
+        # letters.
         offset = struct.unpack_from("<I", content, 60)[0] + 4
     problems = []
     (number,) = struct.unpack_from(form, content, offset)
@@ -97,13 +115,16 @@ def check_library(content: bytes, platform: str) -> list[str]:
     if glibc:
         newest = max(glibc_versions(content), default=(0, 0))
         if newest > (int(glibc[1]), int(glibc[2])):
-            problems.append(f"it needs glibc {'.'.join(map(str, newest))}, newer than its tag {platform}")
+            problems.append(
+                f"it needs glibc {'.'.join(map(str, newest))}, newer than its tag {platform}"
+            )
     start = content.find(TABLE_START)
     if start < 0:
         return [*problems, "it has no table of kernels"]
     table = json.loads(content[start : content.index(b"\0", start)])
     names = [law.replace("~", "_along_") for law in table["laws"]]
-    # The names of exported functions are text in all three formats; macOS puts an underscore before each.
+    # The names of exported functions are text in all three formats; macOS puts an underscore before
+    # each.
     missing = [name for name in names if not re.search(rb"[\0_]" + name.encode() + rb"\0", content)]
     if missing:
         problems.append(f"{len(missing)} kernels are not in it, such as {missing[0]}")

@@ -1,8 +1,9 @@
 """Which release of OpenSim has which class and property first, read from the tags of a clone of opensim-core.
 
-``python schemas/history.py CLONE osimlite/lint/history.json``. Of each release the registrations and the declarations
-of classes and properties are read from the text of its sources. What the first release has that is looked at, and what
-the text does not tell (instances of templates, for one), counts as having been there always.
+``python schemas/history.py CLONE osimlite/lint/history.json``. Of each release the registrations
+and the declarations of classes and properties are read from the text of its sources. What the first
+release has that is looked at, and what the text does not tell (instances of templates, for one),
+counts as having been there always.
 """
 
 from __future__ import annotations
@@ -51,12 +52,17 @@ class Release(NamedTuple):
 def sources(clone: Path, tag: str) -> Iterator[tuple[str, str]]:
     """The name and the text of every source file of a release, tests left out."""
     listing = subprocess.run(
-        ["git", "-C", clone, "ls-tree", "-r", "--name-only", tag, "OpenSim"], capture_output=True, text=True, check=True
+        ["git", "-C", clone, "ls-tree", "-r", "--name-only", tag, "OpenSim"],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     names = [name for name in listing.stdout.splitlines() if re.search(r"\.(h|cpp)$", name)]
     names = [name for name in names if not re.search(r"/[tT]est|Sandbox", name)]
     wanted = "".join(f"{tag}:{name}\n" for name in names).encode()
-    content = subprocess.run(["git", "-C", clone, "cat-file", "--batch"], input=wanted, capture_output=True, check=True)
+    content = subprocess.run(
+        ["git", "-C", clone, "cat-file", "--batch"], input=wanted, capture_output=True, check=True
+    )
     place = 0
     for name in names:
         head, _, _ = content.stdout[place : place + 200].partition(b"\n")
@@ -75,7 +81,9 @@ def release(clone: Path, tag: str) -> Release:
     found = Release(0, {}, {}, set())
     for name, text in sources(clone, tag):
         found.properties.setdefault(Path(name).stem, set()).update(OLD.findall(text))
-        found.registered.update(map(last, REGISTERED.findall(text)) if name.endswith(".cpp") else ())
+        found.registered.update(
+            map(last, REGISTERED.findall(text)) if name.endswith(".cpp") else ()
+        )
         if name.endswith("Common/XMLDocument.cpp"):
             found = found._replace(format=int(FORMAT.search(text)[1]))  # type: ignore[index]
         cls = ""
@@ -106,12 +114,17 @@ def main() -> None:
             classes[name] = known[0]
         for row in entry["properties"]:
             tags = {last(row["name"]), last(row.get("accepts_base", row["name"]))}
-            has = [version for version in names if tags & releases[version].all_properties(last(name))]
+            has = [
+                version for version in names if tags & releases[version].all_properties(last(name))
+            ]
             if not has or known[0] == names[-1] or row["name"] in SAME_IN_FILES:
                 continue
             told: list[str] = []
             if names.index(has[0]) > names.index(known[0]):
-                before, now = (releases[names[names.index(has[0]) - k]].all_properties(last(name)) for k in (1, 0))
+                before, now = (
+                    releases[names[names.index(has[0]) - k]].all_properties(last(name))
+                    for k in (1, 0)
+                )
                 gone = sorted(before - now) if len(now - before) == 1 else []
                 told = [has[0], *gone[:1]]
             if told or has[0] == names[0]:

@@ -1,7 +1,8 @@
 """A real environment with the base dependencies of osimlite alone, made in a moment and without a network.
 
-It is a virtual environment without pip. Its packages are links to those of the environment that runs the tests, so that
-every other package is absent for Python itself: no import system is patched, and no function is replaced.
+It is a virtual environment without pip. Its packages are links to those of the environment that
+runs the tests, so that every other package is absent for Python itself: no import system is
+patched, and no function is replaced.
 """
 
 from __future__ import annotations
@@ -40,10 +41,14 @@ class BareEnvironment:
         (packages / "osimlite.pth").write_text(f"{ROOT}\n", encoding="utf-8")
 
     def _ask(self, script: str) -> str:
-        done = subprocess.run([self.python, "-c", script], check=True, capture_output=True, text=True)
+        done = subprocess.run(
+            [self.python, "-c", script], check=True, capture_output=True, text=True
+        )
         return done.stdout.strip()
 
-    def call(self, *words: object, folder: Path, code: str = CONSOLE_SCRIPT) -> subprocess.CompletedProcess[str]:
+    def call(
+        self, *words: object, folder: Path, code: str = CONSOLE_SCRIPT
+    ) -> subprocess.CompletedProcess[str]:
         """Run the command `osimlite` of the environment in a folder.
 
         Args:
@@ -77,7 +82,9 @@ class BareEnvironment:
 def _clean_environment() -> dict[str, str]:
     """Return the environment variables without those that lead to packages outside of the environment."""
     hidden = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
-    return {name: value for name, value in os.environ.items() if name not in hidden} | {"COLUMNS": "200"}
+    return {name: value for name, value in os.environ.items() if name not in hidden} | {
+        "COLUMNS": "200"
+    }
 
 
 def find_distributions(extras: Sequence[str] = ()) -> Iterator[metadata.Distribution]:
@@ -100,9 +107,15 @@ def find_distributions(extras: Sequence[str] = ()) -> Iterator[metadata.Distribu
                 pending += [(requirement.name.lower(), more) for more in ("", *requirement.extras)]
 
 
-def _link_distribution(distribution: metadata.Distribution, packages: Path, *, only_metadata: bool = False) -> None:
+def _link_distribution(
+    distribution: metadata.Distribution, packages: Path, *, only_metadata: bool = False
+) -> None:
     """Put links to the folders and modules of a distribution into a folder of packages."""
-    names = {file.parts[0] for file in distribution.files or [] if file.parts[0] not in ("..", "__pycache__")}
+    names = {
+        file.parts[0]
+        for file in distribution.files or []
+        if file.parts[0] not in ("..", "__pycache__")
+    }
     for name in sorted(names):
         if only_metadata and not name.endswith(".dist-info"):
             continue

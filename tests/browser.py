@@ -21,12 +21,15 @@ FLAGS = [
 ]
 
 
-# Not for the whole session: as long as Playwright is there, an event loop runs, and tests of coroutines cannot.
+# Not for the whole session: as long as Playwright is there, an event loop runs, and tests of
+# coroutines cannot.
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
     """Chromium, driven by Playwright; OSIMLITE_CHROMIUM names its program if it is not on the PATH."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (extra 'dev')")
-    program = os.environ.get("OSIMLITE_CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), None)
+    program = os.environ.get("OSIMLITE_CHROMIUM") or next(
+        filter(None, map(shutil.which, BROWSERS)), None
+    )
     if program is None:
         pytest.skip("needs Chromium on the PATH, or its program in OSIMLITE_CHROMIUM")
     with playwright.sync_playwright() as driver:

@@ -19,21 +19,29 @@ from tests.suite import Suite
 pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).resolve().parent.parent
-# Reference data too large to commit. It stands beside the repository; tests that need it skip without it.
+# Reference data too large to commit. It stands beside the repository; tests that need it skip
+# without it.
 SHARED = Path(os.environ.get("OSIMLITE_SHARED") or ROOT.parent / "shared")
 NO_SHARED = "needs the shared reference folder, which is not beside this repository"
 ROUNDED = {"m0079": 1e-6, "m0109": 1e-7, "m0168": 1e-7, "m0172": 1e-8}
-"""How near poses of corpus models are to those on record, which are of files that hold more digits than OpenSim
-converts."""
+"""How near poses of corpus models are to those on record, which are of files that hold more digits
+than OpenSim converts.
+"""
 
 # A busy machine must not fail a property, and CI must fail the same way twice.
-settings.register_profile("osimlite", deadline=None, derandomize="CI" in os.environ, print_blob=True)
+settings.register_profile(
+    "osimlite", deadline=None, derandomize="CI" in os.environ, print_blob=True
+)
 settings.load_profile("osimlite")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option that runs the full suite."""
-    parser.addoption("--full", action="store_true", help="run all tests, also those marked `full` (release, nightly)")
+    parser.addoption(
+        "--full",
+        action="store_true",
+        help="run all tests, also those marked `full` (release, nightly)",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -63,7 +71,8 @@ class CorpusModel(NamedTuple):
     id: str
     path: Path  # as published
     truth: Path  # OpenSim's components, poses and energies: gzipped JSON
-    converted: Path | None  # OpenSim's own print of it, gzipped; None where OpenSim cannot load the file
+    # OpenSim's own print of it, gzipped; None where OpenSim cannot load the file
+    converted: Path | None
 
 
 def corpus_models() -> list[CorpusModel]:
@@ -81,7 +90,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Run a test that asks for `corpus_model` once per real file; the quick suite takes some of the files."""
     if "corpus_model" in metafunc.fixturenames:
         models: list[object] = [
-            pytest.param(model, id=model.id, marks=() if model.id in QUICK_CORPUS else pytest.mark.full)
+            pytest.param(
+                model, id=model.id, marks=() if model.id in QUICK_CORPUS else pytest.mark.full
+            )
             for model in corpus_models()
         ]
         absent = pytest.param(None, id="absent", marks=pytest.mark.skip(reason=NO_SHARED))
@@ -92,7 +103,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what reads real files for `-m "not corpus"`, and skip cases of missing engines."""
     missing = [engine for engine, package in ENGINES.items() if find_spec(package) is None]
     for item in items:
-        cases = item.callspec.params.values() if isinstance(item, pytest.Function) and hasattr(item, "callspec") else ()
+        cases = (
+            item.callspec.params.values()
+            if isinstance(item, pytest.Function) and hasattr(item, "callspec")
+            else ()
+        )
         for engine in missing:
             if engine in [case for case in cases if isinstance(case, str)]:
                 item.add_marker(pytest.mark.skip(reason=f"needs {ENGINES[engine]}"))
@@ -150,7 +165,9 @@ def windows_files(monkeypatch: pytest.MonkeyPatch) -> None:
     def guarded(does: Callable[..., None]) -> Callable[..., None]:
         def refuse(*paths: str | Path, **words: Any) -> None:
             at_stake = {os.path.realpath(path) for path in paths}
-            if not at_stake.isdisjoint(os.path.realpath(handle) for handle in DESCRIPTORS.iterdir()):
+            if not at_stake.isdisjoint(
+                os.path.realpath(handle) for handle in DESCRIPTORS.iterdir()
+            ):
                 raise PermissionError(13, "Permission denied")
             does(*paths, **words)
 

@@ -4,8 +4,8 @@ Run it with the Python of an environment into which the wheel, and nothing else,
 
     ENVIRONMENT/bin/python tests/core_install.py [--models FOLDER] [--all]
 
-It needs no pytest and prints a table of commands by exit codes. It exits with 1 if a command fails, prints a
-traceback, or asks for a package that it should not need.
+It needs no pytest and prints a table of commands by exit codes. It exits with 1 if a command fails,
+prints a traceback, or asks for a package that it should not need.
 """
 
 from __future__ import annotations
@@ -25,7 +25,18 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = Path(os.environ.get("OSIMLITE_SHARED", ROOT.parent / "shared"))
-OPTIONAL_PACKAGES = ("numpy", "scipy", "numba", "matplotlib", "PIL", "yaml", "pygls", "mujoco", "pandas", "pyarrow")
+OPTIONAL_PACKAGES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "matplotlib",
+    "PIL",
+    "yaml",
+    "pygls",
+    "mujoco",
+    "pandas",
+    "pyarrow",
+)
 PROJECTS = ("pipelines/pendulum", "pipelines/walking", "setups", "documents")
 """Folders of fixtures that are checked as whole projects."""
 
@@ -72,10 +83,14 @@ class Checker:
         self.exit_codes: dict[str, Counter[int]] = defaultdict(Counter)
         self.problems: list[str] = []
         hidden = ("PYTHONPATH", "PYTHONHOME")
-        self._environment = {name: value for name, value in os.environ.items() if name not in hidden}
+        self._environment = {
+            name: value for name, value in os.environ.items() if name not in hidden
+        }
         self._environment |= {"COLUMNS": "200", "XDG_CACHE_HOME": str(folder / "cache")}
 
-    def call(self, label: str, *words: object, allowed: Iterable[int] = (0, 1)) -> subprocess.CompletedProcess[str]:
+    def call(
+        self, label: str, *words: object, allowed: Iterable[int] = (0, 1)
+    ) -> subprocess.CompletedProcess[str]:
         """Run a command and check its exit code and what it prints.
 
         Args:
@@ -97,7 +112,9 @@ class Checker:
         self.exit_codes[label][done.returncode] += 1
         line = " ".join(["osimlite", *map(str, words)])[:150]
         if done.returncode not in allowed:
-            self.problems.append(f"{line}: exit code {done.returncode}: {done.stderr.strip()[-300:]}")
+            self.problems.append(
+                f"{line}: exit code {done.returncode}: {done.stderr.strip()[-300:]}"
+            )
         if "Traceback" in done.stderr:
             self.problems.append(f"{line}: {done.stderr.strip()[-300:]}")
         return done
@@ -108,13 +125,18 @@ class Checker:
         for path in measurable[:2]:
             notes = [
                 finding
-                for finding in json.loads(self.call("validate (notes)", "validate", "--format", "json", path).stdout)
+                for finding in json.loads(
+                    self.call("validate (notes)", "validate", "--format", "json", path).stdout
+                )
                 if finding["name"] == "not-measured"
             ]
             if len(notes) != 1 or NOTE not in notes[0]["message"] or notes[0]["file"] != str(path):
                 self.problems.append(f"{path}: the JSON report does not say '{NOTE}' once")
             for name in ("full", "concise"):
-                if NOTE not in self.call("validate (notes)", "validate", "--format", name, path).stdout:
+                if (
+                    NOTE
+                    not in self.call("validate (notes)", "validate", "--format", name, path).stdout
+                ):
                     self.problems.append(f"{path}: the {name} report does not say '{NOTE}'")
 
     def check_model(self, source: Path, number: int) -> None:
@@ -142,7 +164,11 @@ class Checker:
         folder = self.folder / f"project-{source.name}"
         shutil.copytree(source, folder)
         self.call("validate FOLDER", "validate", folder)
-        files = sorted(path for path in folder.rglob("*") if path.suffix in (".osim", ".xml", ".omoco", ".sto", ".mot"))
+        files = sorted(
+            path
+            for path in folder.rglob("*")
+            if path.suffix in (".osim", ".xml", ".omoco", ".sto", ".mot")
+        )
         self.call("validate (hook)", "validate", "--skip-other-xml", *files)
         action = ("--no-cache", "--skip-other-xml", "--format", "github", "--")
         self.call("validate (action)", "validate", *action, folder)
@@ -166,7 +192,9 @@ class Checker:
         for words, extra in NAMES_AN_EXTRA.items():
             done = self.call("needs an extra", *words, allowed=(2,))
             if f"osimlite[{extra}]" not in done.stderr or done.stderr.count("\n") != 1:
-                self.problems.append(f"osimlite {' '.join(words)}: names no 'osimlite[{extra}]': {done.stderr[-300:]}")
+                self.problems.append(
+                    f"osimlite {' '.join(words)}: names no 'osimlite[{extra}]': {done.stderr[-300:]}"
+                )
 
     def print_table(self) -> None:
         """Print how often each command ended with each exit code."""
@@ -180,7 +208,11 @@ def find_models(folder: Path, *, everything: bool) -> list[Path]:
     """Return real models of the shared corpus, spread over it, or models of the fixtures where there is no corpus."""
     models = sorted(folder.rglob("*.osim"))
     if not models:
-        with_joints = [path for path in ROOT.glob("fixtures/lint/*/*.osim") if b"<CustomJoint" in path.read_bytes()]
+        with_joints = [
+            path
+            for path in ROOT.glob("fixtures/lint/*/*.osim")
+            if b"<CustomJoint" in path.read_bytes()
+        ]
         with_muscles = [path for path in ROOT.glob("fixtures/lint/OSIM63*/*.osim")]
         models = sorted([*ROOT.glob("fixtures/walker*/*.osim"), *with_joints, *with_muscles])
     return models if everything else models[:: max(1, len(models) // MIN_MODELS)]
@@ -189,19 +221,27 @@ def find_models(folder: Path, *, everything: bool) -> list[Path]:
 def main() -> int:
     """Run all checks and return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--models", type=Path, default=SHARED / "corpus" / "models", help="folder of models")
-    parser.add_argument("--all", action="store_true", help="all models of the folder, not only a dozen")
+    parser.add_argument(
+        "--models", type=Path, default=SHARED / "corpus" / "models", help="folder of models"
+    )
+    parser.add_argument(
+        "--all", action="store_true", help="all models of the folder, not only a dozen"
+    )
     options = parser.parse_args()
     present = [name for name in OPTIONAL_PACKAGES if find_spec(name) is not None]
     if present:
-        print(f"this environment has {', '.join(present)}: install the wheel alone", file=sys.stderr)
+        print(
+            f"this environment has {', '.join(present)}: install the wheel alone", file=sys.stderr
+        )
         return 2
     models = find_models(options.models, everything=options.all)
     projects = [ROOT / "fixtures" / name for name in PROJECTS]
     assert len(models) >= MIN_MODELS and len(projects) >= MIN_PROJECTS
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(2) as pool:
         checker = Checker(Path(folder).resolve())
-        work = [pool.submit(checker.check_model, path, number) for number, path in enumerate(models)]
+        work = [
+            pool.submit(checker.check_model, path, number) for number, path in enumerate(models)
+        ]
         work += [pool.submit(checker.check_project, path) for path in projects]
         work += [pool.submit(checker.check_notes, models)]
         for each in work:

@@ -41,7 +41,9 @@ def run_opensim(setup: Path, results: Path) -> tuple[bool, str]:
     """
     results.mkdir(exist_ok=True)
     command = [sys.executable, "-W", "ignore", "-c", _RUN, setup.name, str(results)]
-    ended = subprocess.run(command, cwd=setup.parent, capture_output=True, text=True, timeout=300, check=False)
+    ended = subprocess.run(
+        command, cwd=setup.parent, capture_output=True, text=True, timeout=300, check=False
+    )
     log = ended.stdout + ended.stderr
     return "run: True" in log, log
 

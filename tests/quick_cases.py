@@ -1,7 +1,7 @@
 """Cases that the quick suite takes of expensive tests with many cases; `pytest --full` takes all.
 
-A key is a test function, the value the ids of the cases that stay in the quick suite. A single expensive test has
-``@pytest.mark.full`` instead.
+A key is a test function, the value the ids of the cases that stay in the quick suite. A single
+expensive test has ``@pytest.mark.full`` instead.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Collection of ``check_*.py``: tests that run in a second process beside the one that collects them.
 
-OpenSim brings a library of the same name as CasADi's, and one process cannot load both. Tests of functions that need
-CasADi are therefore in files ``check_*.py``. The process that collects such files starts a server (``python -m
-tests.separate``), asks it for the tests in them, and lets it run them; each is a test with its own name, marks and
-duration. A server keeps what it has imported, so that its imports are paid once.
+OpenSim brings a library of the same name as CasADi's, and one process cannot load both. Tests of
+functions that need CasADi are therefore in files ``check_*.py``. The process that collects such
+files starts a server (``python -m tests.separate``), asks it for the tests in them, and lets it run
+them; each is a test with its own name, marks and duration. A server keeps what it has imported, so
+that its imports are paid once.
 """
 
 from __future__ import annotations
@@ -38,7 +39,9 @@ class CheckServer:
         self.log = tempfile.TemporaryFile()  # noqa: SIM115
         paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
         # Variables of pytest-xdist make pytest believe that it is a worker.
-        variables = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_XDIST")}
+        variables = {
+            name: value for name, value in os.environ.items() if not name.startswith("PYTEST_XDIST")
+        }
         self.process = subprocess.Popen(
             [sys.executable, "-m", "tests.separate"],
             stdin=subprocess.PIPE,
@@ -65,7 +68,9 @@ class CheckServer:
         self.process.wait()
         self.log.seek(0)
         end = self.log.read().decode(errors="replace")[-4000:]
-        raise ServerDiedError(f"the process of the checks ended with {self.process.returncode}\n{end}")
+        raise ServerDiedError(
+            f"the process of the checks ended with {self.process.returncode}\n{end}"
+        )
 
     def close(self) -> None:
         """End the process, even in the middle of a test."""
@@ -99,7 +104,9 @@ class Checks:
         node.workerinput[_DIST] = self.config.getoption("dist")
 
     @pytest.hookimpl(wrapper=True)
-    def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> Generator[None, Any, Any]:
+    def pytest_collect_file(
+        self, file_path: Path, parent: pytest.Collector
+    ) -> Generator[None, Any, Any]:
         """Collect a file of checks by the server, and not also as an ordinary module when it is named explicitly."""
         collectors = yield
         if not file_path.match("check_*.py"):
@@ -133,7 +140,9 @@ class Checks:
         key = item.nodeid
         try:
             if key not in self._requested:
-                self._run([other for other in self._with(item) if other.nodeid not in self._reports])
+                self._run(
+                    [other for other in self._with(item) if other.nodeid not in self._reports]
+                )
             while not any(report["when"] == "teardown" for report in self._reports.get(key, ())):
                 report = next(self._running)
                 self._reports.setdefault(report["nodeid"], []).append(report)
@@ -146,10 +155,17 @@ class Checks:
 
     def _with(self, item: CheckItem) -> list[pytest.Item]:
         """Return a test and all others that this process will run of its file."""
-        if getattr(self.config, "workerinput", {_DIST: "loadfile"})[_DIST] not in ("loadfile", "loadscope"):
+        if getattr(self.config, "workerinput", {_DIST: "loadfile"})[_DIST] not in (
+            "loadfile",
+            "loadscope",
+        ):
             # Other workers run some of the others.
             return [item]
-        return [other for other in item.session.items if isinstance(other, CheckItem) and other.path == item.path]
+        return [
+            other
+            for other in item.session.items
+            if isinstance(other, CheckItem) and other.path == item.path
+        ]
 
     def _run(self, items: Sequence[pytest.Item]) -> None:
         for report in self._running:
@@ -225,7 +241,10 @@ class CheckItem(pytest.Item):
             if data["outcome"] == "skipped" and isinstance(data["longrepr"], list):
                 # JSON has no tuples, and pytest asks for one here.
                 data["longrepr"] = tuple(data["longrepr"])
-        return [self.config.hook.pytest_report_from_serializable(config=self.config, data=data) for data in reports]
+        return [
+            self.config.hook.pytest_report_from_serializable(config=self.config, data=data)
+            for data in reports
+        ]
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -255,8 +274,17 @@ class Answers:
         """Write what has been collected, where no more is asked."""
         if session.config.option.collectonly:
             for item in session.items:
-                marks = sorted({mark.name for mark in item.iter_markers()} & {"full", "oracle", "corpus"})
-                self.write({"path": str(item.path), "name": item.name, "line": item.location[1] or 0, "marks": marks})
+                marks = sorted(
+                    {mark.name for mark in item.iter_markers()} & {"full", "oracle", "corpus"}
+                )
+                self.write(
+                    {
+                        "path": str(item.path),
+                        "name": item.name,
+                        "line": item.location[1] or 0,
+                        "marks": marks,
+                    }
+                )
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         """Write why a file cannot be collected."""
@@ -268,7 +296,9 @@ class Answers:
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Write the report of one phase of one test."""
         assert self.config is not None
-        self.write(self.config.hook.pytest_report_to_serializable(config=self.config, report=report))
+        self.write(
+            self.config.hook.pytest_report_to_serializable(config=self.config, report=report)
+        )
 
     def write(self, answer: Any) -> None:
         """Write one line."""
@@ -298,7 +328,8 @@ def serve() -> None:
     for line in sys.stdin:
         words = json.loads(line)
         pytest.main(
-            ["-p", "xdist", "-n0", "-q", "-p", "no:cacheprovider", "-p", "no:randomly", *words], plugins=[Server()]
+            ["-p", "xdist", "-n0", "-q", "-p", "no:cacheprovider", "-p", "no:randomly", *words],
+            plugins=[Server()],
         )
         answers.write(None)
 

@@ -38,7 +38,9 @@ class Suite:
         return f"suite: quick, without the tests marked `full`; {HOW}"
 
     @pytest.hookimpl(trylast=True)
-    def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
+    def pytest_collection_modifyitems(
+        self, config: pytest.Config, items: list[pytest.Item]
+    ) -> None:
         """Deselect the tests of the full suite."""
         if not separate.is_server(config):
             # The process that asks for tests of `check_*.py` has chosen them.
@@ -70,7 +72,9 @@ class Suite:
         """Repeat the count before pytest's last line, and let that line contain it."""
         if getattr(config.option, "numprocesses", None):
             # Pytest counts what it deselects in its own process only.
-            terminalreporter.stats.setdefault("deselected", [SimpleNamespace()] * _state["deselected"])
+            terminalreporter.stats.setdefault(
+                "deselected", [SimpleNamespace()] * _state["deselected"]
+            )
             for line in _describe(_state["deselected"]):
                 terminalreporter.write_line(line)
 
@@ -96,7 +100,9 @@ def _mark_cases(config: pytest.Config, items: list[pytest.Item]) -> None:
         for function, cases in seen.items():
             lost = set(QUICK_CASES[function]) - cases
             if lost and cases != {"absent"}:
-                raise pytest.UsageError(f"tests/quick_cases.py: {function} has no case {', '.join(sorted(lost))}")
+                raise pytest.UsageError(
+                    f"tests/quick_cases.py: {function} has no case {', '.join(sorted(lost))}"
+                )
 
 
 def _describe(count: int) -> list[str]:

@@ -23,7 +23,9 @@ def test_optional_packages_are_absent(bare: BareEnvironment, tmp_path: Path) -> 
 
 def test_a_custom_joint_is_validated(bare: BareEnvironment, fixtures: Path, tmp_path: Path) -> None:
     """The linter evaluates functions of joints without numpy."""
-    models = sorted(str(path) for path in fixtures.glob("lint/*/*.osim") if b"<CustomJoint" in path.read_bytes())
+    models = sorted(
+        str(path) for path in fixtures.glob("lint/*/*.osim") if b"<CustomJoint" in path.read_bytes()
+    )
     assert len(models) > 20
     done = bare.call("validate", "--no-cache", "--format", "json", *models, folder=tmp_path)
     assert done.returncode == 1 and done.stderr == ""
@@ -38,7 +40,11 @@ def test_the_language_server_needs_its_own_extra_alone(fixtures: Path, tmp_path:
     uri = (tmp_path / "m.osim").as_uri()
     document = {"uri": uri, "languageId": "xml", "version": 1, "text": text}
     messages: list[dict[str, Any]] = [
-        {"id": 1, "method": "initialize", "params": {"processId": None, "rootUri": None, "capabilities": {}}},
+        {
+            "id": 1,
+            "method": "initialize",
+            "params": {"processId": None, "rootUri": None, "capabilities": {}},
+        },
         {"method": "initialized", "params": {}},
         {"method": "textDocument/didOpen", "params": {"textDocument": document}},
     ]

@@ -16,7 +16,12 @@ ARM = {**HERE, "platform_machine": "aarch64"}
 
 def asked(extra: str, machine: dict[str, str], python: str) -> list[Requirement]:
     """What `pip install osimlite[extra]` wants there."""
-    there = {**machine, "python_version": python, "python_full_version": f"{python}.1", "extra": extra}
+    there = {
+        **machine,
+        "python_version": python,
+        "python_full_version": f"{python}.1",
+        "extra": extra,
+    }
     wanted = map(Requirement, metadata.requires("osimlite") or [])
     return [item for item in wanted if item.marker is None or item.marker.evaluate(there)]
 
@@ -47,7 +52,9 @@ def test_opensim_comes_where_it_has_a_wheel() -> None:
 
 
 def test_rerun_comes_where_it_has_a_wheel() -> None:
-    assert "rerun-sdk" in names("dev", MAC, "3.13") and "rerun-sdk" not in names("dev", OLD_MAC, "3.13")
+    assert "rerun-sdk" in names("dev", MAC, "3.13") and "rerun-sdk" not in names(
+        "dev", OLD_MAC, "3.13"
+    )
 
 
 def test_who_asks_for_pybullet_gets_it() -> None:
@@ -62,7 +69,9 @@ def test_numba_for_old_macs_is_the_last_with_wheels() -> None:
 
 
 def test_simulations_need_no_numba() -> None:
-    assert names("sim", HERE, "3.12") >= {"numpy", "scipy"} and "numba" not in names("sim", HERE, "3.12")
+    assert names("sim", HERE, "3.12") >= {"numpy", "scipy"} and "numba" not in names(
+        "sim", HERE, "3.12"
+    )
 
 
 def test_the_older_name_of_sim() -> None:

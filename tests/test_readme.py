@@ -19,7 +19,9 @@ def blocks(text: str, language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
 
 
-def test_the_library_examples_run(repo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_library_examples_run(
+    repo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     osimlite.write(dynamic_walker(), "walker.osim")
     result = blocks((repo / "README.md").read_text(), "python")
@@ -38,13 +40,20 @@ def test_the_yaml_of_the_guide_is_a_model(repo: Path, tmp_path: Path) -> None:
 
 
 def test_every_command_named_exists_and_every_command_is_named(repo: Path) -> None:
-    named = set(re.findall(r"^osimlite ([a-z-]+)", "\n".join(blocks((repo / "README.md").read_text(), "sh")), re.M))
+    named = set(
+        re.findall(
+            r"^osimlite ([a-z-]+)", "\n".join(blocks((repo / "README.md").read_text(), "sh")), re.M
+        )
+    )
     assert named | {"demo"} == set(COMMANDS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_explains_itself(command: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "osimlite", command, "--help"], capture_output=True, text=True, check=True
+        [sys.executable, "-m", "osimlite", command, "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert "Usage: osimlite" in done.stdout and len(done.stdout.splitlines()) > 5

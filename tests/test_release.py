@@ -34,7 +34,9 @@ def read(path: Path) -> Any:
         ("editors/vscode/package-lock.json", lambda found: found["packages"][""]["version"]),
     ],
 )
-def test_every_file_has_the_version_of_the_package(repo: Path, file: str, version: Callable[[Any], str]) -> None:
+def test_every_file_has_the_version_of_the_package(
+    repo: Path, file: str, version: Callable[[Any], str]
+) -> None:
     assert version(read(repo / file)) == osimlite.__version__ == metadata.version("osimlite")
 
 
@@ -48,7 +50,8 @@ def test_conda_installs_what_pip_does(repo: Path) -> None:
         f"{item.name} {item.specifier}"
         for item in map(Requirement, metadata.requires("osimlite") or [])
         for extra in ("", "sim", "view")
-        if item.name != "osimlite" and (item.marker is None or item.marker.evaluate({**LINUX, "extra": extra}))
+        if item.name != "osimlite"
+        and (item.marker is None or item.marker.evaluate({**LINUX, "extra": extra}))
     }
     recipe = read(repo / "packaging" / "conda" / "recipe.yaml")
     python = metadata.metadata("osimlite")["Requires-Python"]
@@ -70,5 +73,7 @@ def test_programs_that_check_these_files_are_content(repo: Path, command: list[s
     program = shutil.which(command[0])
     if program is None or not (repo / ".github").exists():
         pytest.skip(f"needs the program '{command[0]}', and the repository")
-    done = subprocess.run([program, *command[1:]], cwd=repo, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [program, *command[1:]], cwd=repo, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout + done.stderr

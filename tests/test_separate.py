@@ -54,7 +54,9 @@ def pytest_configure(config):
 
 
 @pytest.fixture
-def project(pytester: pytest.Pytester, repo: Path, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
+def project(
+    pytester: pytest.Pytester, repo: Path, monkeypatch: pytest.MonkeyPatch
+) -> pytest.Pytester:
     """A project with checks."""
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     pytester.makeini(
@@ -67,7 +69,9 @@ def project(pytester: pytest.Pytester, repo: Path, monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize("workers", ["0", pytest.param("2", marks=pytest.mark.full)])
 def test_each_check_is_a_test(project: pytest.Pytester, workers: str) -> None:
     project.makepyfile(check_it=CHECKS)
-    result = project.runpytest_subprocess("-v", "-rs", "-p", "xdist", "-n", workers, "--dist=loadfile")
+    result = project.runpytest_subprocess(
+        "-v", "-rs", "-p", "xdist", "-n", workers, "--dist=loadfile"
+    )
     result.assert_outcomes(passed=3, failed=2, skipped=1, deselected=1)
     result.stdout.fnmatch_lines_random(
         [

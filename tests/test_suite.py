@@ -28,7 +28,9 @@ WORKERS = [
 
 
 @pytest.fixture
-def project(pytester: pytest.Pytester, repo: Path, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
+def project(
+    pytester: pytest.Pytester, repo: Path, monkeypatch: pytest.MonkeyPatch
+) -> pytest.Pytester:
     """A project with our two suites and the tests above."""
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     pytester.makeini(
@@ -44,11 +46,16 @@ def project(pytester: pytest.Pytester, repo: Path, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize("workers", WORKERS)
-def test_tests_of_the_full_suite_are_counted_and_left_out(project: pytest.Pytester, workers: list[str]) -> None:
+def test_tests_of_the_full_suite_are_counted_and_left_out(
+    project: pytest.Pytester, workers: list[str]
+) -> None:
     result = project.runpytest_subprocess(*workers)
     result.assert_outcomes(passed=1, deselected=2)
     result.stdout.fnmatch_lines(
-        ["suite: quick*`pytest --full` runs them", "2 tests of the full suite are left out; `pytest --full` runs them"]
+        [
+            "suite: quick*`pytest --full` runs them",
+            "2 tests of the full suite are left out; `pytest --full` runs them",
+        ]
     )
 
 

@@ -57,7 +57,10 @@ def test_a_file_that_is_being_read_is_written_all_the_same(tmp_path: Path) -> No
 @pytest.mark.usefixtures("windows_files")
 def test_results_that_another_program_holds_are_told(tmp_path: Path) -> None:
     (tmp_path / "coordinates.png").write_text("an earlier picture")
-    with (tmp_path / "coordinates.png").open(), pytest.raises(OsimliteError, match="cannot write here: Permission"):
+    with (
+        (tmp_path / "coordinates.png").open(),
+        pytest.raises(OsimliteError, match="cannot write here: Permission"),
+    ):
         simulated(tmp_path)
 
 
@@ -127,14 +130,21 @@ def test_an_old_console_is_shown_no_codes_of_colours(monkeypatch: pytest.MonkeyP
         assert wants_colour() is not is_old
 
 
-def test_other_programs_are_told_paths_with_slashes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_programs_are_told_paths_with_slashes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("osimlite.lint.reporters.sarif.PurePath", PureWindowsPath)
     monkeypatch.setattr("osimlite.lint.baseline.Path", PureWindowsPath)
     report = Report(
-        [Finding("OSIM101", "x", Severity.ERROR, "no", file) for file in ("models\\a b.osim", "C:\\models\\leg.osim")]
+        [
+            Finding("OSIM101", "x", Severity.ERROR, "no", file)
+            for file in ("models\\a b.osim", "C:\\models\\leg.osim")
+        ]
     )
     results = json.loads(render(report, "sarif"))["runs"][0]["results"]
-    places = [result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] for result in results]
+    places = [
+        result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] for result in results
+    ]
     assert places == ["models/a%20b.osim", "file:///C:/models/leg.osim"]
     write_baseline(tmp_path / "baseline.json", report)
     assert "models/a b.osim" in (tmp_path / "baseline.json").read_text()

@@ -12,7 +12,8 @@ from osimlite.base.records import field
 class Choice(NamedTuple):
     """An option."""
 
-    name: str  # the keyword of the library; on the command line with - for _, unless `spelled` says otherwise
+    # the keyword of the library; on the command line with - for _, unless `spelled` says otherwise
+    name: str
     type: Any  # of its value
     help: str  # one sentence
     default: Any = None  # if it is left out
@@ -32,7 +33,15 @@ class Said(NamedTuple):
     type: Any  # of what is written on the command line, where that is less than the library takes
 
 
-def option(default: Any, help: str = "", *, more: str = "", unit: str = "", shown: str = "", type: Any = None) -> Any:
+def option(
+    default: Any,
+    help: str = "",
+    *,
+    more: str = "",
+    unit: str = "",
+    shown: str = "",
+    type: Any = None,
+) -> Any:
     """An attribute of a record of options; see :class:`Said`."""
     return field(default=default, choice=Said(help, more, unit, shown, type))
 
@@ -42,7 +51,9 @@ def choices(options: Any) -> Iterator[Choice]:
     for name, each in options.__record_fields__.items():
         said: Said = each.choice
         if said.help:
-            kind = said.type or eval(options.__annotations__[name], vars(sys.modules[options.__module__]))
+            kind = said.type or eval(
+                options.__annotations__[name], vars(sys.modules[options.__module__])
+            )
             spelled = (f"--{name.replace('_', '-')}",) if kind is bool else ()
             yield Choice(name, kind, said.help, each.default, said.unit, said.shown, "", spelled)
 
@@ -52,7 +63,11 @@ def described(options: Any) -> str:
     from textwrap import fill
 
     lines = [
-        fill(f"{name}: {each.choice.help} {each.choice.more}".replace("  ", " ").strip(), 112, subsequent_indent="    ")
+        fill(
+            f"{name}: {each.choice.help} {each.choice.more}".replace("  ", " ").strip(),
+            112,
+            subsequent_indent="    ",
+        )
         for name, each in options.__record_fields__.items()
     ]
     return "\n".join(" " * 8 + line.replace("\n", "\n" + " " * 8) for line in lines)

@@ -29,7 +29,9 @@ NAMED_SO = f"in the environment variable {GEOMETRY_VARIABLE}, or with --geometry
 
 def named_mesh_folders() -> tuple[Path, ...]:
     """The folders that the environment names."""
-    return tuple(Path(name) for name in os.environ.get(GEOMETRY_VARIABLE, "").split(os.pathsep) if name)
+    return tuple(
+        Path(name) for name in os.environ.get(GEOMETRY_VARIABLE, "").split(os.pathsep) if name
+    )
 
 
 TABLES = (".sto", ".mot", ".trc")
@@ -52,7 +54,9 @@ def read_file(path: str | Path) -> bytes:
         try:
             return _content(stream, os.fstat(stream.fileno()).st_size, path)
         except OSError as error:
-            raise MissingFileError(f"cannot read the file: {error.strerror}", file=str(path)) from None
+            raise MissingFileError(
+                f"cannot read the file: {error.strerror}", file=str(path)
+            ) from None
 
 
 def stamped(path: str | Path) -> int | None:
@@ -64,7 +68,9 @@ def stamped(path: str | Path) -> int | None:
     except (OSError, ValueError):
         return None
     # Whoever puts another file in the place of one may keep the time of its last change.
-    return hash((result.st_mtime_ns, result.st_ctime_ns, result.st_size, result.st_ino, result.st_dev))
+    return hash(
+        (result.st_mtime_ns, result.st_ctime_ns, result.st_size, result.st_ino, result.st_dev)
+    )
 
 
 def read_standard_input() -> bytes:

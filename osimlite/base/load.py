@@ -1,8 +1,8 @@
 """Python code that a user names: a file, or a module that can be imported from the current folder.
 
-Python keeps what it compiled in a folder ``__pycache__`` beside a file, and tells versions of the file apart by second
-and size: a model that is built again at once with another digit would be the old one. What stands in a user's folder is
-compiled each time, and nothing is written there.
+Python keeps what it compiled in a folder ``__pycache__`` beside a file, and tells versions of the
+file apart by second and size: a model that is built again at once with another digit would be the
+old one. What stands in a user's folder is compiled each time, and nothing is written there.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ def module_of_file(path: Path) -> ModuleType:
     """
     if not path.is_file():
         raise no_such(path)
-    # A name of our own, so that a model in json.py does not take the place of a module that others import.
+    # A name of our own, so that a model in json.py does not take the place of a module that others
+    # import.
     name = f"_osimlite_source_{path.stem}"
     place = str(path.absolute())
     spec = importlib.util.spec_from_file_location(name, place, loader=_Loader(name, place))
@@ -99,7 +100,11 @@ class _Finder:
         if type(getattr(around, "loader", None)) is SourceFileLoader:
             return None
         spec = PathFinder.find_spec(name, path, target)
-        if spec is not None and type(spec.loader) is SourceFileLoader and self._is_users(spec.loader.path):
+        if (
+            spec is not None
+            and type(spec.loader) is SourceFileLoader
+            and self._is_users(spec.loader.path)
+        ):
             spec.loader = _Loader(name, spec.loader.path)
         return spec
 
@@ -121,7 +126,9 @@ def _read_anew(folder: str) -> None:
     importlib.invalidate_caches()
     for name, module in list(sys.modules.items()):
         spec = getattr(module, "__spec__", None)
-        if isinstance(getattr(spec, "loader", None), _Loader) and not name.startswith("_osimlite_source_"):
+        if isinstance(getattr(spec, "loader", None), _Loader) and not name.startswith(
+            "_osimlite_source_"
+        ):
             del sys.modules[name]
 
 
@@ -135,7 +142,9 @@ def errors_placed(file: str) -> Iterator[None]:
             error.file, error.line = file, _line_in(error, file)
         raise
     except Exception as error:
-        raise OsimliteError(f"{type(error).__name__}: {error}", file=file, line=_line_in(error, file)) from error
+        raise OsimliteError(
+            f"{type(error).__name__}: {error}", file=file, line=_line_in(error, file)
+        ) from error
 
 
 def _line_in(error: BaseException, file: str) -> int | None:

@@ -66,7 +66,9 @@ class Pool(Protocol):
 
 
 @contextmanager
-def processes(work: Callable[[Any], Any], *, workers: int | None = None, cluster: str | None = None) -> Iterator[Pool]:
+def processes(
+    work: Callable[[Any], Any], *, workers: int | None = None, cluster: str | None = None
+) -> Iterator[Pool]:
     """Make a pool of processes, here or on a cluster, that do one thing with all that is submitted.
 
     Args:
@@ -80,8 +82,12 @@ def processes(work: Callable[[Any], Any], *, workers: int | None = None, cluster
         MissingDependency: dask.distributed is not installed.
     """
     if cluster is not None and workers is not None:
-        raise SettingError("a cluster has the workers that were started for it; leave out --workers")
-    made: Pool = ProcessPool(work, count_workers(workers)) if cluster is None else ClusterPool(work, cluster)
+        raise SettingError(
+            "a cluster has the workers that were started for it; leave out --workers"
+        )
+    made: Pool = (
+        ProcessPool(work, count_workers(workers)) if cluster is None else ClusterPool(work, cluster)
+    )
     with closing(made):
         yield made
 
@@ -102,7 +108,12 @@ class LocalPool:
 
     task_seconds = 0.25
 
-    def __init__(self, executor: ThreadPoolExecutor | ProcessPoolExecutor, work: Callable[[Any], Any], count: int):
+    def __init__(
+        self,
+        executor: ThreadPoolExecutor | ProcessPoolExecutor,
+        work: Callable[[Any], Any],
+        count: int,
+    ):
         self.workers = count
         self._executor, self._work = executor, work
         self._done: SimpleQueue[tuple[Any, Any]] = SimpleQueue()
@@ -167,7 +178,9 @@ class ClusterPool:
         self._tasks: dict[Any, tuple[Any, Any, int, Any]] = {}
         self._threads, self._asked = 0, 0.0
         try:
-            self._client: Any = distributed.Client(address, timeout=min(10, PATIENCE), set_as_default=False)
+            self._client: Any = distributed.Client(
+                address, timeout=min(10, PATIENCE), set_as_default=False
+            )
         except (OSError, ValueError, TimeoutError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise ClusterLostError(
@@ -185,8 +198,8 @@ class ClusterPool:
     def workers(self) -> int:
         """Threads of all workers, at least one."""
         if time.monotonic() - self._asked > WORKER_COUNT_AGE_S:
-            # A scheduler that does not answer may come back: the client tries for a while, and `result` raises an
-            # error if it gives up.
+            # A scheduler that does not answer may come back: the client tries for a while, and
+            # `result` raises an error if it gives up.
             with suppress(OSError, TimeoutError):
                 self._threads = sum(self._client.nthreads().values())
             self._asked = time.monotonic()
@@ -198,7 +211,9 @@ class ClusterPool:
 
     def _submit(self, tag: Any, values: Any, losses: int) -> None:
         try:
-            future = self._client.submit(elsewhere, self._work, values, osimlite.__version__, pure=False)
+            future = self._client.submit(
+                elsewhere, self._work, values, osimlite.__version__, pure=False
+            )
         except Exception as error:
             if type(error).__name__ == "ClosedClientError":
                 raise self._lost() from None
@@ -235,7 +250,9 @@ class ClusterPool:
                 ) from error
 
     def _lost(self) -> ClusterLostError:
-        return ClusterLostError(f"the Dask scheduler at '{self._address}' has gone; go on with --resume")
+        return ClusterLostError(
+            f"the Dask scheduler at '{self._address}' has gone; go on with --resume"
+        )
 
     def close(self) -> None:
         """Stop what has not begun."""

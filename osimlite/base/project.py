@@ -45,7 +45,8 @@ def largest_file_in(file: Path, table: dict[str, Any]) -> int:
     # TOML has integers of any length, most of them beyond the range of floats.
     if not is_number or not LARGEST_FILE / 1e6 <= given <= sys.float_info.max / 1e6:
         raise OsimliteError(
-            f"'largest-file' must be a number of MB, {LARGEST_FILE / 1e6:g} or more, not '{given}'", file=str(file)
+            f"'largest-file' must be a number of MB, {LARGEST_FILE / 1e6:g} or more, not '{given}'",
+            file=str(file),
         )
     return int(given * 1e6)
 

@@ -53,8 +53,8 @@ def is_due(folder: Path, now: float) -> bool:
 def prune_cache(folder: Path, now: float, *, max_bytes: int = MAX_CACHE_BYTES) -> int:
     """Remove the entries of a cache that are old, then those that are too many, and return how many.
 
-    Several processes may do so at once, and others may write: what is gone already is passed over. Links
-    are neither followed nor removed.
+    Several processes may do so at once, and others may write: what is gone already is passed over.
+    Links are neither followed nor removed.
 
     Args:
         folder: the user's cache folder.

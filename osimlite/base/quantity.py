@@ -49,9 +49,7 @@ def doubt(name: str, given: Quantity | None, range: tuple[float, float]) -> str:
     if low <= given.number <= high:
         return ""
     number = f"{given.number:g}"
-    return (
-        f"{name} = {number} is in rad, and outside its range of {low:.3g} to {high:.3g} rad; did you mean {number}deg?"
-    )
+    return f"{name} = {number} is in rad, and outside its range of {low:.3g} to {high:.3g} rad; did you mean {number}deg?"
 
 
 def tell_doubt(odd: str) -> None:

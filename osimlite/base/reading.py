@@ -14,7 +14,12 @@ from typing import BinaryIO
 
 from osimlite.errors import MissingFileError, MissingFolderError, SpecialFileError
 
-_SPECIAL = {stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
+_SPECIAL = {
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
 
 
 def open_file(path: str | Path) -> BinaryIO:
@@ -25,7 +30,8 @@ def open_file(path: str | Path) -> BinaryIO:
         MissingFileError: it is not there or may not be read.
     """
     try:
-        # Opening a device may already do something; and what was there may be another thing a moment later.
+        # Opening a device may already do something; and what was there may be another thing a
+        # moment later.
         _expect_ordinary(os.stat(path).st_mode, path)
         return open(path, "rb", opener=_open_nonblocking)
     except (OSError, ValueError) as error:
@@ -54,7 +60,9 @@ def read_at_most(path: str | Path, limit: int) -> bytes:
         try:
             return stream.read(limit)
         except OSError as error:
-            raise MissingFileError(f"cannot read the file: {error.strerror}", file=str(path)) from None
+            raise MissingFileError(
+                f"cannot read the file: {error.strerror}", file=str(path)
+            ) from None
 
 
 def _open_nonblocking(path: str, flags: int) -> int:
@@ -70,7 +78,11 @@ def _open_nonblocking(path: str, flags: int) -> int:
 
 def _expect_ordinary(mode: int, path: str | Path) -> None:
     if stat.S_ISDIR(mode):
-        raise MissingFileError("cannot read the file: this is a folder; name a model file in it", file=str(path))
+        raise MissingFileError(
+            "cannot read the file: this is a folder; name a model file in it", file=str(path)
+        )
     if not stat.S_ISREG(mode):
         kind = _SPECIAL.get(stat.S_IFMT(mode), "something else")
-        raise SpecialFileError(f"cannot read the file: this is {kind}, and only files are read", file=str(path))
+        raise SpecialFileError(
+            f"cannot read the file: this is {kind}, and only files are read", file=str(path)
+        )

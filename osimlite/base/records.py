@@ -1,8 +1,9 @@
 """Records: classes declared as dataclasses are, whose methods are made when the first object is.
 
-``dataclasses.dataclass`` writes and compiles half a dozen methods of each class when its module is imported. A command
-loads some 150 records and makes objects of few: here ``__init__`` is compiled with the first object, what compares and
-prints is the same function for all. Everything else is as with dataclasses, whose `replace` and `fields` take records.
+``dataclasses.dataclass`` writes and compiles half a dozen methods of each class when its module is
+imported. A command loads some 150 records and makes objects of few: here ``__init__`` is compiled
+with the first object, what compares and prints is the same function for all. Everything else is as
+with dataclasses, whose `replace` and `fields` take records.
 """
 
 from __future__ import annotations
@@ -21,11 +22,23 @@ class _Field:
     __slots__ = "choice", "compare", "default", "default_factory", "init", "kw_only", "repr"
 
     def __init__(
-        self, default: Any, default_factory: Any = _NOTHING, *, init: bool = True, repr: bool = True,
-        compare: bool = True, choice: Any = None,
-    ) -> None:  # fmt: skip
+        self,
+        default: Any,
+        default_factory: Any = _NOTHING,
+        *,
+        init: bool = True,
+        repr: bool = True,
+        compare: bool = True,
+        choice: Any = None,
+    ) -> None:
         self.default, self.default_factory = default, default_factory
-        self.init, self.repr, self.compare, self.kw_only, self.choice = init, repr, compare, False, choice
+        self.init, self.repr, self.compare, self.kw_only, self.choice = (
+            init,
+            repr,
+            compare,
+            False,
+            choice,
+        )
 
 
 def field(
@@ -52,7 +65,13 @@ def dataclass(
 ) -> Callable[[type[T]], type[T]]: ...
 @dataclass_transform(field_specifiers=(field,))
 def dataclass(
-    cls: Any = None, /, *, frozen: bool = False, eq: bool = True, kw_only: bool = False, slots: bool = False
+    cls: Any = None,
+    /,
+    *,
+    frozen: bool = False,
+    eq: bool = True,
+    kw_only: bool = False,
+    slots: bool = False,
 ) -> Any:
     """As ``dataclasses.dataclass``."""
 
@@ -67,7 +86,11 @@ def _made(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool) -> type
     fields: dict[str, _Field] = {}
     for base in reversed(cls.__mro__[1:]):
         fields |= base.__dict__.get("__record_fields__", {})
-    own = [name for name, kind in space.get("__annotations__", {}).items() if not str(kind).startswith("ClassVar")]
+    own = [
+        name
+        for name, kind in space.get("__annotations__", {}).items()
+        if not str(kind).startswith("ClassVar")
+    ]
     for name in own:
         given = space.get(name, _NOTHING)
         fields[name] = given if isinstance(given, _Field) else _Field(given)
@@ -78,9 +101,15 @@ def _made(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool) -> type
             else:
                 setattr(cls, name, fields[name].default)
     if slots:
-        left = {name: value for name, value in space.items() if name not in (*own, "__dict__", "__weakref__")}
+        left = {
+            name: value
+            for name, value in space.items()
+            if name not in (*own, "__dict__", "__weakref__")
+        }
         cls = type(cls)(
-            cls.__name__, cls.__bases__, {**left, "__slots__": tuple(own), "__qualname__": cls.__qualname__}
+            cls.__name__,
+            cls.__bases__,
+            {**left, "__slots__": tuple(own), "__qualname__": cls.__qualname__},
         )
         space = cls.__dict__
     methods: dict[str, Any] = {"__init__": _first(cls, frozen), "__repr__": _shown}
@@ -123,14 +152,21 @@ def _compiled(cls: Any, frozen: bool) -> Callable[..., None]:
         value = name
         names |= {f"_default_{name}": each.default, f"_make_{name}": each.default_factory}
         if each.default_factory is not _NOTHING:
-            value = f"_make_{name}() if {name} is _nothing else {name}" if each.init else f"_make_{name}()"
+            value = (
+                f"_make_{name}() if {name} is _nothing else {name}"
+                if each.init
+                else f"_make_{name}()"
+            )
         elif not each.init:
             continue
         if each.init:
             default = (
-                "" if each.default is each.default_factory is _NOTHING
-                else "=_nothing" if each.default is _NOTHING else f"=_default_{name}"
-            )  # fmt: skip
+                ""
+                if each.default is each.default_factory is _NOTHING
+                else "=_nothing"
+                if each.default is _NOTHING
+                else f"=_default_{name}"
+            )
             (named if each.kw_only else given).append(name + default)
         lines.append(f'_set(self, "{name}", {value})' if frozen else f"self.{name} = {value}")
     if hasattr(cls, "__post_init__"):
@@ -155,14 +191,20 @@ class _AsDataclass:
             defaults = {word: getattr(each, word) for word in ("default", "default_factory")}
             told |= {word: value for word, value in defaults.items() if value is not _NOTHING}
             made.append((name, Any, d.field(**told)))
-        result: dict[str, Any] = d.make_dataclass(cls.__name__, made).__dict__["__dataclass_fields__"]
+        result: dict[str, Any] = d.make_dataclass(cls.__name__, made).__dict__[
+            "__dataclass_fields__"
+        ]
         # The next one asks the class itself: to make them costs more than many a motion.
         cls.__dataclass_fields__ = result
         return result
 
 
 def _shown(self: Any) -> str:
-    values = (f"{name}={getattr(self, name)!r}" for name, each in self.__record_fields__.items() if each.repr)
+    values = (
+        f"{name}={getattr(self, name)!r}"
+        for name, each in self.__record_fields__.items()
+        if each.repr
+    )
     return f"{type(self).__qualname__}({', '.join(values)})"
 
 

@@ -42,7 +42,9 @@ def require(module: str, *, extra: str, purpose: str, instead: str = "") -> Modu
             return import_module(module)
     except ModuleNotFoundError as error:
         if error.name == package:
-            raise MissingDependency(f"{purpose} needs {package}, which is not installed; {cure}") from error
+            raise MissingDependency(
+                f"{purpose} needs {package}, which is not installed; {cure}"
+            ) from error
         raise MissingDependency(
             f"{purpose} needs {package}, which is installed without its own dependency {error.name}; {cure}"
         ) from error

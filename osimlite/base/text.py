@@ -7,9 +7,11 @@ from collections.abc import Callable, Collection, Container, Iterable
 from itertools import chain, count
 
 _COLOUR = r"\x1b\[[0-9;]*m"
-# Bidirectional controls, the separators of lines, and halves of characters: what stands for a byte that is no UTF-8.
+# Bidirectional controls, the separators of lines, and halves of characters: what stands for a byte
+# that is no UTF-8.
 _UNSAFE = r"[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]|\r(?!\n)"
-# Workflow commands: GitHub obeys `::name::` at the start of a line; it, Azure and TeamCity obey `##name[` anywhere.
+# Workflow commands: GitHub obeys `::name::` at the start of a line; it, Azure and TeamCity obey
+# `##name[` anywhere.
 _COMMAND = r"(?:(?<=\n)|\A)[ \t\xa0\u1680\u2000-\u200a\u202f\u205f\u3000]*:(?=:)|#(?=#\w*\[)"
 _OBEYED = re.compile(f"{_COLOUR}|{_UNSAFE}|{_COMMAND}")
 # What is escaped in JSON: a character of two halves, a half without the other, anything else.
@@ -19,22 +21,29 @@ _HALF = re.compile(r"\\(?:ud[89ab]..\\ud[c-f]..|u(d[89a-f]..)|.)")
 def visible(text: str) -> str:
     r"""The text in one line, all that prints nothing written out: ``\n``, ``\x1b``, ``\u202e``.
 
-    A byte of a file name that is no UTF-8 is written as ``\xe9``. This is for people: it cannot be read back.
+    A byte of a file name that is no UTF-8 is written as ``\xe9``. This is for people: it cannot be
+    read back.
     """
-    return text if text.isprintable() else "".join(c if c.isprintable() else _escape(c) for c in text)
+    return (
+        text if text.isprintable() else "".join(c if c.isprintable() else _escape(c) for c in text)
+    )
 
 
 def json_lines(data: object) -> str:
     r"""JSON as programs read it from a log or a pipe: ASCII, so that it passes everywhere, and of whole characters.
 
-    A byte of a file name that is no UTF-8 is written as ``\xe9``, as :func:`visible` does: no string of JSON holds it.
+    A byte of a file name that is no UTF-8 is written as ``\xe9``, as :func:`visible` does: no
+    string of JSON holds it.
     """
     from json import dumps
 
     text = dumps(data, indent=2)
     if "\\ud" in text:
-        text = _HALF.sub(lambda found: f"\\{_escape(chr(int(found[1], 16)))}" if found[1] else found[0], text)
-    # Where it goes through the log of a CI job, a string must not be taken for a command; `#` stands in strings only.
+        text = _HALF.sub(
+            lambda found: f"\\{_escape(chr(int(found[1], 16)))}" if found[1] else found[0], text
+        )
+    # Where it goes through the log of a CI job, a string must not be taken for a command; `#`
+    # stands in strings only.
     return text.replace("##", "#\\u0023").replace("\x7f", "\\u007f") + "\n"
 
 
@@ -97,16 +106,18 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 60.0) -> str | N
         return best if best is not None and measure(best.lower()) >= cutoff else None
     from rapidfuzz import fuzz, process
 
-    result = process.extractOne(word, choices, scorer=fuzz.ratio, processor=str.lower, score_cutoff=cutoff)
+    result = process.extractOne(
+        word, choices, scorer=fuzz.ratio, processor=str.lower, score_cutoff=cutoff
+    )
     return result[0] if result else None
 
 
 def measure_similarity(word: str) -> Callable[[str], float]:
     """Return a function that measures how similar a text is to a word, in %, as `rapidfuzz.fuzz.ratio` does.
 
-    That is twice the length of the longest common subsequence by the sum of both lengths. The length is computed for
-    all characters of the word at once, each of which has a bit (Hyyrö 2004, "Bit-parallel LCS-length computation
-    revisited").
+    That is twice the length of the longest common subsequence by the sum of both lengths. The
+    length is computed for all characters of the word at once, each of which has a bit (Hyyrö 2004,
+    "Bit-parallel LCS-length computation revisited").
     """
     bits: dict[str, int] = {}
     for place, character in enumerate(word):
@@ -146,7 +157,9 @@ def or_known(word: str, known: Iterable[str], *more: str) -> str:
 
 def span(low: float, high: float, form: str) -> str:
     """``"0.1 to 0.5"``, ``"0.3"`` if both are written so, ``"-"`` for what is no number."""
-    return "-" if low != low else " to ".join(dict.fromkeys((format(low, form), format(high, form))))
+    return (
+        "-" if low != low else " to ".join(dict.fromkeys((format(low, form), format(high, form))))
+    )
 
 
 def counted(number: int, noun: str) -> str:
@@ -157,7 +170,9 @@ def counted(number: int, noun: str) -> str:
 
 def unused(name: str, taken: Container[str | None], first: int = 1) -> str:
     """The name itself, or with the first number behind it that makes it another than those that are taken."""
-    return next(free for free in chain((name,), (f"{name}_{k}" for k in count(first))) if free not in taken)
+    return next(
+        free for free in chain((name,), (f"{name}_{k}" for k in count(first))) if free not in taken
+    )
 
 
 def listed(words: Iterable[str], *, most: int = 8) -> str:

@@ -2,14 +2,16 @@
 
 Who chose the path decides how much is allowed (SECURITY.md states the rule for users):
 
-- :func:`write_atomically`: the user named the file or its folder. A link is followed only if it stays
-  in its project, or without one in its folder; a pipe that is read or a device takes the text.
-- :func:`write_into`: the program chose the name. Never through a link, and never into anything but a
-  regular file.
-- :class:`ResultWriter`: a document names the file. As the last, and only in the trees of the project
-  and the current folder, under no hidden name, and over nothing but a result of the same kind.
-- :func:`write_cached`: nobody named the file. A cache is in the user's cache folder, which no project
-  can fill with links.
+- :func:`write_atomically`: the user named the file or its folder. A link is followed only if it
+  stays in its project, or without one in its folder; a pipe that is read or a device takes the
+  text.
+- :func:`write_into`: the program chose the name. Never through a link, and never into anything but
+  a regular file.
+- :class:`ResultWriter`: a document names the file. As the last, and only in the trees of the
+  project and the current folder, under no hidden name, and over nothing but a result of the same
+  kind.
+- :func:`write_cached`: nobody named the file. A cache is in the user's cache folder, which no
+  project can fill with links.
 """
 
 from __future__ import annotations
@@ -74,7 +76,9 @@ def _encode(content: str, path: str | Path) -> bytes:
     except UnicodeEncodeError as error:
         # Half of a character: JSON can hold it, UTF-8 cannot.
         odd = content[max(0, error.start - 20) : error.end]
-        raise OsimliteError(f"cannot write the file: '{odd}' ends in half a character", file=str(path)) from None
+        raise OsimliteError(
+            f"cannot write the file: '{odd}' ends in half a character", file=str(path)
+        ) from None
 
 
 @contextmanager
@@ -84,9 +88,8 @@ def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
     A file that was there keeps its owner, its mode and all of its names. A link stays a link to the
     file that is written. A pipe or a device takes the text as it is.
 
-    Raises:
-        OsimliteError: the folder is missing or cannot be written to, or the path is a link that leads
-            out of its project; nothing has changed then.
+    Raises: OsimliteError: the folder is missing or cannot be written to, or the path is a link that
+        leads out of its project; nothing has changed then.
     """
     target = Path(os.path.realpath(path))
     # Unlike those of Path, these functions take a name that is too long for a file.
@@ -104,11 +107,11 @@ def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
 def written_into(folder: str | Path, name: str) -> Iterator[BinaryIO]:
     """Yield a stream whose content becomes a file in a folder, under a name that the program chose.
 
-    The new file takes the place of a regular file or of a link; what the link led to stays as it is.
+    The new file takes the place of a regular file or of a link; what the link led to stays as it
+    is.
 
-    Raises:
-        OsimliteError: the folder is missing or cannot be written to, or something else than a regular
-            file has the name; nothing has changed then.
+    Raises: OsimliteError: the folder is missing or cannot be written to, or something else than a
+        regular file has the name; nothing has changed then.
     """
     target = Path(os.path.realpath(folder)) / name
     _expect_regular_or_none(target)
@@ -232,9 +235,8 @@ class ResultWriter:
     def resolve(self, path: str | Path) -> Path:
         """Return the real path of a result, after checking all that depends on its name alone.
 
-        Raises:
-            WriteRefusedError: the path leads out of the trees, is hidden, is a link, or its ending is
-                not that of a result.
+        Raises: WriteRefusedError: the path leads out of the trees, is hidden, is a link, or its
+            ending is not that of a result.
         """
         path = Path(path)
         real = Path(os.path.realpath(path.parent)) / path.name
@@ -326,9 +328,10 @@ class ResultWriter:
 def project_folder(document: str | Path) -> str:
     """Return the top folder of the project that a document belongs to.
 
-    It is the nearest folder above that has `.git`, `osimlite.toml` or `pyproject.toml`. Without one it
-    is the folder around the document's, because laboratories keep setups and results side by side
-    (`../results`). It is never the home folder, the temporary folder or what is above one of them.
+    It is the nearest folder above that has `.git`, `osimlite.toml` or `pyproject.toml`. Without one
+    it is the folder around the document's, because laboratories keep setups and results side by
+    side (`../results`). It is never the home folder, the temporary folder or what is above one of
+    them.
     """
     folder = Path(os.path.realpath(document)).parent
     shared = find_shared_folders()
@@ -365,7 +368,9 @@ def kind_of(beginning: bytes) -> str | None:
     if first.startswith("PathFileType"):
         return "a table of markers"
     head, end, _ = text.partition("endheader")
-    if end and re.search(r"^(version|nRows|datarows|DataType) *=", head, re.MULTILINE | re.IGNORECASE):
+    if end and re.search(
+        r"^(version|nRows|datarows|DataType) *=", head, re.MULTILINE | re.IGNORECASE
+    ):
         name = "" if "=" in first else first.strip()
         return f"a table '{name}' of OpenSim"
     if _RESIDUALS.match(text):
@@ -428,23 +433,31 @@ def _expect_regular_or_none(path: Path, *, links: bool = True) -> None:
         return
     if stat.S_ISREG(mode) or (links and stat.S_ISLNK(mode)):
         return
-    kind = "a folder" if stat.S_ISDIR(mode) else "a link" if stat.S_ISLNK(mode) else "a pipe or a device"
+    kind = (
+        "a folder"
+        if stat.S_ISDIR(mode)
+        else "a link"
+        if stat.S_ISLNK(mode)
+        else "a pipe or a device"
+    )
     raise OsimliteError(f"cannot write the file: this is {kind}; remove it first", file=str(path))
 
 
 @contextmanager
-def _stage(target: Path, there: os.stat_result | None, *, in_place: bool = True) -> Iterator[BinaryIO]:
+def _stage(
+    target: Path, there: os.stat_result | None, *, in_place: bool = True
+) -> Iterator[BinaryIO]:
     """Yield a stream to a temporary file that replaces the target when the context ends.
 
-    Args:
-        target: the place.
-        there: what is there now; None if there is nothing, or what is to be replaced whatever it is.
-        in_place: whether a file with several names, or whose owner cannot be kept, is written into
-            instead of replaced.
+    Args: target: the place. there: what is there now; None if there is nothing, or what is to be
+        replaced whatever it is. in_place: whether a file with several names, or whose owner cannot
+        be kept, is written into instead of replaced.
     """
     # To those who may do everything the mode says it all the same.
     if there is not None and not (there.st_mode & 0o222 and os.access(target, os.W_OK)):
-        raise OsimliteError("cannot write the file: it is read-only; make it writable first", file=str(target))
+        raise OsimliteError(
+            "cannot write the file: it is read-only; make it writable first", file=str(target)
+        )
     try:
         from tempfile import mkstemp
 
@@ -494,10 +507,17 @@ def make_folder(path: str | Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         file = next(
-            (place for place in (folder, *folder.parents) if os.path.exists(place) and not place.is_dir()), None
+            (
+                place
+                for place in (folder, *folder.parents)
+                if os.path.exists(place) and not place.is_dir()
+            ),
+            None,
         )
         reason = "this is a file, not a folder" if file is not None else error.strerror
-        raise OsimliteError(f"cannot make a folder here: {reason}", file=str(file or folder)) from None
+        raise OsimliteError(
+            f"cannot make a folder here: {reason}", file=str(file or folder)
+        ) from None
     return folder
 
 
@@ -525,7 +545,9 @@ def folder_to_fill(path: str | Path) -> Iterator[Path]:
 def _open_special(target: Path) -> Iterator[BinaryIO]:
     """Yield a stream into a pipe or a device, without waiting for a reader of the pipe."""
     if target.is_dir():
-        raise OsimliteError("cannot write the file: this is a folder; name a file in it", file=str(target))
+        raise OsimliteError(
+            "cannot write the file: this is a folder; name a file in it", file=str(target)
+        )
     try:
         handle = os.open(target, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
         os.set_blocking(handle, True)
@@ -578,7 +600,8 @@ def _copy_into(name: str | Path, target: Path) -> None:
             stream.truncate()
     except OSError as error:
         raise OsimliteError(
-            f"cannot write the file: {error.strerror}; what was to be written is in {name}", file=str(target)
+            f"cannot write the file: {error.strerror}; what was to be written is in {name}",
+            file=str(target),
         ) from None
     os.unlink(name)
 

@@ -53,7 +53,9 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
     @application.callback(invoke_without_command=True)
     def osimlite(
         version: bool = typer.Option(False, "--version", help="Print the version and stop."),
-        verbose: bool = typer.Option(False, "--verbose", "-v", help="With --version: say what runs the kernels."),
+        verbose: bool = typer.Option(
+            False, "--verbose", "-v", help="With --version: say what runs the kernels."
+        ),
     ) -> None:
         if version:
             _print_version(verbose=verbose)
@@ -101,7 +103,11 @@ def _suggest_built_in(error: OsimliteError, command: str) -> str:
     if command == "scone":
         from osimlite.models.walking import SCENARIO
 
-        return f"; did you mean '{SCENARIO}', the built-in scenario?" if nearest(name, [SCENARIO]) else ""
+        return (
+            f"; did you mean '{SCENARIO}', the built-in scenario?"
+            if nearest(name, [SCENARIO])
+            else ""
+        )
     # Names of files are often near by chance, such as arm26 and arm.
     similar = nearest(name, BUILT_IN, cutoff=80.0)
     if similar is None:
@@ -128,9 +134,11 @@ def _run(words: list[str]) -> None:
     from osimlite.cli._console import complain
     from osimlite.errors import DoubtfulWarning, OsimliteError, UnitWarning
 
-    # What is imported makes many objects and drops none: the collector would look through them again and again.
+    # What is imported makes many objects and drops none: the collector would look through them
+    # again and again.
     gc.set_threshold(300_000)
-    # At the end Python would look through all that was made once more, a quarter of the time of a short command.
+    # At the end Python would look through all that was made once more, a quarter of the time of a
+    # short command.
     atexit.register(gc.freeze)
     # What draws tables takes any width at its word.
     width = os.environ.get("COLUMNS", "")
@@ -138,7 +146,8 @@ def _run(words: list[str]) -> None:
         os.environ.pop("COLUMNS", None)
     # Plug-ins of pydantic, for which it searches every installed package, have nothing to do here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    # Matrices of mechanisms are small: the threads of OpenBLAS would only wait, and keep a core busy with that.
+    # Matrices of mechanisms are small: the threads of OpenBLAS would only wait, and keep a core
+    # busy with that.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     words = [ALIASES.get(words[0], words[0]), *words[1:]] if words else ["--help"]
     # Only the command that is asked for is loaded; without one, all are, for the help.
@@ -154,7 +163,9 @@ def _run(words: list[str]) -> None:
         with warnings.catch_warnings():
             shown = warnings.showwarning
             warnings.showwarning = lambda message, category, *place: (
-                complain(str(message)) if issubclass(category, DoubtfulWarning) else shown(message, category, *place)
+                complain(str(message))
+                if issubclass(category, DoubtfulWarning)
+                else shown(message, category, *place)
             )
             warnings.simplefilter("once", DoubtfulWarning)
             # Options refuse such a number, or were given its unit.
@@ -190,7 +201,9 @@ def _tell(error: BaseException, words: list[str]) -> NoReturn:
 
     if isinstance(error, OSError):
         # Whoever read our output has gone, which Windows tells as an invalid argument of no file.
-        if not isinstance(error, BrokenPipeError) and (error.errno != errno.EINVAL or error.filename is not None):
+        if not isinstance(error, BrokenPipeError) and (
+            error.errno != errno.EINVAL or error.filename is not None
+        ):
             raise error
         # Python would complain once more when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -201,7 +214,9 @@ def _tell(error: BaseException, words: list[str]) -> NoReturn:
         extra = find_extra(error.name, words[0])
         if extra is None:
             raise error
-        complain(f"'{words[0]}' needs {error.name}, which is not installed; run: pip install 'osimlite[{extra}]'")
+        complain(
+            f"'{words[0]}' needs {error.name}, which is not installed; run: pip install 'osimlite[{extra}]'"
+        )
         raise SystemExit(2) from None
     # The library that reads options does not tell under what name it can be caught.
     if not hasattr(error, "format_message"):

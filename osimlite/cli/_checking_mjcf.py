@@ -20,7 +20,9 @@ def check(file: Path, mjcf: Path, output: Path | None) -> None:
     if result.missing:
         say(f"not in it: {listed(list(result.missing), most=6)}")
     if result.coordinates:
-        say(f"no joint has the name of {listed(list(result.coordinates), most=6)}: it stands where it stands")
+        say(
+            f"no joint has the name of {listed(list(result.coordinates), most=6)}: it stands where it stands"
+        )
     if result.bodies is not None:
         say(f"origins of bodies are off by {1e3 * result.bodies.rms:.2g} mm (root mean square)")
     if output is not None:
@@ -32,10 +34,18 @@ def check(file: Path, mjcf: Path, output: Path | None) -> None:
 def _table(found: Any, name: str) -> Any:
     """A muscle in each row, the worst first: root mean squares over random poses, of the worst of its moment arms.
 
-    Last come the optimal fiber length that the file implies, over the model's, and the change of the tendon's.
+    Last come the optimal fiber length that the file implies, over the model's, and the change of
+    the tendon's.
     """
     table = plain_table(f"{name}: root mean square errors")
-    for column in ("muscle", "length, mm", "moment arm, mm", "force, Fmax", "fiber length, x", "slack length, mm"):
+    for column in (
+        "muscle",
+        "length, mm",
+        "moment arm, mm",
+        "force, Fmax",
+        "fiber length, x",
+        "slack length, mm",
+    ):
         table.add_column(column, justify="left" if column == "muscle" else "right", overflow="fold")
     for muscle in sorted(found.muscles, key=lambda each: -each.worst_arm.rms):
         add_row(

@@ -1,7 +1,7 @@
 """What a command takes, as its function declares it: read by typer, or here, which is quicker.
 
-Typer makes the help, the completion and the messages about what is wrong. Words of which nothing is wrong need none of
-it, and loading it takes longer than most commands do.
+Typer makes the help, the completion and the messages about what is wrong. Words of which nothing is
+wrong need none of it, and loading it takes longer than most commands do.
 """
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_args, get_origin
 if TYPE_CHECKING:
     from osimlite.base.choices import Choice
 
-_NUMBERS = {int: re.compile(r"[0-9]+", re.ASCII), float: re.compile(r"[0-9]*\.?[0-9]+(e[-+]?[0-9]+)?", re.ASCII)}
+_NUMBERS = {
+    int: re.compile(r"[0-9]+", re.ASCII),
+    float: re.compile(r"[0-9]*\.?[0-9]+(e[-+]?[0-9]+)?", re.ASCII),
+}
 """Texts of numbers that mean the same to everybody."""
 
 
@@ -32,7 +35,9 @@ class Declared:
 
     __slots__ = "bare_value", "maker", "names", "told"
 
-    def __init__(self, maker: str, names: Sequence[str], told: dict[str, Any], bare_value: str | None = None) -> None:
+    def __init__(
+        self, maker: str, names: Sequence[str], told: dict[str, Any], bare_value: str | None = None
+    ) -> None:
         self.maker, self.names, self.told, self.bare_value = maker, names, told, bare_value
 
 
@@ -99,9 +104,15 @@ class Command:
         more: what it takes besides, as keyword arguments.
     """
 
-    def __init__(self, function: Callable[..., None], more: Callable[[], Iterable[Choice]] = tuple) -> None:
+    def __init__(
+        self, function: Callable[..., None], more: Callable[[], Iterable[Choice]] = tuple
+    ) -> None:
         self.function, self._more = function, more
-        self.__name__, self.__doc__, self.__module__ = function.__name__, function.__doc__, function.__module__
+        self.__name__, self.__doc__, self.__module__ = (
+            function.__name__,
+            function.__doc__,
+            function.__module__,
+        )
         self._parameters: list[_Parameter] | None = None
 
     def __call__(self, *values: Any, **named: Any) -> None:
@@ -115,13 +126,17 @@ class Command:
 
     def _read_parameters(self) -> list[_Parameter]:
         function: Any = self.function
-        defaults = dict(zip(reversed([*_names(function)]), reversed(function.__defaults__ or ()), strict=False))
+        defaults = dict(
+            zip(reversed([*_names(function)]), reversed(function.__defaults__ or ()), strict=False)
+        )
         result = []
         for name in _names(function):
             annotation = eval(function.__annotations__[name], function.__globals__)
             kind, declared = annotation.__origin__, annotation.__metadata__[0]
             result.append(_Parameter(name, kind, declared, defaults.get(name, ...)))
-        return result + [_Parameter(each.name, each.type, _declared(each), each.default) for each in self._more()]
+        return result + [
+            _Parameter(each.name, each.type, _declared(each), each.default) for each in self._more()
+        ]
 
     @property
     def __annotations__(self) -> dict[str, Any]:  # type: ignore[override]
@@ -150,8 +165,12 @@ class Command:
 
     def complete(self, words: Sequence[str]) -> list[str]:
         """Return the words of a command line, with a value after each option that may stand without one."""
-        # Most command lines have no option that could lack a value, and need no look at the parameters here.
-        if not any(word[:2] == "--" and following[0:1] == "-" for word, following in pairwise([*words, "-"])):
+        # Most command lines have no option that could lack a value, and need no look at the
+        # parameters here.
+        if not any(
+            word[:2] == "--" and following[0:1] == "-"
+            for word, following in pairwise([*words, "-"])
+        ):
             return [*words]
         bare_values = {
             spelling: each.declared.bare_value
@@ -201,7 +220,10 @@ class Command:
             if value is None or (parameter.name in seen and not several):
                 return None
             if several:
-                given[parameter.name] = [*(given[parameter.name] if parameter.name in seen else ()), value]
+                given[parameter.name] = [
+                    *(given[parameter.name] if parameter.name in seen else ()),
+                    value,
+                ]
             else:
                 given[parameter.name] = value
             seen.add(parameter.name)
@@ -215,7 +237,12 @@ def _names(function: Any) -> tuple[str, ...]:
 
 def _declared(choice: Choice) -> Declared:
     shown: Any = choice.shown or (choice.default is not None and choice.type is not bool)
-    told = {"help": choice.help, "metavar": choice.unit, "show_default": shown, "rich_help_panel": choice.group}
+    told = {
+        "help": choice.help,
+        "metavar": choice.unit,
+        "show_default": shown,
+        "rich_help_panel": choice.group,
+    }
     return Option(*choice.spelled, **{word: value for word, value in told.items() if value != ""})
 
 

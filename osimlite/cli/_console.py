@@ -132,7 +132,13 @@ def plain_table(title: str = "", **choices: Any) -> Table:
     """A table without lines, as all commands print theirs."""
     from rich.table import Table
 
-    style = {"box": None, "pad_edge": False, "padding": (0, 2, 0, 0), "header_style": "bold", "title_justify": "left"}
+    style = {
+        "box": None,
+        "pad_edge": False,
+        "padding": (0, 2, 0, 0),
+        "header_style": "bold",
+        "title_justify": "left",
+    }
     return Table(title=visible(title) or None, **{**style, **choices})
 
 
@@ -155,7 +161,8 @@ class Facts:
     def show(self) -> None:
         """Print them as a table; text that is too long for its column is wrapped between words.
 
-        A word is never broken: a path of a file stays whole, so that it can be copied and searched for.
+        A word is never broken: a path of a file stays whole, so that it can be copied and searched
+        for.
         """
         rows = [(visible(name), visible(words)) for name, words in self.rows]
         width = max((len(name) for name, _ in rows), default=0)

@@ -111,7 +111,10 @@ A module without a page, such as one that reads numbers, is passed over for the 
 def page_of(error: BaseException) -> str:
     """The page that says more about an error that was raised."""
     kinds = (f"{kind.__module__}.{kind.__qualname__}" for kind in type(error).__mro__)
-    modules = (frame.f_globals.get("__name__", "") for frame, _ in reversed([*walk_tb(error.__traceback__)]))
+    modules = (
+        frame.f_globals.get("__name__", "")
+        for frame, _ in reversed([*walk_tb(error.__traceback__)])
+    )
     for part in chain(kinds, modules):
         while part:
             if part in PAGES:

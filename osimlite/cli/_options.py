@@ -17,13 +17,20 @@ if TYPE_CHECKING:
 
 File = Annotated[Path, Argument(help="A model file.", show_default=False)]
 Source = Annotated[
-    str, Argument(help="A model file, or anything that 'osimlite build' makes one of.", show_default=False)
+    str,
+    Argument(
+        help="A model file, or anything that 'osimlite build' makes one of.", show_default=False
+    ),
 ]
 Motion = Annotated[Path, Argument(help="Coordinates over time, .sto or .mot.", show_default=False)]
 Parameters = Annotated[
     list[str] | None,
     Option(
-        "-p", "--parameter", metavar="NAME=VALUE", help="Set a parameter of the model function.", show_default=False
+        "-p",
+        "--parameter",
+        metavar="NAME=VALUE",
+        help="Set a parameter of the model function.",
+        show_default=False,
     ),
 ]
 Start = Annotated[
@@ -32,29 +39,57 @@ Start = Annotated[
 ]
 StartSpeed = Annotated[
     list[str] | None,
-    Option("--set-speed", metavar="NAME=VALUE", help="At what speed a coordinate starts (per second)."),
+    Option(
+        "--set-speed", metavar="NAME=VALUE", help="At what speed a coordinate starts (per second)."
+    ),
 ]
 To = Annotated[float, Option("--to", metavar="SECONDS", help="How long to simulate.")]
 Engine = Annotated[
     str | None,
-    Option(help="What computes the accelerations: 'compiled' or 'bullet' (PyBullet).", show_default="compiled"),
+    Option(
+        help="What computes the accelerations: 'compiled' or 'bullet' (PyBullet).",
+        show_default="compiled",
+    ),
 ]
 FirstFrame = Annotated[
-    float, Option("--from", metavar="SECONDS", help="Time of the first frame that counts.", show_default="the first")
+    float,
+    Option(
+        "--from",
+        metavar="SECONDS",
+        help="Time of the first frame that counts.",
+        show_default="the first",
+    ),
 ]
 LastFrame = Annotated[
-    float, Option("--until", metavar="SECONDS", help="Time of the last frame that counts.", show_default="the last")
+    float,
+    Option(
+        "--until",
+        metavar="SECONDS",
+        help="Time of the last frame that counts.",
+        show_default="the last",
+    ),
 ]
 Mass = Annotated[
-    float, Option("--mass", metavar="KG", help="What the subject weighs.", show_default="what the model does")
+    float,
+    Option(
+        "--mass", metavar="KG", help="What the subject weighs.", show_default="what the model does"
+    ),
 ]
 Weights = Annotated[
     list[str] | None,
-    Option("--weight", metavar="NAME=NUMBER", help="How much a marker or sensor counts; 1 if left out, 0 for none."),
+    Option(
+        "--weight",
+        metavar="NAME=NUMBER",
+        help="How much a marker or sensor counts; 1 if left out, 0 for none.",
+    ),
 ]
 Lowpass = Annotated[
     float | None,
-    Option(metavar="HZ", help="Filter the coordinates first, as OpenSim's tools do; 6 is usual.", show_default=False),
+    Option(
+        metavar="HZ",
+        help="Filter the coordinates first, as OpenSim's tools do; 6 is usual.",
+        show_default=False,
+    ),
 ]
 AppliedTo = Annotated[
     list[str] | None,
@@ -101,24 +136,39 @@ Par = Annotated[
         show_default="those that their file begins with",
     ),
 ]
-Numbers = Annotated[str, Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")]
-Format = Annotated[str, Option("--format", metavar="FORMAT", help="full, concise, json, github, sarif or junit.")]
+Numbers = Annotated[
+    str, Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")
+]
+Format = Annotated[
+    str, Option("--format", metavar="FORMAT", help="full, concise, json, github, sarif or junit.")
+]
 Select = Annotated[
     list[str] | None,
-    Option(metavar="RULE", help="Run only these rules: codes, beginnings of codes (OSIM3), names.", show_default=False),
+    Option(
+        metavar="RULE",
+        help="Run only these rules: codes, beginnings of codes (OSIM3), names.",
+        show_default=False,
+    ),
 ]
 Ignore = Annotated[
-    list[str] | None, Option(metavar="RULE", help="Leave these rules out; as for --select.", show_default=False)
+    list[str] | None,
+    Option(metavar="RULE", help="Leave these rules out; as for --select.", show_default=False),
 ]
 FailOn = Annotated[
     str | None,
-    Option(metavar="SEVERITY", help="What makes the exit code 1: error, warning or info.", show_default=False),
+    Option(
+        metavar="SEVERITY",
+        help="What makes the exit code 1: error, warning or info.",
+        show_default=False,
+    ),
 ]
 Everything = Annotated[
-    bool, Option("--all", help="Print every finding; else the first stands for those that are like it.")
+    bool,
+    Option("--all", help="Print every finding; else the first stands for those that are like it."),
 ]
 OnlyOurs = Annotated[
-    bool, Option("--skip-other-xml", help="Pass over XML that is not OpenSim's, also where it is named.")
+    bool,
+    Option("--skip-other-xml", help="Pass over XML that is not OpenSim's, also where it is named."),
 ]
 Folder = Annotated[
     Path | None,
@@ -179,12 +229,15 @@ def results_folder(file: Path, output: Path | None) -> Path:
 
     if output is not None:
         return output
-    # The user did not name it: a link of this name in a stranger's folder must not decide where results go.
+    # The user did not name it: a link of this name in a stranger's folder must not decide where
+    # results go.
     expect_folder_inside(Path(file.stem))
     return Path(file.stem)
 
 
-def named_words(words: Iterable[str] | None, option: str, form: str = "NAME=VALUE") -> dict[str, str]:
+def named_words(
+    words: Iterable[str] | None, option: str, form: str = "NAME=VALUE"
+) -> dict[str, str]:
     """Text by name from the ``NAME=VALUE`` words of an option; `form` is what the user is told to write.
 
     Raises:
@@ -206,7 +259,9 @@ def named_words(words: Iterable[str] | None, option: str, form: str = "NAME=VALU
 def applied_loads(words: Iterable[str] | None) -> dict[str, list[list[str]]]:
     """What ``--applied-to`` says, as :func:`osimlite.inverse_dynamics` takes it; errors as of `named_words`."""
     named = named_words(words, "--applied-to", "BODY=FORCE,POINT,MOMENT")
-    return {body: [load.strip().split(",") for load in text.split("+")] for body, text in named.items()}
+    return {
+        body: [load.strip().split(",") for load in text.split("+")] for body, text in named.items()
+    }
 
 
 def named_numbers(words: Iterable[str] | None, option: str) -> dict[str, float]:
@@ -237,9 +292,8 @@ def quantities(
         option: for messages.
         states: paths of other states, which may be named too.
 
-    Raises:
-        OsimliteError: a word is not of that form, there is no such coordinate, the unit does not fit it, or a value
-            of ``--set`` without a unit can hardly be meant in rad.
+    Raises: OsimliteError: a word is not of that form, there is no such coordinate, the unit does
+        not fit it, or a value of ``--set`` without a unit can hardly be meant in rad.
     """
     from osimlite.base.text import did_you_mean
     from osimlite.errors import ModelError, OsimliteError, SettingError
@@ -261,7 +315,9 @@ def quantities(
             # The model is as it should be; it is the command that asks for what is not there.
             raise OsimliteError(f"{option}: {error.message}{did_you_mean(name, states)}") from None
         except ValueError:
-            raise SettingError(f"{option}: the state '{name}' takes a number, not '{text}'") from None
+            raise SettingError(
+                f"{option}: the state '{name}' takes a number, not '{text}'"
+            ) from None
     return result
 
 
@@ -278,7 +334,9 @@ def read_source(source: str, parameter: Iterable[str] | None) -> tuple[Model, Pa
     if Path(source).suffix.lower() != ".osim":
         return make_model(source, named_words(parameter, "-p")), None
     if parameter:
-        raise SettingError(f"'{source}' is a file and takes no parameters; -p is for functions that make a model")
+        raise SettingError(
+            f"'{source}' is a file and takes no parameters; -p is for functions that make a model"
+        )
     return read(source), Path(source).resolve().parent
 
 

@@ -19,15 +19,18 @@ if TYPE_CHECKING:
 def progress_bar(title: str, total: float | None) -> Iterator[Callable[..., None]]:
     """A progress bar on standard error, if that is a terminal, once the work has taken a second.
 
-    What is yielded takes how much is done, of how much if that has become known, and what tells more of it, which takes
-    how much is done in a second. The library that draws the bar is loaded when it first shows. It has no thread of its
+    What is yielded takes how much is done, of how much if that has become known, and what tells
+    more of it, which takes how much is done in a second. The library that draws the bar is loaded
+    when it first shows. It has no thread of its
     own: processes may be started beside it.
     """
     is_terminal = sys.stderr.isatty()
     due = time.monotonic() + 1.0
     bar: Progress | None = None
 
-    def advance(done: float, of: float | None = None, more: Callable[[float], str] | None = None) -> None:
+    def advance(
+        done: float, of: float | None = None, more: Callable[[float], str] | None = None
+    ) -> None:
         nonlocal bar, due
         if not is_terminal or (now := time.monotonic()) < due:
             return
@@ -103,7 +106,12 @@ def _started(title: str) -> Progress:
         TimeRemainingColumn(),
         TextColumn("{task.fields[more]}", markup=False),
     )
-    bar = Progress(*columns, console=plain_console(file=unguarded(sys.stderr)), transient=True, auto_refresh=False)
+    bar = Progress(
+        *columns,
+        console=plain_console(file=unguarded(sys.stderr)),
+        transient=True,
+        auto_refresh=False,
+    )
     bar.add_task(visible(title), total=None, more="")
     bar.start()
     return bar

@@ -12,12 +12,19 @@ from osimlite.io.tables.storage import StoTable, write_sto
 from osimlite.simulation.recorded_motion import RecordedMotion
 
 
-def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Path, *, trc: bool = False) -> None:
+def written(
+    recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Path, *, trc: bool = False
+) -> None:
     """Write tables into a folder, that of markers as markers.trc too, and say what they are made from."""
     make_folder(folder)
     for name, table in tables.items():
         write_sto(
-            folder / name, table.name, table.times, table.columns, table.rows.tolist(), in_degrees=table.in_degrees
+            folder / name,
+            table.name,
+            table.times,
+            table.columns,
+            table.rows.tolist(),
+            in_degrees=table.in_degrees,
         )
     names = list(tables)
     if trc:

@@ -33,18 +33,33 @@ ReportInterval = Annotated[
         show_default="0.01 for expressions",
     ),
 ]
-Interpolation = Annotated[str, Option(help="Between nodes of a control: 'linear', 'steps' or 'cubic'.")]
+Interpolation = Annotated[
+    str, Option(help="Between nodes of a control: 'linear', 'steps' or 'cubic'.")
+]
 Below = Annotated[
     list[str] | None,
-    Option("--stop-below", metavar="NAME=VALUE", help="End a run when a coordinate falls below.", show_default=False),
+    Option(
+        "--stop-below",
+        metavar="NAME=VALUE",
+        help="End a run when a coordinate falls below.",
+        show_default=False,
+    ),
 ]
 Above = Annotated[
     list[str] | None,
-    Option("--stop-above", metavar="NAME=VALUE", help="End a run when a coordinate rises above.", show_default=False),
+    Option(
+        "--stop-above",
+        metavar="NAME=VALUE",
+        help="End a run when a coordinate rises above.",
+        show_default=False,
+    ),
 ]
 Planted = Annotated[
     bool,
-    Option("--planted", help="Put the walker on the ground with the deeper foot, at rest there, at each start."),
+    Option(
+        "--planted",
+        help="Put the walker on the ground with the deeper foot, at rest there, at each start.",
+    ),
 ]
 Workers = Annotated[
     int | None,
@@ -57,7 +72,9 @@ Workers = Annotated[
 ]
 Cluster = Annotated[
     str | None,
-    Option(metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.", show_default=False),
+    Option(
+        metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.", show_default=False
+    ),
 ]
 
 
@@ -92,12 +109,21 @@ def make_plan(
     with warnings.catch_warnings():
         warnings.simplefilter("error", UnitWarning)
         try:
-            return _plan(source, ranges, parameter, controls=words_to_controls(controls or []), **levels, **choices)
+            return _plan(
+                source,
+                ranges,
+                parameter,
+                controls=words_to_controls(controls or []),
+                **levels,
+                **choices,
+            )
         except UnitWarning as odd:
             raise SettingError(f"{odd} (if not, write rad after the number)") from None
 
 
-def _plan(source: str, ranges: Mapping[str, Any], parameter: Sequence[str] | None, **choices: Any) -> Plan:
+def _plan(
+    source: str, ranges: Mapping[str, Any], parameter: Sequence[str] | None, **choices: Any
+) -> Plan:
     from functools import partial
     from inspect import Parameter
 
@@ -115,7 +141,9 @@ def _plan(source: str, ranges: Mapping[str, Any], parameter: Sequence[str] | Non
     known = {name: default for name, default in parameters_of(source).items() if name not in given}
     # The model as it is given needs a value of what has no default.
     needed = {
-        name: str(ranges[name]).partition(":")[0] for name in known if known[name] is Parameter.empty and name in ranges
+        name: str(ranges[name]).partition(":")[0]
+        for name in known
+        if known[name] is Parameter.empty and name in ranges
     }
     return plan(partial(_make, source, {**needed, **given}), ranges, parameters=known, **choices)
 
@@ -124,7 +152,10 @@ def _make(source: str, given: Mapping[str, str], parameters: Mapping[str, float]
     from osimlite.models.source import make_model
 
     # A parameter that is a whole number is written as one.
-    words = {name: repr(int(value) if value.is_integer() else value) for name, value in parameters.items()}
+    words = {
+        name: repr(int(value) if value.is_integer() else value)
+        for name, value in parameters.items()
+    }
     return make_model(source, {**given, **words})
 
 

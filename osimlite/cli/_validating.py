@@ -102,7 +102,10 @@ def expect_known(format: str, fail_on: str | None) -> None:
     Raises:
         OsimliteError: one is not.
     """
-    for option, word, known in (("--fail-on", fail_on, tuple(Severity)), ("--format", format, FORMATS)):
+    for option, word, known in (
+        ("--fail-on", fail_on, tuple(Severity)),
+        ("--format", format, FORMATS),
+    ):
         if word is not None and word not in known:
             raise OsimliteError(f"{option} is one of {listed(known)}, not '{word}'")
 
@@ -121,7 +124,9 @@ def _check(source: Source, given: Config) -> Report:
 
     assert source.file is not None
     # No rule that is about measures mends anything.
-    return run(subject_in(source, settings_of(source.file).config_for(source.file, given)), measure=False)
+    return run(
+        subject_in(source, settings_of(source.file).config_for(source.file, given)), measure=False
+    )
 
 
 def _fail_on_of(files: list[str]) -> Severity:
@@ -196,7 +201,9 @@ def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int, bool]:
     from osimlite.io.document.source import Source
 
     source = _source(path)
-    after, count, left = _mended(source, given, unsafe, lambda pieces: Source(b"".join(pieces), source.file))
+    after, count, left = _mended(
+        source, given, unsafe, lambda pieces: Source(b"".join(pieces), source.file)
+    )
     print_diff(source.text, after.text, path, path)
     unread = next((item for item in _check(after, given).findings if item.code in UNREADABLE), None)
     if unread is not None:
@@ -219,4 +226,13 @@ def _statistics(report: Report, everything: bool) -> str:
 
     known = {rule.code: rule for rule in all_rules()}
     rows = [f"{count:6d}  {code}  {known[code].name}" for code, count in report.codes.most_common()]
-    return "\n".join([*rows, summary(report), *filter(None, [passed(report, everything), unmeasured(report)])]) + "\n"
+    return (
+        "\n".join(
+            [
+                *rows,
+                summary(report),
+                *filter(None, [passed(report, everything), unmeasured(report)]),
+            ]
+        )
+        + "\n"
+    )

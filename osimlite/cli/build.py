@@ -31,12 +31,14 @@ def build(
     ] = None,
     parameter: options.Parameters = None,
     numbers: options.Numbers = "shortest",
-    list_models: Annotated[bool, Option("--list", help="Name the built-in models and stop.")] = False,
+    list_models: Annotated[
+        bool, Option("--list", help="Name the built-in models and stop.")
+    ] = False,
 ) -> None:
     """Make a built-in model, or one of yours in Python, YAML or JSON, and write its .osim file.
 
-    The model is validated first: nothing is written if it has an error. Beside human-walks its study of Moco is written
-    (.omoco, with a guess), which 'osimlite run' solves.
+    The model is validated first: nothing is written if it has an error. Beside human-walks its
+    study of Moco is written (.omoco, with a guess), which 'osimlite run' solves.
 
     Example: osimlite build dynamic-walker -p thigh_length=0.42 -o walker.osim
     """
@@ -66,7 +68,9 @@ def build(
         return
     target = output or Path(f"{model.name or 'model'}.osim")
     if target.suffix == ".omoco":
-        raise OsimliteError(f"{target}: this is the name of a study; name the model's file, {target.stem}.osim")
+        raise OsimliteError(
+            f"{target}: this is the name of a study; name the model's file, {target.stem}.osim"
+        )
     write(model, target, numbers=style)
     count = sum(1 for _ in model.components())
     warned = len(report.warnings)
@@ -84,4 +88,9 @@ def _list_models() -> None:
     from osimlite.models.source import describe
 
     for name in BUILT_IN:
-        show(textwrap.fill(f"{name}  {describe(name)}", width=79, subsequent_indent=" " * (len(name) + 2)) + "\n")
+        show(
+            textwrap.fill(
+                f"{name}  {describe(name)}", width=79, subsequent_indent=" " * (len(name) + 2)
+            )
+            + "\n"
+        )

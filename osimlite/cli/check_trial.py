@@ -30,13 +30,14 @@ def check_trial(
 ) -> None:
     """Say whether a finished trial is good enough: is the model strong enough, are the data good?
 
-    Made by OpenSim or by 'osimlite run': markers, ranges, filters, feet and weight under the loads, residuals, reserve
-    actuators, errors of tracking, activations and passive forces are compared with published limits. Each number is
-    shown with its limits: good, okay (beyond the stricter of two) or bad; findings say where, by which source and what
-    to look at. What could not be looked at is told with the reason. 'osimlite rule OSIM9' lists the rules.
+    Made by OpenSim or by 'osimlite run': markers, ranges, filters, feet and weight under the loads,
+    residuals, reserve actuators, errors of tracking, activations and passive forces are compared
+    with published limits. Each number is shown with its limits: good, okay (beyond the stricter of
+    two) or bad; findings say where, by which source and what to look at. What could not be looked
+    at is told with the reason. 'osimlite rule OSIM9' lists the rules.
 
-    Exits with 0 if all is well, 1 if there are findings as bad as --fail-on, which is warning here, 2 if it could not
-    be carried out.
+    Exits with 0 if all is well, 1 if there are findings as bad as --fail-on, which is warning here,
+    2 if it could not be carried out.
 
     Example: osimlite check-trial subject01
     """
@@ -50,7 +51,9 @@ def check_trial(
 
     expect_known(format, fail_on)
     with progress_bar("checking", None) as progress:
-        report = check(*paths, select=select, ignore=ignore, progress=lambda done, of: progress(done, of))
+        report = check(
+            *paths, select=select, ignore=ignore, progress=lambda done, of: progress(done, of)
+        )
     if format == "json":
         from osimlite.base.text import json_lines
 
@@ -78,7 +81,9 @@ def _show_verdicts(report: TrialReport) -> None:
     for file, verdicts in groupby(report.worst, key=lambda verdict: verdict.file):
         table = plain_table()
         for column in ("", "", "limits", ""):
-            table.add_column(column, overflow="fold", justify="right" if column == "limits" else "left")
+            table.add_column(
+                column, overflow="fold", justify="right" if column == "limits" else "left"
+            )
         for verdict in verdicts:
             add_row(table, verdict.verdict, verdict.shown, verdict.limits, verdict.words)
         show(f"{file}\n")

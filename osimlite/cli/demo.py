@@ -45,16 +45,19 @@ class Motion(NamedTuple):
 @command
 def demo(
     output: Annotated[
-        Path, Option("-o", "--output", metavar="FOLDER", help="Folder for everything the tour makes.")
+        Path,
+        Option("-o", "--output", metavar="FOLDER", help="Folder for everything the tour makes."),
     ] = Path("osimlite-demo"),
-    pictures: Annotated[bool, Option(help="Draw the plots, and write the pages for the browser.")] = True,
+    pictures: Annotated[
+        bool, Option(help="Draw the plots, and write the pages for the browser.")
+    ] = True,
     browser: options.Browser = True,
 ) -> None:
     """Build, check, translate and simulate: a walker that falls, one that walks, humans who jump and walk by muscles.
 
-    The first is the model of the OpenSim exercise "Building a Dynamic Walker". All four then play in the browser, with
-    the forces of the ground and the muscles in the colours of their activations. The tour takes some four seconds and
-    needs no display.
+    The first is the model of the OpenSim exercise "Building a Dynamic Walker". All four then play
+    in the browser, with the forces of the ground and the muscles in the colours of their
+    activations. The tour takes some four seconds and needs no display.
 
     Example: osimlite demo -o tour --no-browser
     """
@@ -96,7 +99,9 @@ class _Tour:
             for line in textwrap.wrap(f"{result} {took}", 76):
                 say(f"   {line}")
             if files:
-                say(f"   -> {', '.join(file.relative_to(self.folder).as_posix() for file in files)}")
+                say(
+                    f"   -> {', '.join(file.relative_to(self.folder).as_posix() for file in files)}"
+                )
             say()
 
         yield tell
@@ -133,7 +138,10 @@ def _check(tour: _Tour) -> None:
     with tour.step("Translate it to URDF, for robotics") as tell:
         urdf = to_urdf(model)
         urdf.write(file.with_name("urdf"))
-        tell(f"{len(urdf.fidelity)} things that URDF cannot say are listed in fidelity.json", file.with_name("urdf"))
+        tell(
+            f"{len(urdf.fidelity)} things that URDF cannot say are listed in fidelity.json",
+            file.with_name("urdf"),
+        )
 
 
 def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
@@ -145,10 +153,18 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
     result = []
     with ExitStack() as work:
         with tour.step("Make three models ready to move") as tell:
-            ready = [work.enter_context(Simulation(make_model(motion.model), "compiled")) for motion in MOTIONS]
-            tell(f"{listed(motion.model for motion in MOTIONS)}, computed by {ready[0].engine.version}")
+            ready = [
+                work.enter_context(Simulation(make_model(motion.model), "compiled"))
+                for motion in MOTIONS
+            ]
+            tell(
+                f"{listed(motion.model for motion in MOTIONS)}, computed by {ready[0].engine.version}"
+            )
         for motion, simulation in zip(MOTIONS, ready, strict=True):
-            with tour.step(f"{motion.title}: {motion.model}") as tell, motion_bar("   simulating", motion.to) as bar:
+            with (
+                tour.step(f"{motion.title}: {motion.model}") as tell,
+                motion_bar("   simulating", motion.to) as bar,
+            ):
                 trajectory = simulation.run(
                     motion.to, accuracy=ACCURACY, report_interval=REPORT_INTERVAL_S, progress=bar
                 )
@@ -165,14 +181,19 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
     from osimlite.view import Shown, Story, plot_simulation
 
     human_title, human_page = "It walks by reflexes", "human-walks.html"
-    human_command = f"osimlite scone {tour.folder}/human-walks/human-walks.scone --optimize --generations 50"
+    human_command = (
+        f"osimlite scone {tour.folder}/human-walks/human-walks.scone --optimize --generations 50"
+    )
 
     with tour.step("Plot the jump: coordinates, activations, forces, energy") as tell:
         plots = plot_simulation(result[-1], tour.folder / MOTIONS[-1].model)
         tell(f"{len(plots)} pictures", plots[0].with_name("*.png"))
     with tour.step("Write a page for the browser of each motion") as tell:
         pages = []
-        titles = [*((motion.title, f"{motion.model}.html") for motion in MOTIONS), (human_title, human_page)]
+        titles = [
+            *((motion.title, f"{motion.model}.html") for motion in MOTIONS),
+            (human_title, human_page),
+        ]
         for motion, trajectory in zip(MOTIONS, result, strict=True):
             assert trajectory.model is not None
             shown = Shown.of(trajectory.model, trajectory.mechanism, motion=trajectory)
@@ -180,7 +201,11 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
             story = Story(words, motion.command.format(tour.folder), f"{motion.model}.html", titles)
             pages.append(shown.write_page(tour.folder / story.page, story))
         shown = Shown.of(human.model, build_mechanism(human.model), motion=states)
-        pages.append(shown.write_page(tour.folder / human_page, Story(said, human_command, human_page, titles)))
+        pages.append(
+            shown.write_page(
+                tour.folder / human_page, Story(said, human_command, human_page, titles)
+            )
+        )
         size = sum(page.stat().st_size for page in pages) / 1e6
         tell(f"{size:.1f} MB; they need no network", *pages)
     return pages
@@ -196,13 +221,17 @@ def _compare_engines(tour: _Tour, compiled: Trajectory) -> None:
     motion = MOTIONS[0]
     with tour.step("Simulate the walker by PyBullet too: URDF, custom contact forces") as tell:
         if find_spec("pybullet") is None:
-            tell("PyBullet is not installed; to compare both engines, run: pip install 'osimlite[bullet]'")
+            tell(
+                "PyBullet is not installed; to compare both engines, run: pip install 'osimlite[bullet]'"
+            )
             return
         with (
             Simulation(make_model(motion.model), "bullet") as simulation,
             motion_bar("   simulating", motion.to) as bar,
         ):
-            bullet = simulation.run(motion.to, accuracy=ACCURACY, report_interval=REPORT_INTERVAL_S, progress=bar)
+            bullet = simulation.run(
+                motion.to, accuracy=ACCURACY, report_interval=REPORT_INTERVAL_S, progress=bar
+            )
         folder = tour.folder / f"{motion.model}-bullet"
         bullet.write(folder)
         tell(
@@ -264,7 +293,9 @@ def _walks(motion: Trajectory) -> str:
     import numpy as np
 
     events = motion.summary["contact_events"]
-    steps = [event["time_s"] for event in events if event["event"] == "begin" and event["time_s"] > 0.0]
+    steps = [
+        event["time_s"] for event in events if event["event"] == "begin" and event["time_s"] > 0.0
+    ]
     way = np.interp(steps, motion.times, motion.values[:, motion.coordinates.index("Pelvis_tx")])
     return (
         "The same walker, but for the moment of inertia of its shanks (0.0921 instead of 1 kg·m²) and its feet, 7.4 cm "
@@ -279,9 +310,19 @@ def _jumps(motion: Trajectory) -> str:
     heights = [motion.mechanism.center_of_mass(q)[1] for q in motion.values]
     middle = motion.times[int(np.argmax(heights))]
     events = motion.summary["contact_events"]
-    off = max(event["time_s"] for event in events if event["event"] == "end" and event["time_s"] < middle)
-    on = min(event["time_s"] for event in events if event["event"] == "begin" and event["time_s"] > middle)
-    pushes = [column for label, column in motion.forces.items() if ".foot_" in label and label.endswith(".force.Y")]
+    off = max(
+        event["time_s"] for event in events if event["event"] == "end" and event["time_s"] < middle
+    )
+    on = min(
+        event["time_s"]
+        for event in events
+        if event["event"] == "begin" and event["time_s"] > middle
+    )
+    pushes = [
+        column
+        for label, column in motion.forces.items()
+        if ".foot_" in label and label.endswith(".force.Y")
+    ]
     push, mass = np.sum(pushes, axis=0)[motion.times < off].max(), motion.mechanism.total_mass
     return (
         f"A human of {mass:.0f} kg jumps by 16 muscles, whose excitations a search found: the feet push with "
@@ -330,7 +371,9 @@ def distance_to_opensim(trajectory: Trajectory) -> float:
     import csv
     from importlib.resources import files
 
-    text = files("osimlite.models").joinpath("dynamic_walker_opensim.csv").read_text(encoding="utf-8")
+    text = (
+        files("osimlite.models").joinpath("dynamic_walker_opensim.csv").read_text(encoding="utf-8")
+    )
     largest = 0.0
     times = [round(float(t), 6) for t in trajectory.times]
     for row in csv.DictReader(text.splitlines()):

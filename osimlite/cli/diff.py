@@ -13,17 +13,22 @@ if TYPE_CHECKING:
 
 @command
 def diff(
-    files: Annotated[list[Path], Argument(metavar="OLD NEW", help="The two files.", show_default=False)],
+    files: Annotated[
+        list[Path], Argument(metavar="OLD NEW", help="The two files.", show_default=False)
+    ],
     git: Annotated[
-        bool, Option("--git", help="Take the seven arguments that git gives an external diff program.")
+        bool,
+        Option("--git", help="Take the seven arguments that git gives an external diff program."),
     ] = False,
 ) -> None:
     """Show what changed between two models or setups: component, property, old and new value.
 
-    Layout, order, comments and number formats do not count, nor does writing a default down. Of two tables (.sto, .mot)
-    it shows which columns went and came, and where each of the others differs most. Exits with 1 if they differ.
+    Layout, order, comments and number formats do not count, nor does writing a default down. Of two
+    tables (.sto, .mot) it shows which columns went and came, and where each of the others differs
+    most. Exits with 1 if they differ.
 
-    As git's diff for model files: git config diff.osim.command 'osimlite diff --git', and in .gitattributes the
+    As git's diff for model files: git config diff.osim.command 'osimlite diff --git', and in
+    .gitattributes the
     line: *.osim diff=osim
 
     Example: osimlite diff gait2392.osim gait2392_scaled.osim
@@ -36,9 +41,12 @@ def diff(
     from osimlite.schema.model import Model
 
     if git:
-        # path old-file old-hex old-mode new-file new-hex new-mode; a file that is not there is /dev/null.
+        # path old-file old-hex old-mode new-file new-hex new-mode; a file that is not there is
+        # /dev/null.
         if len(files) != 7:
-            raise OsimliteError("--git takes the seven arguments of git's external diff; see 'git help diff'")
+            raise OsimliteError(
+                "--git takes the seven arguments of git's external diff; see 'git help diff'"
+            )
         title, old, new = str(files[0]), files[1], files[4]
     elif len(files) == 2:
         title, (old, new) = "", files
@@ -74,7 +82,9 @@ def described(found: list[Difference]) -> list[str]:
             lines.append(f"  {path}")
             last = path
         if old is None or new is None:
-            lines.append(f"    {'+' if old is None else '-'} {what}: {_words(new if old is None else old)}")
+            lines.append(
+                f"    {'+' if old is None else '-'} {what}: {_words(new if old is None else old)}"
+            )
         else:
             lines.append(f"    {what}: {_words(old)} -> {_words(new)}")
     return lines

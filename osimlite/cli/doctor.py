@@ -103,7 +103,10 @@ class Package(NamedTuple):
 def doctor(
     model: Annotated[
         Path | None,
-        Argument(help="A model file, or a folder: its settings and mesh folders are shown.", show_default=False),
+        Argument(
+            help="A model file, or a folder: its settings and mesh folders are shown.",
+            show_default=False,
+        ),
     ] = None,
 ) -> None:
     """Show what is installed, what each extra adds and how to get it, and where mesh files are looked for.
@@ -129,7 +132,10 @@ def doctor(
     uses = purposes(wanted)
     every = {name for names in wanted.values() for name in names}
     result = {}
-    with progress_bar("loading each package", len(every)) as progress, ThreadPoolExecutor(2 * cores()) as pool:
+    with (
+        progress_bar("loading each package", len(every)) as progress,
+        ThreadPoolExecutor(2 * cores()) as pool,
+    ):
         # Each in a process of its own, side by side.
         for count, package in enumerate(pool.map(examine, every), 1):
             result[package.name] = package
@@ -183,7 +189,9 @@ def find_extra(module: str | None, use: str = "") -> str | None:
     """Return the first extra with a module and all other packages of its use in `NEEDS`, or None."""
     name = {"PIL": "pillow", "yaml": "pyyaml"}.get(module or "", module)
     if name in NEEDS.get(use, ()):
-        return next((extra for extra, uses in purposes(requirements()).items() if use in uses), None)
+        return next(
+            (extra for extra, uses in purposes(requirements()).items() if use in uses), None
+        )
     return next((extra for extra, names in requirements().items() if extra and name in names), None)
 
 
@@ -194,9 +202,14 @@ def examine(name: str) -> Package:
     except metadata.PackageNotFoundError:
         return Package(name, "", "")
     modules = _modules(tuple(sys.path)).get(name.lower(), [])
-    # Some bring more than the module that bears their name; a few have none of it (PIL of pillow, yaml of pyyaml).
+    # Some bring more than the module that bears their name; a few have none of it (PIL of pillow,
+    # yaml of pyyaml).
     named = name.lower().replace("-", "_")
-    main = named if named in modules else next(module for module in modules if not module.startswith("_"))
+    main = (
+        named
+        if named in modules
+        else next(module for module in modules if not module.startswith("_"))
+    )
     # -P: what lies in the current folder is not what was installed.
     done = subprocess.run(
         [sys.executable, "-P", "-c", f"import {main}"],
@@ -208,7 +221,9 @@ def examine(name: str) -> Package:
     )
     if done.returncode == 0:
         return Package(name, version, "")
-    words = done.stderr.decode(errors="replace").strip().splitlines() or [f"its process ended with {done.returncode}"]
+    words = done.stderr.decode(errors="replace").strip().splitlines() or [
+        f"its process ended with {done.returncode}"
+    ]
     return Package(name, version, words[-1])
 
 
@@ -228,9 +243,18 @@ def _show_places(model: Path | None) -> None:
     from osimlite.io.meshes.folders import MeshFolders
     from osimlite.lint.settings import settings_for
 
-    folder = Path.cwd() if model is None else model.resolve() if model.is_dir() else model.resolve().parent
+    folder = (
+        Path.cwd()
+        if model is None
+        else model.resolve()
+        if model.is_dir()
+        else model.resolve().parent
+    )
     settings = settings_for(folder)
-    where = settings.file or "none (they stand in pyproject.toml under tool.osimlite, or in osimlite.toml)"
+    where = (
+        settings.file
+        or "none (they stand in pyproject.toml under tool.osimlite, or in osimlite.toml)"
+    )
     say(f"settings: {where}")
     say("mesh folders, in the order of the search:")
     for place in MeshFolders(folder, settings.mesh_paths).searched:

@@ -18,28 +18,48 @@ if TYPE_CHECKING:
 def find_gait(
     source: options.Source,
     vary: sweeping.Vary = None,
-    samples: Annotated[int, Option(min=1, metavar="N", help="How many random walkers are tried.")] = 65536,
-    tries: Annotated[int, Option(min=1, metavar="N", help="How many of the best of them are led to a cycle.")] = 40,
-    enough: Annotated[int, Option(min=1, metavar="N", help="Cycles after which no more are looked for.")] = 5,
+    samples: Annotated[
+        int, Option(min=1, metavar="N", help="How many random walkers are tried.")
+    ] = 65536,
+    tries: Annotated[
+        int, Option(min=1, metavar="N", help="How many of the best of them are led to a cycle.")
+    ] = 40,
+    enough: Annotated[
+        int, Option(min=1, metavar="N", help="Cycles after which no more are looked for.")
+    ] = 5,
     budget: Annotated[
-        int, Option(min=0, metavar="N", help="Sets of numbers to try on the way to the most stable cycle.")
+        int,
+        Option(
+            min=0, metavar="N", help="Sets of numbers to try on the way to the most stable cycle."
+        ),
     ] = 300,
     stable: Annotated[
-        float, Option(help="A largest multiplier below this is small enough; then the basin counts.")
+        float,
+        Option(help="A largest multiplier below this is small enough; then the basin counts."),
     ] = 0.6,
     perturb: Annotated[
-        float, Option(metavar="PART", help="How near the cycle walkers start for that: 0.1 is 10 %.")
+        float,
+        Option(metavar="PART", help="How near the cycle walkers start for that: 0.1 is 10 %."),
     ] = 0.1,
-    digits: Annotated[int, Option(min=1, max=17, metavar="N", help="Round the numbers of the model to so many.")] = 3,
+    digits: Annotated[
+        int, Option(min=1, max=17, metavar="N", help="Round the numbers of the model to so many.")
+    ] = 3,
     start_digits: Annotated[
         int | None,
-        Option(min=1, max=17, metavar="N", help="Round the start to so many.", show_default="not rounded"),
+        Option(
+            min=1,
+            max=17,
+            metavar="N",
+            help="Round the start to so many.",
+            show_default="not rounded",
+        ),
     ] = None,
     seed: Annotated[int, Option(help="The same seed, the same search.")] = 0,
     foot: options.Foot = None,
     parameter: options.Parameters = None,
     output: Annotated[
-        Path, Option("-o", "--output", metavar="FOLDER", help="For best.osim, cycles.csv, summary.json.")
+        Path,
+        Option("-o", "--output", metavar="FOLDER", help="For best.osim, cycles.csv, summary.json."),
     ] = Path("found"),
     force: Annotated[bool, Option("--force", help="Replace what another search found.")] = False,
     *,
@@ -47,23 +67,39 @@ def find_gait(
 ) -> None:
     """Look for the numbers of a model, and the start, with which a walker never stops; writes it, ready to walk.
 
-    Give the ranges of what may change in the model, and of the values and speeds of the joints at a random start. The
-    walker is put on the ground with one foot at rest. Of random walkers, those whose second step is most like their
-    first are led to cycles. The best of these is led on to where its largest Floquet multiplier is small, and then to
-    where most of 60 walkers that start near it make 20 steps.
+    Give the ranges of what may change in the model, and of the values and speeds of the joints at a
+    random start. The walker is put on the ground with one foot at rest. Of random walkers, those
+    whose second step is most like their first are led to cycles. The best of these is led on to
+    where its largest Floquet multiplier is small, and then to where most of 60 walkers that start
+    near it make 20 steps.
 
-    Example: osimlite find-gait walker.osim --vary '/bodyset/*Shank/inertia/2=0.02:1:log' --vary RHip_rz=-30deg:60deg
-    --vary LHip_rz=-30deg:60deg --vary RHip_rz/speed=-4:4 --vary LHip_rz/speed=-4:4
+    Example: osimlite find-gait walker.osim --vary '/bodyset/*Shank/inertia/2=0.02:1:log' --vary
+    RHip_rz=-30deg:60deg --vary LHip_rz=-30deg:60deg --vary RHip_rz/speed=-4:4 --vary
+    LHip_rz/speed=-4:4
     """
     from osimlite.cli._progress import progress_bars
     from osimlite.studies.gait.gaits import find_gait as search
 
-    plan = sweeping.make_plan(source, vary, parameter, None, None, skip_unsupported=skip_unsupported)
+    plan = sweeping.make_plan(
+        source, vary, parameter, None, None, skip_unsupported=skip_unsupported
+    )
     with progress_bars() as stage:
         gait = search(
-            plan, output, feet=foot, samples=samples, tries=tries, enough=enough, budget=budget, stable=stable,
-            perturb=perturb, digits=digits, start_digits=start_digits, seed=seed, force=force, stage=stage,
-        )  # fmt: skip
+            plan,
+            output,
+            feet=foot,
+            samples=samples,
+            tries=tries,
+            enough=enough,
+            budget=budget,
+            stable=stable,
+            perturb=perturb,
+            digits=digits,
+            start_digits=start_digits,
+            seed=seed,
+            force=force,
+            stage=stage,
+        )
     _told(gait).show()
     if not (gait.walk.walks and not gait.walk.scuffs and gait.found.cycle.largest < 1.0):
         raise SystemExit(1)
@@ -83,7 +119,12 @@ def _told(gait: Gait) -> Facts:
     end = "walking" if walk.walks else f"{walk.ending} {walk.fell_on}".strip()
     done = f"{counted(len(walk.steps), 'step')}, {counted(len(walk.scuffs), 'scuff')}; {end} after {walk.end:.4g} s"
     facts.add("walk", done)
-    facts.add("near it", f"{round(STARTS * gait.found.walking)} of {STARTS} starts make {STEPS} steps")
-    facts.add("search", f"{gait.candidates} random walkers made two steps; {counted(gait.cycles, 'cycle')} found")
+    facts.add(
+        "near it", f"{round(STARTS * gait.found.walking)} of {STARTS} starts make {STEPS} steps"
+    )
+    facts.add(
+        "search",
+        f"{gait.candidates} random walkers made two steps; {counted(gait.cycles, 'cycle')} found",
+    )
     facts.add("files", listed([str(path) for path in gait.files]))
     return facts

@@ -12,29 +12,42 @@ from osimlite.cli._command import Argument, Option, command
 @command
 def fit(
     file: options.File,
-    trials: Annotated[list[Path], Argument(help="Measured markers of movements: .trc, .c3d, .sto.")],
+    trials: Annotated[
+        list[Path], Argument(help="Measured markers of movements: .trc, .c3d, .sto.")
+    ],
     static: Annotated[
-        Path | None, Option("--static", metavar="FILE", help="Measured markers of the subject, standing.")
+        Path | None,
+        Option("--static", metavar="FILE", help="Measured markers of the subject, standing."),
     ] = None,
     held: Annotated[
         list[str] | None,
-        Option("--hold", metavar="NAME", help="A marker that is where the model has it; else those that are fixed."),
+        Option(
+            "--hold",
+            metavar="NAME",
+            help="A marker that is where the model has it; else those that are fixed.",
+        ),
     ] = None,
     weight: options.Weights = None,
     by_axis: Annotated[
         bool, Option("--by-axis", help="Let a body grow in one direction more than in another.")
     ] = False,
-    sides: Annotated[bool, Option("--each-side", help="Let the two sides of the body differ.")] = False,
-    frames: Annotated[int, Option("--frames", metavar="COUNT", help="How many are looked at, of all trials.")] = 200,
+    sides: Annotated[
+        bool, Option("--each-side", help="Let the two sides of the body differ.")
+    ] = False,
+    frames: Annotated[
+        int, Option("--frames", metavar="COUNT", help="How many are looked at, of all trials.")
+    ] = 200,
     mass: options.Mass = -1.0,
     output: options.Folder = None,
 ) -> None:
     """Fit a model to a person: sizes of its segments and places of its markers, from movements.
 
-    All poses, sizes and places that are likeliest are found at once; joints are where the movements show them. Writes
-    the model, its markers, its scale factors, and a setup with which OpenSim's ScaleTool makes the same model.
+    All poses, sizes and places that are likeliest are found at once; joints are where the movements
+    show them. Writes the model, its markers, its scale factors, and a setup with which OpenSim's
+    ScaleTool makes the same model.
 
-    Example: osimlite fit gait2392.osim walk*.trc --static static.trc --hold RASI --hold LASI --mass 72 -o subject
+    Example: osimlite fit gait2392.osim walk*.trc --static static.trc --hold RASI --hold LASI --mass
+        72 -o subject
     """
     from osimlite.base.files import make_folder, write_atomically
     from osimlite.cli._console import say
@@ -66,7 +79,9 @@ def fit(
         say(f"{', '.join(bodies)}: {size}")
     before, after = person.errors(person.before), person.errors(person.after)
     for trial, error in after.items():
-        say(f"{trial}: errors of {100.0 * error:.2f} cm (root mean square), {100.0 * before[trial]:.2f} cm before")
+        say(
+            f"{trial}: errors of {100.0 * error:.2f} cm (root mean square), {100.0 * before[trial]:.2f} cm before"
+        )
     for note in person.notes:
         say(note)
     say(f"wrote {', '.join(texts)} in {folder}")

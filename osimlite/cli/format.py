@@ -11,16 +11,21 @@ from osimlite.cli._command import Argument, Option, command
 @command
 def format(
     paths: Annotated[
-        list[str], Argument(help="Files (.osim, .xml, .omoco), or folders to search.", show_default=False)
+        list[str],
+        Argument(help="Files (.osim, .xml, .omoco), or folders to search.", show_default=False),
     ],
-    check: Annotated[bool, Option("--check", help="Change nothing; exit with 1 if a file would change.")] = False,
-    show_diff: Annotated[bool, Option("--diff", help="Change nothing; print what would change.")] = False,
+    check: Annotated[
+        bool, Option("--check", help="Change nothing; exit with 1 if a file would change.")
+    ] = False,
+    show_diff: Annotated[
+        bool, Option("--diff", help="Change nothing; print what would change.")
+    ] = False,
     only_ours: options.OnlyOurs = False,
 ) -> None:
     """Write files in one layout: OpenSim's, one property a line, shortest numbers, people's comments kept.
 
-    Comments that OpenSim prints by itself are dropped. Formatting twice changes nothing. A file of an older format
-    stays one, and its numbers stay as they are: upgrade brings it up.
+    Comments that OpenSim prints by itself are dropped. Formatting twice changes nothing. A file of
+    an older format stays one, and its numbers stay as they are: upgrade brings it up.
 
     Example: osimlite format models --check
     """

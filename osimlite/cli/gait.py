@@ -32,19 +32,29 @@ def gait(
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
     foot: options.Foot = None,
-    to: Annotated[float, Option("--to", metavar="SECONDS", help="How long to walk at most.")] = 60.0,
-    settle: Annotated[int, Option(min=0, metavar="N", help="Steps to make before the cycle is looked for.")] = 0,
+    to: Annotated[
+        float, Option("--to", metavar="SECONDS", help="How long to walk at most.")
+    ] = 60.0,
+    settle: Annotated[
+        int, Option(min=0, metavar="N", help="Steps to make before the cycle is looked for.")
+    ] = 0,
     accuracy: Annotated[float, Option(help="Of the integrator in the step map.")] = 1e-10,
     perturb: Annotated[
         list[float] | None,
         Option(
-            metavar="PART", help="Change the start at random by this part at most: 0.05 is 5 %.", show_default=False
+            metavar="PART",
+            help="Change the start at random by this part at most: 0.05 is 5 %.",
+            show_default=False,
         ),
     ] = None,
     starts: Annotated[int, Option(min=1, metavar="N", help="How many such starts.")] = 60,
     seed: Annotated[int, Option(help="The same seed, the same such starts.")] = 0,
-    steps: Annotated[int, Option(min=1, metavar="N", help="Steps after which a walker counts as walking.")] = 20,
-    basin: Annotated[bool, Option("--basin", help="Look from where on a grid around the cycle it walks.")] = False,
+    steps: Annotated[
+        int, Option(min=1, metavar="N", help="Steps after which a walker counts as walking.")
+    ] = 20,
+    basin: Annotated[
+        bool, Option("--basin", help="Look from where on a grid around the cycle it walks.")
+    ] = False,
     basin_x: Annotated[
         str, Option(metavar="NAME", help="What the columns change: COORDINATE or COORDINATE/speed.")
     ] = "",
@@ -54,7 +64,13 @@ def gait(
     pictures: Annotated[bool, Option(help="Draw the basin.")] = True,
     output: Annotated[
         Path | None,
-        Option("-o", "--output", metavar="FOLDER", help="For gait.json, basin.csv, basin.png.", show_default=False),
+        Option(
+            "-o",
+            "--output",
+            metavar="FOLDER",
+            help="For gait.json, basin.csv, basin.png.",
+            show_default=False,
+        ),
     ] = None,
     parameter: options.Parameters = None,
     *,
@@ -62,9 +78,9 @@ def gait(
 ) -> None:
     """Count the steps of a walker, find the cycle that it walks in, and say whether that is stable.
 
-    The walk begins at the model's default values and speeds. A step is the other foot touching down at least 5 cm
-    ahead along the slope after at least 0.05 s in the air; any other touch-down is a scuff; anything but a foot on the
-    ground ends the walk.
+    The walk begins at the model's default values and speeds. A step is the other foot touching down
+    at least 5 cm ahead along the slope after at least 0.05 s in the air; any other touch-down is a
+    scuff; anything but a foot on the ground ends the walk.
 
     Exits with 1 if there is no cycle.
 
@@ -82,7 +98,9 @@ def gait(
     model, folder = options.read_source(source, parameter)
     with ExitStack() as work:
         where = None if output is None else work.enter_context(folder_to_fill(output))
-        simulation = work.enter_context(Simulation(model, "compiled", skip_unsupported=skip_unsupported, folder=folder))
+        simulation = work.enter_context(
+            Simulation(model, "compiled", skip_unsupported=skip_unsupported, folder=folder)
+        )
         refuse_constraints(simulation.mechanism)
         state = simulation.initial_state(
             options.quantities(start, simulation.mechanism, "--set"),
@@ -98,11 +116,20 @@ def gait(
                 with progress_bar(f"starting within {part:.0%}", starts) as progress:
                     states = perturbed(step_map, state, part, starts, seed)
                     walks = walks_from(step_map, cycle, states, steps, progress=progress)
-                result.nearby.append(Nearby(part, sum(len(walk.steps) >= steps for walk in walks), starts, steps))
+                result.nearby.append(
+                    Nearby(part, sum(len(walk.steps) >= steps for walk in walks), starts, steps)
+                )
             if basin:
                 with progress_bar("basin", grid * grid) as progress:
                     result.basin = find_basin(
-                        step_map, cycle, basin_x, basin_y, reach=reach, grid=grid, wanted=steps, progress=progress
+                        step_map,
+                        cycle,
+                        basin_x,
+                        basin_y,
+                        reach=reach,
+                        grid=grid,
+                        wanted=steps,
+                        progress=progress,
                     )
         files = _write(where, result, pictures) if where else []
     _told(result, files).show()
@@ -110,13 +137,20 @@ def gait(
         raise SystemExit(1)
 
 
-def _check_numbers(to: float, accuracy: float, reach: float, perturb: Sequence[float], seed: int) -> None:
+def _check_numbers(
+    to: float, accuracy: float, reach: float, perturb: Sequence[float], seed: int
+) -> None:
     """Before the walk, which takes a while, stop at numbers that mean nothing."""
     from math import inf
 
     from osimlite.errors import SettingError
 
-    numbers = [("--to", to), ("--accuracy", accuracy), ("--reach", reach), *(("--perturb", part) for part in perturb)]
+    numbers = [
+        ("--to", to),
+        ("--accuracy", accuracy),
+        ("--reach", reach),
+        *(("--perturb", part) for part in perturb),
+    ]
     for option, number in numbers:
         if not 0.0 < number < inf:
             raise SettingError(f"{option} is a positive number, not {number:g}")
@@ -149,7 +183,12 @@ class GaitReport:
 
 
 def simulate_walk(
-    engine: BatchEngine, state: Sequence[float], feet: Sequence[str] | None, to: float, settle: int, accuracy: float
+    engine: BatchEngine,
+    state: Sequence[float],
+    feet: Sequence[str] | None,
+    to: float,
+    settle: int,
+    accuracy: float,
 ) -> tuple[GaitReport, StepMap | None]:
     """The walk from a state and the cycle near it, with the step map that has it as a fixed point."""
     from osimlite.errors import OsimliteError
@@ -177,7 +216,11 @@ def _told(found: GaitReport, files: Sequence[Path]) -> Facts:
 
     walk, cycle = found.walk, found.cycle
     facts = Facts(found.model)
-    end = f"fell on {walk.fell_on} after {walk.end:.4g} s" if walk.fell_on else f"{walk.ending} after {walk.end:.4g} s"
+    end = (
+        f"fell on {walk.fell_on} after {walk.end:.4g} s"
+        if walk.fell_on
+        else f"{walk.ending} after {walk.end:.4g} s"
+    )
     facts.add(
         "walk",
         f"{counted(len(walk.steps), 'step')}, {counted(len(walk.scuffs), 'scuff')}, {walk.distance:.4g} m; {end}",
@@ -186,20 +229,33 @@ def _told(found: GaitReport, files: Sequence[Path]) -> Facts:
         facts.add("cycle", found.why_not)
     else:
         facts.add("step length", f"{cycle.length:.6g} m")
-        facts.add("period", f"{cycle.period:.6g} s" + (" (mean of the two steps)" if cycle.per_stride else ""))
+        facts.add(
+            "period",
+            f"{cycle.period:.6g} s" + (" (mean of the two steps)" if cycle.per_stride else ""),
+        )
         facts.add("speed", f"{cycle.speed:.6g} m/s")
         if cycle.scuffs:
-            facts.add("scuffs", f"{cycle.scuffs} in each {'stride' if cycle.per_stride else 'step'}")
+            facts.add(
+                "scuffs", f"{cycle.scuffs} in each {'stride' if cycle.per_stride else 'step'}"
+            )
         stable = "stable" if cycle.largest < 1.0 else "not stable"
         facts.add("stability", f"{stable}: largest multiplier {cycle.largest:.4g}")
         sizes = ", ".join(f"{size:.3g}" for size in abs(cycle.multipliers[:6]))
         facts.add("multipliers", f"{sizes} ...; {cycle.neutral} neutral directions left out")
-        facts.add("fixed point", f"to {cycle.residual:.2g} after {counted(cycle.iterations, 'step')} of Newton")
+        facts.add(
+            "fixed point",
+            f"to {cycle.residual:.2g} after {counted(cycle.iterations, 'step')} of Newton",
+        )
     for near in found.nearby:
-        facts.add(f"within {near.part:.0%}", f"{near.walked} of {near.starts} starts make {near.steps} steps")
+        facts.add(
+            f"within {near.part:.0%}",
+            f"{near.walked} of {near.starts} starts make {near.steps} steps",
+        )
     if found.basin is not None:
         basin = found.basin
-        facts.add("basin", f"{basin.part:.0%} of {basin.steps.size} starts make {basin.wanted} steps")
+        facts.add(
+            "basin", f"{basin.part:.0%} of {basin.steps.size} starts make {basin.wanted} steps"
+        )
     for skipped in by_class(found.skipped):
         facts.add("left out", skipped)
     if files:
@@ -221,7 +277,10 @@ def _write(folder: Path, found: GaitReport, pictures: bool) -> list[Path]:
     if basin is not None:
         rows = [f"{basin.x.label},{basin.y.label},steps"]
         for y, line in zip(basin.y.values.tolist(), basin.steps.tolist(), strict=True):
-            rows += [f"{x!r},{y!r},{count}" for x, count in zip(basin.x.values.tolist(), line, strict=True)]
+            rows += [
+                f"{x!r},{y!r},{count}"
+                for x, count in zip(basin.x.values.tolist(), line, strict=True)
+            ]
         written.append(folder / "basin.csv")
         write_atomically(written[-1], ("\n".join(rows) + "\n").encode())
         if pictures:
@@ -235,7 +294,10 @@ def _facts(found: GaitReport) -> dict[str, Any]:
     """What gait.json says."""
 
     def touches(events: Sequence[Step | Scuff]) -> list[dict[str, Any]]:
-        return [{"time_s": each.time, "foot": each.foot, "length_m": each.length, "air_s": each.air} for each in events]
+        return [
+            {"time_s": each.time, "foot": each.foot, "length_m": each.length, "air_s": each.air}
+            for each in events
+        ]
 
     walk, cycle, names = found.walk, found.cycle, found.coordinates
     facts: dict[str, Any] = {
@@ -265,6 +327,7 @@ def _facts(found: GaitReport) -> dict[str, Any]:
             "per_stride": cycle.per_stride,
         }
         facts["random_starts"] = [
-            {"part": each.part, "walk": each.walked, "of": each.starts, "steps": each.steps} for each in found.nearby
+            {"part": each.part, "walk": each.walked, "of": each.starts, "steps": each.steps}
+            for each in found.nearby
         ]
     return facts

@@ -13,7 +13,10 @@ from osimlite.cli._command import Argument, Option, command
 def ik(
     file: options.File,
     trial: Annotated[
-        Path, Argument(help="Measured markers: .trc, .c3d, .sto; or orientations: .sto.", show_default=False)
+        Path,
+        Argument(
+            help="Measured markers: .trc, .c3d, .sto; or orientations: .sto.", show_default=False
+        ),
     ],
     weight: options.Weights = None,
     keep: Annotated[
@@ -26,15 +29,18 @@ def ik(
     ] = None,
     first: options.FirstFrame = float("-inf"),
     last: options.LastFrame = float("inf"),
-    free: Annotated[bool, Option("--without-constraints", help="Let go of the constraints of the model.")] = False,
+    free: Annotated[
+        bool, Option("--without-constraints", help="Let go of the constraints of the model.")
+    ] = False,
     output: options.Folder = None,
 ) -> None:
     """Find the motion that fits measured markers: writes ik.mot and marker_errors.sto.
 
-    Each frame is the pose with the least weighted mean of squared distances, to the last digits. Locked coordinates
-    stay at their defaults, clamped ones in their ranges. ik.mot has degrees, as OpenSim's; marker_errors.sto how far
-    each marker is from where it was measured (m). Of a table of quaternions, the orientations of sensors, the angles
-    are least, and orientation_errors.sto has them (rad).
+    Each frame is the pose with the least weighted mean of squared distances, to the last digits.
+    Locked coordinates stay at their defaults, clamped ones in their ranges. ik.mot has degrees, as
+    OpenSim's; marker_errors.sto how far each marker is from where it was measured (m). Of a table
+    of quaternions, the orientations of sensors, the angles are least, and orientation_errors.sto
+    has them (rad).
 
     Example: osimlite ik gait2392.osim walk.trc --weight RASI=10 -o results
     """
@@ -71,7 +77,12 @@ def ik(
     if of_sensors:
         what, names, errors = "orientation", motion.sensors, motion.orientation_errors
     write_sto(
-        folder / f"{what}_errors.sto", f"{what} errors", motion.times.tolist(), names, errors.tolist(), has_missing=True
+        folder / f"{what}_errors.sto",
+        f"{what} errors",
+        motion.times.tolist(),
+        names,
+        errors.tolist(),
+        has_missing=True,
     )
     for line in told(motion):
         say(line)

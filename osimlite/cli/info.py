@@ -21,12 +21,14 @@ if TYPE_CHECKING:
 @command
 def info(
     file: Annotated[Path, Argument(help="A model, a setup or a table.", show_default=False)],
-    everything: Annotated[bool, Option("--all", help="List every class, or every column of a table.")] = False,
+    everything: Annotated[
+        bool, Option("--all", help="List every class, or every column of a table.")
+    ] = False,
 ) -> None:
     """Show what is in a model: versions, mass, bodies, joints, coordinates, muscles, and how many of each class.
 
-    It also says what of it cannot be simulated. Of a setup it shows what the tool reads and writes, of a table its
-    times, units and columns.
+    It also says what of it cannot be simulated. Of a setup it shows what the tool reads and writes,
+    of a table its times, units and columns.
 
     Example: osimlite info gait2392.osim
     """
@@ -49,7 +51,11 @@ def info(
     model = document.top
     size = f"{file} ({file.stat().st_size / 1000:.0f} kB)"
     if not isinstance(model, Model):
-        rows = [(model.tag, model.name), ("file", size), ("document version", str(document.version))]
+        rows = [
+            (model.tag, model.name),
+            ("file", size),
+            ("document version", str(document.version)),
+        ]
         rows += [*_files(model, file.parent), ("notes on reading", str(len(document.notes)))]
         Facts(rows=rows).show()
         _classes([*model.walk()], everything)
@@ -63,26 +69,34 @@ def info(
     mass = sum(body.mass for body in model.body_set.objects)
     simulation = partial(_simulation, model, file.parent, source.text)
 
-    Facts(rows=[
-        ("model", model.name),
-        ("file", size),
-        ("document version", str(document.version)),
-        ("gravity", " ".join(f"{g:g}" for g in model.gravity) + " m/s^2"),
-        ("bodies", f"{len(model.body_set.objects)}, {mass:.6g} kg"),
-        ("joints", str(len(model.joint_set.objects))),
-        ("coordinates", str(sum(isinstance(component, Coordinate) for component in components))),
-        ("muscles", str(len(muscles))),
-        ("other forces", str(len(model.force_set.objects) - len(muscles))),
-        ("wrap surfaces", f"{surfaces}, for {counted(len(wraps), 'wrap')}"),
-        ("markers", str(len(model.marker_set.objects))),
-        ("controllers", str(len(model.controller_set.objects))),
-        ("probes", str(len(model.probe_set.objects))),
-        ("contact surfaces", str(len(model.contact_geometry_set.objects))),
-        ("constraints", str(len(model.constraint_set.objects))),
-        ("components", f"{len(components)} in the file, {len(tree.components)} as OpenSim counts"),
-        ("notes on reading", str(len(document.notes))),
-        ("simulation", answered("simulation", str(file), source.data, simulation)),
-    ]).show()  # fmt: skip
+    Facts(
+        rows=[
+            ("model", model.name),
+            ("file", size),
+            ("document version", str(document.version)),
+            ("gravity", " ".join(f"{g:g}" for g in model.gravity) + " m/s^2"),
+            ("bodies", f"{len(model.body_set.objects)}, {mass:.6g} kg"),
+            ("joints", str(len(model.joint_set.objects))),
+            (
+                "coordinates",
+                str(sum(isinstance(component, Coordinate) for component in components)),
+            ),
+            ("muscles", str(len(muscles))),
+            ("other forces", str(len(model.force_set.objects) - len(muscles))),
+            ("wrap surfaces", f"{surfaces}, for {counted(len(wraps), 'wrap')}"),
+            ("markers", str(len(model.marker_set.objects))),
+            ("controllers", str(len(model.controller_set.objects))),
+            ("probes", str(len(model.probe_set.objects))),
+            ("contact surfaces", str(len(model.contact_geometry_set.objects))),
+            ("constraints", str(len(model.constraint_set.objects))),
+            (
+                "components",
+                f"{len(components)} in the file, {len(tree.components)} as OpenSim counts",
+            ),
+            ("notes on reading", str(len(document.notes))),
+            ("simulation", answered("simulation", str(file), source.data, simulation)),
+        ]
+    ).show()
 
     if any(joint.coordinates for joint in model.components(Joint)):
         say()
@@ -141,15 +155,26 @@ def _files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:
             for name in value if isinstance(value, tuple) else (value,):
                 if name not in ("", None, "Unassigned"):
                     lost = spec.reference.rule == "file" and not (folder / name.strip()).is_file()
-                    fate = " (not there)" if lost else " (written)" if spec.reference.rule.startswith("output") else ""
-                    yield spec.name if item is top else f"{item.name or item.tag}: {spec.name}", f"{name}{fate}"
+                    fate = (
+                        " (not there)"
+                        if lost
+                        else " (written)"
+                        if spec.reference.rule.startswith("output")
+                        else ""
+                    )
+                    yield (
+                        spec.name if item is top else f"{item.name or item.tag}: {spec.name}",
+                        f"{name}{fate}",
+                    )
 
 
 def _classes(objects: Sequence[Object], everything: bool) -> None:
     """Print how many there are of each class."""
     from osimlite.schema.base import Unknown
 
-    counts = Counter(item.class_name if isinstance(item, Unknown) else type(item).__name__ for item in objects)
+    counts = Counter(
+        item.class_name if isinstance(item, Unknown) else type(item).__name__ for item in objects
+    )
     _listed("Classes", [f"{count} {name}" for name, count in counts.most_common()], everything)
 
 
@@ -178,11 +203,17 @@ def _coordinates(model: Model) -> Iterator[str]:
         yield f"  {joint.name} ({type(joint).__name__})"
         motions = motions_of(joint)
         for coordinate in joint.coordinates:
-            unit = {"rotational": "rad", "translational": "m"}.get(motions.get(coordinate.name, ""), "")
+            unit = {"rotational": "rad", "translational": "m"}.get(
+                motions.get(coordinate.name, ""), ""
+            )
             low, high = coordinate.range
-            flags = [word for word in ("locked", "clamped", "prescribed") if getattr(coordinate, word)]
+            flags = [
+                word for word in ("locked", "clamped", "prescribed") if getattr(coordinate, word)
+            ]
             numbers = f"{coordinate.default_value:>9.4g} {unit:3}  {low:.4g} to {high:.4g} {unit}".rstrip()
-            yield f"    {coordinate.name:{width}} {numbers}" + (f"  ({', '.join(flags)})" if flags else "")
+            yield f"    {coordinate.name:{width}} {numbers}" + (
+                f"  ({', '.join(flags)})" if flags else ""
+            )
 
 
 def _muscles(muscles: Sequence[Any]) -> Iterator[str]:

@@ -29,11 +29,13 @@ def inverse_dynamics(
 ) -> None:
     """Find the forces of a recorded motion: writes inverse_dynamics.sto.
 
-    One generalized force (N or N·m) for each coordinate: what it takes beyond gravity, measured loads and the forces of
-    the model (springs, contacts, but no muscles) to make the bodies move so. The coordinates are differentiated by
-    splines of fifth degree, as in OpenSim's tool. What a camera records takes a filter first: --lowpass 6.
+    One generalized force (N or N·m) for each coordinate: what it takes beyond gravity, measured
+    loads and the forces of the model (springs, contacts, but no muscles) to make the bodies move
+    so. The coordinates are differentiated by splines of fifth degree, as in OpenSim's tool. What a
+    camera records takes a filter first: --lowpass 6.
 
-    Example: osimlite inverse-dynamics gait2392.osim walk.mot --lowpass 6 --external-loads grf.xml -o results
+    Example: osimlite inverse-dynamics gait2392.osim walk.mot --lowpass 6 --external-loads grf.xml
+        -o results
     """
     from osimlite.cli._recorded import written
     from osimlite.io.document.reader import read

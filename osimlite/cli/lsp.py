@@ -10,13 +10,14 @@ from osimlite.cli._command import Option, command
 @command
 def lsp(
     stdio: Annotated[
-        bool, Option("--stdio", help="Speak over standard input and output: what it does in any case.")
+        bool,
+        Option("--stdio", help="Speak over standard input and output: what it does in any case."),
     ] = True,
 ) -> None:
     """Serve an editor: findings while you type, completion, hover, definitions, renaming, mends, outline, formatting.
 
-    An editor starts it and speaks the Language Server Protocol over its standard input and output. How to set up
-    VS Code, Neovim, Helix and Emacs is said in docs/editors.md.
+    An editor starts it and speaks the Language Server Protocol over its standard input and output.
+    How to set up VS Code, Neovim, Helix and Emacs is said in docs/editors.md.
     """
     from osimlite.base.require import require
 

@@ -11,11 +11,20 @@ from osimlite.cli._command import Argument, Option, command
 @command
 def modify(
     file: Annotated[
-        Path, Argument(help="A model, or a study whose ModelProcessor is carried out.", show_default=False)
+        Path,
+        Argument(
+            help="A model, or a study whose ModelProcessor is carried out.", show_default=False
+        ),
     ],
     output: Annotated[
         Path | None,
-        Option("-o", "--output", metavar="FILE", help="The changed model.", show_default="<name>_modified.osim"),
+        Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="The changed model.",
+            show_default="<name>_modified.osim",
+        ),
     ] = None,
     replace: Annotated[
         list[str] | None,
@@ -30,10 +39,12 @@ def modify(
 ) -> None:
     """Replace parts of a model as OpenSim's ModOps do: muscles, tendons, paths, contact, joints.
 
-    With paths=polynomial every path becomes a function of the coordinates, wrapping included, and what it is off is
-    told. Of a MocoStudy, MocoTrack or MocoInverse the model is taken as its ModelProcessor makes it.
+    With paths=polynomial every path becomes a function of the coordinates, wrapping included, and
+    what it is off is told. Of a MocoStudy, MocoTrack or MocoInverse the model is taken as its
+    ModelProcessor makes it.
 
-    Example: osimlite modify gait.osim --replace muscles=degroote --replace tendon=rigid --replace paths=polynomial
+    Example: osimlite modify gait.osim --replace muscles=degroote --replace tendon=rigid --replace
+        paths=polynomial
     """
     from osimlite.base.text import counted
     from osimlite.cli._console import add_row, plain_console, plain_table, say
@@ -54,7 +65,9 @@ def modify(
     top = read_any(file)
     if isinstance(top, Model):
         if not changes:
-            raise SettingError("there is nothing to replace; add --replace NAME=WORD, such as muscles=degroote")
+            raise SettingError(
+                "there is nothing to replace; add --replace NAME=WORD, such as muscles=degroote"
+            )
         model = read(file)
     else:
         processor = next((part for part in top.walk() if isinstance(part, ModelProcessor)), None)
@@ -66,12 +79,25 @@ def modify(
     write(model, target)
     if fitted:
         table = plain_table()
-        for heading in ("path", "coordinates", "order", "length, mm", "moment arm, mm", "worst, mm"):
+        for heading in (
+            "path",
+            "coordinates",
+            "order",
+            "length, mm",
+            "moment arm, mm",
+            "worst, mm",
+        ):
             table.add_column(heading, justify="left" if heading == "path" else "right")
         for item in sorted(fitted, key=lambda item: -item.worst_arm):
             numbers = (item.length, item.arm, max(item.worst_length, item.worst_arm))
             count = len(item.path.coordinate_paths)
             name = item.path.name.rpartition("/")[2]
-            add_row(table, name, str(count), str(item.order), *(f"{1e3 * number:.3f}" for number in numbers))
+            add_row(
+                table,
+                name,
+                str(count),
+                str(item.order),
+                *(f"{1e3 * number:.3f}" for number in numbers),
+            )
         plain_console().print(table)
     say(f"{target}: {counted(len(list(model.components())), 'component')}")

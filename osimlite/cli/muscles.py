@@ -29,23 +29,40 @@ def muscles(
     muscle: Annotated[
         list[str] | None,
         Option(
-            "--muscle", metavar="NAME", help="Only this one; may be repeated.", show_default="all that move with it"
+            "--muscle",
+            metavar="NAME",
+            help="Only this one; may be repeated.",
+            show_default="all that move with it",
         ),
     ] = None,
     points: Annotated[
         int | None,
-        Option(min=2, help="How many values of each coordinate.", show_default="50, of two coordinates 15"),
+        Option(
+            min=2,
+            help="How many values of each coordinate.",
+            show_default="50, of two coordinates 15",
+        ),
     ] = None,
     activation: Annotated[float, Option(help="Of all muscles, 0 to 1.")] = 1.0,
     compare: Annotated[
         Path | None,
-        Option(metavar="FILE", help="Another model, side by side: scaled, or converted.", show_default=False),
+        Option(
+            metavar="FILE",
+            help="Another model, side by side: scaled, or converted.",
+            show_default=False,
+        ),
     ] = None,
-    plot: Annotated[bool, Option("--plot", help="Draw every quantity: PNG files beside the table.")] = False,
+    plot: Annotated[
+        bool, Option("--plot", help="Draw every quantity: PNG files beside the table.")
+    ] = False,
     output: Annotated[
         Path | None,
         Option(
-            "-o", "--output", metavar="FILE", help="Write all numbers: .csv or .parquet, SI units.", show_default=False
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Write all numbers: .csv or .parquet, SI units.",
+            show_default=False,
         ),
     ] = None,
     *,
@@ -53,8 +70,8 @@ def muscles(
 ) -> None:
     """Tell lengths, moment arms, fiber lengths and forces of muscles over a coordinate, as OpenSim's plotter does.
 
-    Fibers are in equilibrium with their tendons at the activation, and the model is at rest. Prints what is least and
-    greatest of each muscle; -o has every number.
+    Fibers are in equilibrium with their tendons at the activation, and the model is at rest. Prints
+    what is least and greatest of each muscle; -o has every number.
 
     Example: osimlite muscles gait2392.osim --coordinate knee_angle_r=-120deg:0 --plot
     """
@@ -68,7 +85,9 @@ def muscles(
     from osimlite.simulation.muscle_curves import muscle_curves
 
     if output is not None and output.suffix not in (".csv", ".parquet"):
-        raise SettingError(f"a table of muscles is written as .csv or .parquet, not '{output.name}'")
+        raise SettingError(
+            f"a table of muscles is written as .csv or .parquet, not '{output.name}'"
+        )
     if output is not None:
         expect_folder_of(output)
     if len(coordinate or ()) > 2:
@@ -77,7 +96,9 @@ def muscles(
         raise SettingError("--plot needs a --coordinate to draw over")
     model = read(file)
     mechanism = build_mechanism(model)
-    values = _swept(mechanism, coordinate or (), points or (15 if len(coordinate or ()) > 1 else 50))
+    values = _swept(
+        mechanism, coordinate or (), points or (15 if len(coordinate or ()) > 1 else 50)
+    )
     result: dict[str, MuscleCurves] = {}
     for path in (file, *((compare,) if compare is not None else ())):
         with progress_bar(f"muscles of {path.name}", None) as advance:
@@ -94,7 +115,8 @@ def muscles(
     first, *others = result.values()
     if not first.muscles:
         raise ModelError(
-            f"'{file.name}' has no muscle" + (f" that moves with {listed(list(values))}" if values else "s")
+            f"'{file.name}' has no muscle"
+            + (f" that moves with {listed(list(values))}" if values else "s")
         )
     if others:
         first, second = _common(first, others[0])
@@ -131,7 +153,9 @@ def _swept(mechanism: Mechanism, words: Sequence[str], points: int) -> dict[str,
         if equals:
             parts = given.split(":")
             if len(parts) != 2:
-                raise SettingError(f"--coordinate takes NAME=LOW:HIGH, such as {name}=-120deg:0, got '{word}'")
+                raise SettingError(
+                    f"--coordinate takes NAME=LOW:HIGH, such as {name}=-120deg:0, got '{word}'"
+                )
             for part in parts:
                 if odd := suspect_value(info, name, part):
                     raise SettingError(f"--coordinate: {odd} (if not, write {part.strip()}rad)")
@@ -139,7 +163,9 @@ def _swept(mechanism: Mechanism, words: Sequence[str], points: int) -> dict[str,
         if equals and low > high:
             raise SettingError(f"--coordinate takes the lower end of the range first, got '{word}'")
         if not (isfinite(low) and isfinite(high) and low < high):
-            raise SettingError(f"coordinate '{name}' has no range to sweep; give one, such as {name}=-1:1")
+            raise SettingError(
+                f"coordinate '{name}' has no range to sweep; give one, such as {name}=-1:1"
+            )
         result[name] = [low + (high - low) * k / (points - 1) for k in range(points)]
     return result
 
@@ -158,7 +184,8 @@ def _common(first: MuscleCurves, second: MuscleCurves) -> tuple[MuscleCurves, Mu
     if alone:
         say(f"of one model only: {listed(alone)}")
     one, other = (
-        curves.of([own.index(name) for name in both]) for curves, own in zip((first, second), names, strict=True)
+        curves.of([own.index(name) for name in both])
+        for curves, own in zip((first, second), names, strict=True)
     )
     return one, other
 
@@ -173,17 +200,33 @@ def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> 
     first, *others = curves
     arms = {f"moment_arm_{name}": f"arm {name} (mm)" for name in first.coordinates}
     lengths = {"length": "length (mm)"} if len(arms) < 2 else {}
-    shown = {**lengths, **arms, "normalized_fiber_length": "fiber / optimal", "tendon_force": "tendon (N)"}
-    table = plain_table(f"Largest differences of {compare.name} from {file.name}" if compare is not None else "")
+    shown = {
+        **lengths,
+        **arms,
+        "normalized_fiber_length": "fiber / optimal",
+        "tendon_force": "tendon (N)",
+    }
+    table = plain_table(
+        f"Largest differences of {compare.name} from {file.name}" if compare is not None else ""
+    )
     table.add_column("Muscle")
     columns = [[path.rpartition("/")[2] for path in first.muscles]]
     for name, label in shown.items():
         table.add_column(label, justify="right")
-        factor, form = (1000.0, ".1f") if label.endswith("(mm)") else (1.0, ".0f" if label.endswith("(N)") else ".3f")
+        factor, form = (
+            (1000.0, ".1f")
+            if label.endswith("(mm)")
+            else (1.0, ".0f" if label.endswith("(N)") else ".3f")
+        )
         low, high = first.bounds(name)
         if others:
             low = high = np.fmax.reduce(np.abs(others[0].columns[name] - first.columns[name]))
-        columns.append([span(factor * least, factor * most, form) for least, most in zip(low, high, strict=True)])
+        columns.append(
+            [
+                span(factor * least, factor * most, form)
+                for least, most in zip(low, high, strict=True)
+            ]
+        )
     for row in zip(*columns, strict=True):
         add_row(table, *row)
     plain_console().print(table)
@@ -203,7 +246,11 @@ def _write(found: Mapping[str, MuscleCurves], output: Path) -> None:
     columns: dict[str, list[Any]] = {}
     for file, curves in found.items():
         rows, numbers = curves.table
-        for name, column in {"model": np.full(len(rows["muscle"]), file), **rows, **numbers}.items():
+        for name, column in {
+            "model": np.full(len(rows["muscle"]), file),
+            **rows,
+            **numbers,
+        }.items():
             columns.setdefault(name, []).extend(column.tolist())
     if output.suffix == ".parquet":
         from osimlite.base.require import require

@@ -36,11 +36,16 @@ def optimize(
         ),
     ] = "cma",
     popsize: Annotated[
-        int | None, Option(metavar="N", help="Runs between two decisions.", show_default="what suits the method")
+        int | None,
+        Option(
+            metavar="N", help="Runs between two decisions.", show_default="what suits the method"
+        ),
     ] = None,
     sigma: Annotated[
         float,
-        Option(help="How far from where it begins the method looks at first, as a fraction of the ranges."),
+        Option(
+            help="How far from where it begins the method looks at first, as a fraction of the ranges."
+        ),
     ] = 0.25,
     seed: Annotated[int, Option(help="The same seed, the same search.")] = 0,
     start: Annotated[
@@ -52,15 +57,24 @@ def optimize(
         ),
     ] = None,
     maximize: Annotated[
-        bool | None, Option("--maximize/--minimize", help="What is better.", show_default="see --objective")
+        bool | None,
+        Option("--maximize/--minimize", help="What is better.", show_default="see --objective"),
     ] = None,
-    unbounded: Annotated[bool, Option("--unbounded", help="The ranges say where to begin, and may be left.")] = False,
+    unbounded: Annotated[
+        bool, Option("--unbounded", help="The ranges say where to begin, and may be left.")
+    ] = False,
     tolerance: Annotated[
-        float | None, Option(help="At which the search has converged.", show_default="that of the method")
+        float | None,
+        Option(help="At which the search has converged.", show_default="that of the method"),
     ] = None,
     measure: Annotated[
         list[str] | None,
-        Option("--measure", metavar="NAME", help="What else to keep in the history.", show_default=False),
+        Option(
+            "--measure",
+            metavar="NAME",
+            help="What else to keep in the history.",
+            show_default=False,
+        ),
     ] = None,
     to: options.To = 2.0,
     engine: options.Engine = None,
@@ -74,9 +88,16 @@ def optimize(
     cluster: sweeping.Cluster = None,
     output: Annotated[
         Path,
-        Option("-o", "--output", metavar="FOLDER", help="For history.parquet, best.osim, summary.json (and best.par)."),
+        Option(
+            "-o",
+            "--output",
+            metavar="FOLDER",
+            help="For history.parquet, best.osim, summary.json (and best.par).",
+        ),
     ] = Path("optimum"),
-    resume: Annotated[bool, Option("--resume", help="Go on with an interrupted or finished search.")] = False,
+    resume: Annotated[
+        bool, Option("--resume", help="Go on with an interrupted or finished search.")
+    ] = False,
     force: Annotated[bool, Option("--force", help="Replace what another search found.")] = False,
     controls: options.Controls = None,
     controller: options.Controller = None,
@@ -89,25 +110,52 @@ def optimize(
     Of muscles: osimlite optimize jumper --objective 'max(center_of_mass_Y)' --maximize
     --vary '{*}_?/control@0:0.3:4=0:1'
 
-    Of reflexes: osimlite optimize arm.osim --objective 'elbow/value' --maximize --controller hold.yaml
+    Of reflexes: osimlite optimize arm.osim --objective 'elbow/value' --maximize --controller
+    hold.yaml
 
-    Example: osimlite optimize walker.osim --objective distance --vary RHip_rz=0:60deg --vary Pelvis_tx/speed=0:2
+    Example: osimlite optimize walker.osim --objective distance --vary RHip_rz=0:60deg --vary
+        Pelvis_tx/speed=0:2
     """
     from osimlite.cli._progress import progress_bar
     from osimlite.studies.sweep.optimize import Objective, found_by
     from osimlite.studies.sweep.optimize import optimize as search
 
     plan = sweeping.make_plan(
-        source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure or ()), to=to,
-        engine=engine, report_interval=report_interval, interpolation=interpolation, is_planted=planted,
-        feet=tuple(foot) if foot else None, controller=options.feedback(controller, par), **chosen,
-    )  # fmt: skip
+        source,
+        vary,
+        parameter,
+        stop_below,
+        stop_above,
+        controls,
+        measures=tuple(measure or ()),
+        to=to,
+        engine=engine,
+        report_interval=report_interval,
+        interpolation=interpolation,
+        is_planted=planted,
+        feet=tuple(foot) if foot else None,
+        controller=options.feedback(controller, par),
+        **chosen,
+    )
     with progress_bar("searching", budget) as progress:
         result = search(
-            plan, Objective(objective, maximize), output, method=method, budget=budget, popsize=popsize, seed=seed,
-            sigma=sigma, tolerance=tolerance, is_bounded=not unbounded, resume=resume, force=force,
-            start=found_by(start) if start else None, workers=workers, cluster=cluster, progress=progress,
-        )  # fmt: skip
+            plan,
+            Objective(objective, maximize),
+            output,
+            method=method,
+            budget=budget,
+            popsize=popsize,
+            seed=seed,
+            sigma=sigma,
+            tolerance=tolerance,
+            is_bounded=not unbounded,
+            resume=resume,
+            force=force,
+            start=found_by(start) if start else None,
+            workers=workers,
+            cluster=cluster,
+            progress=progress,
+        )
     _told(objective, result).show()
 
 

@@ -45,7 +45,12 @@ def rule(
         width = max(len(known.name) for known in result)
         for known in result:
             head = f"{known.code}  {known.name:{width}}  {known.severity.value:7}  "
-            show(textwrap.fill(known.summary, columns, initial_indent=head, subsequent_indent=" " * len(head)) + "\n")
+            show(
+                textwrap.fill(
+                    known.summary, columns, initial_indent=head, subsequent_indent=" " * len(head)
+                )
+                + "\n"
+            )
         return
     show(_wrapped(page_of(result[0]), columns) + "\n")
 
@@ -64,5 +69,9 @@ def _wrapped(page: str, columns: int) -> str:
             prose = []
         code ^= line.startswith("```")
         lead = "  " if line.startswith("- ") else ""
-        rows.append(textwrap.fill(line, columns, subsequent_indent=lead, break_on_hyphens=False) if lead else line)
+        rows.append(
+            textwrap.fill(line, columns, subsequent_indent=lead, break_on_hyphens=False)
+            if lead
+            else line
+        )
     return "\n".join(rows[:-1])

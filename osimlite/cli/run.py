@@ -26,18 +26,32 @@ MOST_ROWS = 40
 @command
 def run(
     setups: Annotated[
-        list[str], Argument(help="Setup files of tools, or patterns such as 'subjects/*/ik.xml'.", show_default=False)
+        list[str],
+        Argument(
+            help="Setup files of tools, or patterns such as 'subjects/*/ik.xml'.",
+            show_default=False,
+        ),
     ],
     output: Annotated[
         Path | None,
-        Option("-o", "--output", metavar="FOLDER", help="Folder to write into.", show_default="where the setup says"),
+        Option(
+            "-o",
+            "--output",
+            metavar="FOLDER",
+            help="Folder to write into.",
+            show_default="where the setup says",
+        ),
     ] = None,
     workers: sweeping.Workers = None,
     cluster: sweeping.Cluster = None,
-    resume: Annotated[bool, Option("--resume", help="Leave out what an interrupted run has done.")] = False,
+    resume: Annotated[
+        bool, Option("--resume", help="Leave out what an interrupted run has done.")
+    ] = False,
     report: Annotated[
         Path | None,
-        Option("--report", metavar="FILE.html", help="Show it all on one page.", show_default=False),
+        Option(
+            "--report", metavar="FILE.html", help="Show it all on one page.", show_default=False
+        ),
     ] = None,
     refine: Annotated[
         str | None,
@@ -49,9 +63,14 @@ def run(
             show_default=False,
         ),
     ] = None,
-    as_json: Annotated[bool, Option("--json", help="Print what became of each setup as JSON.")] = False,
+    as_json: Annotated[
+        bool, Option("--json", help="Print what became of each setup as JSON.")
+    ] = False,
     overwrite: Annotated[
-        bool, Option("--overwrite", help="Let results replace any file, not only results of the same kind.")
+        bool,
+        Option(
+            "--overwrite", help="Let results replace any file, not only results of the same kind."
+        ),
     ] = False,
     write_outside: Annotated[
         bool,
@@ -63,16 +82,20 @@ def run(
 ) -> None:
     """Run setup files of OpenSim's tools, and write the files that OpenSim would write.
 
-    A setup and all that it names are checked first, as 'osimlite validate' does; an error stops it. Files are looked
-    for from the folder of the setup, then from here. 'run-tool' is another name of this command.
+    A setup and all that it names are checked first, as 'osimlite validate' does; an error stops it.
+    Files are looked for from the folder of the setup, then from here. 'run-tool' is another name of
+    this command.
 
-    Of several setups each waits for those that make what it names; one that fails stops no other. What is done is noted
-    until all are, and --resume goes on after Ctrl-C, a crash or an error. With -o each has a folder of its own in it.
+    Of several setups each waits for those that make what it names; one that fails stops no other.
+    What is done is noted until all are, and --resume goes on after Ctrl-C, a crash or an error.
+    With -o each has a folder of its own in it.
 
-    A result replaces an existing file only if that is a result of the same kind. It is not written through a link, nor
-    under a hidden name, nor outside of the setup's project and the current folder. See --overwrite, --write-outside.
+    A result replaces an existing file only if that is a result of the same kind. It is not written
+    through a link, nor under a hidden name, nor outside of the setup's project and the current
+    folder. See --overwrite, --write-outside.
 
-    With --report what a study of Moco finds is simulated, too, and it is told how far the motion stays with it.
+    With --report what a study of Moco finds is simulated, too, and it is told how far the motion
+    stays with it.
 
     Exits with 0 if all is done, 1 if the answer of a tool is no, 2 if a setup could not be run.
 
@@ -87,10 +110,14 @@ def run(
     files = found(setups)
     if report is not None:
         if resume or cluster or workers not in (None, 1):
-            raise SettingError("--report runs setups one after the other; leave out --workers, --cluster and --resume")
+            raise SettingError(
+                "--report runs setups one after the other; leave out --workers, --cluster and --resume"
+            )
         expect_folder_of(report)
         if any(inputs_among([report], setup) for setup in files):
-            raise SettingError(f"--report would replace '{report}', which the results come from; give it another name")
+            raise SettingError(
+                f"--report would replace '{report}', which the results come from; give it another name"
+            )
         workers = 1
     if len(files) == 1 and not as_json and not (resume or cluster):
         outcome = _run_alone(
@@ -104,7 +131,9 @@ def run(
         _write_report({files[0]: outcome}, report)
         raise SystemExit(0 if outcome.done else 1)
     if refine is not None:
-        raise SettingError("--refine takes one study; leave out the others, --json, --resume and --cluster")
+        raise SettingError(
+            "--refine takes one study; leave out the others, --json, --resume and --cluster"
+        )
     kept: dict[str | Path, Outcome] | None = None if report is None else {}
     count = 1 if workers is None and cluster is None and len(files) < WORTH_SHARING else workers
     with progress_bar("running", len(files)) as progress:
@@ -171,7 +200,9 @@ def _run_alone(
     return outcome
 
 
-def _write_report(outcomes: Mapping[str | Path, Outcome], report: Path | None, *, err: bool = False) -> None:
+def _write_report(
+    outcomes: Mapping[str | Path, Outcome], report: Path | None, *, err: bool = False
+) -> None:
     from osimlite.cli._console import say
 
     if report is not None:
@@ -197,7 +228,9 @@ def _show(setup: Path, outcome: Outcome) -> None:
         facts.add("check", str(finding))
     if (more := len(unsaid) - MOST_WARNINGS) > 0:
         files = " ".join(dict.fromkeys(finding.file or str(setup) for finding in unsaid))
-        facts.add("check", f"{counted(more, 'warning')} more; see them with: osimlite validate {files}")
+        facts.add(
+            "check", f"{counted(more, 'warning')} more; see them with: osimlite validate {files}"
+        )
     facts.add("files", ", ".join(str(path) for path in outcome.files) or "none")
     facts.show()
 
@@ -211,7 +244,10 @@ def _show_trials(trials: list[Trial]) -> None:
 
     shown = trials
     if len(trials) > MOST_ROWS:
-        worst = sorted(trials, key=lambda trial: (_codes([trial])[0], trial.summary.get("rms_marker_error", 0.0)))
+        worst = sorted(
+            trials,
+            key=lambda trial: (_codes([trial])[0], trial.summary.get("rms_marker_error", 0.0)),
+        )
         shown = worst[-MOST_ROWS:][::-1]
     table = plain_table()
     for column in ("setup", "", "s", ""):
@@ -219,14 +255,28 @@ def _show_trials(trials: list[Trial]) -> None:
     for trial in shown:
         words = trial.message or "; ".join(f"{name} {said}" for name, said in trial.told[:2])
         if trial.warnings:
-            more = f"; and {counted(len(trial.warnings) - 1, 'warning')} more" if len(trial.warnings) > 1 else ""
+            more = (
+                f"; and {counted(len(trial.warnings) - 1, 'warning')} more"
+                if len(trial.warnings) > 1
+                else ""
+            )
             words = f"{words}; {trial.warnings[0]}{more}"
         seconds = "" if trial.was_done else f"{trial.seconds:.2f}"
-        add_row(table, trial.setup, trial.status + (", before" if trial.was_done else ""), seconds, words)
+        add_row(
+            table,
+            trial.setup,
+            trial.status + (", before" if trial.was_done else ""),
+            seconds,
+            words,
+        )
     plain_console().print(table)
     counts = Counter(trial.status for trial in trials)
     told = ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
     if warned := sum(1 for trial in trials if trial.warnings):
         told += f", {warned} with warnings"
-    more = f" ({len(shown)} shown: those that failed or whose markers are farthest off)" if shown is not trials else ""
+    more = (
+        f" ({len(shown)} shown: those that failed or whose markers are farthest off)"
+        if shown is not trials
+        else ""
+    )
     show(f"{counted(len(trials), 'setup')}: {told}{more}\n")

@@ -13,7 +13,8 @@ from osimlite.cli._command import Argument, Option, command
 def scale(
     file: options.File,
     static: Annotated[
-        Path | None, Argument(help="Measured markers of the subject, standing: .trc, .c3d, or .sto.")
+        Path | None,
+        Argument(help="Measured markers of the subject, standing: .trc, .c3d, or .sto."),
     ] = None,
     distance: Annotated[
         list[str] | None,
@@ -26,7 +27,11 @@ def scale(
     ] = None,
     factor: Annotated[
         list[str] | None,
-        Option("--factor", metavar="BODY=X[,Y,Z]", help="Scale a body by a number, or one for each axis."),
+        Option(
+            "--factor",
+            metavar="BODY=X[,Y,Z]",
+            help="Scale a body by a number, or one for each axis.",
+        ),
     ] = None,
     mass: options.Mass = -1.0,
     preserve: Annotated[
@@ -38,15 +43,19 @@ def scale(
     first: options.FirstFrame = float("-inf"),
     last: options.LastFrame = float("inf"),
     output: Annotated[
-        Path | None, Option("-o", "--output", metavar="FILE", help="The scaled model.", show_default="scaled.osim")
+        Path | None,
+        Option(
+            "-o", "--output", metavar="FILE", help="The scaled model.", show_default="scaled.osim"
+        ),
     ] = None,
 ) -> None:
     """Scale a model to a subject, as OpenSim's ScaleTool does.
 
-    Lengths of muscles, masses and inertias follow. With --place the model is posed as the subject stood, and its
-    markers are moved to the measured places.
+    Lengths of muscles, masses and inertias follow. With --place the model is posed as the subject
+    stood, and its markers are moved to the measured places.
 
-    Example: osimlite scale gait2392.osim static.trc --distance femur_r=RASI:RKNE --mass 72 --place -o subject.osim
+    Example: osimlite scale gait2392.osim static.trc --distance femur_r=RASI:RKNE --mass 72 --place
+        -o subject.osim
     """
     from osimlite.cli._console import say
     from osimlite.errors import SettingError
@@ -55,10 +64,15 @@ def scale(
     from osimlite.io.document.reader import read
 
     measurements = {
-        body: ([_pair(pair, body) for pair in pairs.split(",")], {body.partition(".")[0]: _axes(body)})
+        body: (
+            [_pair(pair, body) for pair in pairs.split(",")],
+            {body.partition(".")[0]: _axes(body)},
+        )
         for body, pairs in options.named_words(distance, "--distance", "BODY=MARKER:MARKER").items()
     }
-    factors = {body: _factors(text, body) for body, text in options.named_words(factor, "--factor").items()}
+    factors = {
+        body: _factors(text, body) for body, text in options.named_words(factor, "--factor").items()
+    }
     if not (measurements or factors or place or mass > 0.0):
         raise SettingError("there is nothing to scale; add --distance, --factor, --mass or --place")
     result = scaled(
@@ -92,7 +106,9 @@ def _pair(text: str, body: str) -> tuple[str, str]:
 
     one, _, two = text.partition(":")
     if not one or not two:
-        raise SettingError(f"'{text}' names no pair of markers for '{body}'; write {body}=MARKER:MARKER")
+        raise SettingError(
+            f"'{text}' names no pair of markers for '{body}'; write {body}=MARKER:MARKER"
+        )
     return one.strip(), two.strip()
 
 
@@ -108,5 +124,7 @@ def _factors(text: str, body: str) -> tuple[float, ...]:
     except ValueError:
         numbers = []
     if len(numbers) not in (1, 3):
-        raise SettingError(f"'{text}' are no factors for '{body}'; write one number, or three with commas")
+        raise SettingError(
+            f"'{text}' are no factors for '{body}'; write one number, or three with commas"
+        )
     return tuple(numbers * 3)[:3]

@@ -8,7 +8,13 @@ from typing import Annotated
 from osimlite.cli import _options as options
 from osimlite.cli._command import Argument, Option, command
 
-UNITS = {"speed": "m/s", "power": "W/kg", "transport": "J/(kg m)", "jump height": "cm", "early rise": "cm"}
+UNITS = {
+    "speed": "m/s",
+    "power": "W/kg",
+    "transport": "J/(kg m)",
+    "jump height": "cm",
+    "early rise": "cm",
+}
 """Of what measures report."""
 
 
@@ -25,27 +31,39 @@ def scone(
     par: options.Par = None,
     optimize: Annotated[bool, Option("--optimize", help="Look for better ones.")] = False,
     generations: Annotated[
-        int | None, Option(metavar="N", help="How many.", show_default="what the scenario says, or 1000")
+        int | None,
+        Option(metavar="N", help="How many.", show_default="what the scenario says, or 1000"),
     ] = None,
     population: Annotated[
         int | None,
-        Option(metavar="N", help="Candidates of each generation.", show_default="what the scenario says, or 16"),
+        Option(
+            metavar="N",
+            help="Candidates of each generation.",
+            show_default="what the scenario says, or 16",
+        ),
     ] = None,
     seed: Annotated[
-        int | None, Option(help="The same seed, the same search.", show_default="what the scenario says, or 0")
+        int | None,
+        Option(help="The same seed, the same search.", show_default="what the scenario says, or 0"),
     ] = None,
     duration: Annotated[
-        float | None, Option("--to", metavar="SECONDS", help="Length of a walk.", show_default="that of the scenario")
+        float | None,
+        Option(
+            "--to", metavar="SECONDS", help="Length of a walk.", show_default="that of the scenario"
+        ),
     ] = None,
     resume: Annotated[bool, Option("--resume", help="Go on with a search.")] = False,
     output: Annotated[
-        Path, Option("-o", "--output", metavar="FOLDER", help="For states.sto, excitations.sto, best.par.")
+        Path,
+        Option(
+            "-o", "--output", metavar="FOLDER", help="For states.sto, excitations.sto, best.par."
+        ),
     ] = Path("scone"),
 ) -> None:
     """Have the human of a scenario walk, or look for the parameters with which it does best.
 
-    A controller of your own, and which of SCONE's parts there are: docs/reflexes.md. All else is refused by its name
-    and line.
+    A controller of your own, and which of SCONE's parts there are: docs/reflexes.md. All else is
+    refused by its name and line.
 
     What comes out can be looked at: osimlite view walk/human.osim walk/states.sto
 
@@ -61,8 +79,12 @@ def scone(
     from osimlite.studies.reflexes.scenario import Scenario
     from osimlite.studies.reflexes.search import BEST, search
 
-    if not optimize and (resume or any(given is not None for given in (generations, population, seed))):
-        raise SettingError("--generations, --population, --seed and --resume say how to search; add --optimize")
+    if not optimize and (
+        resume or any(given is not None for given in (generations, population, seed))
+    ):
+        raise SettingError(
+            "--generations, --population, --seed and --resume say how to search; add --optimize"
+        )
     if str(scenario) == SCENARIO:
         scenario = write_scenario(output)
     given = Scenario(scenario)
@@ -70,13 +92,22 @@ def scone(
     files = []
     if optimize:
         values = search(
-            given, output, generations=generations, population=population, seed=seed, resume=resume,
+            given,
+            output,
+            generations=generations,
+            population=population,
+            seed=seed,
+            resume=resume,
             tell=lambda each: show(f"{each}\n", err=True),
-        )  # fmt: skip
+        )
         files.append(output / BEST)
     walked = given.walk(values, duration=duration)
     make_folder(output)
-    for name, table in (("states", walked.states), ("excitations", walked.excitations), ("loads", walked.loads)):
+    for name, table in (
+        ("states", walked.states),
+        ("excitations", walked.excitations),
+        ("loads", walked.loads),
+    ):
         files.append(output / f"{name}.sto")
         write_sto(files[-1], name, table.times, table.columns, table.rows)
     facts = Facts(f"{given.model.name} {walked.times[0]:.3f} s")

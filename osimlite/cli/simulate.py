@@ -29,7 +29,9 @@ def simulate(
     states: Annotated[
         Path | None,
         Option(
-            metavar="FILE", help="Start from the last row of a file of states; --set says more.", show_default=False
+            metavar="FILE",
+            help="Start from the last row of a file of states; --set says more.",
+            show_default=False,
         ),
     ] = None,
     controller: options.Controller = None,
@@ -88,7 +90,9 @@ def simulate(
             with motion_bar("simulating", to) as progress:
                 trajectory = simulation.run(
                     to,
-                    fixed_step=LIVE_STEP if gui and chosen["fixed_step"] is None else chosen["fixed_step"],
+                    fixed_step=LIVE_STEP
+                    if gui and chosen["fixed_step"] is None
+                    else chosen["fixed_step"],
                     initial=initial,
                     initial_speeds=speeds,
                     controls=words_to_controls(controls) if controls else None,
@@ -102,7 +106,9 @@ def simulate(
             is_failure = isinstance(stopped, SimulationError)
             how = "stopped" if is_failure else "interrupted"
             # After many steps, it takes a while to work out what is written.
-            complain(f"{how} at {trajectory.times[-1]:.6g} s of {to:g} s; what was recorded goes into '{results}'")
+            complain(
+                f"{how} at {trajectory.times[-1]:.6g} s of {to:g} s; what was recorded goes into '{results}'"
+            )
             _told(trajectory, write_files(trajectory, results)).show()
             if is_failure:
                 raise
@@ -114,7 +120,15 @@ def simulate(
             folders = options.mesh_folders(file, None)
             with progress_bar("drawing", None) as bar:
                 wrapping = chosen["wrapping"]
-                return draw(model, trajectory, path, folders=folders, file=file, wrapping=wrapping, progress=bar)
+                return draw(
+                    model,
+                    trajectory,
+                    path,
+                    folders=folders,
+                    file=file,
+                    wrapping=wrapping,
+                    progress=bar,
+                )
 
         files = write_files(trajectory, results, plot=plot, film=film if animate else None)
         _told(trajectory, files).show()
@@ -123,13 +137,24 @@ def simulate(
 
 SOME = {
     *("probes.sto", "controller.sto", "animation.gif"),
-    *("coordinates.png", "states.png", "contact_forces.png", "other_forces.png", "probes.png", "energy.png"),
+    *(
+        "coordinates.png",
+        "states.png",
+        "contact_forces.png",
+        "other_forces.png",
+        "probes.png",
+        "energy.png",
+    ),
 }
 """What not every simulation writes: --plot and --animate draw pictures."""
 
 
 def write_files(
-    trajectory: Trajectory, folder: Path, *, plot: bool = False, film: Callable[[Path], Path] | None = None
+    trajectory: Trajectory,
+    folder: Path,
+    *,
+    plot: bool = False,
+    film: Callable[[Path], Path] | None = None,
 ) -> list[Path]:
     """Write everything beside its place first, so that a failure leaves nothing behind."""
     import shutil
@@ -173,7 +198,10 @@ def _told(trajectory: Trajectory, files: Sequence[Path]) -> Facts:
     facts = Facts(f"{summary['model']}, {trajectory.times[-1]:g} s")
     facts.add("engine", f"{summary['engine']}, {summary['route']}, {summary['integrator']}")
     tried = summary["attempted_steps"]
-    facts.add("steps", f"{summary['steps']} of {tried} tried, {summary['evaluations']} evaluations of the forces")
+    facts.add(
+        "steps",
+        f"{summary['steps']} of {tried} tried, {summary['evaluations']} evaluations of the forces",
+    )
     facts.add("time taken", f"{summary['wall_time_s']:.3g} s")
     lengths = {path for path in trajectory.auxiliary if path.endswith("/fiber_length")}
     if lengths - set(summary["settings"]["initial"]) and "equilibrate" not in summary["settings"]:
@@ -187,7 +215,9 @@ def _told(trajectory: Trajectory, files: Sequence[Path]) -> Facts:
             if event["contact"] == name
         ]
         # The unit follows the last time.
-        shown = ", ".join(times[:6]) + " s" + (f" and {len(times) - 6} more" if len(times) > 6 else "")
+        shown = (
+            ", ".join(times[:6]) + " s" + (f" and {len(times) - 6} more" if len(times) > 6 else "")
+        )
         size, when = largest["force_N"], largest["time_s"]
         facts.add(name, f"at most {size:.4g} N ({when:.4g} s)" + (f"; {shown}" if times else ""))
     for skipped in by_class(summary["skipped_forces"]):

@@ -23,8 +23,12 @@ def static_optimization(
             show_default=False,
         ),
     ] = None,
-    replace: Annotated[bool, Option("--replace-forces", help="They take the place of the model's own forces.")] = False,
-    exponent: Annotated[float, Option(metavar="NUMBER", help="Power of the activations whose sum is least.")] = 2.0,
+    replace: Annotated[
+        bool, Option("--replace-forces", help="They take the place of the model's own forces.")
+    ] = False,
+    exponent: Annotated[
+        float, Option(metavar="NUMBER", help="Power of the activations whose sum is least.")
+    ] = 2.0,
     muscles: Annotated[
         str,
         Option(
@@ -41,13 +45,15 @@ def static_optimization(
 ) -> None:
     """Share the forces of a recorded motion among the muscles: of all activations that move it so, the least.
 
-    Writes StaticOptimization_activation.sto, StaticOptimization_force.sto (N, N·m) and StaticOptimization_controls.xml,
-    as OpenSim's analysis does, each time solved exactly. Muscles alone rarely move a pelvis: give reserve actuators
-    with --forces. What min_control and max_control leave without a solution is told with the coordinates that lack
-    strength, has no numbers in the files, and makes the exit code 1. What a camera records takes a filter first:
+    Writes StaticOptimization_activation.sto, StaticOptimization_force.sto (N, N·m) and
+    StaticOptimization_controls.xml, as OpenSim's analysis does, each time solved exactly. Muscles
+    alone rarely move a pelvis: give reserve actuators with --forces. What min_control and
+    max_control leave without a solution is told with the coordinates that lack strength, has no
+    numbers in the files, and makes the exit code 1. What a camera records takes a filter first:
     --lowpass 6.
 
-    Example: osimlite static-optimization gait.osim walk.mot --lowpass 6 --external-loads grf.xml --forces reserves.xml
+    Example: osimlite static-optimization gait.osim walk.mot --lowpass 6 --external-loads grf.xml
+        --forces reserves.xml
     """
     from osimlite.cli._console import complain
     from osimlite.cli._recorded import say_motion

@@ -21,11 +21,19 @@ def sweep(
     vary: sweeping.Vary = None,
     samples: Annotated[
         int | None,
-        Option("--samples", metavar="N", help="How many runs; leave it out for a grid.", show_default=False),
+        Option(
+            "--samples",
+            metavar="N",
+            help="How many runs; leave it out for a grid.",
+            show_default=False,
+        ),
     ] = None,
     sampler: Annotated[
         str | None,
-        Option(help="'grid', 'random', 'sobol' or 'lhs'.", show_default="grid if every range has a COUNT, else sobol"),
+        Option(
+            help="'grid', 'random', 'sobol' or 'lhs'.",
+            show_default="grid if every range has a COUNT, else sobol",
+        ),
     ] = None,
     seed: Annotated[int, Option(help="The same seed, the same random samples.")] = 0,
     measure: Annotated[
@@ -49,10 +57,15 @@ def sweep(
     workers: sweeping.Workers = None,
     cluster: sweeping.Cluster = None,
     output: Annotated[
-        Path, Option("-o", "--output", metavar="FILE", help="Parquet file to write, one row for each run.")
+        Path,
+        Option(
+            "-o", "--output", metavar="FILE", help="Parquet file to write, one row for each run."
+        ),
     ] = Path("results.parquet"),
     resume: Annotated[bool, Option("--resume", help="Go on with an interrupted sweep.")] = False,
-    force: Annotated[bool, Option("--force", help="Replace results that were made with other settings.")] = False,
+    force: Annotated[
+        bool, Option("--force", help="Replace results that were made with other settings.")
+    ] = False,
     controls: options.Controls = None,
     controller: options.Controller = None,
     par: options.Par = None,
@@ -63,21 +76,41 @@ def sweep(
 
     Results of an interrupted sweep are kept beside the file, and --resume goes on with them.
 
-    Example: osimlite sweep walker.osim --vary RHip_rz=20deg:40deg --vary Pelvis_tx/speed=0:1 --samples 1000
+    Example: osimlite sweep walker.osim --vary RHip_rz=20deg:40deg --vary Pelvis_tx/speed=0:1
+        --samples 1000
     """
     from osimlite.cli._progress import progress_bar
     from osimlite.studies.sweep.run import sweep as run
     from osimlite.studies.sweep.sampling import samples as choose
 
     plan = sweeping.make_plan(
-        source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure) if measure else None,
-        to=to, engine=engine, report_interval=report_interval, interpolation=interpolation, is_planted=planted,
-        feet=tuple(foot) if foot else None, controller=options.feedback(controller, par), **chosen,
-    )  # fmt: skip
+        source,
+        vary,
+        parameter,
+        stop_below,
+        stop_above,
+        controls,
+        measures=tuple(measure) if measure else None,
+        to=to,
+        engine=engine,
+        report_interval=report_interval,
+        interpolation=interpolation,
+        is_planted=planted,
+        feet=tuple(foot) if foot else None,
+        controller=options.feedback(controller, par),
+        **chosen,
+    )
     points = choose(plan.variables, sampler, samples, seed)
     with progress_bar("sweeping", points.count) as progress:
         outcome = run(
-            plan, points, output, resume=resume, force=force, workers=workers, cluster=cluster, progress=progress
+            plan,
+            points,
+            output,
+            resume=resume,
+            force=force,
+            workers=workers,
+            cluster=cluster,
+            progress=progress,
         )
     _told(plan, outcome).show()
     if outcome.status["failed"] == outcome.count:
@@ -95,14 +128,23 @@ def _told(plan: Plan, outcome: Outcome) -> Facts:
     if outcome.before:
         facts.add("there before", str(outcome.before))
     if new:
-        facts.add("time taken", f"{outcome.seconds:.3g} s, {new / outcome.seconds:.4g} runs per second")
-        facts.add("ended", ", ".join(f"{count} {word}" for word, count in outcome.status.most_common()))
+        facts.add(
+            "time taken", f"{outcome.seconds:.3g} s, {new / outcome.seconds:.4g} runs per second"
+        )
+        facts.add(
+            "ended", ", ".join(f"{count} {word}" for word, count in outcome.status.most_common())
+        )
     told = outcome.reasons.most_common(3)
     for reason, count in told:
         facts.add("failed", f"{counted(count, 'run')}: {reason}")
     if others := outcome.status["failed"] - sum(count for _, count in told):
-        facts.add("failed", f"{counted(others, 'run')} for other reasons; the column 'reason' has them all")
-    for name, result in ranges(outcome.path, [measure_name(spec) for spec in plan.measures]).items():
+        facts.add(
+            "failed",
+            f"{counted(others, 'run')} for other reasons; the column 'reason' has them all",
+        )
+    for name, result in ranges(
+        outcome.path, [measure_name(spec) for spec in plan.measures]
+    ).items():
         facts.add(
             name,
             f"{result.least:.6g} (run {result.run_of_least}) to {result.most:.6g} (run {result.run_of_most}), "

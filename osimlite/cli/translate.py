@@ -27,7 +27,9 @@ def _choices() -> Iterator[Choice]:
 
 
 def _told() -> str:
-    return "The format: " + "; ".join(f"'{name}' writes {each.help}" for name, each in exporters("translate").items())
+    return "The format: " + "; ".join(
+        f"'{name}' writes {each.help}" for name, each in exporters("translate").items()
+    )
 
 
 @command_with(_choices)
@@ -74,13 +76,19 @@ def translate(
     if to not in formats:
         raise OsimliteError(f"--to is {' or '.join(map(repr, formats))}, not '{to}'")
     for name, exporter in formats.items():
-        strange = [each.name for each in exporter.choices if chosen[each.name] is not None and name != to]
+        strange = [
+            each.name for each in exporter.choices if chosen[each.name] is not None and name != to
+        ]
         if strange:
             raise SettingError(f"--{strange[0]} is an option of --to {name}")
     export = formats[to].write
     given = {name: value for name, value in chosen.items() if value is not None}
     made = export(
-        read(file), folder=file.parent, name=file.stem, geometry=options.mesh_folders(file, geometry), **given
+        read(file),
+        folder=file.parent,
+        name=file.stem,
+        geometry=options.mesh_folders(file, geometry),
+        **given,
     )
     written = made.write(options.results_folder(file, output))
 
@@ -115,6 +123,10 @@ def tabulate(fidelity: Fidelity, target: str) -> Any:
         names = dict.fromkeys(owner.rsplit("/", 1)[1] or "the model" for owner in owners)
         worst = [f"{name} {error.max:.2g} {error.unit}" for name, error in group.worst()]
         add_row(
-            table, group.cannot_say, group.done, listed(list(names), most=3), *([", ".join(worst)] if measured else [])
+            table,
+            group.cannot_say,
+            group.done,
+            listed(list(names), most=3),
+            *([", ".join(worst)] if measured else []),
         )
     return table

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 @command
 def upgrade(
-    file: Annotated[Path, Argument(help="A model, setup or other document of any version.", show_default=False)],
+    file: Annotated[
+        Path, Argument(help="A model, setup or other document of any version.", show_default=False)
+    ],
     output: Annotated[
         Path | None,
         Option(
@@ -32,8 +34,8 @@ def upgrade(
 ) -> None:
     """Write a file of an older version in the current format, and list what changed and what was lost.
 
-    Components get the names and paths that OpenSim gives them. Comments and numbers stay as they are. Other files that
-    it names are left alone.
+    Components get the names and paths that OpenSim gives them. Comments and numbers stay as they
+    are. Other files that it names are left alone.
 
     Example: osimlite upgrade gait2354.osim -o gait2354_v4.osim
     """
@@ -53,10 +55,14 @@ def upgrade(
         return
     target = output or file.with_name(f"{file.stem}_{CURRENT_VERSION}{file.suffix or '.osim'}")
     if output is None and target.exists():
-        raise OsimliteError(f"'{target}' is there already; name the file to write with -o", file=str(file))
+        raise OsimliteError(
+            f"'{target}' is there already; name the file to write with -o", file=str(file)
+        )
     write(document.top, target, numbers=style)
     _report(document)
-    say(f"{target}: version {document.version} to {CURRENT_VERSION}, {counted(len(document.changes), 'change')}")
+    say(
+        f"{target}: version {document.version} to {CURRENT_VERSION}, {counted(len(document.changes), 'change')}"
+    )
 
 
 def _report(document: Document) -> None:
@@ -77,7 +83,11 @@ def _report(document: Document) -> None:
     for note in document.notes:
         if note.line is not None:
             meant = (
-                "as nothing" if not note.value else "as it stands" if note.value == note.word else f"as '{note.value}'"
+                "as nothing"
+                if not note.value
+                else "as it stands"
+                if note.value == note.word
+                else f"as '{note.value}'"
             )
             fate = f"; {note.value}" if note.kind == "overlooked" else f" and was read {meant}"
             say(f"line {note.line}: '{note.word}' is no XML{fate}")

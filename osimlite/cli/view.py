@@ -25,7 +25,9 @@ def _choices() -> Iterator[Choice]:
 @command_with(_choices)
 def view(
     file: options.File,
-    motion: Annotated[Path | None, Argument(help="Coordinates over time, .sto or .mot.", show_default=False)] = None,
+    motion: Annotated[
+        Path | None, Argument(help="Coordinates over time, .sto or .mot.", show_default=False)
+    ] = None,
     values: Annotated[
         list[str] | None,
         Option("--set", metavar="NAME=VALUE", help="Where a coordinate is (rad, m, or 30deg)."),
@@ -39,7 +41,9 @@ def view(
         ),
     ] = None,
     geometry: options.Geometry = None,
-    port: Annotated[int, Option(help="Serve the page at this port.", show_default="any that is free")] = 0,
+    port: Annotated[
+        int, Option(help="Serve the page at this port.", show_default="any that is free")
+    ] = 0,
     browser: options.Browser = True,
     *,
     wrapping: str,
@@ -47,12 +51,12 @@ def view(
 ) -> None:
     """Look at a model, and at a motion: bodies, contacts, muscles, the component tree, a slider for every coordinate.
 
-    Muscles bend around their wrap surfaces in every pose. Where the motion has activations, as a file of states, they
-    are blue at rest and red when active. A click on one shows its length and moment arms over each coordinate that it
-    crosses.
+    Muscles bend around their wrap surfaces in every pose. Where the motion has activations, as a
+    file of states, they are blue at rest and red when active. A click on one shows its length and
+    moment arms over each coordinate that it crosses.
 
-    Opens a page in the browser and serves it until you press Ctrl-C; with --html, --glb, --rerun or --screenshot it
-    writes files instead.
+    Opens a page in the browser and serves it until you press Ctrl-C; with --html, --glb, --rerun or
+    --screenshot it writes files instead.
 
     Example: osimlite view gait.osim walk.sto --geometry ~/OpenSim/Geometry --html walk.html
     """
@@ -65,9 +69,16 @@ def view(
     given: Mapping[str, float] = options.quantities(values, mechanism, "--set")
     folders = options.mesh_folders(file, geometry)
     shown = Shown.of(
-        model, mechanism, folders, file=file, motion=motion, forces=forces, values=given, wrapping=wrapping,
+        model,
+        mechanism,
+        folders,
+        file=file,
+        motion=motion,
+        forces=forces,
+        values=given,
+        wrapping=wrapping,
         left_out=left_out,
-    )  # fmt: skip
+    )
     for remark in (*shown.remarks, *describe_errors(shown.findings, shown.scene.remarks)):
         say(remark)
     written = {name: each for name, each in exporters("view").items() if chosen[name] is not None}

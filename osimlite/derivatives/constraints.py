@@ -64,7 +64,12 @@ def independent_equations(mechanism: Mechanism, packed: Packed, state: StateLayo
 def _independent(rows: Array) -> list[int]:
     """The longest rest first, of equations that weigh the same."""
     lengths = np.linalg.norm(rows, axis=1)
-    rest = rows / np.where(lengths > REDUNDANT * max(lengths.max(initial=0.0), 1.0), lengths, np.inf)[:, None]
+    rest = (
+        rows
+        / np.where(lengths > REDUNDANT * max(lengths.max(initial=0.0), 1.0), lengths, np.inf)[
+            :, None
+        ]
+    )
     chosen: list[int] = []
     for _ in range(min(rows.shape)):
         left = np.linalg.norm(rest, axis=1)
@@ -80,7 +85,8 @@ def _independent(rows: Array) -> list[int]:
 def dynamics_with(equations: Sequence[int]) -> Law:
     """The law of accelerations that fulfil some of the equations, which all others follow from.
 
-    As in `by_multipliers`: the tree's own factor of the mass matrix gives what each equation's force does.
+    As in `by_multipliers`: the tree's own factor of the mass matrix gives what each equation's
+    force does.
     """
 
     def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector, unused: int) -> int:
@@ -92,13 +98,18 @@ def dynamics_with(equations: Sequence[int]) -> Law:
         rows, missing = [], []
         for number in equations:
             row = [data[h[CONSTRAINED.WORK_ROWS] + size * number + k] for k in range(size)]
-            missing.append(data[h[CONSTRAINED.WORK_DRIFTS] + number] - sum(a * right[k] for k, a in enumerate(row)))
+            missing.append(
+                data[h[CONSTRAINED.WORK_DRIFTS] + number]
+                - sum(a * right[k] for k, a in enumerate(row))
+            )
             turned = Vector(row)
             on_symbols(toward_ground)(model, data, turned)
             rows.append(casadi.horzcat(*turned.cells))
         g = casadi.sparsify(casadi.SX(casadi.vertcat(*rows)))
         scaled = g @ casadi.diag(casadi.vertcat(*inverse))
-        multipliers = casadi.ldl_solve(casadi.SX(casadi.vertcat(*missing)), *casadi.ldl(scaled @ g.T))
+        multipliers = casadi.ldl_solve(
+            casadi.SX(casadi.vertcat(*missing)), *casadi.ldl(scaled @ g.T)
+        )
         push = Vector(casadi.vertsplit(casadi.densify(scaled.T @ multipliers)))
         on_symbols(away_from_ground)(model, data, push)
         for k in range(size):

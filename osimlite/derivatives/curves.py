@@ -40,7 +40,10 @@ def pieces_on_symbols(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
     here = [SX.binary(casadi.OP_AND, *pair) for pair in zip(beyond, [*below, SX(1.0)], strict=True)]
 
     def chosen(first: int, step: int) -> Any:
-        parts = [SX.binary(casadi.OP_IF_ELSE_ZERO, test, table[first + k * step]) for k, test in enumerate(here)]
+        parts = [
+            SX.binary(casadi.OP_IF_ELSE_ZERO, test, table[first + k * step])
+            for k, test in enumerate(here)
+        ]
         return reduce(plus, parts)
 
     t, value, slope, curvature = minus(z, chosen(4, 1)), 0.0, 0.0, 0.0
@@ -73,7 +76,8 @@ def damped_velocity_on_symbols(
 ) -> tuple[bool, Any, Any]:
     """As :func:`osimlite.mechanics.laws.millard2012_equilibrium.damped_velocity`, without that one's tolerance.
 
-    What the fibers bear, share * factor + damping * velocity, is a polynomial on each section of the curve too.
+    What the fibers bear, share * factor + damping * velocity, is a polynomial on each section of
+    the curve too.
     """
     c, share, wanted = curves.velocity, active * by_length, divide(tendon, cos) - elastic
 
@@ -105,15 +109,19 @@ def _section(c: Any, beyond: Sequence[Any]) -> list[Any]:
     result = [c[first + place] for place in places]
     for number, test in enumerate(beyond, 1):
         at = first + SECTION * number
-        result = [casadi.if_else(test, c[at + place], own) for place, own in zip(places, result, strict=True)]
+        result = [
+            casadi.if_else(test, c[at + place], own)
+            for place, own in zip(places, result, strict=True)
+        ]
     return result
 
 
 def _place(c: Sequence[Any], u: Any) -> Any:
     """The zero of a polynomial that rises from u = 0 to 1.
 
-    The search has no derivatives: what it finds is rounded to a grid as fine as its digits. A last step of Halley's
-    method, whose error is the third power of that before, brings first and second derivatives with it.
+    The search has no derivatives: what it finds is rounded to a grid as fine as its digits. A last
+    step of Halley's method, whose error is the third power of that before, brings first and second
+    derivatives with it.
     """
     return _search()(casadi.vertcat(*c), u)
 
@@ -132,7 +140,9 @@ def _better(c: Sequence[Any], u: Any) -> Any:
     """A step of Halley's method."""
     value, slope = _value(c, u), _slope(c, u)
     divisor = slope * slope - value * _slope(_derivative(c), u) / 2.0
-    return u - casadi.if_else(divisor > 0.0, value * slope / casadi.if_else(divisor > 0.0, divisor, 1.0), 0.0)
+    return u - casadi.if_else(
+        divisor > 0.0, value * slope / casadi.if_else(divisor > 0.0, divisor, 1.0), 0.0
+    )
 
 
 def _between(x: Any, low: Any, high: Any) -> Any:

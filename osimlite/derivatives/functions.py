@@ -34,20 +34,21 @@ FUNCTIONS = "dynamics", "residual", "constraints", "outputs", "paths"
 """Those that `save` writes."""
 
 
-def casadi(model: Model, parameters: Iterable[str] = (), folder: str | Path | None = None) -> CasadiModel:
+def casadi(
+    model: Model, parameters: Iterable[str] = (), folder: str | Path | None = None
+) -> CasadiModel:
     """A model as functions of CasADi, made of the same laws that simulate it.
 
-    Args:
-        model: what moves.
-        parameters: numbers of the model that stay symbols, by path: ``/bodyset/torso/mass``, ``/forceset/soleus_r/
-            max_isometric_force``, ``/bodyset/torso/mass_center/1``; one path may stand for several that are the same.
-        folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
+    Args: model: what moves. parameters: numbers of the model that stay symbols, by path:
+        ``/bodyset/torso/mass``, ``/forceset/soleus_r/ max_isometric_force``,
+        ``/bodyset/torso/mass_center/1``; one path may stand for several that are the same. folder:
+        where the model's file is, for the files that it names; the folder that the program runs in
+        if None.
 
-    Raises:
-        MissingDependency: casadi is not installed, or cannot be loaded beside what is loaded already.
-        ModelError: the model is not a mechanism.
-        SettingError: there is no such number.
-        UnsupportedError: a part of the model has no formula, or a number cannot stay a symbol; the message names it.
+    Raises: MissingDependency: casadi is not installed, or cannot be loaded beside what is loaded
+        already. ModelError: the model is not a mechanism. SettingError: there is no such number.
+        UnsupportedError: a part of the model has no formula, or a number cannot stay a symbol; the
+        message names it.
     """
     expect_model(model)
     return CasadiModel(model, tuple(parameters), Path(folder or "."))
@@ -56,20 +57,27 @@ def casadi(model: Model, parameters: Iterable[str] = (), folder: str | Path | No
 class CasadiModel(StatedModel):
     """Functions of CasADi (``casadi.Function``), each made when it is first asked for.
 
-    All are functions of columns: time t (s); the state x, named by `states`; its derivative xdot; the controls u of the
-    actuators, named by `controls`, in the place of what the model's controllers say (to which a stretch reflex adds);
-    the parameters p, named by `parameters`. Units are those of OpenSim's files of states: m, rad, s, N.
-    Where a result does not exist (a joint stands where its rates are not defined), it is not a number.
+    All are functions of columns: time t (s); the state x, named by `states`; its derivative xdot;
+    the controls u of the actuators, named by `controls`, in the place of what the model's
+    controllers say (to which a stretch reflex adds); the parameters p, named by `parameters`. Units
+    are those of OpenSim's files of states: m, rad, s, N. Where a result does not exist (a joint
+    stands where its rates are not defined), it is not a number.
 
     The arguments and attributes are those of :class:`osimlite.derivatives.stated.StatedModel`, and:
 
-    Args:
-        loads_given: whether t has, behind the time, what the functions of time of measured and prescribed forces are
-            then (`loads`; of a model with parameters it has none): thousands of knots are no formula to look through.
+    Args: loads_given: whether t has, behind the time, what the functions of time of measured and
+        prescribed forces are then (`loads`; of a model with parameters it has none): thousands of
+        knots are no formula to look through.
     """
 
     def __init__(
-        self, model: Model, parameters: Sequence[str], folder: Path, *, apart: bool = False, loads_given: bool = False
+        self,
+        model: Model,
+        parameters: Sequence[str],
+        folder: Path,
+        *,
+        apart: bool = False,
+        loads_given: bool = False,
     ) -> None:
         # Before all else: it says what is missing.
         from osimlite.derivatives.symbols import casadi as library
@@ -104,7 +112,9 @@ class CasadiModel(StatedModel):
         moving = [k for k, info in enumerate(infos) if not info.locked]
         paths = in_model_order(model, [f"{infos[k].path}/value" for k in moving])
         places = {f"{infos[k].path}/value": k for k in moving}
-        return SearchedPaths(mechanism, super()._forces_of(model, mechanism), [places[path] for path in paths])
+        return SearchedPaths(
+            mechanism, super()._forces_of(model, mechanism), [places[path] for path in paths]
+        )
 
     @property
     def searched(self) -> tuple[str, ...]:
@@ -118,7 +128,11 @@ class CasadiModel(StatedModel):
         if not np.array_equal(packed.structure, self._packed.structure):
             return np.zeros(0)
         # Ways that are searched for may not change: lengths are no lines over anything.
-        ways = [searched.measured(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)] if searched.size else []
+        ways = (
+            [searched.measured(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)]
+            if searched.size
+            else []
+        )
         return np.concatenate((packed.numbers, *_fixed_numbers(mechanism, packed), *ways))
 
     @cached_property
@@ -137,8 +151,14 @@ class CasadiModel(StatedModel):
 
         numbers = self._packed.numbers.tolist()
         if self._parameters:
-            numbers = filled(self._parameters.base.tolist(), self._parameters.slopes, self._entries("p"))
-        equations = independent_equations(self.mechanism, self._packed, self._state) if self.constraints_kept else ()
+            numbers = filled(
+                self._parameters.base.tolist(), self._parameters.slopes, self._entries("p")
+            )
+        equations = (
+            independent_equations(self.mechanism, self._packed, self._state)
+            if self.constraints_kept
+            else ()
+        )
         return Traced(
             self._packed,
             self.forces,
@@ -171,10 +191,14 @@ class CasadiModel(StatedModel):
         symbols = [self._symbols[item] for item in given]
         if self._measured is None or "x" not in given:
             return self._library.Function(name, symbols, [*results.values()], [*given], [*results])
-        inner = self._library.Function(f"{name}_of_paths", [*symbols, self._symbols["paths"]], [*results.values()])
+        inner = self._library.Function(
+            f"{name}_of_paths", [*symbols, self._symbols["paths"]], [*results.values()]
+        )
         outer = self._arguments(given)
         found = inner(*outer, self._measured(outer[given.index("x")][: len(self.coordinates)]))
-        return self._library.Function(name, outer, [*found] if len(results) > 1 else [found], [*given], [*results])
+        return self._library.Function(
+            name, outer, [*found] if len(results) > 1 else [found], [*given], [*results]
+        )
 
     def _arguments(self, given: Sequence[str]) -> list[Any]:
         """Symbols for the arguments of a function: of expressions, if one of its parts is none."""
@@ -186,7 +210,9 @@ class CasadiModel(StatedModel):
     def dynamics(self) -> Any:
         """``dynamics(t, x, u, p) -> xdot``: the derivative of the state."""
         found = self._evaluated
-        return self._function("dynamics", ("t", "x", "u", "p"), {"xdot": found.sure(self._in_order(found.f.cells))})
+        return self._function(
+            "dynamics", ("t", "x", "u", "p"), {"xdot": found.sure(self._in_order(found.f.cells))}
+        )
 
     @cached_property
     def linear(self) -> Any:
@@ -195,15 +221,18 @@ class CasadiModel(StatedModel):
         symbols = self._arguments(given)
         xdot = self.dynamics(*symbols)
         slopes = [self._library.jacobian(xdot, symbols[given.index(name)]) for name in ("x", "u")]
-        return self._library.Function("linear", symbols, [xdot, *slopes], [*given], ["xdot", "A", "B"])
+        return self._library.Function(
+            "linear", symbols, [xdot, *slopes], [*given], ["xdot", "A", "B"]
+        )
 
     @cached_property
     def residual(self) -> Any:
         """``residual(t, x, xdot, u, p, multipliers) -> residual``: zero where a motion is one of the model.
 
-        In the order of the state: what the rates of values are beyond those that follow from the speeds (rad/s, m/s);
-        the generalized forces M udot + c - f + Gᵀ multipliers (N, N m); what the rates of auxiliary states are beyond
-        those that the laws give. The multipliers (N, N m) are those of the rows of G in `constraints`; none without.
+        In the order of the state: what the rates of values are beyond those that follow from the
+        speeds (rad/s, m/s); the generalized forces M udot + c - f + Gᵀ multipliers (N, N m); what
+        the rates of auxiliary states are beyond those that the laws give. The multipliers (N, N m)
+        are those of the rows of G in `constraints`; none without.
         """
         size, xdot = len(self.coordinates), self._engine_order("xdot")
         found = self._traced.missing(xdot[size : 2 * size])
@@ -212,7 +241,9 @@ class CasadiModel(StatedModel):
         rows[size : 2 * size] = f[size : 2 * size]
         if self.constraints_kept:
             push = self._bound["jacobian"].T @ self._symbols["multipliers"]
-            rows[size : 2 * size] = [rows[size + k] + push[self._speed_place(k)] for k in range(size)]
+            rows[size : 2 * size] = [
+                rows[size + k] + push[self._speed_place(k)] for k in range(size)
+            ]
         given = "t", "x", "xdot", "u", "p", "multipliers"
         return self._function("residual", given, {"residual": found.sure(self._in_order(rows))})
 
@@ -226,27 +257,28 @@ class CasadiModel(StatedModel):
         Args:
             pushing: paths of the forces.
 
-        Returns:
-            A ``casadi.Function`` whose result (k, 1) is in the order of `coordinates`, N and N m; constraints do not
-            push.
+        Returns: A ``casadi.Function`` whose result (k, 1) is in the order of `coordinates`, N and N
+            m; constraints do not push.
         """
         size, xdot = len(self.coordinates), self._engine_order("xdot")
         found = self._traced.missing(xdot[size : 2 * size], pushing)
         forces = self._in_order(found.f.cells)[size : 2 * size]
-        return self._function("generalized_forces", ("t", "x", "xdot", "u", "p"), {"missing": found.sure(forces)})
+        return self._function(
+            "generalized_forces", ("t", "x", "xdot", "u", "p"), {"missing": found.sure(forces)}
+        )
 
     def joint_load(self, path: str, side: str) -> Any:
         """``joint_load(t, x, xdot, u, p, multipliers) -> force, moment``: what a joint pushes one of its bodies with.
 
-        It is what all that the joint carries lacks for its accelerations; the multipliers are those of `residual`.
+        It is what all that the joint carries lacks for its accelerations; the multipliers are those
+        of `residual`.
 
         Args:
             path: of the joint.
             side: ``child`` or ``parent``.
 
-        Returns:
-            A ``casadi.Function`` of the force (3,), N, and the moment (3,), N m, about the origin of the joint's frame
-            on that side, along the axes of ground.
+        Returns: A ``casadi.Function`` of the force (3,), N, and the moment (3,), N m, about the
+            origin of the joint's frame on that side, along the axes of ground.
         """
         from osimlite.derivatives.outputs import frame_places, joint_load_columns
 
@@ -254,30 +286,43 @@ class CasadiModel(StatedModel):
         body = next(body for body in bodies if body.mobilizer.joint == path)
         link = placements[bodies.index(body)].link
         if link == (GROUND if body.parent == GROUND else placements[body.parent].link):
-            own = CasadiModel(self._model, self.parameters, self._folder, apart=True, loads_given=bool(self.loads))
+            own = CasadiModel(
+                self._model, self.parameters, self._folder, apart=True, loads_given=bool(self.loads)
+            )
             return own.joint_load(path, side)
-        # The body that the joint carries in the tree gets what is missing there, the other one the opposite.
+        # The body that the joint carries in the tree gets what is missing there, the other one the
+        # opposite.
         sign = 1.0 if (side == "child") != body.mobilizer.reversed else -1.0
         size, xdot = len(self.coordinates), self._engine_order("xdot")
         found = self._traced.missing(xdot[size : 2 * size])
         pushes = []
         if self.constraints_kept:
             multipliers = self._entries("multipliers")
-            pushes = [(of, multipliers[row], unit) for (row, of), unit in self._traced.bound().result.items()]
+            pushes = [
+                (of, multipliers[row], unit)
+                for (row, of), unit in self._traced.bound().result.items()
+            ]
         joint: Any = self._model.find(path)
-        frame = self._model.tree().target(joint, f"socket_{side}_frame", getattr(joint, f"socket_{side}_frame")).path
+        frame = (
+            self._model.tree()
+            .target(joint, f"socket_{side}_frame", getattr(joint, f"socket_{side}_frame"))
+            .path
+        )
         places = frame_places(self.mechanism, self._packed)
         number = [*places].index(frame)
         origin = places[frame][0], self._fixed[1][12 * number + 9 : 12 * number + 12]
         given = "t", "x", "xdot", "u", "p", "multipliers"
-        return self._function("joint_load", given, joint_load_columns(found, link, origin, sign, pushes))
+        return self._function(
+            "joint_load", given, joint_load_columns(found, link, origin, sign, pushes)
+        )
 
     @cached_property
     def constraints(self) -> Any:
         """``constraints(t, x, xdot, p) -> position, velocity, acceleration, jacobian``: zero where they hold.
 
-        The errors of the equations that bind positions (rad, m), of all in speeds (G u less what it is to be), and in
-        accelerations (likewise G udot); G (m, n) has a row for each equation and a column for each of `coordinates`.
+        The errors of the equations that bind positions (rad, m), of all in speeds (G u less what it
+        is to be), and in accelerations (likewise G udot); G (m, n) has a row for each equation and
+        a column for each of `coordinates`.
         """
         return self._function("constraints", ("t", "x", "xdot", "p"), self._bound)
 
@@ -289,7 +334,12 @@ class CasadiModel(StatedModel):
         if not count:
             nothing = self._library.SX(0, 1)
             empty = self._library.SX(0, size)
-            return {"position": nothing, "velocity": nothing, "acceleration": nothing, "jacobian": empty}
+            return {
+                "position": nothing,
+                "velocity": nothing,
+                "acceleration": nothing,
+                "jacobian": empty,
+            }
         found, structure = self._traced.bound(), self._traced.structure
         h, data = structure[structure[MODEL.CONSTRAINED] :], found.data
         order = [self.state_indices.index(k) for k in range(size)]
@@ -306,7 +356,9 @@ class CasadiModel(StatedModel):
         def wanted(place: int) -> Any:
             return column(*data[h[place] : h[place] + count])
 
-        errors = [data[h[CONSTRAINED.WORK_ERRORS] + number] for number in position_equations(structure)]
+        errors = [
+            data[h[CONSTRAINED.WORK_ERRORS] + number] for number in position_equations(structure)
+        ]
         return {
             "position": self._library.SX(column(*errors)),
             "velocity": jacobian @ u - wanted(CONSTRAINED.WORK_RATES),
@@ -318,14 +370,18 @@ class CasadiModel(StatedModel):
     def outputs(self) -> Any:
         """``outputs(t, x, u, p) -> ...``: columns whose entries are named by `output_names`.
 
-        ``stations``, ``station_velocities``: of markers and other stations in ground (m, m/s); ``mass_center``,
-        ``mass_center_velocity``; ``contact_forces``: of each pair the force in ground (N) on the second surface, or on
-        the sphere, and its point (m); ``forces``: what is known of each force, such as ``tension`` (N), ``activation``,
-        ``fiber_length`` (m), ``cos_pennation``, ``active_fiber_force`` (N); ``probes``: what each probe finds times its
-        gain, before it is integrated or compared over time. Probes of energies and of joints are not among them.
+        ``stations``, ``station_velocities``: of markers and other stations in ground (m, m/s);
+        ``mass_center``, ``mass_center_velocity``; ``contact_forces``: of each pair the force in
+        ground (N) on the second surface, or on the sphere, and its point (m); ``forces``: what is
+        known of each force, such as ``tension`` (N), ``activation``, ``fiber_length`` (m),
+        ``cos_pennation``, ``active_fiber_force`` (N); ``probes``: what each probe finds times its
+        gain, before it is integrated or compared over time. Probes of energies and of joints are
+        not among them.
         """
         return self._function(
-            "outputs", ("t", "x", "u", "p"), {key: column for key, (_, column) in self._outputs.items()}
+            "outputs",
+            ("t", "x", "u", "p"),
+            {key: column for key, (_, column) in self._outputs.items()},
         )
 
     @cached_property
@@ -359,9 +415,8 @@ class CasadiModel(StatedModel):
         Args:
             paths: of k frames.
 
-        Returns:
-            A ``casadi.Function``: origins (3, k) in m, rotation matrices (9, k) column by column, velocities of the
-            origins (3, k) in m/s, angular velocities (3, k) in rad/s.
+        Returns: A ``casadi.Function``: origins (3, k) in m, rotation matrices (9, k) column by
+            column, velocities of the origins (3, k) in m/s, angular velocities (3, k) in rad/s.
 
         Raises:
             SettingError: there is no such frame.
@@ -369,7 +424,10 @@ class CasadiModel(StatedModel):
         from osimlite.derivatives.outputs import frame_columns, frame_places
 
         places, chosen = frame_places(self.mechanism, self._packed), []
-        numbers = {path: self._fixed[1][12 * number : 12 * number + 12] for number, path in enumerate(places)}
+        numbers = {
+            path: self._fixed[1][12 * number : 12 * number + 12]
+            for number, path in enumerate(places)
+        }
         for path in paths:
             if path not in places:
                 raise SettingError(f"the model has no frame '{path}'{did_you_mean(path, places)}")
@@ -388,13 +446,16 @@ class CasadiModel(StatedModel):
     def paths(self) -> Any:
         """``paths(t, x, p) -> lengths, speeds, moment_arms``: of the paths of `path_names`.
 
-        Lengths (m), lengthening speeds (m/s), and the moment arms (m, or 1 of sliding coordinates) about each of
+        Lengths (m), lengthening speeds (m/s), and the moment arms (m, or 1 of sliding coordinates)
+        about each of
         `coordinates` (k, n): the generalized force of a tension of 1 N.
         """
         _, lengths, speeds = self._paths
         size = len(self.coordinates)
         arms = -self._library.jacobian(speeds, self._symbols["x"])[:, size : 2 * size]
-        return self._function("paths", ("t", "x", "p"), {"lengths": lengths, "speeds": speeds, "moment_arms": arms})
+        return self._function(
+            "paths", ("t", "x", "p"), {"lengths": lengths, "speeds": speeds, "moment_arms": arms}
+        )
 
     @cached_property
     def path_names(self) -> tuple[str, ...]:
@@ -411,8 +472,9 @@ class CasadiModel(StatedModel):
     def save(self, folder: str | Path, functions: Iterable[str] = FUNCTIONS) -> list[Path]:
         """Write the functions into a folder: each as ``NAME.casadi``, and all together as C.
 
-        ``casadi.Function.load`` reads the former without osimlite; ``model.c`` and ``model.h`` need only a compiler.
-        ``model.json`` has the names of the states, controls and parameters, and the numbers to start from.
+        ``casadi.Function.load`` reads the former without osimlite; ``model.c`` and ``model.h`` need
+        only a compiler. ``model.json`` has the names of the states, controls and parameters, and
+        the numbers to start from.
 
         Args:
             folder: is made.
@@ -424,7 +486,9 @@ class CasadiModel(StatedModel):
         """
         names, folder = [*functions], Path(folder)
         if unknown := [name for name in names if name not in FUNCTIONS]:
-            raise SettingError(f"there is no function '{unknown[0]}'; there are {', '.join(FUNCTIONS)}")
+            raise SettingError(
+                f"there is no function '{unknown[0]}'; there are {', '.join(FUNCTIONS)}"
+            )
         if self._measured is not None:
             raise UnsupportedError(
                 "paths around surfaces are searched for by osimlite, which files cannot do; put polynomials in their "
@@ -458,5 +522,7 @@ def _fixed_numbers(mechanism: Mechanism, packed: Packed) -> tuple[Array, Array]:
     from osimlite.derivatives.outputs import frame_places, station_places
 
     stations = [number for _, _, point in station_places(mechanism, packed) for number in point]
-    frames = [number for _, numbers in frame_places(mechanism, packed).values() for number in numbers]
+    frames = [
+        number for _, numbers in frame_places(mechanism, packed).values() for number in numbers
+    ]
     return np.array(stations), np.array(frames)

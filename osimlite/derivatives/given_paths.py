@@ -1,10 +1,11 @@
 """Paths around surfaces: no formula, but functions whose derivatives CasADi is given.
 
-Where a path runs is searched for by the kernels, so that its length and moment arms come from machine code
-(`casadi.Callback`). To the rest of the model it is a path of which these are known as functions of the coordinates.
-Their derivatives are differences of what the kernels find, extrapolated (L. F. Richardson, Phil. Trans. R. Soc. A 226,
-1927): good to some 1e-9 where a path does not touch or leave a surface. Where it does there is a derivative on each
-side, and these are a mean of both. Second derivatives are differences of these.
+Where a path runs is searched for by the kernels, so that its length and moment arms come from
+machine code (`casadi.Callback`). To the rest of the model it is a path of which these are known as
+functions of the coordinates. Their derivatives are differences of what the kernels find,
+extrapolated (L. F. Richardson, Phil. Trans. R. Soc. A 226, 1927): good to some 1e-9 where a path
+does not touch or leave a surface. Where it does there is a derivative on each side, and these are a
+mean of both. Second derivatives are differences of these.
 """
 
 from __future__ import annotations
@@ -43,9 +44,8 @@ class GivenPath:
     Args:
         coordinates: places in the mechanism of those that it depends on.
 
-    Attributes:
-        symbols: the length, a moment arm for each coordinate, and what each of their speeds gives to its own, once they
-            are known.
+    Attributes: symbols: the length, a moment arm for each coordinate, and what each of their speeds
+        gives to its own, once they are known.
     """
 
     coupled: ClassVar[bool] = False
@@ -73,7 +73,9 @@ class GivenPath:
         def speed_law(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
             rates = zip(self.symbols[1 + count :], freedoms, strict=True)
             first = s[MODEL.DOFS]
-            w.rest(s[item + ITEM.RECORD])[0] = sum((by * y[first + place] for by, place in rates if place >= 0), 0.0)
+            w.rest(s[item + ITEM.RECORD])[0] = sum(
+                (by * y[first + place] for by, place in rates if place >= 0), 0.0
+            )
             return OUTCOME.OK
 
         law.takes_symbols = speed_law.takes_symbols = True  # type: ignore[attr-defined]
@@ -102,14 +104,20 @@ class SearchedPaths:
 
     def __init__(self, mechanism: Mechanism, forces: Forces, order: Sequence[int]) -> None:
         owners: list[Any] = [item for item in forces.elements if _is_searched(item)]
-        self.forces, self.given, self.names, self.size = forces, list[GivenPath](), tuple[str, ...](), 0
+        self.forces, self.given, self.names, self.size = (
+            forces,
+            list[GivenPath](),
+            tuple[str, ...](),
+            0,
+        )
         if not owners:
             return
         self._order = list(order)
         self._still = np.zeros(len(mechanism.coordinates))
         self._default = np.array([info.default_value for info in mechanism.coordinates])
         self._system = PathSystem(
-            mechanism.released(), Forces(tuple(MeasuredPath(item.path, item.place) for item in owners))
+            mechanism.released(),
+            Forces(tuple(MeasuredPath(item.path, item.place) for item in owners)),
         )
         poses = self._poses(mechanism)
         arms = np.abs(self._system.pulled(poses)).max(axis=0)
@@ -119,7 +127,9 @@ class SearchedPaths:
         self.names = tuple(item.path for item in owners)
         self.size = sum(item.size for item in self.given)
         others = {item.path: given for item, given in zip(owners, self.given, strict=True)}
-        elements = (replace(e, place=others[e.path]) if e.path in others else e for e in forces.elements)
+        elements = (
+            replace(e, place=others[e.path]) if e.path in others else e for e in forces.elements
+        )
         self.forces = replace(forces, elements=tuple(elements))
 
     def _speeds(self, pose: Array) -> list[Array]:
@@ -155,7 +165,10 @@ class SearchedPaths:
         speeds = self._speeds(pose)
         parts = zip(lengths, arms, speeds, self.given, strict=True)
         return np.concatenate(
-            [np.concatenate([[length], arm[[*item.coordinates]], speed]) for length, arm, speed, item in parts]
+            [
+                np.concatenate([[length], arm[[*item.coordinates]], speed])
+                for length, arm, speed, item in parts
+            ]
         )
 
     def slopes(self, q: Array) -> Array:
@@ -164,7 +177,10 @@ class SearchedPaths:
         owners = np.repeat(np.arange(len(self.given)), [item.size for item in self.given])
         for group in self._groups:
             columns = [self._order.index(place) for place in group]
-            one, two = ([self.measured(_moved(q, columns, sign * h)) for sign in (1, -1)] for h in (STEP, 2.0 * STEP))
+            one, two = (
+                [self.measured(_moved(q, columns, sign * h)) for sign in (1, -1)]
+                for h in (STEP, 2.0 * STEP)
+            )
             slope = (8.0 * (one[0] - one[1]) - (two[0] - two[1])) / (12.0 * STEP)
             for place, column in zip(group, columns, strict=True):
                 own = np.array([place in item.coordinates for item in self.given])[owners]
@@ -186,7 +202,9 @@ class SearchedPaths:
 
     def function(self) -> Any:
         """``paths(q)`` as a function of CasADi, with its derivative. It must be kept as long as it is used."""
-        slopes = _Called("path_slopes", [len(self._order), self.size], self.pattern, lambda q, _: self.slopes(q))
+        slopes = _Called(
+            "path_slopes", [len(self._order), self.size], self.pattern, lambda q, _: self.slopes(q)
+        )
         dense = casadi.Sparsity.dense(self.size, 1)
         return _Called("path_lengths", [len(self._order)], dense, self.measured, slopes)
 
@@ -211,7 +229,10 @@ def _apart(paths: Sequence[Sequence[int]]) -> list[list[int]]:
 
 
 def _is_searched(element: Any) -> bool:
-    if not (isinstance(element, DeclaredForce) and element.kind.geometry is PATH) or element.place is None:
+    if (
+        not (isinstance(element, DeclaredForce) and element.kind.geometry is PATH)
+        or element.place is None
+    ):
         return False
     surfaces = getattr(element.place, "surfaces", None)
     return bool(surfaces) if surfaces is not None else not hasattr(element.place, "length")
@@ -229,7 +250,12 @@ class _Called(casadi.Callback):  # type: ignore[misc]
     """
 
     def __init__(
-        self, name: str, sizes: Sequence[int], out: Any, function: Callable[..., Array], slopes: Any = None
+        self,
+        name: str,
+        sizes: Sequence[int],
+        out: Any,
+        function: Callable[..., Array],
+        slopes: Any = None,
     ) -> None:
         casadi.Callback.__init__(self)
         self._sizes, self._out, self._call, self._slopes = sizes, out, function, slopes

@@ -63,18 +63,17 @@ def linearize(
 ) -> Linearization:
     """The exact derivatives of the motion of a model by its state and by the controls of its actuators.
 
-    Controllers of the model are left aside: what they do is no part of A. Under constraints, accelerations are those
-    that fulfil them.
+    Controllers of the model are left aside: what they do is no part of A. Under constraints,
+    accelerations are those that fulfil them.
 
-    Args:
-        model: that moves; or what is made of it once for many states: its tangents (:func:`osimlite.tangents`), or
-            its functions (:func:`osimlite.casadi`), whose tangents these are then.
-        state: numbers by the names of states, the others as the model has them, or all (x,) in their order.
-        controls: numbers by the paths of actuators, the others 0, or all (u,).
-        outputs: what is observed, in the order of y: groups of `TangentModel.output_names` (``mass_center``), or single
-            entries of these (``mass_center:y``, ``forces:/forceset/soleus_r|tension``).
-        time: s.
-        folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
+    Args: model: that moves; or what is made of it once for many states: its tangents
+        (:func:`osimlite.tangents`), or its functions (:func:`osimlite.casadi`), whose tangents
+        these are then. state: numbers by the names of states, the others as the model has them, or
+        all (x,) in their order. controls: numbers by the paths of actuators, the others 0, or all
+        (u,). outputs: what is observed, in the order of y: groups of `TangentModel.output_names`
+        (``mass_center``), or single entries of these (``mass_center:y``,
+        ``forces:/forceset/soleus_r|tension``). time: s. folder: where the model's file is, for the
+        files that it names; the folder that the program runs in if None.
 
     Raises:
         SettingError: there is no such state, control or output.
@@ -90,18 +89,30 @@ def linearize(
     u = _filled("control", model.controls, model.u, controls)
     xdot, a, b = model.linear(time, x, u)
     if len(xdot) and np.isnan(xdot).all():
-        raise SimulationError("the model has no accelerations in this state; a simulation from it says why")
+        raise SimulationError(
+            "the model has no accelerations in this state; a simulation from it says why"
+        )
     chosen = _chosen(model.output_names if outputs else {}, outputs)
     if not (np.isfinite(xdot).all() and np.isfinite(a).all() and np.isfinite(b).all()):
         raise SimulationError(_odd_entry(model.states, model.controls, xdot, a, b))
-    y, c, d = model.observed(time, x, u, chosen) if outputs else (np.zeros((0, size)) for size in (1, len(x), len(u)))
+    y, c, d = (
+        model.observed(time, x, u, chosen)
+        if outputs
+        else (np.zeros((0, size)) for size in (1, len(x), len(u)))
+    )
     if not all(np.isfinite(part).all() for part in (y, c, d)):
-        raise SimulationError("an output of the model or its derivative is no finite number in this state")
+        raise SimulationError(
+            "an output of the model or its derivative is no finite number in this state"
+        )
     names = tuple(f"{group}:{model.output_names[group][k]}" for group, k in chosen)
-    return Linearization(model.states, model.controls, time, x, u, xdot, a, b, names, y.ravel(), c, d)
+    return Linearization(
+        model.states, model.controls, time, x, u, xdot, a, b, names, y.ravel(), c, d
+    )
 
 
-def _odd_entry(states: Sequence[str], controls: Sequence[str], xdot: Array, a: Array, b: Array) -> str:
+def _odd_entry(
+    states: Sequence[str], controls: Sequence[str], xdot: Array, a: Array, b: Array
+) -> str:
     """Return which derivative is NaN or infinite, in words."""
     columns = [("", xdot.reshape(-1, 1), [""]), (" by ", a, states), (" by ", b, controls)]
     for words, matrix, names in columns:
@@ -113,11 +124,17 @@ def _odd_entry(states: Sequence[str], controls: Sequence[str], xdot: Array, a: A
     return "a derivative is no finite number"
 
 
-def _chosen(output_names: Mapping[str, Sequence[str]], names: Sequence[str]) -> list[tuple[str, int]]:
+def _chosen(
+    output_names: Mapping[str, Sequence[str]], names: Sequence[str]
+) -> list[tuple[str, int]]:
     """The groups of outputs and the places in these that names stand for."""
-    groups = {group: [(group, k) for k in range(len(labels))] for group, labels in output_names.items()}
+    groups = {
+        group: [(group, k) for k in range(len(labels))] for group, labels in output_names.items()
+    }
     single = {
-        f"{group}:{label}": [(group, k)] for group, labels in output_names.items() for k, label in enumerate(labels)
+        f"{group}:{label}": [(group, k)]
+        for group, labels in output_names.items()
+        for k, label in enumerate(labels)
     }
     known, result = {**groups, **single}, list[tuple[str, int]]()
     for name in names:
@@ -132,7 +149,9 @@ def _filled(what: str, names: Sequence[str], default: Array, given: Any) -> Arra
     if isinstance(given, Mapping):
         for name, value in given.items():
             if name not in names:
-                raise SettingError(f"the model has no {what} '{name}'{did_you_mean_path(name, names)}")
+                raise SettingError(
+                    f"the model has no {what} '{name}'{did_you_mean_path(name, names)}"
+                )
             result[names.index(name)] = value
     elif given is not None:
         if len(given) != len(names):

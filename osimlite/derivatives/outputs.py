@@ -33,21 +33,33 @@ if TYPE_CHECKING:
 AXES = "xyz"
 
 
-def station_places(mechanism: Mechanism, packed: Packed) -> list[tuple[str, int, tuple[float, ...]]]:
+def station_places(
+    mechanism: Mechanism, packed: Packed
+) -> list[tuple[str, int, tuple[float, ...]]]:
     """Of every station its path, its link, and where in that it is."""
     places = Places(mechanism, {}, packed.placements)
-    return [(path, *places.station(body, point.tolist())) for path, (body, point) in mechanism.stations.items()]
+    return [
+        (path, *places.station(body, point.tolist()))
+        for path, (body, point) in mechanism.stations.items()
+    ]
 
 
 def frame_places(mechanism: Mechanism, packed: Packed) -> dict[str, tuple[int, list[float]]]:
     """By the path of every frame its link, and its axes and origin in that (12,)."""
     places = Places(mechanism, {}, packed.placements)
-    return {path: places.frame(placed.body, placed.transform) for path, placed in mechanism.frames.items()}
+    return {
+        path: places.frame(placed.body, placed.transform)
+        for path, placed in mechanism.frames.items()
+    }
 
 
 def probe_places(packed: Packed, elements: Sequence[Any]) -> list[int]:
     """Places of the items of all probes."""
-    return [place for place, owner in packed.owners.items() if isinstance(elements[owner], DeclaredProbe)]
+    return [
+        place
+        for place, owner in packed.owners.items()
+        if isinstance(elements[owner], DeclaredProbe)
+    ]
 
 
 def frame_columns(found: Evaluated, frames: Sequence[tuple[int, Sequence[Any]]]) -> dict[str, Any]:
@@ -64,7 +76,9 @@ def frame_columns(found: Evaluated, frames: Sequence[tuple[int, Sequence[Any]]])
         origin = found.on(station)(found.model, found.data, link, tuple(numbers[9:]))
         columns[0] += origin
         for axis in range(3):
-            columns[1] += found.on(direction)(found.model, found.data, link, tuple(numbers[3 * axis : 3 * axis + 3]))
+            columns[1] += found.on(direction)(
+                found.model, found.data, link, tuple(numbers[3 * axis : 3 * axis + 3])
+            )
         columns[2] += found.on(velocity)(found.model, found.data, link, origin)
         columns[3] += found.on(angular_velocity)(found.model, found.data, link)
     names = "position", "rotation", "velocity", "angular_velocity"
@@ -93,7 +107,9 @@ def output_columns(
     speeds: list[Any] = []
     for number, (path, link, _) in enumerate(station_places(mechanism, packed)):
         labels += [f"{path}|{axis}" for axis in AXES]
-        point = at_station(found.model, found.data, link, tuple(points[3 * number : 3 * number + 3]))
+        point = at_station(
+            found.model, found.data, link, tuple(points[3 * number : 3 * number + 3])
+        )
         places += point
         speeds += speed_of(found.model, found.data, link, point)
     center, rate = _mass_center(mechanism, packed, found)
@@ -115,7 +131,10 @@ def output_columns(
         "station_velocities": (labels, found.sure(speeds)),
         "mass_center": ([*AXES], found.sure(center)),
         "mass_center_velocity": ([*AXES], found.sure(rate)),
-        "contact_forces": ([name for name, _ in pushed], found.sure([value for _, value in pushed])),
+        "contact_forces": (
+            [name for name, _ in pushed],
+            found.sure([value for _, value in pushed]),
+        ),
         "forces": ([name for name, _ in known], found.sure([value for _, value in known])),
         "probes": ([name for name, _ in probed], found.sure([value for _, value in probed])),
     }
@@ -126,11 +145,19 @@ def _mass_center(mechanism: Mechanism, packed: Packed, found: Found) -> tuple[li
     parts = []
     for link in range(int(packed.structure[MODEL.LINKS])):
         first = INERTIA_AT + INERTIA.SIZE * link
-        parts.append((found.reals[first], link, tuple(found.reals[first + INERTIA.CENTER : first + INERTIA.MOMENTS])))
+        parts.append(
+            (
+                found.reals[first],
+                link,
+                tuple(found.reals[first + INERTIA.CENTER : first + INERTIA.MOMENTS]),
+            )
+        )
     for placement, body in zip(packed.placements, mechanism.bodies, strict=True):
         if placement.link == GROUND:
             own, frame = body.mass_properties, placement.frame
-            parts.append((own.mass, GROUND, tuple((frame[:3, :3] @ own.center + frame[:3, 3]).tolist())))
+            parts.append(
+                (own.mass, GROUND, tuple((frame[:3, :3] @ own.center + frame[:3, 3]).tolist()))
+            )
     total, center, rate = 0.0, [0.0] * 3, [0.0] * 3
     for mass, link, point in parts:
         place = found.on(station)(found.model, found.data, link, point)
@@ -151,9 +178,14 @@ def _contacts(packed: Packed, forces: Forces, found: Found) -> list[tuple[str, A
         if isinstance(element, PairContact):
             folder = element.path.rpartition("/")[0]
             pairs += [
-                (f"{folder}/{element.pair_name(k)}", place) for k, (place, _) in enumerate(items[: len(element.pairs)])
+                (f"{folder}/{element.pair_name(k)}", place)
+                for k, (place, _) in enumerate(items[: len(element.pairs)])
             ]
-        elif isinstance(element, DeclaredForce) and element.kind.geometry is SPHERE_ON_PLANE and items:
+        elif (
+            isinstance(element, DeclaredForce)
+            and element.kind.geometry is SPHERE_ON_PLANE
+            and items
+        ):
             pairs.append((element.path, items[-1][0] + len(element.kind.recorded)))
     return [
         (f"{name}|{what}_{axis}", found.data[place + 3 * part + k])

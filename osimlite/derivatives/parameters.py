@@ -24,26 +24,27 @@ SHIFTS = 0.125, -0.0625
 class Parameters:
     """Numbers of a model by their paths, and the numbers of the kernels as linear functions of them.
 
-    Most parameters are handed on as they are: masses, stiffnesses, strengths, places. What becomes of each is found by
-    changing it, and tested with all of them changed at once; another way in which numbers depend on one is refused.
+    Most parameters are handed on as they are: masses, stiffnesses, strengths, places. What becomes
+    of each is found by changing it, and tested with all of them changed at once; another way in
+    which numbers depend on one is refused.
 
     Args:
         model: of which they are numbers; a copy that may be changed.
         names: paths, as of sweeps; one may stand for several numbers that are the same.
         numbers_of: what makes the numbers (k,) of the kernels, of the model as it is then.
 
-    Attributes:
-        names: as given.
-        values: of the parameters in the model (p,), in the units of the file.
-        base: the numbers (k,) of the kernels where the parameters are zero.
-        slopes: by place in these numbers, for each parameter that it depends on, its number and its factor.
+    Attributes: names: as given. values: of the parameters in the model (p,), in the units of the
+        file. base: the numbers (k,) of the kernels where the parameters are zero. slopes: by place
+        in these numbers, for each parameter that it depends on, its number and its factor.
 
     Raises:
         SettingError: there is no such number, or several that differ.
         UnsupportedError: the numbers of the kernels depend on a parameter in another way.
     """
 
-    def __init__(self, model: Model, names: Sequence[str], numbers_of: Callable[[Model], Array]) -> None:
+    def __init__(
+        self, model: Model, names: Sequence[str], numbers_of: Callable[[Model], Array]
+    ) -> None:
         self.names = tuple(names)
         self._setters = [_setters(model, name) for name in names]
         given = [_value(name, setters) for name, setters in zip(names, self._setters, strict=True)]
@@ -60,29 +61,47 @@ class Parameters:
             finally:
                 self._put(self.values)
             if len(result) != len(base):
-                raise UnsupportedError(f"{what} cannot be a parameter: more of the model depends on it than numbers")
+                raise UnsupportedError(
+                    f"{what} cannot be a parameter: more of the model depends on it than numbers"
+                )
             return result
 
         columns = np.zeros((len(base), len(given)))
         for k, name in enumerate(names):
             one, two = (self._changed(number, [k]) for number in range(2))
             columns[:, k] = _apart(numbers_at(one, f"'{name}'"), base) / (one[k] - given[k])
-            _require(numbers_at(two, f"'{name}'"), base, columns[:, [k]], (two - self.values)[[k]], f"'{name}'")
+            _require(
+                numbers_at(two, f"'{name}'"),
+                base,
+                columns[:, [k]],
+                (two - self.values)[[k]],
+                f"'{name}'",
+            )
         if len(given) > 1:
-            every = " and ".join(f"'{name}'" for name in names) if len(names) < 4 else "these parameters"
+            every = (
+                " and ".join(f"'{name}'" for name in names)
+                if len(names) < 4
+                else "these parameters"
+            )
             for number in range(2):
                 values = self._changed(number, range(len(given)))
                 what = f"{every} together"
                 _require(numbers_at(values, what), base, columns, values - self.values, what)
         self.base = base - columns @ self.values if len(given) else base
         for place, number in zip(*np.nonzero(columns), strict=True):
-            self.slopes.setdefault(int(place), []).append((int(number), float(columns[place, number])))
+            self.slopes.setdefault(int(place), []).append(
+                (int(number), float(columns[place, number]))
+            )
 
     def _changed(self, number: int, which: Sequence[int] | range) -> Array:
         values = self.values.copy()
         for k in which:
             # Not all by the same factor, which quotients would not notice.
-            values[k] = values[k] * (TRIED[number] + k / 64.0) if values[k] else SHIFTS[number] * (1.0 + k / 8.0)
+            values[k] = (
+                values[k] * (TRIED[number] + k / 64.0)
+                if values[k]
+                else SHIFTS[number] * (1.0 + k / 8.0)
+            )
         return values
 
     def _put(self, values: Array) -> None:
@@ -99,7 +118,9 @@ def number_of(model: Model, name: str) -> float:
 def _setters(model: Model, name: str) -> list[Setter]:
     setters = [place.setter(model) for place in places(model, name)]
     if not setters:
-        raise SettingError(f"the model has no number '{name}'{did_you_mean(name, spellings(model))}")
+        raise SettingError(
+            f"the model has no number '{name}'{did_you_mean(name, spellings(model))}"
+        )
     return setters
 
 
@@ -127,7 +148,9 @@ def _require(found: Array, base: Array, columns: Array, change: Array, what: str
         )
 
 
-def filled(numbers: Sequence[float], slopes: Mapping[int, Sequence[tuple[int, float]]], p: Sequence[Any]) -> list[Any]:
+def filled(
+    numbers: Sequence[float], slopes: Mapping[int, Sequence[tuple[int, float]]], p: Sequence[Any]
+) -> list[Any]:
     """The numbers of the kernels with symbols in them."""
     result: list[Any] = list(numbers)
     for place, parts in slopes.items():

@@ -1,9 +1,10 @@
 """How a simulated motion depends on numbers of the model and on where it starts: dS/dt = (df/dx) S + df/dp.
 
-The equation is integrated by Merson's formula over the very steps that `simulate` took, from the states that it found:
-what comes out is the exact derivative of these steps, their lengths held (H. G. Bock, "Numerical treatment of inverse
-problems in chemical reaction kinetics", Springer 1981). Where the laws have a bend (Thelen's muscles have several), a
-derivative is off by the length of a step although the motion is not: such steps are halved until it is accurate too.
+The equation is integrated by Merson's formula over the very steps that `simulate` took, from the
+states that it found: what comes out is the exact derivative of these steps, their lengths held (H.
+G. Bock, "Numerical treatment of inverse problems in chemical reaction kinetics", Springer 1981).
+Where the laws have a bend (Thelen's muscles have several), a derivative is off by the length of a
+step although the motion is not: such steps are halved until it is accurate too.
 """
 
 from __future__ import annotations
@@ -36,8 +37,9 @@ CHOICES = {*PER_RUN, "folder"} - {"fixed_step", "integrator", "controller", "res
 ACCURACY = 1e-6
 """That is taken where none is chosen."""
 LOOSER = 10.0
-"""So many times the accuracy is what the error of a derivative may be in a step, over the largest by that number: less
-makes them no better, for the motion is not."""
+"""So many times the accuracy is what the error of a derivative may be in a step, over the largest
+by that number: less makes them no better, for the motion is not.
+"""
 SAME = 1e-6
 """What rates of the tangents may be off from those of the motion, over the largest of a state or 1."""
 YIELDING, SAME_EQUATION = 1e5, 1e-9
@@ -50,15 +52,12 @@ SHORTEST = 1e-9
 class Sensitivity(Tabular):
     """The derivatives of a motion by numbers of its model and by its start.
 
-    Attributes:
-        trajectory: the motion, as `simulate` gives it.
-        times: of its rows (n,), s.
-        states: names of the x states as in ``states.sto``: values, speeds, auxiliary states; locked coordinates are
-            none.
-        numbers: what the derivatives are by (k,): paths of parameters, then names of states, which stand for their
-            values at the start.
-        motion: the states (n, x) at the times; m, rad, s.
-        derivatives: of each state by each number (n, x, k), in units of the state over those of the number.
+    Attributes: trajectory: the motion, as `simulate` gives it. times: of its rows (n,), s. states:
+        names of the x states as in ``states.sto``: values, speeds, auxiliary states; locked
+        coordinates are none. numbers: what the derivatives are by (k,): paths of parameters, then
+        names of states, which stand for their values at the start. motion: the states (n, x) at the
+        times; m, rad, s. derivatives: of each state by each number (n, x, k), in units of the state
+        over those of the number.
     """
 
     trajectory: Trajectory
@@ -74,14 +73,21 @@ class Sensitivity(Tabular):
         Raises:
             SettingError: there is no such state, or no such number.
         """
-        at = [_place(*names) for names in (("state", self.states, state), ("number", self.numbers, number))]
+        at = [
+            _place(*names)
+            for names in (("state", self.states, state), ("number", self.numbers, number))
+        ]
         result: Array = self.derivatives[:, at[0], at[1]]
         return result
 
     @property
     def table(self) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
         """Columns ``STATE|NUMBER`` (n,) over ``time`` (s)."""
-        columns = {f"{state}|{number}": self.of(state, number) for state in self.states for number in self.numbers}
+        columns = {
+            f"{state}|{number}": self.of(state, number)
+            for state in self.states
+            for number in self.numbers
+        }
         return {"time": self.times}, columns
 
 
@@ -95,26 +101,22 @@ def sensitivity(
 ) -> Sensitivity:
     """The derivatives of all states along a simulated motion by numbers of the model and by states at its start.
 
-    The motion is that of :func:`osimlite.simulate` by Merson's steps. Its start is held: what of it follows from
-    parameters, as where muscles are in equilibrium (`equilibrate`), counts as given. Where constraints bind the motion
-    the start goes with them, as little as they need.
+    The motion is that of :func:`osimlite.simulate` by Merson's steps. Its start is held: what of it
+    follows from parameters, as where muscles are in equilibrium (`equilibrate`), counts as given.
+    Where constraints bind the motion the start goes with them, as little as they need.
 
-    Args:
-        model: what moves.
-        parameters: numbers of the model, by paths as :func:`osimlite.tangents` takes them; or its tangents, so
-            that they are made once for many motions; or its functions (:func:`osimlite.casadi`), for their parameters.
-            Their values are those in the model now.
-        to: how long, s.
-        states: names of states (``/jointset/knee/flexion/value``) that the derivatives are by, too, at the start.
-        choices: `accuracy`, `report_interval`, `initial`, `initial_speeds`, `equilibrate`, `controls`, `progress` and
-            `folder` of :class:`osimlite.simulation.Options`. The accuracy is 1e-6 if left out, with which the
-            derivatives of a second of muscles with tendons are good to 1e-3 of the largest, of smooth motions to 1e-5;
-            take less for more.
+    Args: model: what moves. parameters: numbers of the model, by paths as :func:`osimlite.tangents`
+        takes them; or its tangents, so that they are made once for many motions; or its functions
+        (:func:`osimlite.casadi`), for their parameters. Their values are those in the model now.
+        to: how long, s. states: names of states (``/jointset/knee/flexion/value``) that the
+        derivatives are by, too, at the start. choices: `accuracy`, `report_interval`, `initial`,
+        `initial_speeds`, `equilibrate`, `controls`, `progress` and `folder` of
+        :class:`osimlite.simulation.Options`. The accuracy is 1e-6 if left out, with which the
+        derivatives of a second of muscles with tendons are good to 1e-3 of the largest, of smooth
+        motions to 1e-5; take less for more.
 
-    Raises:
-        SettingError: there is no such number or state, or an option that does not go with this; the tangents are
-            those of another model.
-        UnsupportedError: a force is computed in Python.
+    Raises: SettingError: there is no such number or state, or an option that does not go with this;
+        the tangents are those of another model. UnsupportedError: a force is computed in Python.
         SimulationError: the motion ended, or a derivative of it is no finite number.
 
     Other errors are those of :func:`osimlite.tangents` and :func:`osimlite.simulate`.
@@ -132,38 +134,54 @@ def sensitivity(
         if isinstance(parameters, TangentModel):
             made = parameters
         else:
-            made = tangents(model, parameters.parameters if isinstance(parameters, StatedModel) else parameters, folder)
+            made = tangents(
+                model,
+                parameters.parameters if isinstance(parameters, StatedModel) else parameters,
+                folder,
+            )
         initial = [_place("state", made.states, name) for name in states]
         for name in made.parameters:
             _require_held(model, made, name)
         made.take(np.array([number_of(model, name) for name in made.parameters]))
-        trajectory = simulation.run(to, **{name: choices[name] for name in choices if name != "folder"})
-        _, _, held = starting(simulation.mechanism, _moving(simulation, choices), choices.get("initial_speeds") or {})
+        trajectory = simulation.run(
+            to, **{name: choices[name] for name in choices if name != "folder"}
+        )
+        _, _, held = starting(
+            simulation.mechanism, _moving(simulation, choices), choices.get("initial_speeds") or {}
+        )
         motion = _Followed(made, simulation, initial, held)
         rows = motion.rows(trajectory, accuracy)
     names = *made.parameters, *(made.states[k] for k in initial)
-    return Sensitivity(trajectory, trajectory.times, made.states, names, motion.states(trajectory), rows)
+    return Sensitivity(
+        trajectory, trajectory.times, made.states, names, motion.states(trajectory), rows
+    )
 
 
 class _Followed:
     """The derivatives along the steps of a motion.
 
-    Args:
-        made: tangents of the model, with the parameters that it has.
-        simulation: of it, with the controls of the motion.
-        initial: places of the states of which the start counts.
-        held: places in the mechanism of the coordinates whose values, and of those whose speeds, were given.
+    Args: made: tangents of the model, with the parameters that it has. simulation: of it, with the
+        controls of the motion. initial: places of the states of which the start counts. held:
+        places in the mechanism of the coordinates whose values, and of those whose speeds, were
+        given.
     """
 
     def __init__(
-        self, made: TangentModel, simulation: Simulation, initial: Sequence[int], held: Sequence[Sequence[int]]
+        self,
+        made: TangentModel,
+        simulation: Simulation,
+        initial: Sequence[int],
+        held: Sequence[Sequence[int]],
     ) -> None:
         self._made, self._simulation, self._initial, self._held = made, simulation, initial, held
         engine: Any = simulation.engine
         self._engine = engine
         infos, order = simulation.mechanism.coordinates, self._engine.order
         moving = [f"{infos[place].path}/{what}" for what in ("value", "speed") for place in order]
-        known = [*moving, *(variable.path for variable in simulation.state.variables if variable.is_named)]
+        known = [
+            *moving,
+            *(variable.path for variable in simulation.state.variables if variable.is_named),
+        ]
         if {*known} != {*made.states} or made.controls != simulation.forces.controls.names:
             raise SettingError("the tangents are of another model; make them of this one")
         own = [*moving, *simulation.state.paths]
@@ -183,7 +201,9 @@ class _Followed:
         """The derivatives (n, x, k) at the times of the motion."""
         start = self._rows(trajectory)[0].tolist()
         wanted = trajectory.times.tolist()
-        times, states, ended = self._simulation.every_step(0.0, start, wanted[-1], Settings(accuracy))
+        times, states, ended = self._simulation.every_step(
+            0.0, start, wanted[-1], Settings(accuracy)
+        )
         if ended is not None:
             raise ended
         for place in (0, len(times) // 2, -1):
@@ -199,15 +219,17 @@ class _Followed:
     def _bind(self, x: Array, slopes: Array) -> None:
         """Have the start (x,) go with the constraints along all directions, by derivatives (x, m) of it.
 
-        As it was found: of what is not held, values that do not count give way, then all as little as can be, and
-        speeds relative to themselves where they are above 1.
+        As it was found: of what is not held, values that do not count give way, then all as little
+        as can be, and speeds relative to themselves where they are above 1.
         """
         made, size = self._made, len(self._made.coordinates)
         infos = {info.path: info for info in made.mechanism.coordinates}
         eases = np.ones(size), np.maximum(np.abs(x[size : 2 * size]), 1.0)
         eases[0][[infos[path].yielding for path in made.coordinates]] = YIELDING
         by_numbers = np.eye(len(made.parameters), slopes.shape[1])
-        for part, (held, ease, equations) in enumerate(zip(self._held, eases, made.bound(0.0, x), strict=True)):
+        for part, (held, ease, equations) in enumerate(
+            zip(self._held, eases, made.bound(0.0, x), strict=True)
+        ):
             places = slice(part * size, (part + 1) * size)
             paths = [made.mechanism.coordinates[place].path for place in held]
             scales = np.where(np.isin(made.coordinates, paths), 0.0, ease)
@@ -260,7 +282,9 @@ def followed(
         size = np.abs(y)
         if not np.isfinite(size.sum()):
             worst = names[int(np.nonzero(~np.isfinite(steps.slopes(y)).all(axis=1))[0][0])]
-            raise SimulationError(f"between {t0:g} and {t1:g} s the derivatives of '{worst}' are no finite numbers")
+            raise SimulationError(
+                f"between {t0:g} and {t1:g} s the derivatives of '{worst}' are no finite numbers"
+            )
         # As the integrator weighs states; of each number, what counts is its largest derivative.
         before = np.abs(y0)
         weights = 1.0 / np.maximum(1.0, before[:, :, :1])
@@ -292,13 +316,19 @@ def _require_held(model: Model, made: TangentModel, name: str) -> None:
         what = str(place.steps[0])
         state = f"{place.component}/{what.removeprefix('default_').removesuffix('_value')}"
         if what.startswith("default_") and state in made.states:
-            raise SettingError(f"'{name}' is where a state starts, which is held; take '{state}' among the states")
+            raise SettingError(
+                f"'{name}' is where a state starts, which is held; take '{state}' among the states"
+            )
 
 
 def _moving(simulation: Simulation, choices: Mapping[str, Any]) -> dict[str, float]:
     """What was given of the values of coordinates at the start, and not of auxiliary states."""
     auxiliary = simulation.state.paths
-    return {name: value for name, value in (choices.get("initial") or {}).items() if name not in auxiliary}
+    return {
+        name: value
+        for name, value in (choices.get("initial") or {}).items()
+        if name not in auxiliary
+    }
 
 
 def _place(what: str, names: Sequence[str], name: str) -> int:

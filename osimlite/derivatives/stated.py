@@ -30,21 +30,18 @@ class StatedModel:
         folder: of the model's file.
         apart: whether bodies that never move in one another are links of their own.
 
-    Attributes:
-        name: of the model.
-        states: the entries of x as in ``states.sto``: values, speeds, and then auxiliary states, each in the order of
-            the model. Coordinates that are locked are none.
-        in_system: the same in the order in which Simbody holds them.
-        controls: the entries of u: paths of the actuators.
-        parameters: the entries of p.
-        p: the values (p,) that the model has for these.
-        x: the state (x,) that the model starts from, where its constraints hold.
-        u: controls (u,) of zero.
-        coordinates: paths of the coordinates whose accelerations are found, in the order of the speeds.
-        constraints_kept: how many equations constrain the motion.
+    Attributes: name: of the model. states: the entries of x as in ``states.sto``: values, speeds,
+        and then auxiliary states, each in the order of the model. Coordinates that are locked are
+        none. in_system: the same in the order in which Simbody holds them. controls: the entries of
+        u: paths of the actuators. parameters: the entries of p. p: the values (p,) that the model
+        has for these. x: the state (x,) that the model starts from, where its constraints hold. u:
+        controls (u,) of zero. coordinates: paths of the coordinates whose accelerations are found,
+        in the order of the speeds. constraints_kept: how many equations constrain the motion.
     """
 
-    def __init__(self, model: Model, parameters: Sequence[str], folder: Path, *, apart: bool = False) -> None:
+    def __init__(
+        self, model: Model, parameters: Sequence[str], folder: Path, *, apart: bool = False
+    ) -> None:
         self._folder, self._model = folder, model
         # Whether bodies stay apart decides what is linear in masses and places.
         self._apart = apart or bool(parameters)
@@ -55,10 +52,18 @@ class StatedModel:
         self._packed: Packed = pack(self.mechanism, self.forces, apart=self._apart)
         self._state = StateLayout(self.mechanism, self._packed.order, self.forces.elements)
         infos = self.mechanism.coordinates
-        own = [f"{infos[place].path}/{what}" for what in ("value", "speed") for place in self._packed.order]
+        own = [
+            f"{infos[place].path}/{what}"
+            for what in ("value", "speed")
+            for place in self._packed.order
+        ]
         moving, paths = len(own), self._state.paths
-        self.coordinates = tuple(path.rpartition("/")[0] for path in in_model_order(model, own[: moving // 2]))
-        values, speeds = ([f"{path}/{what}" for path in self.coordinates] for what in ("value", "speed"))
+        self.coordinates = tuple(
+            path.rpartition("/")[0] for path in in_model_order(model, own[: moving // 2])
+        )
+        values, speeds = (
+            [f"{path}/{what}" for path in self.coordinates] for what in ("value", "speed")
+        )
         self.states = (*values, *speeds, *in_model_order(model, paths))
         self.in_system = (*own, *paths)
         names = {name: place for place, name in enumerate(self.in_system)}
@@ -66,23 +71,38 @@ class StatedModel:
         self.controls = self.forces.controls.names
         self.u = np.zeros(len(self.controls))
         start, rates = kept_state(
-            self.mechanism, [i.default_value for i in infos], [i.default_speed for i in infos], (), ()
+            self.mechanism,
+            [i.default_value for i in infos],
+            [i.default_speed for i in infos],
+            (),
+            (),
         )
         self.x = np.array(self._state.pack(start.tolist(), rates.tolist()))[self.state_indices]
-        self._parameters = Parameters(model.copy_deep(), self.parameters, self._numbers_of) if parameters else None
+        self._parameters = (
+            Parameters(model.copy_deep(), self.parameters, self._numbers_of) if parameters else None
+        )
         self.p = self._parameters.values if self._parameters else np.zeros(0)
         at_equations = self._packed.structure[MODEL.CONSTRAINED]
-        self.constraints_kept = int(self._packed.structure[at_equations + CONSTRAINED.EQUATIONS]) if at_equations else 0
+        self.constraints_kept = (
+            int(self._packed.structure[at_equations + CONSTRAINED.EQUATIONS]) if at_equations else 0
+        )
 
     def _forces_of(self, model: Model, mechanism: Mechanism) -> Forces:
         forces = force_elements(model, mechanism, folder=self._folder)
-        # Probes are outputs, whatever they make of their results over time; some look at more than the kernels.
+        # Probes are outputs, whatever they make of their results over time; some look at more than
+        # the kernels.
         kept = (e for e in forces.elements if not (isinstance(e, DeclaredProbe) and e.kind.measure))
-        elements = (replace(e, operation="value") if isinstance(e, DeclaredProbe) else e for e in kept)
+        elements = (
+            replace(e, operation="value") if isinstance(e, DeclaredProbe) else e for e in kept
+        )
         return replace(forces, elements=tuple(elements))
 
     def _numbers_of(self, changed: Model) -> Array:
         """The numbers that depend on parameters, of the model with others; none if more than numbers are others."""
         mechanism = build_mechanism(changed)
         packed = pack(mechanism, self._forces_of(changed, mechanism), apart=self._apart)
-        return packed.numbers if np.array_equal(packed.structure, self._packed.structure) else np.zeros(0)
+        return (
+            packed.numbers
+            if np.array_equal(packed.structure, self._packed.structure)
+            else np.zeros(0)
+        )

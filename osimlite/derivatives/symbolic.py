@@ -152,11 +152,16 @@ class _Writer(Kernel, ast.NodeTransformer):
         """The function."""
         tree = self.tree
         body = [part for item in self.body for part in self._listed(self.visit(item))]
-        clear = [ast.Assign([_set(name)], _name("unset_")) for name in sorted(self.cleared - set(self.given))]
+        clear = [
+            ast.Assign([_set(name)], _name("unset_"))
+            for name in sorted(self.cleared - set(self.given))
+        ]
         tree.body, tree.returns, tree.decorator_list = [*clear, *body], None, []
         for argument in tree.args.args:
             argument.annotation = None
-        code = compile(ast.fix_missing_locations(ast.Module([tree], [])), f"<{self.name} on symbols>", "exec")
+        code = compile(
+            ast.fix_missing_locations(ast.Module([tree], [])), f"<{self.name} on symbols>", "exec"
+        )
         scope = _Scope(self.function)
         exec(code, scope)
         made = scope[tree.name]
@@ -179,7 +184,9 @@ class _Writer(Kernel, ast.NodeTransformer):
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         self.generic_visit(node)
-        return _call_of("both_" if isinstance(node.op, ast.And) else "either_", *map(_lazy, node.values))
+        return _call_of(
+            "both_" if isinstance(node.op, ast.And) else "either_", *map(_lazy, node.values)
+        )
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
         self.generic_visit(node)
@@ -195,7 +202,9 @@ class _Writer(Kernel, ast.NodeTransformer):
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
         self.generic_visit(node)
-        return _call_of("choose_", node.test, _lazy(node.body), _lazy(node.orelse), self._part(node))
+        return _call_of(
+            "choose_", node.test, _lazy(node.body), _lazy(node.orelse), self._part(node)
+        )
 
     # -------------------------------------------------------------------------------------------- statements
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
@@ -205,7 +214,9 @@ class _Writer(Kernel, ast.NodeTransformer):
             return node
         before: Any = copy_tree(node.target)
         before.ctx = ast.Load()
-        return ast.Assign([self.visit(node.target)], _call_of(sign, self.visit(before), self.visit(node.value)))
+        return ast.Assign(
+            [self.visit(node.target)], _call_of(sign, self.visit(before), self.visit(node.value))
+        )
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
         assert node.value is not None
@@ -230,15 +241,20 @@ class _Writer(Kernel, ast.NodeTransformer):
             self.is_divided = True
             node.test = _call_of("decide_", part, node.test)
             return node
-        # for side in branch.sides(): the variables as before; if side: ... else: ...; branch.ends.append(the variables)
+        # for side in branch.sides(): the variables as before; if side: ... else: ...;
+        # branch.ends.append(the variables)
         self.cleared.update(names)
         branch, side, before = (f"{name}{self.number}_" for name in ("branch", "side", "before"))
         self.number += 1
         test, node.test = node.test, _name(side)
-        append = ast.Attribute(ast.Attribute(_name(branch), "ends", ast.Load()), "append", ast.Load())
+        append = ast.Attribute(
+            ast.Attribute(_name(branch), "ends", ast.Load()), "append", ast.Load()
+        )
         sides = ast.Call(ast.Attribute(_name(branch), "sides", ast.Load()), [], [])
         back: list[ast.stmt] = [_assign(names, _name(before))] if names else []
-        after: list[ast.stmt] = [_assign(names, ast.Attribute(_name(branch), "end", ast.Load()))] if names else []
+        after: list[ast.stmt] = (
+            [_assign(names, ast.Attribute(_name(branch), "end", ast.Load()))] if names else []
+        )
         kept = ast.Expr(ast.Call(append, [_tuple(names)], []))
         return [
             ast.Assign([_set(branch)], _call_of("branch_", part, test)),
@@ -252,7 +268,11 @@ class _Writer(Kernel, ast.NodeTransformer):
         match node:
             case ast.If(body=[ast.Return(value=ast.expr() as value)], orelse=[]):
                 returns = self.tree.returns
-                kind = returns.value if isinstance(returns, ast.Constant) else getattr(returns, "id", "")
+                kind = (
+                    returns.value
+                    if isinstance(returns, ast.Constant)
+                    else getattr(returns, "id", "")
+                )
                 return kind == "int" and ast.unparse(value) != "OUTCOME.OK"
         return False
 

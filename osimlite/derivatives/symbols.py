@@ -1,8 +1,8 @@
 """Numbers that may be symbols of CasADi, and what the code of kernels does with them. Only this module imports CasADi.
 
-A branch that depends on a symbol becomes a selection: both sides are computed. While one side is, a condition says
-where it counts, and what could be no number elsewhere (a quotient, a root) is computed there from 1 instead, so that
-nothing of it reaches the derivatives of the other side.
+A branch that depends on a symbol becomes a selection: both sides are computed. While one side is, a
+condition says where it counts, and what could be no number elsewhere (a quotient, a root) is
+computed there from 1 instead, so that nothing of it reaches the derivatives of the other side.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from osimlite.errors import MissingDependency
 
 if "opensim" in sys.modules and "casadi" not in sys.modules:
     # OpenSim has a library of the same name with other contents.
-    raise MissingDependency("casadi cannot be loaded where opensim is loaded already; take another process")
+    raise MissingDependency(
+        "casadi cannot be loaded where opensim is loaded already; take another process"
+    )
 casadi: Any = require("casadi", extra="casadi", purpose="a model as functions of CasADi")
 SX: Any = casadi.SX
 
@@ -67,9 +69,15 @@ class Torn:
     def _asked(self, *_: Any) -> Any:
         raise WiderWays(self.part)
 
-    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = __neg__ = _asked
-    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __index__ = __int__ = __float__ = __bool__ = _asked
-    __getitem__ = __setitem__ = __floordiv__ = __mod__ = __pow__ = __and__ = __iter__ = __len__ = _asked
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = (
+        __neg__
+    ) = _asked
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __index__ = __int__ = __float__ = (
+        __bool__
+    ) = _asked
+    __getitem__ = __setitem__ = __floordiv__ = __mod__ = __pow__ = __and__ = __iter__ = __len__ = (
+        _asked
+    )
     __hash__ = None  # type: ignore[assignment]
 
 
@@ -96,7 +104,9 @@ class Vector:
         if place < 0:
             raise IndexError("a kernel writes before the beginning of a vector")
         if self.journals:
-            self.journals[-1].setdefault((id(self.cells), place), (self.cells, place, self.cells[place]))
+            self.journals[-1].setdefault(
+                (id(self.cells), place), (self.cells, place, self.cells[place])
+            )
         self.cells[place] = value
 
     def __eq__(self, other: object) -> bool:
@@ -152,11 +162,9 @@ def safe(value: Any, instead: float = 1.0) -> Any:
 def merged(test: Any, a: Any, b: Any, part: Any) -> Any:
     """`a` where a test holds, else `b`.
 
-    Args:
-        test: a symbol.
-        a: numbers, tuples of them, or what is the same in both.
-        b: likewise.
-        part: of the code, which is run once more for each way if what cannot be merged is asked for.
+    Args: test: a symbol. a: numbers, tuples of them, or what is the same in both. b: likewise.
+        part: of the code, which is run once more for each way if what cannot be merged is asked
+        for.
     """
     if a is b or isinstance(b, Unset):
         return a
@@ -203,7 +211,11 @@ def divide(a: Any, b: Any) -> Any:
         return a / safe(b)
     a, b = plain(a), plain(b)
     if b == 0.0 and not isinstance(a, SX):
-        return math.nan if a == 0.0 or math.isnan(a) else math.copysign(math.inf, a) * math.copysign(1.0, b)
+        return (
+            math.nan
+            if a == 0.0 or math.isnan(a)
+            else math.copysign(math.inf, a) * math.copysign(1.0, b)
+        )
     return a / b
 
 
@@ -237,7 +249,11 @@ def _joined(parts: Iterable[Callable[[], Any]], *, stop: bool) -> Any:
                 if bool(value) is stop:
                     return stop
                 continue
-            known = value if known is None else (casadi.logic_or if stop else casadi.logic_and)(known, value)
+            known = (
+                value
+                if known is None
+                else (casadi.logic_or if stop else casadi.logic_and)(known, value)
+            )
             where.condition = also(casadi.logic_not(value) if stop else value)
     finally:
         where.condition = before
@@ -323,7 +339,9 @@ def _of(name: str, instead: float | None = None) -> Callable[..., Any]:
     def function(*values: Any) -> Any:
         if not any(map(is_symbol, values)):
             return numeric(*map(plain, values))
-        return symbolic(*(safe(v, instead) if instead is not None and is_symbol(v) else v for v in values))
+        return symbolic(
+            *(safe(v, instead) if instead is not None and is_symbol(v) else v for v in values)
+        )
 
     return function
 
@@ -352,4 +370,6 @@ for _name in ("exp", "expm1", "sinh", "cosh", "asin", "acos"):
     COUNTERPARTS[getattr(math, _name)] = _of(_name, 0.0)
 for _name in ("log", "log1p", "atan2"):
     COUNTERPARTS[getattr(math, _name)] = _of(_name, 1.0)
-COUNTERPARTS[math.erfc] = lambda value: 1.0 - COUNTERPARTS[math.erf](value) if is_symbol(value) else math.erfc(value)
+COUNTERPARTS[math.erfc] = lambda value: (
+    1.0 - COUNTERPARTS[math.erf](value) if is_symbol(value) else math.erfc(value)
+)

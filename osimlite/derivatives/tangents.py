@@ -35,18 +35,18 @@ from osimlite.simulation.integrators import MERSON
 from osimlite.simulation.pack import Packed, pack
 
 
-def tangents(model: Model, parameters: Iterable[str] = (), folder: str | Path | None = None) -> TangentModel:
+def tangents(
+    model: Model, parameters: Iterable[str] = (), folder: str | Path | None = None
+) -> TangentModel:
     """The rates of a model with exact derivatives, by the machine code that simulates it.
 
-    Args:
-        model: what moves.
-        parameters: numbers of the model, by path, that the rates are functions of, as of :func:`osimlite.casadi`.
-        folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
+    Args: model: what moves. parameters: numbers of the model, by path, that the rates are functions
+        of, as of :func:`osimlite.casadi`. folder: where the model's file is, for the files that it
+        names; the folder that the program runs in if None.
 
-    Raises:
-        ModelError: the model is not a mechanism.
-        SettingError: there is no such number.
-        UnsupportedError: a force is computed in Python, or a number cannot be a parameter; the message names it.
+    Raises: ModelError: the model is not a mechanism. SettingError: there is no such number.
+        UnsupportedError: a force is computed in Python, or a number cannot be a parameter; the
+        message names it.
     """
     expect_model(model)
     return TangentModel(model, tuple(parameters), Path(folder or "."))
@@ -70,7 +70,9 @@ class Machine:
         UnsupportedError: a force is computed in Python.
     """
 
-    def __init__(self, packed: Packed, forces: Forces, entries: Sequence[str], room: int = 0) -> None:
+    def __init__(
+        self, packed: Packed, forces: Forces, entries: Sequence[str], room: int = 0
+    ) -> None:
         for place, kernel in packed.kernels.items():
             if place in packed.owners and not isinstance(kernel, str):
                 path = forces.elements[packed.owners[place]].path
@@ -97,9 +99,10 @@ class Machine:
 class TangentModel(StatedModel):
     """A model whose rates xdot = f(t, x, u, p) are found with derivatives along directions of x, u and p.
 
-    The controls u stand in the place of what the model's controllers say (to which a stretch reflex adds). Units are
-    those of OpenSim's files of states: m, rad, s, N. Where rates do not exist, all is not a number. Where a law bends,
-    or a path touches a surface, the derivative is that of the side that machine code takes there.
+    The controls u stand in the place of what the model's controllers say (to which a stretch reflex
+    adds). Units are those of OpenSim's files of states: m, rad, s, N. Where rates do not exist, all
+    is not a number. Where a law bends, or a path touches a surface, the derivative is that of the
+    side that machine code takes there.
 
     The arguments and attributes are those of :class:`osimlite.derivatives.stated.StatedModel`.
     """
@@ -128,7 +131,9 @@ class TangentModel(StatedModel):
     def put(self, numbers: Array) -> None:
         """Put what depends on the parameters into numbers (k,) of the model."""
         if self._parameters:
-            numbers[self._parametric] = self._parameters.base[self._parametric] + self._slopes @ self.p
+            numbers[self._parametric] = (
+                self._parameters.base[self._parametric] + self._slopes @ self.p
+            )
 
     def put_along(self, dp: Array, numbers: Array) -> None:
         """Likewise its derivatives (k, m) along directions of the parameters (p, m)."""
@@ -146,14 +151,10 @@ class TangentModel(StatedModel):
     ) -> tuple[Array, Array]:
         """The rates (x,), and their derivatives (x, m) along m directions.
 
-        Args:
-            t: time, s.
-            x: state (x,).
-            u: controls (u,).
-            dx: directions of the state (x, m).
-            du: of the controls (u, m); 0 if left out.
-            dp: of the parameters (p, m); 0 if left out.
-            look: called after each evaluation, with the directions that it had and their places behind a number.
+        Args: t: time, s. x: state (x,). u: controls (u,). dx: directions of the state (x, m). du:
+            of the controls (u, m); 0 if left out. dp: of the parameters (p, m); 0 if left out.
+            look: called after each evaluation, with the directions that it had and their places
+            behind a number.
         """
         machine, y, f = self._machine, self._y, self._f
         y[self.state_indices, 0], self._driven[:, 0] = x, u
@@ -178,7 +179,9 @@ class TangentModel(StatedModel):
         """What is known of a state, by groups, and the names of the entries of each; see `CasadiModel.outputs`."""
         return {group: tuple(labels) for group, (labels, _) in self._outputs().items()}
 
-    def observed(self, t: float, x: Array, u: Array, chosen: Sequence[tuple[str, int]]) -> tuple[Array, Array, Array]:
+    def observed(
+        self, t: float, x: Array, u: Array, chosen: Sequence[tuple[str, int]]
+    ) -> tuple[Array, Array, Array]:
         """Outputs (y,), and their derivatives by the state (y, x) and by the controls (y, u).
 
         Args:
@@ -198,14 +201,18 @@ class TangentModel(StatedModel):
             for row, (group, k) in enumerate(chosen):
                 number = known[group][1][k]
                 y[row] = number
-                slopes[row, part] = number.slopes[: own.stop - 1] if isinstance(number, Carrying) else 0.0
+                slopes[row, part] = (
+                    number.slopes[: own.stop - 1] if isinstance(number, Carrying) else 0.0
+                )
 
         self.along(t, x, u, both[:size], both[size:], look=look)
         return y, slopes[:, :size], slopes[:, size:]
 
     def _outputs(self) -> dict[str, tuple[list[str], list[Any]]]:
         """Of the state that was evaluated last."""
-        points = [axis for _, _, point in station_places(self.mechanism, self._packed) for axis in point]
+        points = [
+            axis for _, _, point in station_places(self.mechanism, self._packed) for axis in point
+        ]
         machine = self._machine
         found = Seen(machine.program.ints, machine.x, machine.w)
         return output_columns(self.mechanism, self._packed, self.forces, found, points)
@@ -214,12 +221,16 @@ class TangentModel(StatedModel):
     def _probes(self) -> list[tuple[int, Callable[[int], int]]]:
         """Places of the items of probes, and what computes them."""
         places, kernels = probe_places(self._packed, self.forces.elements), self._packed.kernels
-        return [(place, self._machine.entry(str(kernels[place + ITEM.LAW]), self._y, self._f)) for place in places]
+        return [
+            (place, self._machine.entry(str(kernels[place + ITEM.LAW]), self._y, self._f))
+            for place in places
+        ]
 
     def bound(self, t: float, x: Array) -> tuple[Array, Array]:
         """The derivatives of the errors of constraints at positions (m, x + p) and at speeds (k, x + p).
 
-        They are by the state and by the parameters; in units of the equations, m and rad, m/s and rad/s.
+        They are by the state and by the parameters; in units of the equations, m and rad, m/s and
+        rad/s.
         """
         s, w, y, size = self._machine.program.ints, self._machine.w, self._y, len(x)
         h, freedoms = s[s[MODEL.CONSTRAINED] :], int(s[MODEL.DOFS])
@@ -229,9 +240,13 @@ class TangentModel(StatedModel):
 
         def look(part: slice, own: slice) -> None:
             rows, errors, rates = (
-                w[h[at] :][: count * each] for at, each in
-                ((CONSTRAINED.WORK_ROWS, freedoms), (CONSTRAINED.WORK_ERRORS, 1), (CONSTRAINED.WORK_RATES, 1))
-            )  # fmt: skip
+                w[h[at] :][: count * each]
+                for at, each in (
+                    (CONSTRAINED.WORK_ROWS, freedoms),
+                    (CONSTRAINED.WORK_ERRORS, 1),
+                    (CONSTRAINED.WORK_RATES, 1),
+                )
+            )
             rows, u = rows.reshape(count, freedoms, -1), y[freedoms : 2 * freedoms]
             positions[:, part] = errors[:, own]
             moved = np.einsum("ijk,j->ik", rows[:, :, own], u[:, 0]) + rows[:, :, 0] @ u[:, own]
@@ -245,7 +260,9 @@ class TangentModel(StatedModel):
         ]
         return positions[of_places], speeds
 
-    def linear(self, t: float, x: Array, u: Array, p: Array | None = None) -> tuple[Array, Array, Array]:
+    def linear(
+        self, t: float, x: Array, u: Array, p: Array | None = None
+    ) -> tuple[Array, Array, Array]:
         """The rates (x,), and their derivatives by the state (x, x) and by the controls (x, u)."""
         size = len(x)
         both = np.eye(size + len(u))
@@ -287,8 +304,8 @@ class Seen:
 class Steps:
     """Steps of Merson's method, with derivatives of where they lead by where they begin and by numbers of the model.
 
-    They work on blocks (b, x, 1 + DIRECTIONS): for so many directions at once, in the packed order, states and their
-    derivatives.
+    They work on blocks (b, x, 1 + DIRECTIONS): for so many directions at once, in the packed order,
+    states and their derivatives.
 
     Args:
         packed: the model with the controls of the motion.
@@ -298,14 +315,21 @@ class Steps:
 
     def __init__(self, packed: Packed, forces: Forces, places: Sequence[int]) -> None:
         size, self.state_indices = len(places), places
-        method, first = int(packed.structure[MODEL.WORK_SIZE]), int(packed.structure[MODEL.WORK_STATE])
+        method, first = (
+            int(packed.structure[MODEL.WORK_SIZE]),
+            int(packed.structure[MODEL.WORK_STATE]),
+        )
         # Where constraints bind the motion, no step is good enough to be projected.
         self._accepted = -1.0 if packed.structure[MODEL.CONSTRAINED] else np.inf
-        self._machine = machine = Machine(packed, forces, ("evaluate", MERSON), merson.HEAD + merson.STATES * size)
+        self._machine = machine = Machine(
+            packed, forces, ("evaluate", MERSON), merson.HEAD + merson.STATES * size
+        )
         self._start, self._end = (np.zeros((2 * size, 1 + DIRECTIONS)) for _ in range(2))
         self._errors, self._h = machine.w[first + ERRORS * size :][:size], machine.w[method:, 0]
         self._evaluate = machine.entry("evaluate", self._start, self._start[size:])
-        self._step: Callable[[], int] = partial(machine.entry(MERSON, self._start, self._end), method)
+        self._step: Callable[[], int] = partial(
+            machine.entry(MERSON, self._start, self._end), method
+        )
 
     def take(self, numbers: Array, changes: Array) -> None:
         """Have the numbers of the model (k,) be these from now on, and change so along all directions (k, m)."""
@@ -324,12 +348,20 @@ class Steps:
 
     def slopes(self, blocks: Array) -> Array:
         """The derivatives (x, m) in blocks."""
-        parts = [block[self.state_indices, own] for block, (_, own) in zip(blocks, batches(self._count), strict=True)]
+        parts = [
+            block[self.state_indices, own]
+            for block, (_, own) in zip(blocks, batches(self._count), strict=True)
+        ]
         return np.hstack(parts)
 
     def step(self, t0: float, t1: float, start: Array) -> tuple[Array, Array]:
         """The blocks of the end of a step, and of the error there; what does not exist is not a number."""
-        end, error, machine, size = np.empty(start.shape), np.empty(start.shape), self._machine, start.shape[1]
+        end, error, machine, size = (
+            np.empty(start.shape),
+            np.empty(start.shape),
+            self._machine,
+            start.shape[1],
+        )
         for number, block in enumerate(start):
             if self._number != number:
                 self._number, machine.x[:] = number, self._numbers[number]

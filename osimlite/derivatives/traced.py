@@ -44,15 +44,10 @@ REFUSED = {
 class Traced:
     """What the kernels compute of a state of symbols.
 
-    Args:
-        packed: the model.
-        forces: of it.
-        numbers: of it, some of which may be symbols.
-        t: time, s.
-        y: the state, in the order of the packed model.
-        controls: of the actuators.
-        equations: numbers of those of the constraints that the others follow from.
-        loads: at this time, one after the other as `given_loads` has them; none if they are computed of the time.
+    Args: packed: the model. forces: of it. numbers: of it, some of which may be symbols. t: time,
+        s. y: the state, in the order of the packed model. controls: of the actuators. equations:
+        numbers of those of the constraints that the others follow from. loads: at this time, one
+        after the other as `given_loads` has them; none if they are computed of the time.
 
     Raises:
         UnsupportedError: a force has no formula; the message names it.
@@ -93,7 +88,9 @@ class Traced:
 
     def evaluated(self, stage: int) -> Evaluated:
         """All that `evaluate` finds up to a stage."""
-        return self.run(lambda model, reals, data, y, f: on_symbols(evaluate)(model, reals, data, y, f, stage))
+        return self.run(
+            lambda model, reals, data, y, f: on_symbols(evaluate)(model, reals, data, y, f, stage)
+        )
 
     def probed(self) -> Evaluated:
         """All that `evaluate` finds, and after it what the probes do."""
@@ -111,7 +108,9 @@ class Traced:
         size, structure = self.structure[MODEL.DOFS], [*self.structure]
         if pushing is not None:
             first, count = structure[MODEL.ITEM_AT], structure[MODEL.ITEMS]
-            items = [item for item in structure[first : first + count] if self._path(item) in pushing]
+            items = [
+                item for item in structure[first : first + count] if self._path(item) in pushing
+            ]
             structure[MODEL.ITEMS], structure[first : first + len(items)] = len(items), items
             run = structure[MODEL.RUN_AT]
             structure[MODEL.RUNS], structure[run + RUN.LAW] = 1, 0
@@ -129,14 +128,20 @@ class Traced:
         first = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS]
         size = self.structure[MODEL.DOFS]
 
-        def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> dict[tuple[int, int], list[Any]]:
+        def law(
+            model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector
+        ) -> dict[tuple[int, int], list[Any]]:
             wrenches: dict[tuple[int, int], list[Any]] = {}
             kernel = on_symbols(add_wrench)
 
-            def add(model: Vector, data: Vector, link: int, torque: Any, force: Any, row: Vector) -> None:
+            def add(
+                model: Vector, data: Vector, link: int, torque: Any, force: Any, row: Vector
+            ) -> None:
                 key = (row.first - first) // size, link
                 before = wrenches.get(key, [0.0] * 6)
-                wrenches[key] = [old + new for old, new in zip(before, (*torque, *force), strict=True)]
+                wrenches[key] = [
+                    old + new for old, new in zip(before, (*torque, *force), strict=True)
+                ]
                 kernel(model, data, link, torque, force, row)
 
             on_symbols(evaluate)(model, reals, data, y, f, STAGE.VELOCITY)
@@ -147,12 +152,17 @@ class Traced:
         return self.run(law)
 
     def run(
-        self, law: Callable[[Vector, Vector, Vector, Vector, Vector], Any], structure: list[int] | None = None
+        self,
+        law: Callable[[Vector, Vector, Vector, Vector, Vector], Any],
+        structure: list[int] | None = None,
     ) -> Evaluated:
         """What a function of the five vectors leaves."""
 
         def run() -> Evaluated:
-            model, reals = Vector(self.structure if structure is None else structure), Vector(list(self.numbers))
+            model, reals = (
+                Vector(self.structure if structure is None else structure),
+                Vector(list(self.numbers)),
+            )
             data, y = Vector([0.0] * self.structure[MODEL.WORK_SIZE]), Vector(list(self._y))
             f = Vector([0.0] * len(self._y))
             data[WORK.TIME] = self._t
@@ -165,7 +175,9 @@ class Traced:
         try:
             return ways.repeated(run)
         except ways.NoFormula as error:
-            named = next((self._path(item) for item in error.items if item in self._packed.owners), "")
+            named = next(
+                (self._path(item) for item in error.items if item in self._packed.owners), ""
+            )
             whose = f"'{named}'" if named else "the model"
             raise UnsupportedError(
                 f"{whose} has no formula for CasADi: {error}; set its appliesForce to false, or take another class"
@@ -184,7 +196,9 @@ class Traced:
 
 def given_loads(elements: Sequence[Any]) -> list[Function]:
     """The functions of time of all forces, points and torques that are given."""
-    loads = (element.place for element in elements if isinstance(getattr(element, "place", None), Load))
+    loads = (
+        element.place for element in elements if isinstance(getattr(element, "place", None), Load)
+    )
     return [function for load in loads for group in load.groups for function in group]
 
 
@@ -201,7 +215,13 @@ class Evaluated:
     """
 
     def __init__(
-        self, model: Vector, reals: Vector, data: Vector, f: Vector, result: Any, failures: Sequence[Any]
+        self,
+        model: Vector,
+        reals: Vector,
+        data: Vector,
+        f: Vector,
+        result: Any,
+        failures: Sequence[Any],
     ) -> None:
         self.model, self.reals, self.data, self.f, self.result = model, reals, data, f, result
         self.on, self._failed = on_symbols, reduce(casadi.logic_or, failures) if failures else None
@@ -209,4 +229,8 @@ class Evaluated:
     def sure(self, numbers: Sequence[Any]) -> Any:
         """Numbers as one column, which are none where the evaluation fails."""
         column = casadi.SX(casadi.vertcat(*numbers))
-        return column if self._failed is None else casadi.if_else(self._failed, casadi.DM.nan(column.shape), column)
+        return (
+            column
+            if self._failed is None
+            else casadi.if_else(self._failed, casadi.DM.nan(column.shape), column)
+        )

@@ -1,8 +1,9 @@
 """Code that branches on symbols, run so that what it computes holds on both sides.
 
-A branch that only assigns is run for both sides, and what they have set is merged at its end (`Branch`). Where a side
-returns, or leaves a round of a loop, the whole function is run once for each way through it (`in_ways`). What cannot be
-merged, such as how many points a path runs through, is torn; if somebody asks for it, a wider part is run in both ways.
+A branch that only assigns is run for both sides, and what they have set is merged at its end
+(`Branch`). Where a side returns, or leaves a round of a loop, the whole function is run once for
+each way through it (`in_ways`). What cannot be merged, such as how many points a path runs through,
+is torn; if somebody asks for it, a wider part is run in both ways.
 """
 
 from __future__ import annotations
@@ -33,9 +34,8 @@ Writes = dict[tuple[int, int], tuple[list[Any], int, Any]]
 class _Run:
     """What is known while a system is evaluated.
 
-    Attributes:
-        wider: parts of the code, what they would merge being needed apart: their branches are those of what calls them.
-        frame: of the function that is being run in all its ways.
+    Attributes: wider: parts of the code, what they would merge being needed apart: their branches
+        are those of what calls them. frame: of the function that is being run in all its ways.
         failures: conditions under which a law has no solution, or a matrix no inverse.
     """
 
@@ -66,7 +66,9 @@ def repeated(function: Callable[[], Any]) -> Any:
             return function()
         except WiderWays as wider:
             if wider.part in run.wider:
-                raise NoFormula(f"{wider.part} depends on the state in a way that has no formula") from None
+                raise NoFormula(
+                    f"{wider.part} depends on the state in a way that has no formula"
+                ) from None
             run.wider.add(wider.part)
         finally:
             Vector.journals.clear()
@@ -176,7 +178,9 @@ def in_ways(part: str, function: Callable[..., Any], *given: Any) -> Any:
     if not frame.taken:
         kept = Vector.journals.pop()
         if Vector.journals:
-            Vector.journals[-1].update({key: kept[key] for key in kept if key not in Vector.journals[-1]})
+            Vector.journals[-1].update(
+                {key: kept[key] for key in kept if key not in Vector.journals[-1]}
+            )
         run.frame, where.condition = outer, condition
         return result
 

@@ -35,7 +35,11 @@ class ChosenFrames:
     """
 
     def __init__(
-        self, trials: Mapping[str, MarkerData], known: Sequence[str], count: int, weights: Mapping[str, float]
+        self,
+        trials: Mapping[str, MarkerData],
+        known: Sequence[str],
+        count: int,
+        weights: Mapping[str, float],
     ) -> None:
         for name, weight in weights.items():
             if name not in known:
@@ -48,7 +52,12 @@ class ChosenFrames:
         if not self.markers:
             raise SettingError("no marker counts; give one a weight")
         self.weights = np.array([weights.get(name, 1.0) for name in self.markers])
-        self.trials, self.notes, times, measured = list[str](), list[str](), list[float](), list[Array]()
+        self.trials, self.notes, times, measured = (
+            list[str](),
+            list[str](),
+            list[float](),
+            list[Array](),
+        )
         moving = sum(len(trial.times) for name, trial in trials.items() if name != STATIC)
         for name, trial in trials.items():
             share = STANDING if name == STATIC and moving else len(trial.times) / max(moving, 1)
@@ -58,7 +67,11 @@ class ChosenFrames:
                     rows[:, index] = trial.positions[:, trial.names.index(marker)]
             seen = np.flatnonzero(np.isfinite(rows).all(axis=2).sum(axis=1) >= FEWEST)
             taken = max(1, round(count * min(share, 1.0)))
-            for frame in seen[np.unique(np.linspace(0, len(seen) - 1, taken).round().astype(int))] if len(seen) else ():
+            for frame in (
+                seen[np.unique(np.linspace(0, len(seen) - 1, taken).round().astype(int))]
+                if len(seen)
+                else ()
+            ):
                 self.trials.append(name)
                 times.append(float(trial.times[frame]))
                 measured.append(rows[frame])
@@ -74,11 +87,16 @@ class ChosenFrames:
         distances = np.linalg.norm(places - self.measured, axis=2)
         with np.errstate(all="ignore"):
             usual = np.array(
-                [np.median(own[np.isfinite(own)]) if np.isfinite(own).any() else 0.0 for own in distances.T]
+                [
+                    np.median(own[np.isfinite(own)]) if np.isfinite(own).any() else 0.0
+                    for own in distances.T
+                ]
             )
         # What is taken for another pulls its neighbours with it.
         with np.errstate(invalid="ignore"):
-            worst = np.nanmax(np.where(np.isfinite(distances), distances, 0.0), axis=1, keepdims=True)
+            worst = np.nanmax(
+                np.where(np.isfinite(distances), distances, 0.0), axis=1, keepdims=True
+            )
             far = (distances > np.maximum(LOST * usual, FAR)) & (distances > 0.5 * worst)
         for place in np.flatnonzero(far.any(axis=0)):
             where = sorted({self.trials[frame] for frame in np.flatnonzero(far[:, place])})

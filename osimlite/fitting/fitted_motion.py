@@ -13,29 +13,25 @@ from osimlite.schema.model import Model
 from osimlite.simulation.movement import Movement
 
 ADVICE = 0.02, 0.04
-"""What OpenSim's documentation calls good: a root mean square of the marker errors of less than 2 cm, and a largest one
-of less than 4 cm (m)."""
+"""What OpenSim's documentation calls good: a root mean square of the marker errors of less than 2
+cm, and a largest one of less than 4 cm (m).
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedMotion(Movement):
     """A motion of a model that fits measured markers and orientations.
 
-    Attributes:
-        mechanism: what moves.
-        times: of the frames (t,), s.
-        values: of all n coordinates (t, n), in the mechanism's order, rad and m.
-        markers: names of the m markers that were fitted.
-        measured: where they were measured (t, m, 3), m; NaN where one was not seen.
-        places: where they are in the fitted poses (t, m, 3), m.
-        costs: what is least in each frame (t,).
-        steps: Newton steps of each frame (t,).
-        unseen: numbers of the frames in which nothing was seen: they have the pose before.
-        unsettled: numbers of the frames whose best pose was not reached.
-        model: what was fitted.
-        sensors: names of the k sensors that were fitted.
-        turns: of the sensors from where they were measured (t, k, 3), in ground, rad; NaN where one was not.
-        undetermined: names of coordinates that no measurement determines: they start at their default values.
+    Attributes: mechanism: what moves. times: of the frames (t,), s. values: of all n coordinates
+        (t, n), in the mechanism's order, rad and m. markers: names of the m markers that were
+        fitted. measured: where they were measured (t, m, 3), m; NaN where one was not seen. places:
+        where they are in the fitted poses (t, m, 3), m. costs: what is least in each frame (t,).
+        steps: Newton steps of each frame (t,). unseen: numbers of the frames in which nothing was
+        seen: they have the pose before. unsettled: numbers of the frames whose best pose was not
+        reached. model: what was fitted. sensors: names of the k sensors that were fitted. turns: of
+        the sensors from where they were measured (t, k, 3), in ground, rad; NaN where one was not.
+        undetermined: names of coordinates that no measurement determines: they start at their
+        default values.
     """
 
     mechanism: Mechanism
@@ -92,7 +88,11 @@ class FittedMotion(Movement):
             if seen.any():
                 filled = np.where(seen, errors, -1.0)
                 frame, one = np.unravel_index(int(filled.argmax()), filled.shape)
-                noun, time = ("marker", "worst_time") if kind == "marker" else ("sensor", "worst_sensor_time")
+                noun, time = (
+                    ("marker", "worst_time")
+                    if kind == "marker"
+                    else ("sensor", "worst_sensor_time")
+                )
                 result |= {
                     f"rms_{kind}_error": float(np.sqrt(np.mean(errors[seen] ** 2))),
                     f"largest_{kind}_error": float(filled.max()),
@@ -100,7 +100,9 @@ class FittedMotion(Movement):
                     time: float(self.times[int(frame)]),
                 }
             missing = (1.0 - seen.mean(axis=0)).tolist()
-            partly |= {name: round(part, 4) for name, part in zip(names, missing, strict=True) if part}
+            partly |= {
+                name: round(part, 4) for name, part in zip(names, missing, strict=True) if part
+            }
         result["partly_unseen"] = partly
         result["frames_unseen"], result["frames_unsettled"] = len(self.unseen), len(self.unsettled)
         if self.undetermined:

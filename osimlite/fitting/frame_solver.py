@@ -23,13 +23,10 @@ from osimlite.schema.model import Model
 class FrameSolver:
     """Finds the pose that fits markers, sensors or both, each from the one before.
 
-    Args:
-        model: whose poses.
-        markers: names of its markers whose positions `step` is given, in that order; if neither they nor sensors are
-            named, all of them.
-        weights: of markers and sensors by name; those left out weigh 1.
-        sensors: names of frames whose orientations `step` is given, in that order.
-        constraints: whether those of the model hold.
+    Args: model: whose poses. markers: names of its markers whose positions `step` is given, in that
+        order; if neither they nor sensors are named, all of them. weights: of markers and sensors
+        by name; those left out weigh 1. sensors: names of frames whose orientations `step` is
+        given, in that order. constraints: whether those of the model hold.
 
     Attributes:
         markers: as given.
@@ -56,7 +53,9 @@ class FrameSolver:
         self.sensors = tuple(sensors)
         for name in (*self.markers, *(weights or {})):
             if name not in stations and name not in self.sensors:
-                raise SettingError(f"'{model.name}' has no marker '{name}'{did_you_mean(name, stations)}")
+                raise SettingError(
+                    f"'{model.name}' has no marker '{name}'{did_you_mean(name, stations)}"
+                )
         if not self.markers and not sensors:
             raise SettingError(f"'{model.name}' has no markers; add some, or name those to fit")
         frames = {name: sensor_frames(model, mechanism, (name,))[name] for name in self.sensors}
@@ -77,13 +76,14 @@ class FrameSolver:
         """Begin anew, from a pose or from the default one: the next frame has nothing to do with those before."""
         self._fit.start(self._begin if q is None else self._mechanism.values(q))
 
-    def step(self, positions: ArrayLike = (), time: float = 0.0, *, orientations: ArrayLike = ()) -> Array:
+    def step(
+        self, positions: ArrayLike = (), time: float = 0.0, *, orientations: ArrayLike = ()
+    ) -> Array:
         """The pose that fits one frame best: values of all coordinates (n,), rad and m.
 
-        Args:
-            positions: of the markers in ground (m, 3), m; NaN for one that is not seen. If nothing is, the pose stays.
-            time: s, for prescribed coordinates.
-            orientations: of the sensors in ground, quaternions (k, 4), scalar first, or rotation matrices (k, 3, 3).
+        Args: positions: of the markers in ground (m, 3), m; NaN for one that is not seen. If
+            nothing is, the pose stays. time: s, for prescribed coordinates. orientations: of the
+            sensors in ground, quaternions (k, 4), scalar first, or rotation matrices (k, 3, 3).
 
         Raises:
             SettingError: the values are not those of so many markers and sensors.

@@ -40,18 +40,23 @@ UNNAMED = ("", "Unassigned")
 class Tasks(NamedTuple):
     """What inverse kinematics is asked for."""
 
-    weights: dict[str, float]  # of the markers that are fitted or reported, in the order of the data
+    # of the markers that are fitted or reported, in the order of the data
+    weights: dict[str, float]
     goals: list[Goal]  # coordinates that are to have values
     wanted: Array  # these values (t, k), rad or m
 
 
 def tasks_of(
-    model: Model, mechanism: Mechanism, tasks: Iterable[IKTask], data: MarkerData, coordinates: StoTable | None
+    model: Model,
+    mechanism: Mechanism,
+    tasks: Iterable[IKTask],
+    data: MarkerData,
+    coordinates: StoTable | None,
 ) -> Tasks:
     """What a set of tasks asks for of a model and data.
 
-    Without a marker task that applies, all markers weigh 1. Values from a file are taken in degrees, whatever it says,
-    and from splines of fifth degree, as in OpenSim.
+    Without a marker task that applies, all markers weigh 1. Values from a file are taken in
+    degrees, whatever it says, and from splines of fifth degree, as in OpenSim.
 
     Raises:
         SettingError: a coordinate is not there, has no value in the file, or a weight is none.
@@ -60,7 +65,9 @@ def tasks_of(
     applied = [task for task in tasks if task.apply]
     for task in applied:
         check_weight(task.weight, f"the task '{task.name}'")
-    asked = {task.name: float(task.weight) for task in applied if isinstance(task, IKMarkerTask)} or None
+    asked = {
+        task.name: float(task.weight) for task in applied if isinstance(task, IKMarkerTask)
+    } or None
     names = data.shared([*marker_stations(model, mechanism)], asked)
     weights = {name: 1.0 if asked is None else asked[name] for name in names}
     goals, wanted = [], []
@@ -73,7 +80,11 @@ def tasks_of(
 
 
 def _values(
-    task: IKCoordinateTask, mechanism: Mechanism, place: int, times: Array, coordinates: StoTable | None
+    task: IKCoordinateTask,
+    mechanism: Mechanism,
+    place: int,
+    times: Array,
+    coordinates: StoTable | None,
 ) -> Array:
     """The values of a coordinate task over time, rad or m."""
     info = mechanism.coordinates[place]
@@ -83,11 +94,19 @@ def _values(
         return np.full(len(times), info.default_value)
     columns = () if coordinates is None else coordinates.columns
     if coordinates is None or task.name not in columns:
-        where = "there is no coordinate_file" if coordinates is None else f"'{coordinates.file}' has no such column"
+        where = (
+            "there is no coordinate_file"
+            if coordinates is None
+            else f"'{coordinates.file}' has no such column"
+        )
         raise SettingError(
             f"the value of '{task.name}' is to be from a file, and {where}{did_you_mean(task.name, columns)}"
         )
-    values = np.deg2rad(coordinates[task.name]) if info.motion_type == "rotational" else coordinates[task.name]
+    values = (
+        np.deg2rad(coordinates[task.name])
+        if info.motion_type == "rotational"
+        else coordinates[task.name]
+    )
     half = min(3, (len(values) + 1) // 2)
     if len(values) < 2:
         return np.full(len(times), float(values[0]))
@@ -108,7 +127,9 @@ def run_inverse_kinematics(
 
 def motion_table(motion: FittedMotion) -> StoTable:
     """The coordinates as the tool writes them, in degrees."""
-    return StoTable("Coordinates", motion.times, motion.coordinates, motion.in_degrees, in_degrees=True)
+    return StoTable(
+        "Coordinates", motion.times, motion.coordinates, motion.in_degrees, in_degrees=True
+    )
 
 
 def coordinate_table(name: str, folder: Path) -> StoTable | None:
@@ -122,7 +143,11 @@ def told(motion: FittedMotion, advice: tuple[float, float] = ADVICE, of: str = "
     if "rms_marker_error" in result:
         rms, largest = result["rms_marker_error"], result["largest_marker_error"]
         most = " and ".join(f"{100.0 * limit:g}" for limit in advice)
-        advised = "" if rms < advice[0] and largest < advice[1] else f"; OpenSim advises less than {most} cm{of}"
+        advised = (
+            ""
+            if rms < advice[0] and largest < advice[1]
+            else f"; OpenSim advises less than {most} cm{of}"
+        )
         advised += "; check the units of the data" if rms > ABSURD else ""
         yield (
             f"{counted(result['frames'], 'frame')}, {counted(result['markers'], 'marker')}: "
@@ -130,7 +155,9 @@ def told(motion: FittedMotion, advice: tuple[float, float] = ADVICE, of: str = "
             f"at most {100.0 * largest:.2f} cm ({result['worst_marker']} at {result['worst_time']:g} s){advised}"
         )
     if "rms_orientation_error" in result:
-        rms, largest = (math.degrees(result[f"{which}_orientation_error"]) for which in ("rms", "largest"))
+        rms, largest = (
+            math.degrees(result[f"{which}_orientation_error"]) for which in ("rms", "largest")
+        )
         yield (
             f"{result['frames']} frames, {result['sensors']} sensors: errors of {rms:.2f} degrees (root mean square), "
             f"at most {largest:.2f} degrees ({result['worst_sensor']} at {result['worst_sensor_time']:g} s)"

@@ -1,8 +1,9 @@
 """Inverse kinematics: the motion of a model that fits measured markers and orientations best, to the last digits.
 
-OpenSim minimises the same cost, but for numbers that it leaves out: half the weighted mean of the squared distances of
-the markers that were seen, half that of the squared angles by which sensors are turned from where they were measured,
-and half of the weighted squared deviations of coordinates.
+OpenSim minimises the same cost, but for numbers that it leaves out: half the weighted mean of the
+squared distances of the markers that were seen, half that of the squared angles by which sensors
+are turned from where they were measured, and half of the weighted squared deviations of
+coordinates.
 """
 
 from __future__ import annotations
@@ -47,25 +48,21 @@ def inverse_kinematics(
 ) -> FittedMotion:
     """Fit the pose of a model to measured markers, orientations of sensors, or both, frame by frame.
 
-    Args:
-        model: whose markers have the names of the measured ones, and frames those of the sensors.
-        markers: a .trc, .c3d or .sto file, or arrays (t, 3) by name in ground, m; NaN where a marker was not seen.
-        orientations: a .sto file of quaternions, or by name arrays of quaternions (t, 4), scalar first, or rotation
-            matrices (t, 3, 3) that turn what is given along the axes of a sensor into ground; NaN where one was not
-            measured. Without markers they say nothing of where the model is: coordinates that are translations keep
-            their default values, as in OpenSim. With markers they are of the same times.
-        times: of the frames of arrays, s; by default 0, 1, 2 ...
-        weights: of markers and sensors by name; those left out weigh 1, those of 0 do not count.
-        coordinates: weights (1/rad², 1/m²) of coordinates that are to keep their default values, by name, or the
-            weight and the value (rad or m) that one is to have. Beside the mean over the markers such a weight of 1 is
-            large.
-        constraints: whether those of the model hold.
-        start: first time, s.
-        end: last time, s.
+    Args: model: whose markers have the names of the measured ones, and frames those of the sensors.
+        markers: a .trc, .c3d or .sto file, or arrays (t, 3) by name in ground, m; NaN where a
+        marker was not seen. orientations: a .sto file of quaternions, or by name arrays of
+        quaternions (t, 4), scalar first, or rotation matrices (t, 3, 3) that turn what is given
+        along the axes of a sensor into ground; NaN where one was not measured. Without markers they
+        say nothing of where the model is: coordinates that are translations keep their default
+        values, as in OpenSim. With markers they are of the same times. times: of the frames of
+        arrays, s; by default 0, 1, 2 ... weights: of markers and sensors by name; those left out
+        weigh 1, those of 0 do not count. coordinates: weights (1/rad², 1/m²) of coordinates that
+        are to keep their default values, by name, or the weight and the value (rad or m) that one
+        is to have. Beside the mean over the markers such a weight of 1 is large. constraints:
+        whether those of the model hold. start: first time, s. end: last time, s.
 
-    Returns:
-        The motion, every frame at its minimum to 1e-8 rad. Clamped coordinates stay in their ranges, locked ones at
-        their defaults.
+    Returns: The motion, every frame at its minimum to 1e-8 rad. Clamped coordinates stay in their
+        ranges, locked ones at their defaults.
 
     Raises:
         OsimliteError: a file cannot be read, or no marker is in both the model and the data.
@@ -75,7 +72,11 @@ def inverse_kinematics(
     """
     if markers is None and orientations is None:
         raise SettingError("there is nothing to fit; give markers, orientations, or both")
-    turned = None if orientations is None else OrientationData.of(orientations, times).between(start, end)
+    turned = (
+        None
+        if orientations is None
+        else OrientationData.of(orientations, times).between(start, end)
+    )
     if markers is not None:
         data = MarkerData.of(markers, times).between(start, end)
     elif turned is not None:
@@ -97,7 +98,9 @@ def inverse_kinematics(
     goals, wanted = [], []
     for name, goal in (coordinates or {}).items():
         place = mechanism.coordinate_index(name)
-        weight, value = goal if isinstance(goal, tuple) else (goal, mechanism.coordinates[place].default_value)
+        weight, value = (
+            goal if isinstance(goal, tuple) else (goal, mechanism.coordinates[place].default_value)
+        )
         goals.append(Goal(place, float(weight)))
         wanted.append(float(value))
     rows = np.tile(wanted, (len(data.times), 1))
@@ -121,7 +124,10 @@ def fitted(
         SettingError: markers and orientations are not of the same times.
     """
     turned = OrientationData.nothing(data.times) if orientations is None else orientations
-    if data.times.shape != turned.times.shape or np.abs(data.times - turned.times).max() > SAME_TIMES:
+    if (
+        data.times.shape != turned.times.shape
+        or np.abs(data.times - turned.times).max() > SAME_TIMES
+    ):
         raise SettingError(
             f"the {len(data.times)} frames of the markers and the {len(turned.times)} of the orientations are not of "
             "the same times; give both at the times of one"
@@ -141,7 +147,9 @@ def fitted(
         first_pose(mechanism, float(data.times[0]), constraints),
     )
     seen = np.asarray(np.isfinite(measured).all(axis=2))
-    undetermined = find_undetermined(mechanism, poses.values, seen, points, turning, goals, constraints=constraints)
+    undetermined = find_undetermined(
+        mechanism, poses.values, seen, points, turning, goals, constraints=constraints
+    )
     return FittedMotion(
         mechanism,
         data.times,
@@ -173,9 +181,12 @@ def check_weight(weight: float, what: str) -> None:
 def without_slides(mechanism: Mechanism) -> Mechanism:
     """The mechanism with all translations locked at their default values, as OpenSim fits orientations."""
     infos = tuple(
-        replace(info, locked=True) if info.motion_type == "translational" else info for info in mechanism.coordinates
+        replace(info, locked=True) if info.motion_type == "translational" else info
+        for info in mechanism.coordinates
     )
-    others = tuple(item for item in mechanism.constraints if not isinstance(item, Lock | Prescribed))
+    others = tuple(
+        item for item in mechanism.constraints if not isinstance(item, Lock | Prescribed)
+    )
     return replace(mechanism, coordinates=infos, constraints=others)
 
 

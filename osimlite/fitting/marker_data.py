@@ -75,13 +75,19 @@ def read_trc(path: str | Path) -> MarkerData:
     header = MarkerHeader(data)
     names = tuple(label.text for label in header.labels)
     if not names or not header.lines[0].lstrip("\ufeff").startswith("PathFileType"):
-        raise DocumentError("it is no marker file: it must begin with 'PathFileType' and name markers", file=file)
+        raise DocumentError(
+            "it is no marker file: it must begin with 'PathFileType' and name markers", file=file
+        )
     unit = header.entries["Units"].value.text if "Units" in header.entries else ""
     if unit not in METRES:
-        raise DocumentError(f"the markers are in '{unit}'; Units is one of {', '.join(METRES)}", file=file, line=3)
+        raise DocumentError(
+            f"the markers are in '{unit}'; Units is one of {', '.join(METRES)}", file=file, line=3
+        )
     width = 2 + 3 * len(names)
     rows = []
-    for number, line in enumerate(data[header.rows :].decode("utf-8", "replace").splitlines(), header.row_line):
+    for number, line in enumerate(
+        data[header.rows :].decode("utf-8", "replace").splitlines(), header.row_line
+    ):
         if not line.strip():
             continue
         cells = line.rstrip("\r\n").split("\t")
@@ -89,12 +95,18 @@ def read_trc(path: str | Path) -> MarkerData:
             cells = line.split()
         if any(cell.strip() for cell in cells[width:]):
             raise DocumentError(
-                f"the row has more than the {width} cells of {len(names)} markers", file=file, line=number
+                f"the row has more than the {width} cells of {len(names)} markers",
+                file=file,
+                line=number,
             )
-        rows.append([_number(cell, file, number, index) for index, cell in enumerate(cells[:width])])
+        rows.append(
+            [_number(cell, file, number, index) for index, cell in enumerate(cells[:width])]
+        )
         rows[-1] += [np.nan] * (width - len(rows[-1]))
     table = np.array(rows, dtype=float).reshape(-1, width)
-    return MarkerData(names, table[:, 1], METRES[unit] * table[:, 2:].reshape(-1, len(names), 3), file)
+    return MarkerData(
+        names, table[:, 1], METRES[unit] * table[:, 2:].reshape(-1, len(names), 3), file
+    )
 
 
 def _number(cell: str, file: str, line: int, place: int) -> float:
@@ -122,7 +134,8 @@ def read_sto_markers(path: str | Path) -> MarkerData:
     names = tuple(label.removesuffix(ends[0]) for label in firsts)
     if [f"{name}{end}" for name in names for end in ends] != [*table.columns]:
         raise DocumentError(
-            f"the columns are no places of markers: a marker has three, which end in {', '.join(ends)}", file=str(path)
+            f"the columns are no places of markers: a marker has three, which end in {', '.join(ends)}",
+            file=str(path),
         )
     unit = METRES.get(table.header.get("Units", "m"), 1.0)
     return MarkerData(names, table.times, unit * table.rows.reshape(-1, len(names), 3), str(path))

@@ -57,10 +57,13 @@ class Measuring:
                 if self._is_known(name, "scale factors given by hand"):
                     self.found.factors[name] = [float(factor) for factor in scale.scales]
 
-    def by_measurements(self, measurements: Iterable[Measurement], data: MarkerData, first: float, last: float) -> None:
+    def by_measurements(
+        self, measurements: Iterable[Measurement], data: MarkerData, first: float, last: float
+    ) -> None:
         """Take those that distances of markers give, the mean of their ratios over the pairs of each measurement.
 
-        A measurement of which a marker is missing, or was not seen in a frame of the range, is left out.
+        A measurement of which a marker is missing, or was not seen in a frame of the range, is left
+        out.
 
         Args:
             measurements: in the order in which they overwrite one another.
@@ -83,7 +86,9 @@ class Measuring:
                     if axis.lower() in ("x", "y", "z"):
                         self.found.factors[body.name]["xyz".index(axis.lower())] = ratio
 
-    def _ratio(self, measurement: Measurement, data: MarkerData, frames: slice) -> tuple[float, str]:
+    def _ratio(
+        self, measurement: Measurement, data: MarkerData, frames: slice
+    ) -> tuple[float, str]:
         """Measured to model, or why there is none."""
         ratios = []
         for pair in measurement.marker_pair_set.objects:
@@ -92,9 +97,15 @@ class Measuring:
                 return 0.0, f"a pair names {len(names)} markers"
             for marker in names:
                 if marker not in self._stations:
-                    return 0.0, f"the model has no marker '{marker}'{did_you_mean(marker, self._stations)}"
+                    return (
+                        0.0,
+                        f"the model has no marker '{marker}'{did_you_mean(marker, self._stations)}",
+                    )
                 if marker not in data.names:
-                    return 0.0, f"the data have no marker '{marker}'{did_you_mean(marker, data.names)}"
+                    return (
+                        0.0,
+                        f"the data have no marker '{marker}'{did_you_mean(marker, data.names)}",
+                    )
             one, two = (self._state.point(*self._stations[marker]) for marker in names)
             length = float(np.linalg.norm(one - two))
             places = data.only(names)[frames]
@@ -109,13 +120,17 @@ class Measuring:
     def _is_known(self, name: str, what: str) -> bool:
         """Whether there is a frame of a name; if not it is noted."""
         if name not in self.found.factors:
-            self.found.notes.append(f"{what}: the model has no body '{name}'{did_you_mean(name, self.found.factors)}")
+            self.found.notes.append(
+                f"{what}: the model has no body '{name}'{did_you_mean(name, self.found.factors)}"
+            )
         return name in self.found.factors
 
 
 def scale_set(frames: Iterable[str], measured: Measured) -> ScaleSet:
     """The factors of physical frames, by their names, as OpenSim writes them."""
-    scales = [Scale(scales=tuple(measured.factors[name]), segment=name, apply=True) for name in frames]
+    scales = [
+        Scale(scales=tuple(measured.factors[name]), segment=name, apply=True) for name in frames
+    ]
     return ScaleSet(objects=scales)
 
 

@@ -31,10 +31,10 @@ class OrientationData(Recording):
     def of(cls, source: Orientations, times: ArrayLike | None = None) -> OrientationData:
         """Orientations from a file, or from arrays by the names of the sensors.
 
-        Args:
-            source: a .sto file of quaternions; or by name quaternions (t, 4), scalar first, or rotation matrices
-                (t, 3, 3), which turn what is given along the axes of a sensor into ground; or what is these already.
-            times: of the frames of arrays, s; by default 0, 1, 2 ...
+        Args: source: a .sto file of quaternions; or by name quaternions (t, 4), scalar first, or
+            rotation matrices (t, 3, 3), which turn what is given along the axes of a sensor into
+            ground; or what is these already. times: of the frames of arrays, s; by default 0, 1, 2
+            ...
 
         Raises:
             MissingFileError: there is no such file.
@@ -45,7 +45,9 @@ class OrientationData(Recording):
             return source
         if isinstance(source, str | Path):
             return read_orientations(source)
-        return cls.of_arrays({name: rotations(value, f"sensor '{name}'") for name, value in source.items()}, times)
+        return cls.of_arrays(
+            {name: rotations(value, f"sensor '{name}'") for name, value in source.items()}, times
+        )
 
     def between(self, first: float, last: float) -> OrientationData:
         """The frames from a time up to another, these included.
@@ -53,7 +55,9 @@ class OrientationData(Recording):
         Raises:
             SettingError: no frame lies between.
         """
-        inside = np.flatnonzero((self.times >= first - SAME_TIME) & (self.times <= last + SAME_TIME))
+        inside = np.flatnonzero(
+            (self.times >= first - SAME_TIME) & (self.times <= last + SAME_TIME)
+        )
         if not len(inside):
             raise self.none_between(first, last)
         return self.rows(int(inside[0]), int(inside[-1]) + 1)
@@ -98,10 +102,13 @@ def read_orientations(path: str | Path) -> OrientationData:
     table = read_sto(path)
     if table.kind != KIND:
         raise DocumentError(
-            f"the table holds {table.kind}, not quaternions; its header must say DataType={KIND}", file=str(path)
+            f"the table holds {table.kind}, not quaternions; its header must say DataType={KIND}",
+            file=str(path),
         )
     names = tuple(label.removesuffix("_1") for label in table.columns[::4])
-    return OrientationData(names, table.times, rotation_of(table.rows.reshape(-1, len(names), 4)), str(path))
+    return OrientationData(
+        names, table.times, rotation_of(table.rows.reshape(-1, len(names), 4)), str(path)
+    )
 
 
 Orientations = OrientationData | str | Path | Mapping[str, ArrayLike]

@@ -1,9 +1,10 @@
 """A model that fits a person: sizes of the segments, places of the markers and all poses at once, from any trials.
 
-What is least is the sum of the squared distances of the markers over chosen frames, and of how unlikely sizes and
-offsets are (a maximum a posteriori estimate). In each frame the best pose is found for itself (variable projection, G.
-Golub and V. Pereyra, Inverse Problems 19, 2003): a step of Gauss and Newton is taken in sizes and offsets alone, with
-the normal equations of the poses eliminated frame by frame, and the poses follow it.
+What is least is the sum of the squared distances of the markers over chosen frames, and of how
+unlikely sizes and offsets are (a maximum a posteriori estimate). In each frame the best pose is
+found for itself (variable projection, G. Golub and V. Pereyra, Inverse Problems 19, 2003): a step
+of Gauss and Newton is taken in sizes and offsets alone, with the normal equations of the poses
+eliminated frame by frame, and the poses follow it.
 """
 
 from __future__ import annotations
@@ -35,11 +36,13 @@ SKIN = 0.01
 INDEPENDENT = 20.0
 """As many frames as all are worth: skin moves alike in those of one movement."""
 FIRST, APART, ACROSS = 0.3, 0.1, 0.05
-"""How far the size of the first segment usually is from the model's, those of neighbouring segments and the factors of
-one segment from one another."""
+"""How far the size of the first segment usually is from the model's, those of neighbouring segments
+and the factors of one segment from one another.
+"""
 OFFSET = 0.01
-"""How far a marker on a bone usually is from where the model has it (m). Those of clusters may be anywhere: offsets
-have the distribution of Cauchy, which does not pull at what is far away."""
+"""How far a marker on a bone usually is from where the model has it (m). Those of clusters may be
+anywhere: offsets have the distribution of Cauchy, which does not pull at what is far away.
+"""
 SMALLEST, LARGEST = 0.4, 2.5
 """Ends of the range of factors."""
 STEPS, LOOKS = 60, 3
@@ -52,18 +55,14 @@ NEARLY, ENOUGH = 1e-2, 1e-4
 class Person:
     """A model that was fitted to a person.
 
-    Attributes:
-        model: the scaled model, its markers where they are on the person.
-        factors: of each body along its axes, by name.
-        uncertain: standard deviations of the factors, as far as the assumptions about skin hold.
-        offsets: of the markers that may move (3,), m, along the axes of their bodies, beside the scaled model's.
-        trials: what the chosen frames are from, by frame.
-        times: of the chosen frames (t,), s.
-        markers: names of the m markers.
-        measured: where they were measured (t, m, 3), m.
-        before: where they are in the best poses of the model as it was (t, m, 3), m.
-        after: likewise of the fitted one.
-        notes: what was left out, and what to look at.
+    Attributes: model: the scaled model, its markers where they are on the person. factors: of each
+        body along its axes, by name. uncertain: standard deviations of the factors, as far as the
+        assumptions about skin hold. offsets: of the markers that may move (3,), m, along the axes
+        of their bodies, beside the scaled model's. trials: what the chosen frames are from, by
+        frame. times: of the chosen frames (t,), s. markers: names of the m markers. measured: where
+        they were measured (t, m, 3), m. before: where they are in the best poses of the model as it
+        was (t, m, 3), m. after: likewise of the fitted one. notes: what was left out, and what to
+        look at.
     """
 
     model: Model
@@ -83,7 +82,9 @@ class Person:
         result = {}
         for trial in dict.fromkeys(self.trials):
             chosen = [name == trial for name in self.trials]
-            result[trial] = sqrt(float(np.nanmean(((places - self.measured)[chosen] ** 2).sum(axis=-1))))
+            result[trial] = sqrt(
+                float(np.nanmean(((places - self.measured)[chosen] ** 2).sum(axis=-1)))
+            )
         return result
 
 
@@ -101,19 +102,18 @@ def fit(
 ) -> Person:
     """Fit a model to a person: factors of its bodies and places of its markers, from movements.
 
-    Joint centres are found by how the segments move, so trials in which all joints move tell most. A marker that is
-    `fixed` in the model, or in `held`, stays where the scaled model has it; all others may move.
+    Joint centres are found by how the segments move, so trials in which all joints move tell most.
+    A marker that is `fixed` in the model, or in `held`, stays where the scaled model has it; all
+    others may move.
 
-    Args:
-        model: the generic model, with markers named as those of the data; it stays as it is.
-        trials: movements, as .trc, .c3d or .sto files or arrays by name; a mapping gives them names.
-        static: the subject standing.
-        weights: of markers by name; those left out weigh 1, those of 0 do not count.
-        held: markers that are known to be where the model has them; by default those that are `fixed`.
-        by_axis: whether a body may grow in one direction more than in another.
-        symmetric: whether both sides of the body have the same factors.
-        frames: how many are looked at, spread evenly over all trials.
-        mass: what the subject weighs, kg; if it is not positive that follows from the factors.
+    Args: model: the generic model, with markers named as those of the data; it stays as it is.
+        trials: movements, as .trc, .c3d or .sto files or arrays by name; a mapping gives them
+        names. static: the subject standing. weights: of markers by name; those left out weigh 1,
+        those of 0 do not count. held: markers that are known to be where the model has them; by
+        default those that are `fixed`. by_axis: whether a body may grow in one direction more than
+        in another. symmetric: whether both sides of the body have the same factors. frames: how
+        many are looked at, spread evenly over all trials. mass: what the subject weighs, kg; if it
+        is not positive that follows from the factors.
 
     Raises:
         SettingError: nothing is given, or something names what is not there.
@@ -122,19 +122,29 @@ def fit(
         UnsupportedError: the model has a joint or a constraint that cannot be computed.
     """
     mechanism = build_mechanism(model)
-    stations = {name: place for name, place in marker_stations(model, mechanism).items() if place.body != GROUND}
+    stations = {
+        name: place
+        for name, place in marker_stations(model, mechanism).items()
+        if place.body != GROUND
+    }
     chosen = ChosenFrames(_named(trials, static), list(stations), frames, weights or {})
     moving = {marker.name for marker in model.components(ModelMarker) if not marker.fixed}
     if held is not None:
         unknown = [name for name in held if name not in stations]
         if unknown:
-            raise SettingError(f"'{model.name}' has no marker '{unknown[0]}'{did_you_mean(unknown[0], stations)}")
+            raise SettingError(
+                f"'{model.name}' has no marker '{unknown[0]}'{did_you_mean(unknown[0], stations)}"
+            )
         moving = set(stations) - set(held)
     names = [body.name for body in mechanism.bodies]
-    carriers = {body.name: names[body.parent] if body.parent != GROUND else "" for body in mechanism.bodies}
+    carriers = {
+        body.name: names[body.parent] if body.parent != GROUND else "" for body in mechanism.bodies
+    }
     marked = {names[stations[marker].body] for marker in chosen.markers}
     segments = Segments.of(carriers, marked, by_axis=by_axis, symmetric=symmetric)
-    search = _Search(Shape(model, chosen.markers, segments), chosen, [name in moving for name in chosen.markers])
+    search = _Search(
+        Shape(model, chosen.markers, segments), chosen, [name in moving for name in chosen.markers]
+    )
     result = search.start(mechanism)
     before = result.places
     for _ in range(LOOKS):
@@ -145,7 +155,9 @@ def fit(
     scaled = model.copy_deep()
     factors = segments.factors(result.sizes)
     scale_model(scaled, factors, mass)
-    offsets = {name: by for name, by in zip(chosen.markers, result.offsets, strict=True) if name in moving}
+    offsets = {
+        name: by for name, by in zip(chosen.markers, result.offsets, strict=True) if name in moving
+    }
     placements = Placements(scaled.tree())
     for marker in scaled.components(ModelMarker):
         if marker.name in offsets:
@@ -167,13 +179,17 @@ def fit(
     )
 
 
-def _named(trials: Mapping[str, Markers] | Iterable[Markers], static: Markers | None) -> dict[str, MarkerData]:
+def _named(
+    trials: Mapping[str, Markers] | Iterable[Markers], static: Markers | None
+) -> dict[str, MarkerData]:
     """All trials by name; the static one is called so."""
     if isinstance(trials, Mapping):
         result = {name: MarkerData.of(trial) for name, trial in trials.items()}
     else:
         read = [MarkerData.of(trial) for trial in trials]
-        result = {trial.file or f"trial {number}": trial for number, trial in enumerate(read, start=1)}
+        result = {
+            trial.file or f"trial {number}": trial for number, trial in enumerate(read, start=1)
+        }
     if static is not None:
         result[STATIC] = MarkerData.of(static)
     if not result:
@@ -245,7 +261,9 @@ class _Search:
         squares = self._unit * float(np.nansum(self._chosen.weights[:, None] * errors**2))
         likely = self._prior @ sizes - self._wanted
         far = float(np.log1p((offsets[self._free] ** 2).sum(axis=1) / OFFSET**2).sum())
-        return _Found(sizes, offsets, posed, values, places, 0.5 * (squares + float(likely @ likely) + far))
+        return _Found(
+            sizes, offsets, posed, values, places, 0.5 * (squares + float(likely @ likely) + far)
+        )
 
     def _normal(self, here: _Found) -> tuple[Array, Array]:
         """Matrix and right side of the normal equations in sizes and offsets, the poses eliminated."""

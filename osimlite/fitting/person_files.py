@@ -15,7 +15,12 @@ from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.markers import MarkerSet
 from osimlite.schema.tools.scale import GenericModelMaker, MarkerPlacer, ModelScaler, ScaleTool
 
-MARKERS, UNSCALED, FACTORS, SETUP = "markers.xml", "markers_unscaled.xml", "scale_set.xml", "setup_scale.xml"
+MARKERS, UNSCALED, FACTORS, SETUP = (
+    "markers.xml",
+    "markers_unscaled.xml",
+    "scale_set.xml",
+    "setup_scale.xml",
+)
 
 
 def person_texts(person: Person, generic: Path, folder: Path, mass: float = -1.0) -> dict[str, str]:
@@ -40,9 +45,13 @@ def person_texts(person: Person, generic: Path, folder: Path, mass: float = -1.0
     tool = ScaleTool(
         name=model.name,
         mass=mass,
-        generic_model_maker=GenericModelMaker(model_file=_way(generic, folder), marker_set_file=UNSCALED),
+        generic_model_maker=GenericModelMaker(
+            model_file=_way(generic, folder), marker_set_file=UNSCALED
+        ),
         model_scaler=ModelScaler(
-            scaling_order=("manualScale",), scale_set=scale_set(frames, result), output_model_file=file
+            scaling_order=("manualScale",),
+            scale_set=scale_set(frames, result),
+            output_model_file=file,
         ),
         marker_placer=MarkerPlacer(apply=False),
     )

@@ -27,7 +27,8 @@ from osimlite.simulation.states import StateLayout, in_model_order
 class Placed:
     """Markers that were placed."""
 
-    pose: FittedMotion  # of the model as the subject stood, with the errors of the markers before they were moved
+    # of the model as the subject stood, with the errors of the markers before they were moved
+    pose: FittedMotion
     removed: tuple[str, ...]  # markers of the model that the data do not have; it has them no more
     moved: dict[str, float]  # by how much each marker was moved in its frame, m
 
@@ -46,8 +47,8 @@ def place_markers(
 ) -> Placed:
     """Pose a model as a subject stood, and move its markers to where they were measured, but for those that are fixed.
 
-    A marker that was not seen in every frame of the time range does not count for the pose, as in OpenSim; it is placed
-    by the frames in which it was seen.
+    A marker that was not seen in every frame of the time range does not count for the pose, as in
+    OpenSim; it is placed by the frames in which it was seen.
 
     Args:
         model: is changed: markers that the data do not have are removed.
@@ -72,7 +73,9 @@ def place_markers(
             f"the time range of the markers, {first:g} to {last:g} s, holds no frames to average; give one that begins "
             f"before it ends, within {data.times[0]:g} to {data.times[-1]:g} s"
         )
-    mean = MarkerData(data.names, np.array((first,)), data.positions[within].mean(axis=0)[None], data.file)
+    mean = MarkerData(
+        data.names, np.array((first,)), data.positions[within].mean(axis=0)[None], data.file
+    )
     averaged = data.positions[frames_between(data.times, first, last)]
     seen = np.asarray(np.isfinite(averaged).all(axis=2))
     chosen = np.where(seen[..., None], averaged, 0.0)
@@ -99,7 +102,9 @@ def place_markers(
 def _frame_of(model: Model, marker: Marker) -> str:
     """The path of the frame of a marker."""
     tree = model.tree()
-    return tree.path_of(tree.target(marker, "socket_parent_frame", marker.socket_parent_frame)) or ""
+    return (
+        tree.path_of(tree.target(marker, "socket_parent_frame", marker.socket_parent_frame)) or ""
+    )
 
 
 def pose_text(model: Model, placed: Placed) -> str:

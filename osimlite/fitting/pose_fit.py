@@ -30,19 +30,20 @@ class Poses(NamedTuple):
     values: Array  # of all coordinates (t, n), rad and m
     places: Array  # of the markers in these poses (t, m, 3), m
     turns: Array  # of the sensors from where they were measured (t, k, 3), in ground, rad; NaN where one was not
-    # half the weighted means of the squared distances of the markers and of the squared angles of the sensors, and
-    # the squares of the goals (t,)
+    # half the weighted means of the squared distances of the markers and of the squared angles of
+    # the sensors, and the squares of the goals (t,)
     costs: Array
     steps: Array  # Newton steps that were taken (t,)
-    unseen: tuple[int, ...]  # frames of which nothing was measured: they have the pose of the frame before
+    # frames of which nothing was measured: they have the pose of the frame before
+    unseen: tuple[int, ...]
     unsettled: tuple[int, ...]  # frames in which the search ended before the best pose was certain
 
 
 class PoseFit:
     """Finds poses that fit measurements, each from the one before.
 
-    Locked coordinates stay at their defaults, clamped ones in their ranges; prescribed ones follow their functions, and
-    what a coupler gives is substituted.
+    Locked coordinates stay at their defaults, clamped ones in their ranges; prescribed ones follow
+    their functions, and what a coupler gives is substituted.
 
     Args:
         mechanism: whose poses.
@@ -52,14 +53,11 @@ class PoseFit:
         constraints: whether those of the mechanism hold.
         code: what runs the kernels; the best that is installed if left out.
 
-    Attributes:
-        markers: how many there are.
-        sensors: likewise.
-        measured: count of the numbers of their places and rotations.
-        order: places in the mechanism of the coordinates that are found.
-        width: count of the numbers of one frame: the markers' places, the rotations, the goals, and what is held.
-        found: count of those that the kernel finds: the values, the markers' places, the sensors' turns, cost, steps,
-            and an ending.
+    Attributes: markers: how many there are. sensors: likewise. measured: count of the numbers of
+        their places and rotations. order: places in the mechanism of the coordinates that are
+        found. width: count of the numbers of one frame: the markers' places, the rotations, the
+        goals, and what is held. found: count of those that the kernel finds: the values, the
+        markers' places, the sensors' turns, cost, steps, and an ending.
 
     Raises:
         UnsupportedError: a joint, a function or a constraint that the kernels do not know.
@@ -75,7 +73,11 @@ class PoseFit:
         constraints: bool = True,
         code: Code | None = None,
     ) -> None:
-        self.mechanism, self.markers, self.measured = mechanism, len(markers), 3 * len(markers) + 9 * len(sensors)
+        self.mechanism, self.markers, self.measured = (
+            mechanism,
+            len(markers),
+            3 * len(markers) + 9 * len(sensors),
+        )
         infos = list(mechanism.coordinates)
         self._held: dict[int, Function | None] = {}
         free = set(free_coordinates(mechanism))
@@ -83,7 +85,9 @@ class PoseFit:
             if place in free and (info.locked or info.prescribed is not None):
                 self._held[place] = None if info.locked else info.prescribed
                 infos[place] = replace(info, locked=False, prescribed=None)
-        acting = [item for item in mechanism.constraints if not isinstance(item, Lock | Prescribed)] * constraints
+        acting = [
+            item for item in mechanism.constraints if not isinstance(item, Lock | Prescribed)
+        ] * constraints
         fixed = {place for place in range(len(infos)) if place not in free or place in self._held}
         self._couplers, others = substituted(acting, fixed)
         # A goal of a coordinate that cannot move changes nothing.
@@ -91,26 +95,33 @@ class PoseFit:
         unlocked = replace(mechanism, coordinates=tuple(infos), constraints=tuple(others))
         self.system = _System(unlocked, Forces(()), code=code)
         self.order = list(self.system.order)
-        places = Places(unlocked, {place: k for k, place in enumerate(self.order)}, self.system.placements)
+        places = Places(
+            unlocked, {place: k for k, place in enumerate(self.order)}, self.system.placements
+        )
         kept = [goals[number] for number in self._goals]
-        self.layout = FitLayout(self.system, places, markers, sensors, kept, list(self._held), self._couplers)
+        self.layout = FitLayout(
+            self.system, places, markers, sensors, kept, list(self._held), self._couplers
+        )
         self._history = self.layout.work[self.layout.ints[fit.HISTORY] :]
         self.width = self.measured + len(kept) + len(self._held)
-        self.sensors, self.found = len(sensors), len(self.order) + 3 * (len(markers) + len(sensors)) + 3
+        self.sensors, self.found = (
+            len(sensors),
+            len(self.order) + 3 * (len(markers) + len(sensors)) + 3,
+        )
 
     def start(self, q: Array) -> None:
         """Begin anew, at the values (n,) of all coordinates."""
         self._history[0] = 0.0
         self.system.start(q)
 
-    def fit(self, measured: Array, times: Sequence[float] | Array | None = None, q: Array | None = None) -> Poses:
+    def fit(
+        self, measured: Array, times: Sequence[float] | Array | None = None, q: Array | None = None
+    ) -> Poses:
         """Fit frames (t, ...) of what is measured, from the pose that was found last on.
 
-        Args:
-            measured: of each frame the places of the markers, the rotations by rows, the values of the goals; NaN
-                where something was not seen.
-            times: of the frames, s, for prescribed coordinates; zeros if left out.
-            q: values (n,) of all coordinates to begin anew with.
+        Args: measured: of each frame the places of the markers, the rotations by rows, the values
+            of the goals; NaN where something was not seen. times: of the frames, s, for prescribed
+            coordinates; zeros if left out. q: values (n,) of all coordinates to begin anew with.
 
         Raises:
             SimulationError: no pose fulfils the constraints.
@@ -121,7 +132,9 @@ class PoseFit:
         given = measured.reshape(count, -1)
         frames, result = np.empty((count, self.width)), np.empty((count, self.found))
         frames[:, : self.measured] = given[:, : self.measured]
-        frames[:, self.measured : self.measured + len(self._goals)] = given[:, self.measured :][:, self._goals]
+        frames[:, self.measured : self.measured + len(self._goals)] = given[:, self.measured :][
+            :, self._goals
+        ]
         self.fill_held(frames, np.zeros(count) if times is None else np.asarray(times, dtype=float))
         self.bound(frames, result)(count)
         status = result[:, -1]
@@ -130,7 +143,9 @@ class PoseFit:
         values = np.tile(self.mechanism.values({}), (count, 1))
         values[:, self.order] = result[:, :free]
         vectors = result[:, free:-3].reshape(count, -1, 3)
-        unseen, unsettled = (tuple(np.flatnonzero(status == what).tolist()) for what in (UNSEEN, STUCK))
+        unseen, unsettled = (
+            tuple(np.flatnonzero(status == what).tolist()) for what in (UNSEEN, STUCK)
+        )
         places, turns = vectors[:, : self.markers], vectors[:, self.markers :]
         return Poses(values, places, turns, result[:, -3], result[:, -2], unseen, unsettled)
 
@@ -146,7 +161,9 @@ class PoseFit:
             if function is None:
                 columns[:, column] = self.mechanism.coordinates[place].default_value
             else:
-                columns[:, column] = [function.evaluate(np.array((t,)))[0] for t in moments.tolist()]
+                columns[:, column] = [
+                    function.evaluate(np.array((t,)))[0] for t in moments.tolist()
+                ]
 
     def frame(self) -> Frame:
         """What fits one frame at a time, from the pose that was found last on; there are no goals."""
@@ -154,7 +171,9 @@ class PoseFit:
 
     def apart(self, frame: int) -> SimulationError:
         """The error for a frame that no pose fits in which the constraints hold."""
-        names = ", ".join(item.name for item in self.mechanism.constraints if not isinstance(item, Lock))
+        names = ", ".join(
+            item.name for item in self.mechanism.constraints if not isinstance(item, Lock)
+        )
         return SimulationError(
             f"no pose of '{self.mechanism.name}' near that of frame {frame + 1} keeps its constraints ({names}); "
             "change default values, or leave constraints out"

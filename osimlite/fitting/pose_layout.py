@@ -46,7 +46,9 @@ class Goal:
     weight: float = 1.0
 
 
-def substituted(constraints: Sequence[Constraint], fixed: set[int]) -> tuple[list[Coupler], list[Constraint]]:
+def substituted(
+    constraints: Sequence[Constraint], fixed: set[int]
+) -> tuple[list[Coupler], list[Constraint]]:
     """Couplers whose coordinate each gives, in an order in which all that one goes by is known; and the rest.
 
     Args:
@@ -95,10 +97,16 @@ class FitLayout:
         if s[MODEL.CONSTRAINED]:
             equations = int(s[s[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS])
         ints, numbers = [0] * fit.FIT_HEAD, list[float]()
-        self._listed(ints, fit.MARKERS, fit.MARKER_AT, list(self._markers(places, markers, numbers)))
-        self._listed(ints, fit.SENSORS, fit.SENSOR_AT, list(self._sensors(places, sensors, numbers)))
+        self._listed(
+            ints, fit.MARKERS, fit.MARKER_AT, list(self._markers(places, markers, numbers))
+        )
+        self._listed(
+            ints, fit.SENSORS, fit.SENSOR_AT, list(self._sensors(places, sensors, numbers))
+        )
         numbers += [goal.weight for goal in goals]
-        self._listed(ints, fit.GOALS, fit.GOAL_AT, [places.freedom(goal.coordinate) for goal in goals])
+        self._listed(
+            ints, fit.GOALS, fit.GOAL_AT, [places.freedom(goal.coordinate) for goal in goals]
+        )
         self._listed(ints, fit.HELD, fit.HELD_AT, [places.freedom(place) for place in held])
         ints[fit.RANGES_AT] = len(numbers)
         for low, high in ranges(system.mechanism, system.order, couplers):
@@ -128,7 +136,9 @@ class FitLayout:
             fit.TURNED: 9 * links,
             fit.ROWS: equations * size,
             fit.ERRORS: equations,
-            fit.ROOM: max(room, 2 * size + max([len(item.independent) for item in couplers], default=0)),
+            fit.ROOM: max(
+                room, 2 * size + max([len(item.independent) for item in couplers], default=0)
+            ),
             fit.HISTORY: 2 + (POSES + 2) * size,
             fit.TRIAL: 2 * size,
             fit.STEP: size,
@@ -184,23 +194,31 @@ class FitLayout:
         FitLayout._listed(ints, fit.BALLS, fit.BALL_AT, balls)
 
 
-def ranges(mechanism: Mechanism, order: Sequence[int], couplers: Sequence[Coupler]) -> Iterator[tuple[float, float]]:
+def ranges(
+    mechanism: Mechanism, order: Sequence[int], couplers: Sequence[Coupler]
+) -> Iterator[tuple[float, float]]:
     """Ends between which each degree of freedom stays: those of its range if it is clamped.
 
-    Where a clamped coordinate depends on one other, the other stays where the range allows it to be.
+    Where a clamped coordinate depends on one other, the other stays where the range allows it to
+    be.
     """
     ends = {
-        place: info.range if info.clamped else (-np.inf, np.inf) for place, info in enumerate(mechanism.coordinates)
+        place: info.range if info.clamped else (-np.inf, np.inf)
+        for place, info in enumerate(mechanism.coordinates)
     }
     for coupler in reversed(couplers):
         low, high = ends[coupler.dependent]
         if len(coupler.independent) == 1 and (low > -np.inf or high < np.inf):
             (other,) = coupler.independent
-            ends[other] = _allowed(coupler, mechanism.coordinates[other].default_value, ends[other], low, high)
+            ends[other] = _allowed(
+                coupler, mechanism.coordinates[other].default_value, ends[other], low, high
+            )
     yield from (ends[place] for place in order)
 
 
-def _allowed(coupler: Coupler, start: float, ends: tuple[float, float], low: float, high: float) -> tuple[float, float]:
+def _allowed(
+    coupler: Coupler, start: float, ends: tuple[float, float], low: float, high: float
+) -> tuple[float, float]:
     """The interval around a place in which what a coupler gives is in a range, within ends."""
 
     def is_inside(place: float) -> bool:

@@ -28,7 +28,9 @@ class Recording:
     def __post_init__(self) -> None:
         twice = sorted({name for name in self.names if self.names.count(name) > 1})
         if twice:
-            raise DocumentError(f"two {self.noun}s are called {listed(twice)}; rename one of each", file=self.file)
+            raise DocumentError(
+                f"two {self.noun}s are called {listed(twice)}; rename one of each", file=self.file
+            )
         if len(self.times) == 0:
             raise DocumentError(f"there are {self.noun}s but no frames", file=self.file)
         if self.values.shape != (len(self.times), len(self.names), *self.shape):
@@ -53,7 +55,9 @@ class Recording:
             SettingError: the arrays do not fit together.
         """
         if not isinstance(arrays, Mapping):
-            raise SettingError(f"{cls.noun}s are a file, or arrays by their names, not a {type(arrays).__name__}")
+            raise SettingError(
+                f"{cls.noun}s are a file, or arrays by their names, not a {type(arrays).__name__}"
+            )
         values = [np.asarray(value, dtype=float) for value in arrays.values()]
         values = [value[None] if value.ndim == len(cls.shape) else value for value in values]
         counts = {value.shape for value in values}
@@ -62,7 +66,11 @@ class Recording:
                 f"every {cls.noun} has {' × '.join(map(str, cls.shape))} numbers for each frame, as many as all others"
             )
         (count, *_), *_ = counts
-        moments = np.arange(count, dtype=float) if times is None else np.asarray(times, dtype=float).reshape(-1)
+        moments = (
+            np.arange(count, dtype=float)
+            if times is None
+            else np.asarray(times, dtype=float).reshape(-1)
+        )
         return cls(tuple(arrays), moments, np.stack(values, axis=1))
 
     @classmethod
@@ -91,7 +99,9 @@ class Recording:
         places = {name: index for index, name in enumerate(self.names)}
         for name in names:
             if name not in places:
-                raise SettingError(f"there is no {self.noun} '{name}' in {self.source}{did_you_mean(name, self.names)}")
+                raise SettingError(
+                    f"there is no {self.noun} '{name}' in {self.source}{did_you_mean(name, self.names)}"
+                )
         return self.values[:, [places[name] for name in names]]
 
     def shared(self, model: Sequence[str], chosen: Mapping[str, float] | None = None) -> list[str]:
@@ -104,7 +114,9 @@ class Recording:
         Raises:
             OsimliteError: there are none.
         """
-        names = [name for name in self.names if name in model and (chosen is None or name in chosen)]
+        names = [
+            name for name in self.names if name in model and (chosen is None or name in chosen)
+        ]
         if not names:
             raise OsimliteError(
                 f"no {self.noun} of {self.source} ({listed([*self.names])}) is one of the model "

@@ -45,12 +45,10 @@ Pairs = Mapping[str, tuple[Sequence[tuple[str, str]], Mapping[str, str]]]
 class Scaled:
     """A scaled model.
 
-    Attributes:
-        model: the model.
-        measured: factors of the bodies, and what they come from.
-        placed: where the markers went, if they were placed.
-        texts: names, from the folder of the setup file, and texts of the files that the tool writes.
-        unknown: what is said of parts of unknown classes, which keep their size; "" if there are none.
+    Attributes: model: the model. measured: factors of the bodies, and what they come from. placed:
+        where the markers went, if they were placed. texts: names, from the folder of the setup
+        file, and texts of the files that the tool writes. unknown: what is said of parts of unknown
+        classes, which keep their size; "" if there are none.
     """
 
     model: Model
@@ -79,28 +77,28 @@ def scale(
 ) -> Scaled:
     """Scale a model to a subject, as OpenSim's ScaleTool does; the model itself stays as it is.
 
-    Args:
-        model: the generic model, with markers named as those of the data.
-        static: measured markers of the standing subject: a file, or arrays by name.
-        measurements: by name pairs of markers, and by body the axes that the mean ratio of their distances scales, as
-            ``{"thigh": ([("RASI", "RKNE")], {"femur_r": "XYZ"})}``; or OpenSim's objects. Later ones overwrite.
-        factors: of bodies, one or one for each axis; they overwrite what is measured.
-        mass: what the subject weighs, kg; if it is not positive that follows from the factors.
-        preserve_mass_distribution: let the bodies keep their shares of the mass.
-        place: whether to pose the scaled model as the subject stood and move its markers to the measured places.
-        tasks: what that pose is fitted to; by default all markers, which weigh the same.
-        start: time from which markers are averaged, s.
-        end: time up to which, s.
+    Args: model: the generic model, with markers named as those of the data. static: measured
+        markers of the standing subject: a file, or arrays by name. measurements: by name pairs of
+        markers, and by body the axes that the mean ratio of their distances scales, as ``{"thigh":
+        ([("RASI", "RKNE")], {"femur_r": "XYZ"})}``; or OpenSim's objects. Later ones overwrite.
+        factors: of bodies, one or one for each axis; they overwrite what is measured. mass: what
+        the subject weighs, kg; if it is not positive that follows from the factors.
+        preserve_mass_distribution: let the bodies keep their shares of the mass. place: whether to
+        pose the scaled model as the subject stood and move its markers to the measured places.
+        tasks: what that pose is fitted to; by default all markers, which weigh the same. start:
+        time from which markers are averaged, s. end: time up to which, s.
 
-    Raises:
-        SettingError: something names what is not there, a factor is not positive, or markers are needed and not given.
+    Raises: SettingError: something names what is not there, a factor is not positive, or markers
+        are needed and not given.
     """
     copy = model.copy_deep()
     measuring = Measuring(copy)
 
     def expect_body(name: str) -> None:
         if name not in measuring.frames:
-            raise SettingError(f"'{model.name}' has no body '{name}'{did_you_mean(name, measuring.frames)}")
+            raise SettingError(
+                f"'{model.name}' has no body '{name}'{did_you_mean(name, measuring.frames)}"
+            )
 
     if isinstance(measurements, Mapping):
         measurements = _measurements(measurements)
@@ -109,7 +107,9 @@ def scale(
     data = None if static is None else MarkerData.of(static)
     wanted = list(measurements)
     if (wanted or place) and data is None:
-        raise SettingError("the subject is to be measured, and there are no markers of it; give them")
+        raise SettingError(
+            "the subject is to be measured, and there are no markers of it; give them"
+        )
     if data is not None and wanted:
         measuring.by_measurements(wanted, data, start, end)
     by_hand = []
@@ -122,7 +122,13 @@ def scale(
         by_hand.append(Scale(segment=name, scales=tuple(map(float, three))))
     measuring.by_hand(by_hand)
     results, mechanism = measuring.found, measuring.mechanism
-    scale_model(copy, results.factors, mass, preserve_mass_distribution=preserve_mass_distribution, mechanism=mechanism)
+    scale_model(
+        copy,
+        results.factors,
+        mass,
+        preserve_mass_distribution=preserve_mass_distribution,
+        mechanism=mechanism,
+    )
     result = Scaled(copy, measuring.found, unknown=describe_unknown(model, UNSCALED))
     if place and data is not None:
         result.placed = place_markers(copy, data, tasks, start, end)
@@ -132,15 +138,21 @@ def scale(
 def _measurements(pairs: Pairs) -> list[Measurement]:
     for name, (_, on) in pairs.items():
         if not isinstance(on, Mapping):
-            raise SettingError(f"measurement '{name}' is pairs of markers, and by body the axes that they scale")
+            raise SettingError(
+                f"measurement '{name}' is pairs of markers, and by body the axes that they scale"
+            )
         for body, axes in on.items():
             if not axes or not {*axes.lower()} <= {*"xyz"}:
                 raise SettingError(f"'{axes}' of '{body}' are no axes; write some of XYZ")
     return [
         Measurement(
             name=name,
-            marker_pair_set=MarkerPairSet(objects=[MarkerPair(markers=tuple(pair)) for pair in markers]),
-            body_scale_set=BodyScaleSet(objects=[BodyScale(name=body, axes=tuple(axes)) for body, axes in on.items()]),
+            marker_pair_set=MarkerPairSet(
+                objects=[MarkerPair(markers=tuple(pair)) for pair in markers]
+            ),
+            body_scale_set=BodyScaleSet(
+                objects=[BodyScale(name=body, axes=tuple(axes)) for body, axes in on.items()]
+            ),
         )
         for name, (markers, on) in pairs.items()
     ]
@@ -159,7 +171,9 @@ def run_scale(tool: ScaleTool, folder: Path) -> Scaled:
     """
     maker, scaler, placer = tool.generic_model_maker, tool.model_scaler, tool.marker_placer
     if maker.model_file in UNNAMED:
-        raise SettingError("the setup names no model; put its file into model_file of GenericModelMaker")
+        raise SettingError(
+            "the setup names no model; put its file into model_file of GenericModelMaker"
+        )
     result = Scaled(read_anew(folder / maker.model_file, Model))
     model = result.model
     if scaler.apply:
@@ -176,7 +190,9 @@ def run_scale(tool: ScaleTool, folder: Path) -> Scaled:
         data = MarkerData.of(folder / placer.marker_file)
         coordinates = coordinate_table(placer.coordinate_file, folder)
         first, last = both_of(placer.time_range)
-        result.placed = place_markers(model, data, placer.ik_task_set.objects, first, last, coordinates)
+        result.placed = place_markers(
+            model, data, placer.ik_task_set.objects, first, last, coordinates
+        )
         _put(result, placer.output_model_file, model)
         _put(result, placer.output_marker_file, model.marker_set)
         if placer.output_motion_file not in UNNAMED:
@@ -190,17 +206,25 @@ def _scaled(tool: ScaleTool, model: Model, folder: Path) -> Measured:
     for word in scaler.scaling_order:
         if word == MEASUREMENTS and any(item.apply for item in scaler.measurement_set.objects):
             if scaler.marker_file in UNNAMED:
-                raise SettingError("the model is scaled by measurements, and ModelScaler has no marker_file; name one")
+                raise SettingError(
+                    "the model is scaled by measurements, and ModelScaler has no marker_file; name one"
+                )
             data = MarkerData.of(folder / scaler.marker_file)
-            measuring.by_measurements(scaler.measurement_set.objects, data, *both_of(scaler.time_range))
+            measuring.by_measurements(
+                scaler.measurement_set.objects, data, *both_of(scaler.time_range)
+            )
         elif word == BY_HAND:
             measuring.by_hand(scaler.scale_set.objects)
         elif word != MEASUREMENTS:
             near = did_you_mean(word, (MEASUREMENTS, BY_HAND))
-            raise SettingError(f"scaling_order has '{word}'; it consists of {MEASUREMENTS} and {BY_HAND}{near}")
+            raise SettingError(
+                f"scaling_order has '{word}'; it consists of {MEASUREMENTS} and {BY_HAND}{near}"
+            )
     keeps = scaler.preserve_mass_distribution
     result, mechanism = measuring.found, measuring.mechanism
-    scale_model(model, result.factors, tool.mass, preserve_mass_distribution=keeps, mechanism=mechanism)
+    scale_model(
+        model, result.factors, tool.mass, preserve_mass_distribution=keeps, mechanism=mechanism
+    )
     return result
 
 
@@ -212,7 +236,9 @@ def add_markers(model: Model, path: Path) -> None:
     """
     result = read_any(path)
     if not isinstance(result, MarkerSet):
-        raise DocumentError(f"the file holds a {type(result).__name__}, not a MarkerSet", file=str(path))
+        raise DocumentError(
+            f"the file holds a {type(result).__name__}, not a MarkerSet", file=str(path)
+        )
     for marker in result.objects:
         for same in [item for item in model.marker_set.objects if item.name == marker.name]:
             model.marker_set.objects.remove(same)

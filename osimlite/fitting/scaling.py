@@ -48,21 +48,18 @@ def scale_model(
 ) -> None:
     """Scale a model, as OpenSim's Model::scale does.
 
-    Offsets of frames, stations, path points, wrap surfaces, mass centres and translations of joints go by the factors
-    of the body that they are fixed to; optimal fiber, tendon slack and resting lengths by how much longer the whole
-    path is in the default pose. Forces, stiffnesses, ranges of coordinates and contact geometry stay.
+    Offsets of frames, stations, path points, wrap surfaces, mass centres and translations of joints
+    go by the factors of the body that they are fixed to; optimal fiber, tendon slack and resting
+    lengths by how much longer the whole path is in the default pose. Forces, stiffnesses, ranges of
+    coordinates and contact geometry stay.
 
-    Args:
-        model: is changed.
-        factors: of its bodies.
-        mass: what all bodies together are to weigh, kg; if it is not positive that follows from the factors.
-        preserve_mass_distribution: let the bodies keep their shares of the mass, instead of weighing more where they
-            are larger.
+    Args: model: is changed. factors: of its bodies. mass: what all bodies together are to weigh,
+        kg; if it is not positive that follows from the factors. preserve_mass_distribution: let the
+        bodies keep their shares of the mass, instead of weighing more where they are larger.
         mechanism: of the model as it is; made if left out.
 
-    Raises:
-        ModelError: a coupler binds a translation to a body that is scaled in one direction more than in another.
-        OsimliteError: the paths of the model cannot be computed.
+    Raises: ModelError: a coupler binds a translation to a body that is scaled in one direction more
+        than in another. OsimliteError: the paths of the model cannot be computed.
     """
     mechanism = build_mechanism(model) if mechanism is None else mechanism
     before = path_lengths(model, mechanism)
@@ -115,7 +112,8 @@ def scales(cls: type[Any]) -> dict[str, str]:
 def scale_inertia(body: Body, factors: Array, *, scales_mass: bool) -> None:
     """Give a body the mass and the inertia that it has once it is scaled.
 
-    Where the factors differ, OpenSim takes the body for a cylinder along the axis of its least moment of inertia.
+    Where the factors differ, OpenSim takes the body for a cylinder along the axis of its least
+    moment of inertia.
     """
     mass, volume = body.mass, abs(float(np.prod(factors)))
     xx, yy, zz, xy, xz, yz = body.inertia
@@ -132,7 +130,10 @@ def scale_inertia(body: Body, factors: Array, *, scales_mass: bool) -> None:
         axis = int(np.argmin(moments))
         side = 1 if axis == 0 else 0
         radius = sqrt(max(2.0 * moments[axis] / mass, 0.0))
-        length = sqrt(max(12.0 * (moments[side] - 0.25 * mass * radius * radius) / mass, 0.0)) * factors[axis]
+        length = (
+            sqrt(max(12.0 * (moments[side] - 0.25 * mass * radius * radius) / mass, 0.0))
+            * factors[axis]
+        )
         one, two = np.delete(factors, axis).tolist()
         square = radius * one * radius * two
         moments = np.full(3, body.mass * (length * length / 12.0 + 0.25 * square))
@@ -178,7 +179,11 @@ class _Scaler:
             else:
                 factors = self.of_base(self.placements.named(component, whose))
             if factors is not None:
-                setattr(component, name, _scaled(getattr(component, name), _chosen(component, factors, which)))
+                setattr(
+                    component,
+                    name,
+                    _scaled(getattr(component, name), _chosen(component, factors, which)),
+                )
 
     def _holder(self, component: Component) -> PhysicalFrame:
         """The frame in which a component is."""
@@ -192,7 +197,9 @@ class _Scaler:
         """The factor of a coupler: that of the parent of the joint whose translation it gives; none of an angle."""
         coordinate = self.tree.target(coupler, name, getattr(coupler, name))
         assert isinstance(coordinate, Coordinate)
-        info = self.mechanism.coordinates[self.mechanism.coordinate_index(self.placements.path(coordinate))]
+        info = self.mechanism.coordinates[
+            self.mechanism.coordinate_index(self.placements.path(coordinate))
+        ]
         joint = self.tree.parent_of(coordinate)
         if info.motion_type != "translational" or not isinstance(joint, Joint):
             return None
@@ -229,7 +236,10 @@ def _scaled(value: Any, factors: Array) -> Any:
         for name in TRANSLATIONS:
             axis = getattr(value, name)
             # An axis that moves as its coordinate does is no length.
-            if isinstance(axis.function, LinearFunction) and tuple(axis.function.coefficients) == (1.0, 0.0):
+            if isinstance(axis.function, LinearFunction) and tuple(axis.function.coefficients) == (
+                1.0,
+                0.0,
+            ):
                 continue
             axis.function = _multiplied(axis.function, float(np.abs(axis.axis) @ factors))
         return value

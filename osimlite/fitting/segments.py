@@ -28,20 +28,23 @@ class Segments(NamedTuple):
     parts: tuple[Segment, ...]  # whose factor each number is
     # pairs of lists of numbers whose means are much the same: segments that hang on one another
     alike: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
-    sides: tuple[tuple[int, tuple[int, ...]], ...]  # pairs of a number and the list of all numbers of its segment
+    # pairs of a number and the list of all numbers of its segment
+    sides: tuple[tuple[int, tuple[int, ...]], ...]
 
     @classmethod
-    def of(cls, carriers: Mapping[str, str], marked: Collection[str], *, by_axis: bool, symmetric: bool) -> Segments:
+    def of(
+        cls, carriers: Mapping[str, str], marked: Collection[str], *, by_axis: bool, symmetric: bool
+    ) -> Segments:
         """Those of bodies.
 
-        A body without markers has the factors of the one with markers that it carries, as the talus those of the foot,
-        or else of the one that carries it, as the patella, the toes and the hand.
+        A body without markers has the factors of the one with markers that it carries, as the talus
+        those of the foot, or else of the one that carries it, as the patella, the toes and the
+        hand.
 
-        Args:
-            carriers: the body that carries each body, by name, carriers first; bodies on ground have another name.
-            marked: bodies with markers.
-            by_axis: whether a body may grow in one direction more than in another.
-            symmetric: whether the two sides of the body have the same factors.
+        Args: carriers: the body that carries each body, by name, carriers first; bodies on ground
+            have another name. marked: bodies with markers. by_axis: whether a body may grow in one
+            direction more than in another. symmetric: whether the two sides of the body have the
+            same factors.
         """
         if symmetric:
             marked = {*marked, *(other_side(body, carriers) for body in marked)}
@@ -54,14 +57,18 @@ class Segments(NamedTuple):
                 first[body] = first[carrier]
         if symmetric:
             first = {body: min(own, other_side(own, carriers)) for body, own in first.items()}
-        groups = {name: tuple(body for body in carriers if first[body] == name) for name in first.values()}
+        groups = {
+            name: tuple(body for body in carriers if first[body] == name) for name in first.values()
+        }
         parts: list[Segment] = []
         numbers: dict[str, tuple[int, ...]] = {}
         for name, bodies in groups.items():
             axes = ((0,), (1,), (2,)) if by_axis else ((0, 1, 2),)
             numbers[name] = tuple(range(len(parts), len(parts) + len(axes)))
             parts += [Segment(bodies, chosen) for chosen in axes]
-        pairs = {(first[body], first[carrier]) for body, carrier in carriers.items() if carrier in first}
+        pairs = {
+            (first[body], first[carrier]) for body, carrier in carriers.items() if carrier in first
+        }
         alike = tuple((numbers[one], numbers[two]) for one, two in sorted(pairs) if one != two)
         sides = tuple((k, own) for own in numbers.values() for k in own if len(own) > 1)
         return cls(tuple(parts), alike, sides)
@@ -84,7 +91,10 @@ class Segments(NamedTuple):
             across: how far the factors of one segment are from their mean.
         """
         own = [k for k, part in enumerate(self.parts) if part.bodies == self.parts[0].bodies]
-        rows = [self._mean(own, first), *((self._mean(one, apart) - self._mean(two, apart)) for one, two in self.alike)]
+        rows = [
+            self._mean(own, first),
+            *((self._mean(one, apart) - self._mean(two, apart)) for one, two in self.alike),
+        ]
         rows += [self._mean((k,), across) - self._mean(own, across) for k, own in self.sides]
         wanted = np.zeros(len(rows))
         wanted[0] = 1.0 / first
@@ -101,7 +111,13 @@ def other_side(name: str, names: Mapping[str, object]) -> str:
 
     def swapped(found: re.Match[str]) -> str:
         word = SIDES[found[0].lower()]
-        return word.upper() if found[0].isupper() else word.capitalize() if found[0][0].isupper() else word
+        return (
+            word.upper()
+            if found[0].isupper()
+            else word.capitalize()
+            if found[0][0].isupper()
+            else word
+        )
 
     other = _SIDE.sub(swapped, name)
     return other if other in names else name

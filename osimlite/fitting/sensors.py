@@ -32,12 +32,14 @@ class PlacedSensors(NamedTuple):
 
     names: tuple[str, ...]  # of the sensors
     left_out: tuple[str, ...]  # names of those of the data for which the model has no frame
-    # angle about the vertical by which the data were turned so that the base faces where the model does (rad), None
-    # if they were not
+    # angle about the vertical by which the data were turned so that the base faces where the model
+    # does (rad), None if they were not
     heading: float | None
 
 
-def sensor_frames(model: Model, mechanism: Mechanism, wanted: Iterable[str]) -> dict[str, FramePlacement]:
+def sensor_frames(
+    model: Model, mechanism: Mechanism, wanted: Iterable[str]
+) -> dict[str, FramePlacement]:
     """The frames of a model that have wanted names, in the model's order.
 
     Raises:
@@ -48,29 +50,32 @@ def sensor_frames(model: Model, mechanism: Mechanism, wanted: Iterable[str]) -> 
     for name, path in frames:
         if name in wanted:
             if name in result:
-                raise SettingError(f"'{model.name}' has several frames '{name}'; a sensor has the name of one")
+                raise SettingError(
+                    f"'{model.name}' has several frames '{name}'; a sensor has the name of one"
+                )
             result[name] = mechanism.frames[path]
     if not result:
         near = did_you_mean(wanted[0], [name for name, _ in frames]) if wanted else ""
-        raise SettingError(f"'{model.name}' has no frame that is called as a sensor ({listed(wanted)}){near}")
+        raise SettingError(
+            f"'{model.name}' has no frame that is called as a sensor ({listed(wanted)}){near}"
+        )
     return result
 
 
-def place_sensors(model: Model, data: OrientationData, base: str = "", axis: str = "") -> PlacedSensors:
+def place_sensors(
+    model: Model, data: OrientationData, base: str = "", axis: str = ""
+) -> PlacedSensors:
     """Put sensors onto a model in the pose in which the subject stood, its default one.
 
-    The sensor of a frame is called as the frame with ``_imu`` behind. It becomes a frame there, in the mass centre of a
-    body, with an IMU; where there is such a frame already, that is turned.
+    The sensor of a frame is called as the frame with ``_imu`` behind. It becomes a frame there, in
+    the mass centre of a body, with an IMU; where there is such a frame already, that is turned.
 
-    Args:
-        model: is changed.
-        data: orientations of the sensors in ground, of which the first frame counts.
-        base: the sensor whose axis points where the model faces; if left out, the data are not turned.
-        axis: that axis: x, y or z, with a minus sign if it points back.
+    Args: model: is changed. data: orientations of the sensors in ground, of which the first frame
+        counts. base: the sensor whose axis points where the model faces; if left out, the data are
+        not turned. axis: that axis: x, y or z, with a minus sign if it points back.
 
-    Raises:
-        SettingError: there is no such sensor or axis, the model has no frame of any sensor, or one was not measured.
-        SimulationError: the default pose cannot keep the constraints.
+    Raises: SettingError: there is no such sensor or axis, the model has no frame of any sensor, or
+        one was not measured. SimulationError: the default pose cannot keep the constraints.
     """
     mechanism = build_mechanism(model)
     q, _ = mechanism.default_state()
@@ -79,7 +84,9 @@ def place_sensors(model: Model, data: OrientationData, base: str = "", axis: str
     heading = None
     if base and axis:
         if base not in measured:
-            raise SettingError(f"there is no sensor '{base}' in {data.source}{did_you_mean(base, data.names)}")
+            raise SettingError(
+                f"there is no sensor '{base}' in {data.source}{did_you_mean(base, data.names)}"
+            )
         faced = _axis_of(measured[base], axis)
         heading = _heading(_forwards(model, mechanism, state.rotations), faced)
         turn = rotation_about_space((0.0, heading, 0.0))
@@ -91,7 +98,9 @@ def place_sensors(model: Model, data: OrientationData, base: str = "", axis: str
         if worn is None:
             continue
         if not np.isfinite(rotation).all():
-            raise SettingError(f"{data.source} does not say in its first frame how the sensor '{name}' is turned")
+            raise SettingError(
+                f"{data.source} does not say in its first frame how the sensor '{name}' is turned"
+            )
         body, matrix = mechanism.frames[model.tree().path_of(worn) or ""]
         inside = (state.transform(body) @ matrix)[:3, :3].T @ rotation
         placed.append((name, worn, tuple(angles_xyz(inside).tolist())))
@@ -102,12 +111,16 @@ def place_sensors(model: Model, data: OrientationData, base: str = "", axis: str
             f"behind{example}"
         )
     for name, worn, angles in placed:
-        there = _only_one([frame for frame in frames if isinstance(frame, PhysicalOffsetFrame)], name, model)
+        there = _only_one(
+            [frame for frame in frames if isinstance(frame, PhysicalOffsetFrame)], name, model
+        )
         if isinstance(there, PhysicalOffsetFrame):
             there.orientation = angles
             continue
         centre = worn.mass_center if isinstance(worn, Body) else (0.0, 0.0, 0.0)
-        frame = PhysicalOffsetFrame(name=name, socket_parent="..", translation=centre, orientation=angles)
+        frame = PhysicalOffsetFrame(
+            name=name, socket_parent="..", translation=centre, orientation=angles
+        )
         worn.components.append(frame)
         model.add(IMU(name=name, socket_frame=frame))
     names = tuple(name for name, _, _ in placed)
@@ -136,7 +149,9 @@ def _forwards(model: Model, mechanism: Mechanism, rotations: Array) -> Array:
     tree = model.tree()
     for joint in model.joint_set.objects:
         ends = [
-            mechanism.frames[tree.path_of(tree.target(joint, socket, getattr(joint, socket))) or ""].body
+            mechanism.frames[
+                tree.path_of(tree.target(joint, socket, getattr(joint, socket))) or ""
+            ].body
             for socket in ("socket_parent_frame", "socket_child_frame")
         ]
         if ends[0] == GROUND:

@@ -1,7 +1,8 @@
 """Where the markers of a model are if its bodies are larger or smaller: at one pose, a linear function of the factors.
 
-All translations of a mechanism are multiplied by factors, and no rotation is. So what one factor does is the difference
-of two models, exactly, whatever the joints are; no joint has a formula for it.
+All translations of a mechanism are multiplied by factors, and no rotation is. So what one factor
+does is the difference of two models, exactly, whatever the joints are; no joint has a formula for
+it.
 """
 
 from __future__ import annotations
@@ -62,11 +63,13 @@ class Shape:
     def columns(self, values: Array) -> tuple[Array, Array]:
         """What the factors and the offsets of markers do to their places in poses (t, n) of all coordinates.
 
-        Returns:
-            Derivatives (t, m, 3, k) of the places by the factors, m; rotations (t, m, 3, 3) of the markers' bodies.
+        Returns: Derivatives (t, m, 3, k) of the places by the factors, m; rotations (t, m, 3, 3) of
+            the markers' bodies.
         """
         places, rotations = self._first.places(values)
-        return np.stack([larger.places(values)[0] - places for larger in self._larger], axis=-1), rotations
+        return np.stack(
+            [larger.places(values)[0] - places for larger in self._larger], axis=-1
+        ), rotations
 
 
 class Posed:
@@ -81,9 +84,14 @@ class Posed:
 
     def __init__(self, shape: Shape, sizes: Array, offsets: Array, weights: Array) -> None:
         self.mechanism, stations = shape.scaled(sizes)
-        moved = [place._replace(location=place.location + by) for place, by in zip(stations, offsets, strict=True)]
+        moved = [
+            place._replace(location=place.location + by)
+            for place, by in zip(stations, offsets, strict=True)
+        ]
         self._points = _Points(self.mechanism, moved)
-        markers = [Marker(place, weight) for place, weight in zip(moved, weights.tolist(), strict=True)]
+        markers = [
+            Marker(place, weight) for place, weight in zip(moved, weights.tolist(), strict=True)
+        ]
         self._fit = PoseFit(self.mechanism, markers)
 
     def poses(self, measured: Array, starts: Array) -> tuple[Array, Array]:
@@ -96,8 +104,13 @@ class Posed:
         Returns:
             Values of all coordinates (t, n), and where the markers are then (t, m, 3), m.
         """
-        frames = [self._fit.fit(frame[None], q=start) for frame, start in zip(measured, starts, strict=True)]
-        return np.concatenate([frame.values for frame in frames]), np.concatenate([frame.places for frame in frames])
+        frames = [
+            self._fit.fit(frame[None], q=start)
+            for frame, start in zip(measured, starts, strict=True)
+        ]
+        return np.concatenate([frame.values for frame in frames]), np.concatenate(
+            [frame.places for frame in frames]
+        )
 
     def freedoms(self, values: Array) -> list[Array]:
         """For each of some poses (t, n) how the markers can move (m, 3, f), a column for each free direction."""
@@ -114,19 +127,27 @@ class _Points:
         self._carrying, self._links = np.unique(links, return_inverse=True)
         frames = [self._system.placements[place.body][1] for place in stations]
         located = zip(frames, stations, strict=True)
-        self._own = np.array([frame[:3, :3] @ place.location + frame[:3, 3] for frame, place in located])
+        self._own = np.array(
+            [frame[:3, :3] @ place.location + frame[:3, 3] for frame, place in located]
+        )
         self._turned = np.array([frame[:3, :3] for frame in frames])
         holds = [item for item in mechanism.constraints if not isinstance(item, Lock | Prescribed)]
         self._couplers, _ = substituted(holds, set())
         self._holds = holds
-        self._still = [k for k, info in enumerate(mechanism.coordinates) if info.locked or info.prescribed is not None]
+        self._still = [
+            k
+            for k, info in enumerate(mechanism.coordinates)
+            if info.locked or info.prescribed is not None
+        ]
 
     def places(self, values: Array) -> tuple[Array, Array]:
         """Places (t, m, 3), m, and rotations (t, m, 3, 3) of their bodies; what depends on others follows them."""
         followed = values.copy()
         for coupler in self._couplers:
             others = list(coupler.independent)
-            followed[:, coupler.dependent] = [coupler.function.evaluate(row[others])[0] for row in followed]
+            followed[:, coupler.dependent] = [
+                coupler.function.evaluate(row[others])[0] for row in followed
+            ]
         links = self._moving(followed, np.zeros_like(followed))
         turned = links[..., :9].reshape(*links.shape[:2], 3, 3) @ self._turned
         return moving(links, self._own)[..., :3], turned
@@ -142,7 +163,9 @@ class _Points:
         """The speeds (n, f) that joints, constraints and ends of ranges allow in a pose."""
         held = [
             k
-            for k, (info, value) in enumerate(zip(self._mechanism.coordinates, q.tolist(), strict=True))
+            for k, (info, value) in enumerate(
+                zip(self._mechanism.coordinates, q.tolist(), strict=True)
+            )
             if info.clamped and not info.range[0] + AT_END < value < info.range[1] - AT_END
         ]
         rows = [np.eye(len(q))[[*self._still, *held]]]
@@ -155,5 +178,7 @@ class _Points:
     def _moving(self, values: Array, speeds: Array) -> Array:
         """What the kernels find of the links of the markers (t, m, ...)."""
         order, still = list(self._system.order), np.zeros((len(values), 1))
-        result = self._system.links_of(np.hstack((still, values[:, order], speeds[:, order])), self._carrying.tolist())
+        result = self._system.links_of(
+            np.hstack((still, values[:, order], speeds[:, order])), self._carrying.tolist()
+        )
         return result[:, self._links]

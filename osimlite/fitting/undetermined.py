@@ -32,8 +32,8 @@ def find_undetermined(
 ) -> tuple[str, ...]:
     """Return the names of coordinates that can move without moving anything that is measured.
 
-    The null space of the Jacobian of all measured points and frames, of the constraints, and of what is held or has a
-    goal, is computed in a few frames by a singular value decomposition.
+    The null space of the Jacobian of all measured points and frames, of the constraints, and of
+    what is held or has a goal, is computed in a few frames by a singular value decomposition.
 
     Args:
         mechanism: that was fitted.
@@ -48,7 +48,11 @@ def find_undetermined(
         Names in the order of the mechanism.
     """
     count = len(mechanism.coordinates)
-    held = [k for k, info in enumerate(mechanism.coordinates) if info.locked or info.prescribed is not None]
+    held = [
+        k
+        for k, info in enumerate(mechanism.coordinates)
+        if info.locked or info.prescribed is not None
+    ]
     held += [goal.coordinate for goal in goals if goal.weight > 0.0]
     open_everywhere = np.ones(count, dtype=bool)
     frames = np.linspace(0, len(values) - 1, min(len(values), MOST_FRAMES)).astype(int)

@@ -18,7 +18,16 @@ if TYPE_CHECKING:
     from osimlite.lint.engine import all_rules
     from osimlite.schema.model import Model
 
-__all__ = ["Config", "Finding", "Report", "Severity", "all_rules", "assert_valid", "checked_words", "validate"]
+__all__ = [
+    "Config",
+    "Finding",
+    "Report",
+    "Severity",
+    "all_rules",
+    "assert_valid",
+    "checked_words",
+    "validate",
+]
 
 
 def validate(
@@ -31,17 +40,15 @@ def validate(
 ) -> Report:
     """Check a model, a setup, a table, or all that is in a folder against every rule.
 
-    Args:
-        model: a Model, the path of a file or of a folder, or a Source. Only of a text do findings know line and
-            column.
-        select: codes, beginnings of codes, or names of rules to run; all if not given.
-        ignore: the same, of rules to leave out.
-        classes: files that declare the classes of plug-ins.
-        config: everything that can be set; `select`, `ignore` and `classes` take its place.
+    Args: model: a Model, the path of a file or of a folder, or a Source. Only of a text do findings
+        know line and column. select: codes, beginnings of codes, or names of rules to run; all if
+        not given. ignore: the same, of rules to leave out. classes: files that declare the classes
+        of plug-ins. config: everything that can be set; `select`, `ignore` and `classes` take its
+        place.
 
-    Raises:
-        MissingFileError: the file is missing or cannot be read. What is wrong inside a file is a finding.
-        OsimliteError: no rule has a code in `select` or `ignore`, or a class is declared wrongly.
+    Raises: MissingFileError: the file is missing or cannot be read. What is wrong inside a file is
+        a finding. OsimliteError: no rule has a code in `select` or `ignore`, or a class is declared
+        wrongly.
     """
     from osimlite.io.document.plugins import used
     from osimlite.io.document.reader import collector_paused
@@ -54,7 +61,9 @@ def validate(
         meshes = tuple(map(str, named_mesh_folders()))
         named = [classes] if isinstance(classes, str | os.PathLike) else classes
         files = tuple(map(os.path.abspath, named))
-        config = Config(checked_words(select), checked_words(ignore), mesh_paths=meshes, classes=files)
+        config = Config(
+            checked_words(select), checked_words(ignore), mesh_paths=meshes, classes=files
+        )
     with used(config.classes):
         if isinstance(model, Model):
             return run(Subject(model, config))
@@ -63,14 +72,20 @@ def validate(
 
             # Processes that are not forked would run the caller's script anew.
             passed: list[str] = []
-            report = check_files(project_files([model], passed=passed), config, cached=False, processes=1)
+            report = check_files(
+                project_files([model], passed=passed), config, cached=False, processes=1
+            )
             report.passed = passed
             return report
         with collector_paused():
-            return check_source(model if isinstance(model, Source) else Source.of_file(model), config)
+            return check_source(
+                model if isinstance(model, Source) else Source.of_file(model), config
+            )
 
 
-def assert_valid(model: Model | str | Path, *, ignore: tuple[str, ...] | list[str] | str | None = None) -> None:
+def assert_valid(
+    model: Model | str | Path, *, ignore: tuple[str, ...] | list[str] | str | None = None
+) -> None:
     """Fail a test with all findings unless a model has neither errors nor warnings."""
     report = validate(model, ignore=ignore)
     bad = report.at_least(Severity.WARNING)
@@ -78,7 +93,8 @@ def assert_valid(model: Model | str | Path, *, ignore: tuple[str, ...] | list[st
 
 
 def __getattr__(name: str) -> Any:
-    # The rules and all that they need are imported when they are wanted, not for what was found before.
+    # The rules and all that they need are imported when they are wanted, not for what was found
+    # before.
     if name == "all_rules":
         from osimlite.lint.engine import all_rules
 

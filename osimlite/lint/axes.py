@@ -31,16 +31,21 @@ def names_on_axes(joint: CustomJoint) -> list[str]:
 def axes_refused(joint: CustomJoint) -> bool:
     """Whether OpenSim refuses the joint for the coordinates its axes name.
 
-    OpenSim goes through the names in the order of :func:`names_on_axes` and makes up a coordinate for each that the
-    joint does not declare. It fails if the one made up does not come right after those declared, if no axis names any,
-    and if it would have to put declared coordinates in another order while their number is not that of the names.
-    Measured on 1,200 random joints. A name that no component may have is refused as well, and one that a frame of the
-    joint has: OpenSim calls the frame otherwise then and does not find it.
+    OpenSim goes through the names in the order of :func:`names_on_axes` and makes up a coordinate
+    for each that the joint does not declare. It fails if the one made up does not come right after
+    those declared, if no axis names any, and if it would have to put declared coordinates in
+    another order while their number is not that of the names. Measured on 1,200 random joints. A
+    name that no component may have is refused as well, and one that a frame of the joint has:
+    OpenSim calls the frame otherwise then and does not find it.
     """
     # OpenSim has renamed the second of a name by then, so that no axis names it.
     declared: list[str] = []
     for coordinate in coordinates_of(joint):
-        declared.append(coordinate.name if coordinate.name not in declared else f"{coordinate.name}_{len(declared)}/")
+        declared.append(
+            coordinate.name
+            if coordinate.name not in declared
+            else f"{coordinate.name}_{len(declared)}/"
+        )
     names = names_on_axes(joint)
     if any(frame.name in names and frame.name not in declared for frame in joint.frames):
         # The coordinate that is made up takes the name of the frame.
@@ -64,5 +69,6 @@ def made_up_paths(subject: Subject) -> set[str]:
         f"{subject.path(joint)}/{name}"
         for joint in subject.named("CustomJoint")
         if not axes_refused(joint)
-        for name in set(names_on_axes(joint)) - {coordinate.name for coordinate in coordinates_of(joint)}
+        for name in set(names_on_axes(joint))
+        - {coordinate.name for coordinate in coordinates_of(joint)}
     }

@@ -34,7 +34,9 @@ def without_baseline(path: str | Path, report: Report) -> Report:
         data = json.loads(read_file(path))
         counts = Counter({tuple(key): int(count) for *key, count in data["findings"]})
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
-        raise OsimliteError("this is no baseline; write one with --write-baseline", file=str(path)) from None
+        raise OsimliteError(
+            "this is no baseline; write one with --write-baseline", file=str(path)
+        ) from None
     kept = []
     for finding in report.findings:
         key = _key(finding)
@@ -50,4 +52,9 @@ def without_baseline(path: str | Path, report: Report) -> Report:
 def _key(finding: Finding) -> tuple[str, str, str, str]:
     file = Path(finding.file).as_posix() if finding.file is not None else ""
     # Where the project lies on this machine is not what another is to know it by.
-    return finding.code, file, finding.component, finding.message.replace(os.path.join(os.getcwd(), ""), "")
+    return (
+        finding.code,
+        file,
+        finding.component,
+        finding.message.replace(os.path.join(os.getcwd(), ""), ""),
+    )

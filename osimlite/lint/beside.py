@@ -36,9 +36,11 @@ def folders_in(folder: Path) -> list[Path]:
     """The folders in a folder."""
     try:
         with os.scandir(folder) as entries:
-            return sorted(Path(entry.path) for entry in entries if entry.is_dir() and not entry.name.startswith("."))[
-                :100
-            ]
+            return sorted(
+                Path(entry.path)
+                for entry in entries
+                if entry.is_dir() and not entry.name.startswith(".")
+            )[:100]
     except OSError:
         return []
 

@@ -1,7 +1,8 @@
 """What was found in files before, so that a file that has not changed need not be checked again.
 
-An entry holds for one text, under one path, by one configuration, with this very osimlite. A file whose times, size and
-place on the disk are those noted has not changed; of another its text tells. Files that the model names may change as
+An entry holds for one text, under one path, by one configuration, with this very osimlite. A file
+whose times, size and place on the disk are those noted has not changed; of another its text tells.
+Files that the model names may change as
 well: an entry notes when each of them was last written, or that it was not there.
 """
 
@@ -52,10 +53,14 @@ class Cache:
                     **rest,
                 }:
                     stamps = dict(map(_outside, outside))
-                    if kept != key or any(self._stamp(path) != stamp for path, stamp in stamps.items()):
+                    if kept != key or any(
+                        self._stamp(path) != stamp for path, stamp in stamps.items()
+                    ):
                         return None
                     why_not = _of(why_not, *[_TEXT] * len(why_not))
-                    known = Report([_finding(file, values) for values in findings], unmeasured=why_not)
+                    known = Report(
+                        [_finding(file, values) for values in findings], unmeasured=why_not
+                    )
                     now = time_ns()
                     if rest.get("file") != _own_stamp(file):
                         if text != text_of(read_file(file)):
@@ -67,7 +72,15 @@ class Cache:
             pass
         return None
 
-    def put(self, file: str, key: str, text: list[object], report: Report, outside: Iterable[str], since: int) -> None:
+    def put(
+        self,
+        file: str,
+        key: str,
+        text: list[object],
+        report: Report,
+        outside: Iterable[str],
+        since: int,
+    ) -> None:
         """Keep what was found.
 
         Args:
@@ -113,9 +126,18 @@ def key_of(file: str, config: Config) -> str:
     severity = sorted((word, str(level)) for word, level in config.severity.items())
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
     setting = (
-        digest_of_code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths, thresholds,
-        [(path, stamped(path)) for path in config.classes], config.target_version, absent("numpy"),
-    )  # fmt: skip
+        digest_of_code(),
+        file,
+        os.getcwd(),
+        config.select,
+        config.ignore,
+        severity,
+        config.mesh_paths,
+        thresholds,
+        [(path, stamped(path)) for path in config.classes],
+        config.target_version,
+        absent("numpy"),
+    )
     return ascii(setting)
 
 
@@ -179,20 +201,33 @@ def _outside(values: Any) -> tuple[str, Stamp]:
 def _values(finding: Finding) -> list[object]:
     fix = finding.fix
     return [
-        finding.code, finding.name, finding.severity.value, finding.message, finding.line, finding.column,
-        finding.length, finding.component, finding.suggestion,
-        None if fix is None else [fix.safe, [[edit.start, edit.end, edit.text] for edit in fix.edits]],
-    ]  # fmt: skip
+        finding.code,
+        finding.name,
+        finding.severity.value,
+        finding.message,
+        finding.line,
+        finding.column,
+        finding.length,
+        finding.component,
+        finding.suggestion,
+        None
+        if fix is None
+        else [fix.safe, [[edit.start, edit.end, edit.text] for edit in fix.edits]],
+    ]
 
 
 def _finding(file: str, values: Any) -> Finding:
     """The finding that `_values` made a list of; TypeError for anything else."""
-    code, name, severity, message, line, column, length, component, suggestion, fix = _of(values, *_FINDING)
+    code, name, severity, message, line, column, length, component, suggestion, fix = _of(
+        values, *_FINDING
+    )
     place = [number for number in (line, column) if number is not None]
     if len(place) == 1 or min(*place, length, length) < 1:
         raise TypeError
     level = Severity(severity)
-    return Finding(code, name, level, message, file, line, column, length, component, suggestion, _fix(fix))
+    return Finding(
+        code, name, level, message, file, line, column, length, component, suggestion, _fix(fix)
+    )
 
 
 def _fix(values: Any) -> Fix | None:

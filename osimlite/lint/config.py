@@ -27,11 +27,12 @@ class Threshold(NamedTuple):
 class Config:
     """Which rules run, how bad their findings are, and from which numbers on they speak.
 
-    `select` and `ignore` hold codes (``OSIM301``), the beginning of codes (``OSIM3``) or names of rules
-    (``unresolved-reference``); an empty `select` means all. `severity` overrides that of a rule. `mesh_paths` are
-    folders where meshes are looked for besides OpenSim's own places. `thresholds` are numbers by the names that
-    ``osimlite rule CODE`` shows. `classes` are files that declare the classes of plug-ins,
-    `target_version` the release of OpenSim that is to read the files, 4.6 if it is empty.
+    `select` and `ignore` hold codes (``OSIM301``), the beginning of codes (``OSIM3``) or names of
+    rules (``unresolved-reference``); an empty `select` means all. `severity` overrides that of a
+    rule. `mesh_paths` are folders where meshes are looked for besides OpenSim's own places.
+    `thresholds` are numbers by the names that ``osimlite rule CODE`` shows. `classes` are files
+    that declare the classes of plug-ins, `target_version` the release of OpenSim that is to read
+    the files, 4.6 if it is empty.
     """
 
     select: tuple[str, ...] = ()
@@ -67,7 +68,11 @@ class Config:
 
     def value_of(self, threshold: Threshold) -> float:
         """The number that holds for a threshold."""
-        return self.thresholds.get(threshold.name, threshold.default) if self.thresholds else threshold.default
+        return (
+            self.thresholds.get(threshold.name, threshold.default)
+            if self.thresholds
+            else threshold.default
+        )
 
 
 def _check_thresholds(given: Mapping[str, float]) -> None:
@@ -80,8 +85,14 @@ def _check_thresholds(given: Mapping[str, float]) -> None:
             raise OsimliteError(
                 f"no rule has a threshold '{name}'{did_you_mean(name, known)} `osimlite rule CODE` shows what there is"
             )
-        if isinstance(number, bool) or not isinstance(number, int | float) or not 0 <= number < math.inf:
-            raise OsimliteError(f"the threshold '{name}' must be a number, 0 or more, not '{number}'")
+        if (
+            isinstance(number, bool)
+            or not isinstance(number, int | float)
+            or not 0 <= number < math.inf
+        ):
+            raise OsimliteError(
+                f"the threshold '{name}' must be a number, 0 or more, not '{number}'"
+            )
 
 
 def checked_words(words: tuple[str, ...] | list[str] | str | None) -> tuple[str, ...]:
@@ -90,7 +101,11 @@ def checked_words(words: tuple[str, ...] | list[str] | str | None) -> tuple[str,
     Raises:
         OsimliteError: no rule has such a code or name.
     """
-    given = words.split(",") if isinstance(words, str) else [part for word in words or () for part in word.split(",")]
+    given = (
+        words.split(",")
+        if isinstance(words, str)
+        else [part for word in words or () for part in word.split(",")]
+    )
     cleaned = tuple(word.strip() for word in given if word.strip())
     if not cleaned:
         return ()

@@ -6,7 +6,9 @@ from osimlite.schema.base import Object
 from osimlite.schema.facts import REFUSED
 
 
-def consequence(cls: type[Object], name: str, number: float, *, rigid_tendon: bool = False) -> tuple[str, bool]:
+def consequence(
+    cls: type[Object], name: str, number: float, *, rigid_tendon: bool = False
+) -> tuple[str, bool]:
     """What happens with `number`, outside its domain, in a property; and whether that is a failure.
 
     A rigid tendon may have no length, where an elastic one needs some.
@@ -16,7 +18,13 @@ def consequence(cls: type[Object], name: str, number: float, *, rigid_tendon: bo
         facts = base.__dict__.get("facts")
         if facts is None:
             continue
-        case = facts.missing if number != number else facts.zero if number == 0 and not is_allowed else {}
+        case = (
+            facts.missing
+            if number != number
+            else facts.zero
+            if number == 0 and not is_allowed
+            else {}
+        )
         for fates in (case, facts.outside, {REFUSED: facts.refused}):
             for fate, properties in fates.items():
                 if name in properties.split():

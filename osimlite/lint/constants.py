@@ -27,6 +27,8 @@ def constant_value(function: Object | None) -> float | None:
             return None if function.coefficients[0] else function.coefficients[1]
         case PolynomialFunction() if function.coefficients:
             return None if any(function.coefficients[:-1]) else function.coefficients[-1]
-        case SimmSpline() | GCVSpline() | PiecewiseLinearFunction() | PiecewiseConstantFunction() if function.y:
+        case (
+            SimmSpline() | GCVSpline() | PiecewiseLinearFunction() | PiecewiseConstantFunction()
+        ) if function.y:
             return function.y[0] if len({*function.y}) == 1 else None
     return None

@@ -1,8 +1,8 @@
 """Reasons why a model cannot be computed, for the rules that report them.
 
-The linter works without a numeric library. `osimlite.lint.measuring.construction` builds the mechanism
-and the forces, assembles the default pose and evaluates one acceleration. It is loaded by its name,
-and only for models whose construction may fail.
+The linter works without a numeric library. `osimlite.lint.measuring.construction` builds the
+mechanism and the forces, assembles the default pose and evaluates one acceleration. It is loaded by
+its name, and only for models whose construction may fail.
 """
 
 from __future__ import annotations
@@ -112,7 +112,9 @@ def may_fail(subject: Subject) -> bool:
         return True
     if any(item.prescribed for item in subject.named("Coordinate")):
         return True
-    return any(not body.mass > 0.0 or not min(body.inertia[:3]) > 0.0 for body in subject.named("Body"))
+    return any(
+        not body.mass > 0.0 or not min(body.inertia[:3]) > 0.0 for body in subject.named("Body")
+    )
 
 
 def find_obstacles(subject: Subject, *, anew: bool = True) -> str:

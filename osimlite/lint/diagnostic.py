@@ -15,7 +15,8 @@ from osimlite.base.text import visible
 class Severity(StrEnum):
     """How bad a finding is.
 
-    ERROR: OpenSim refuses the model, crashes, computes NaN, or does something other than what the text says.
+    ERROR: OpenSim refuses the model, crashes, computes NaN, or does something other than what the
+        text says.
     WARNING: physically or numerically doubtful. INFO: tidiness, or something worth knowing.
     """
 
@@ -53,9 +54,9 @@ class Fix:
 class Finding:
     """One finding.
 
-    `line` and `column` are 1-based and None for a model made in Python; `length` characters are concerned.
-    `component` is the absolute path of the component, empty where there is none. `suggestion` is the text that would
-    be right in this place.
+    `line` and `column` are 1-based and None for a model made in Python; `length` characters are
+    concerned. `component` is the absolute path of the component, empty where there is none.
+    `suggestion` is the text that would be right in this place.
     """
 
     code: str
@@ -118,9 +119,11 @@ class NotMeasured(NamedTuple):
 class Report:
     """Everything found in one or several models, sorted by file and place.
 
-    `texts` holds the text of each file with findings, for the snippets of a reporter; `checked` counts the files,
-    `known` what a baseline has left out. `unmeasured` has a sentence for each file of which some rules were not
-    measured: its name, which rules, and why. `passed` names the files of a folder that are none of OpenSim's.
+    `texts` holds the text of each file with findings, for the snippets of a reporter; `checked`
+    counts the files, `known` what a baseline has left out. `unmeasured` has a sentence for each
+    file of which some rules were not
+    measured: its name, which rules, and why. `passed` names the files of a folder that are none of
+        OpenSim's.
     """
 
     findings: list[Finding] = field(default_factory=list)
@@ -160,14 +163,17 @@ class Report:
     def missing_package_notes(self) -> list[NotMeasured]:
         """Return a note for each file that was not measured for want of the numeric packages.
 
-        Reports for programs contain these notes; other reasons follow from findings, which they contain anyway.
+        Reports for programs contain these notes; other reasons follow from findings, which they
+        contain anyway.
         """
         notes = []
         for text in self.unmeasured:
             before, _, reason = text.partition(NOT_MEASURED)
             file, _, families = before.rpartition(": rules ")
             if reason.startswith("needs osimlite["):
-                notes.append(NotMeasured(file, families[:6], f"rules {families}{NOT_MEASURED}{reason}"))
+                notes.append(
+                    NotMeasured(file, families[:6], f"rules {families}{NOT_MEASURED}{reason}")
+                )
         return notes
 
     def at_least(self, severity: Severity) -> list[Finding]:

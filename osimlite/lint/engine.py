@@ -1,6 +1,7 @@
 """The registry of rules, and running them.
 
-A rule is a function of the subject and of `found`, which it calls once per finding. Its docstring is its page.
+A rule is a function of the subject and of `found`, which it calls once per finding. Its docstring
+is its page.
 """
 
 from __future__ import annotations
@@ -72,10 +73,11 @@ class FindingSink:
     ) -> None:
         """Note one finding; where it is, is said as in :meth:`Subject.position`, or by `at`.
 
-        A rule that tells faults apart says which it is, by its name; what nobody wants to hear of is passed over.
+        A rule that tells faults apart says which it is, by its name; what nobody wants to hear of
+        is passed over.
 
-        Of a rule about tables or documents that mends, a suggestion is a mend: safe if it is `certain` or differs in
-        letter case alone.
+        Of a rule about tables or documents that mends, a suggestion is a mend: safe if it is
+        `certain` or differs in letter case alone.
         """
         rule, subject = self.rules.get(fault), self.subject
         if rule is None:
@@ -84,7 +86,9 @@ class FindingSink:
             at = subject.position(item, **where)
         line, column, length = at if at is not None else (None, None, 1)
         if rule.mends and rule.about != "model" and suggestion is not None and at is not None:
-            named = where.get("word") or (item and getattr(item, where.get("attribute") or where.get("tag") or "name"))
+            named = where.get("word") or (
+                item and getattr(item, where.get("attribute") or where.get("tag") or "name")
+            )
             fix = fix or subject.replacing(at, named, suggestion, certain=certain)
         elif subject.upgraded:
             # What is said of an upgraded document need not be said of its text.
@@ -115,11 +119,13 @@ Mends = Literal["", "safe", "unsafe", "both"]
 class Rule:
     """One registered rule.
 
-    `severity` is that of its findings unless it says otherwise of one; `before` has another for documents older than a
-    version, where OpenSim does something else with them. `mends` says of what kind its mends are, `about` what it looks
-    at: ``model``, ``table``, ``document`` (a setup, or a part of one), ``measures`` (of the model's paths and muscles),
-    ``construction`` (what stops the computation of a model), ``trial`` (what was measured of a finished one).
-    A rule that tells faults apart is a `group`: there is a rule for each `fault`, all with the same `check`.
+    `severity` is that of its findings unless it says otherwise of one; `before` has another for
+    documents older than a version, where OpenSim does something else with them. `mends` says of
+    what kind its mends are, `about` what it looks
+    at: ``model``, ``table``, ``document`` (a setup, or a part of one), ``measures`` (of the model's
+    paths and muscles), ``construction`` (what stops the computation of a model), ``trial`` (what
+    was measured of a finished one). A rule that tells faults apart is a `group`: there is a rule
+    for each `fault`, all with the same `check`.
     """
 
     code: str
@@ -142,13 +148,16 @@ class Rule:
     def page(self) -> str:
         """What it does, why that is bad, an example and the same mended: the paragraphs of the docstring.
 
-        The example stands there once, its lines marked as in a diff: `-` what fails, `+` what mends it.
+        The example stands there once, its lines marked as in a diff: `-` what fails, `+` what mends
+        it.
         """
         if self.fault is not None:
             return self.fault.page(f"{self.code[:-2]} {self.group}")
         summary, what, why, example = cleandoc(self.check.__doc__ or "").split("\n\n", 3)
         fence, *lines, end = example.splitlines()
-        fails, mended = ("\n".join(line[2:] for line in lines if line[:1] != left_out) for left_out in "+-")
+        fails, mended = (
+            "\n".join(line[2:] for line in lines if line[:1] != left_out) for left_out in "+-"
+        )
         return (
             f"{summary}\n\n## What it does\n{what}\n\n## Why is this bad\n{why}\n\n"
             f"## Example\n{fence}\n{fails}\n{end}\n\n## Use instead\n{fence}\n{mended}\n{end}"
@@ -157,7 +166,11 @@ class Rule:
     @property
     def summary(self) -> str:
         """The first line of the page."""
-        told = self.fault.summary if self.fault is not None else (self.check.__doc__ or "").partition("\n")[0]
+        told = (
+            self.fault.summary
+            if self.fault is not None
+            else (self.check.__doc__ or "").partition("\n")[0]
+        )
         return told.rstrip(".")
 
     def severity_in(self, version: int | None) -> Severity:
@@ -168,7 +181,9 @@ class Rule:
 
     def is_called(self, word: str) -> bool:
         """Whether `word` is this rule's code, the beginning of it, its name or that of its group."""
-        return bool(word) and (self.code.startswith(word.upper()) or word in (self.name, self.group))
+        return bool(word) and (
+            self.code.startswith(word.upper()) or word in (self.name, self.group)
+        )
 
     def matches(self, word: str) -> bool:
         """Whether the rule is called so, or `word` is its family."""
@@ -194,8 +209,8 @@ def rule(
 ) -> Callable[[Check], Check]:
     """Register a function as the rule `code`; the other arguments are those of :class:`Rule`.
 
-    With `faults` it is a group: these are listed as :mod:`osimlite.lint.faults` says, with examples that stand in
-    `frames`.
+    With `faults` it is a group: these are listed as :mod:`osimlite.lint.faults` says, with examples
+    that stand in `frames`.
     """
 
     def register(check: Check) -> Check:
@@ -205,7 +220,12 @@ def rule(
             return check
         _add(_GROUPS, whole)
         for fault in faults_in(faults, frames or {}):
-            own: Any = {"code": code + fault.number, "name": fault.name, "mends": fault.mends, "group": name}
+            own: Any = {
+                "code": code + fault.number,
+                "name": fault.name,
+                "mends": fault.mends,
+                "group": name,
+            }
             _add(_RULES, replace(whole, severity=Severity(fault.severity), fault=fault, **own))
         return check
 
@@ -226,7 +246,9 @@ APART = {"document": ("setup_", "moco"), "table": ("table", "marker_table"), "tr
 @cache
 def all_rules(about: str = "") -> tuple[Rule, ...]:
     """Every rule, by code; if it is said what the rules are about, perhaps none that are about something else."""
-    others = tuple(name for kind, names in APART.items() if about not in ("", kind) for name in names)
+    others = tuple(
+        name for kind, names in APART.items() if about not in ("", kind) for name in names
+    )
     for module in iter_modules(rules.__path__):
         if not module.name.startswith(others):
             import_module(f"{rules.__name__}.{module.name}")
@@ -278,7 +300,9 @@ def use_classes(config: Config | None) -> None:
 
 
 def _subject_of(found: Survey, config: Config | None) -> Subject:
-    if not is_document(found.source.file) or (found.document and isinstance(found.document.top, Model)):
+    if not is_document(found.source.file) or (
+        found.document and isinstance(found.document.top, Model)
+    ):
         return Subject(found, config)
     from osimlite.lint.setup import Setup
 
@@ -289,13 +313,16 @@ def _subject_of(found: Survey, config: Config | None) -> Subject:
 def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Report:
     """Run every rule that is wanted, and return all findings sorted by place.
 
-    Args:
-        subject: what is checked.
-        measure: whether rules run that are about what is measured of paths and muscles, which takes longer.
-        recall: whether they run too where it was measured before.
+    Args: subject: what is checked. measure: whether rules run that are about what is measured of
+        paths and muscles, which takes longer. recall: whether they run too where it was measured
+        before.
     """
     findings: list[Finding] = []
-    wanted = [known for known in all_rules(subject.about) if subject.config.wants(known) and subject.is_for(known)]
+    wanted = [
+        known
+        for known in all_rules(subject.about)
+        if subject.config.wants(known) and subject.is_for(known)
+    ]
     measuring = [known for known in wanted if known.about == MEASURES]
     building = [known for known in wanted if known.about == CONSTRUCTION]
     why_not = unbuilt = ""
@@ -314,7 +341,9 @@ def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Repo
         check(subject, FindingSink(told_apart, subject, findings))
     if subject.sure_until is not None:
         limit = subject.sure_until
-        findings = [f for f in findings if f.code[4] == "0" or (f.line is not None and f.line < limit)]
+        findings = [
+            f for f in findings if f.code[4] == "0" or (f.line is not None and f.line < limit)
+        ]
     comments = subject.suppressions()
     if comments:
         findings = _not_ignored(subject, comments, findings, left_out)
@@ -345,7 +374,9 @@ def _make_ignore_test(comments: list[Suppression]) -> Callable[[Finding], bool]:
 
     def is_ignored(finding: Finding) -> bool:
         near = by_line.get(finding.line or 0, [])
-        return any([comment.covers(finding, _RULES[finding.code].is_called) for comment in (*long, *near)])
+        return any(
+            [comment.covers(finding, _RULES[finding.code].is_called) for comment in (*long, *near)]
+        )
 
     return is_ignored
 

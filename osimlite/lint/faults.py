@@ -6,9 +6,9 @@ They are listed beside the rule::
     - <accuracy>0.5</accuracy>
     + <accuracy>1e-5</accuracy>
 
-The code of a fault is that of its rule and two digits more, so that whatever names the rule (`--select`, a comment, a
-setting, a baseline) means all its faults. `ik` is the document around the lines of the example, and a fault that has
-mends says of what kind: ``error, mends safe, in ik``.
+The code of a fault is that of its rule and two digits more, so that whatever names the rule
+(`--select`, a comment, a setting, a baseline) means all its faults. `ik` is the document around the
+lines of the example, and a fault that has mends says of what kind: ``error, mends safe, in ik``.
 """
 
 from __future__ import annotations
@@ -65,4 +65,12 @@ def faults_in(listed: str, frames: Mapping[str, str]) -> Iterator[Fault]:
     for head, words, lines in parts:
         name, severity, *mends, frame = head[3:].split(", ")
         kind = mends[0].removeprefix("mends ") if mends else ""
-        yield Fault(head[:2], name, severity, kind, frames[frame.removeprefix("in ")], " ".join(words), tuple(lines))
+        yield Fault(
+            head[:2],
+            name,
+            severity,
+            kind,
+            frames[frame.removeprefix("in ")],
+            " ".join(words),
+            tuple(lines),
+        )

@@ -12,7 +12,9 @@ from osimlite.lint.diagnostic import Edit, Finding, Fix, Report
 from osimlite.lint.suffixes import is_table
 
 
-def replaced(source: Source | None, place: Position | None, text: str | None, *, safe: bool = True) -> Fix | None:
+def replaced(
+    source: Source | None, place: Position | None, text: str | None, *, safe: bool = True
+) -> Fix | None:
     """Put another text in a place."""
     if source is None or place is None or text is None:
         return None
@@ -20,7 +22,9 @@ def replaced(source: Source | None, place: Position | None, text: str | None, *,
     return Fix((Edit(start, start + place.length, text),), safe)
 
 
-def suggested(source: Source | None, place: Position, named: object, text: str, *, certain: bool) -> Fix | None:
+def suggested(
+    source: Source | None, place: Position, named: object, text: str, *, certain: bool
+) -> Fix | None:
     """Put what is meant in the place of a name; None if that name is not what stands there."""
     if source is None or not isinstance(named, str) or "'" in text or '"' in text:
         return None
@@ -30,7 +34,9 @@ def suggested(source: Source | None, place: Position, named: object, text: str, 
     return replaced(source, place, escape(text), safe=certain or text.lower() == named.lower())
 
 
-def renamed(source: Source | None, number: int, tag: str | None, *, safe: bool = True) -> Fix | None:
+def renamed(
+    source: Source | None, number: int, tag: str | None, *, safe: bool = True
+) -> Fix | None:
     """Give an element another tag."""
     if source is None or tag is None:
         return None
@@ -112,11 +118,13 @@ def mended(source: Source, report: Report, *, unsafe: bool = False) -> tuple[byt
     return b"".join(pieces), count
 
 
-def mended_pieces(source: Source, report: Report, *, unsafe: bool = False) -> tuple[list[bytes | memoryview], int]:
+def mended_pieces(
+    source: Source, report: Report, *, unsafe: bool = False
+) -> tuple[list[bytes | memoryview], int]:
     """The same in pieces, which of a table are no copies; a document keeps its encoding.
 
-    Raises:
-        OsimliteError: the bytes are in no single encoding, so that they cannot be written back as they were.
+    Raises: OsimliteError: the bytes are in no single encoding, so that they cannot be written back
+        as they were.
     """
     edits, count = edits_of(report.findings, unsafe=unsafe)
     ends = [0, *(edit.end for edit in edits)]
@@ -127,13 +135,19 @@ def mended_pieces(source: Source, report: Report, *, unsafe: bool = False) -> tu
             pieces += data[end : edit.start], edit.text.encode()
         return [*pieces, data[ends[-1] :]], count
     if source.text.encode(source.encoding, "replace") != source.data:
-        raise OsimliteError("the file mixes encodings and cannot be mended; save it as UTF-8 first", file=source.file)
-    parts = (source.text[end : edit.start] + edit.text for end, edit in zip(ends, edits, strict=False))
+        raise OsimliteError(
+            "the file mixes encodings and cannot be mended; save it as UTF-8 first",
+            file=source.file,
+        )
+    parts = (
+        source.text[end : edit.start] + edit.text for end, edit in zip(ends, edits, strict=False)
+    )
     try:
         return ["".join([*parts, source.text[ends[-1] :]]).encode(source.encoding)], count
     except UnicodeEncodeError:
         raise OsimliteError(
-            f"a mend cannot be written in {source.encoding}; save the file as UTF-8 first", file=source.file
+            f"a mend cannot be written in {source.encoding}; save the file as UTF-8 first",
+            file=source.file,
         ) from None
 
 

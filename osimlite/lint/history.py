@@ -19,8 +19,9 @@ NEWEST = "4.6"
 class Later(NamedTuple):
     """What came after a release.
 
-    `format` is the newest version of documents that the release writes. `classes` has the first release of each class
-    by its tag; `properties`, by class and tag, that of each property and the name that it had before, if it had one.
+    `format` is the newest version of documents that the release writes. `classes` has the first
+    release of each class by its tag; `properties`, by class and tag, that of each property and the
+    name that it had before, if it had one.
     """
 
     format: int
@@ -43,9 +44,13 @@ def later_than(release: str) -> Later:
         return Later(CURRENT_VERSION, {}, {})
     import json
 
-    known: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8"))
+    known: dict[str, dict[str, Any]] = json.loads(
+        Path(__file__).with_suffix(".json").read_text(encoding="utf-8")
+    )
     if release not in known["formats"]:
-        raise OsimliteError(f"of OpenSim '{release}' nothing is known; known are {listed(known['formats'], most=20)}")
+        raise OsimliteError(
+            f"of OpenSim '{release}' nothing is known; known are {listed(known['formats'], most=20)}"
+        )
     numbers = _numbers(release)
     return Later(
         known["formats"][release],
@@ -58,9 +63,16 @@ def later_than(release: str) -> Later:
 def new_properties(cls: type[Object], release: str) -> list[NewProperty]:
     """The properties of a class that came after a release."""
     later = later_than(release).properties
-    names = {spec: (f"{spec.declared_in.tag}.{tag}", f"{cls.tag}.{tag}") for tag, spec in field_specs(cls).items()}
+    names = {
+        spec: (f"{spec.declared_in.tag}.{tag}", f"{cls.tag}.{tag}")
+        for tag, spec in field_specs(cls).items()
+    }
     told = ((spec, later.get(base) or later.get(own)) for spec, (base, own) in names.items())
-    return [NewProperty(spec, result[0], "".join(result[1:])) for spec, result in told if result is not None]
+    return [
+        NewProperty(spec, result[0], "".join(result[1:]))
+        for spec, result in told
+        if result is not None
+    ]
 
 
 def _numbers(release: str) -> tuple[int, ...]:

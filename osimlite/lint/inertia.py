@@ -14,8 +14,8 @@ _EDGES = ((0.0, 1.0, 1.0), (1.0, 0.0, 1.0), (1.0, 1.0, 0.0))
 def possible_inertia(inertia: Sequence[float]) -> Inertia:
     """The inertia nearest to `inertia` (xx yy zz xy xz yz) whose principal moments obey the triangle inequality.
 
-    Nearest in the Frobenius norm: the principal axes stay, and the principal moments are projected onto the cone of
-    those that some distribution of mass has.
+    Nearest in the Frobenius norm: the principal axes stay, and the principal moments are projected
+    onto the cone of those that some distribution of mass has.
     """
     moments, axes = principal_axes(inertia)
     nearest = _on_cone(moments)
@@ -41,7 +41,10 @@ def principal_axes(inertia: Sequence[float]) -> tuple[list[float], list[list[flo
         for row in range(3):
             a[row][p], a[row][q] = c * a[row][p] - s * a[row][q], s * a[row][p] + c * a[row][q]
         for column in range(3):
-            a[p][column], a[q][column] = c * a[p][column] - s * a[q][column], s * a[p][column] + c * a[q][column]
+            a[p][column], a[q][column] = (
+                c * a[p][column] - s * a[q][column],
+                s * a[p][column] + c * a[q][column],
+            )
         for row in range(3):
             v[row][p], v[row][q] = c * v[row][p] - s * v[row][q], s * v[row][p] + c * v[row][q]
     return [a[k][k] for k in range(3)], v
@@ -55,7 +58,10 @@ def _on_cone(moments: Sequence[float]) -> list[float]:
         weights = _weights(face, moments)
         if min(weights, default=0.0) < -1e-15 * max(map(abs, moments)):
             continue
-        point = [sum(weight * edge[k] for weight, edge in zip(weights, face, strict=True)) for k in range(3)]
+        point = [
+            sum(weight * edge[k] for weight, edge in zip(weights, face, strict=True))
+            for k in range(3)
+        ]
         distance = math.dist(point, moments)
         if distance < least:
             best, least = point, distance
@@ -64,7 +70,8 @@ def _on_cone(moments: Sequence[float]) -> list[float]:
 
 def _weights(face: Sequence[Sequence[float]], moments: Sequence[float]) -> list[float]:
     """The mixture of some edges that comes nearest to `moments`; the weights may be negative."""
-    # Any two edges have the scalar product 1, and each has 2 with itself: the normal equations are solved at once.
+    # Any two edges have the scalar product 1, and each has 2 with itself: the normal equations are
+    # solved at once.
     products = [sum(a * b for a, b in zip(edge, moments, strict=True)) for edge in face]
     share = sum(products) / (len(face) + 1) if face else 0.0
     return [product - share for product in products]

@@ -44,12 +44,10 @@ def check_files(
 ) -> Report:
     """Check files, each by the settings of its folder and what `given` says besides.
 
-    Args:
-        files: paths, ``-`` for standard input.
-        given: what comes before the settings of the project.
-        cached: whether findings of files that have not changed are taken from the cache, and new ones kept there.
-        processes: how many processes to use; if not given, as many as there is work for.
-        progress: called with the number of files done and that of all.
+    Args: files: paths, ``-`` for standard input. given: what comes before the settings of the
+        project. cached: whether findings of files that have not changed are taken from the cache,
+        and new ones kept there. processes: how many processes to use; if not given, as many as
+        there is work for. progress: called with the number of files done and that of all.
 
     Raises:
         MissingFileError: a file is missing or cannot be read.
@@ -96,7 +94,9 @@ class Texts(dict[str, str]):
 
 def settings_of(file: str) -> Settings:
     """The settings that hold for a file; for standard input those of the working folder."""
-    return settings_for(Path.cwd() if file in ("-", "<stdin>") else resolve_folder(os.path.dirname(file)))
+    return settings_for(
+        Path.cwd() if file in ("-", "<stdin>") else resolve_folder(os.path.dirname(file))
+    )
 
 
 @cache

@@ -1,7 +1,8 @@
 """What is measured of the paths and muscles of a model, for the rules that are about it.
 
-The linter computes without a numeric library. Numbers that need one come from :mod:`osimlite.lint.measuring`, which stands
-above linter and simulation: it is loaded by its name, for a model that has something to measure.
+The linter computes without a numeric library. Numbers that need one come from
+:mod:`osimlite.lint.measuring`, which stands above linter and simulation: it is loaded by its name,
+for a model that has something to measure.
 """
 
 from __future__ import annotations
@@ -92,17 +93,20 @@ class MovingPoint(NamedTuple):
     owner: str  # path of what has the point
     point: str  # its name
     end: Value  # of the range
-    # by how much the coordinate is outside what the functions are given for there (rad or m), 0 if inside
+    # by how much the coordinate is outside what the functions are given for there (rad or m), 0 if
+    # inside
     beyond: float
     moved: float  # how far they let the point move on that way, m
-    rate: float  # of the place over the coordinate that OpenSim goes on with outside the range, m/rad or 1
+    # of the place over the coordinate that OpenSim goes on with outside the range, m/rad or 1
+    rate: float
 
 
 class Start(NamedTuple):
     """A muscle in the state that it starts with, and in equilibrium at the same activation, in the default pose."""
 
     owner: str  # its path
-    lengths: tuple[float, float]  # of the fibers, in optimal fiber lengths; in equilibrium NaN if there is none
+    # of the fibers, in optimal fiber lengths; in equilibrium NaN if there is none
+    lengths: tuple[float, float]
     tensions: tuple[float, float]  # of the tendon, in max_isometric_force
 
 
@@ -119,8 +123,8 @@ class Reach(NamedTuple):
 class Measures(NamedTuple):
     """What is measured of a model."""
 
-    # for each path the places in the mechanism of the coordinates that change its length; in what poses a path is
-    # looked at, those of all paths say
+    # for each path the places in the mechanism of the coordinates that change its length; in what
+    # poses a path is looked at, those of all paths say
     swept: dict[str, tuple[int, ...]]
     wrappings: list[Wrapping]
     jumps: list[Jump]
@@ -177,7 +181,9 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
     known = None if parts is None else recall(parts, subject.kept_in)
     if parts is not None and known is not None:
         still = known.of(parts)
-        if still.swept.keys() == parts.paths.keys() and swept_places(still) == swept_places(known.measures):
+        if still.swept.keys() == parts.paths.keys() and swept_places(still) == swept_places(
+            known.measures
+        ):
             subject.kept[MEASURES] = still
             return ""
     if not anew:

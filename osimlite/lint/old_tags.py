@@ -31,7 +31,10 @@ _OLD: Final[dict[str, dict[str, Successor]]] = {
         for what in ("location", "orientation")
         for side in ("_in_parent", "_in_child", "")
     },
-    "Body": {f"inertia_{axes}": Successor(30500, "inertia") for axes in ("xx", "yy", "zz", "xy", "xz", "yz")}
+    "Body": {
+        f"inertia_{axes}": Successor(30500, "inertia")
+        for axes in ("xx", "yy", "zz", "xy", "xz", "yz")
+    }
     | {
         "Joint": Successor(30501, None, "it belongs in the JointSet of the model"),
         "VisibleObject": Successor(30502, None, "write <attached_geometry>"),
@@ -40,7 +43,8 @@ _OLD: Final[dict[str, dict[str, Successor]]] = {
     "AbstractPathPoint": {"body": Successor(30505, "socket_parent_frame")},
     "ConditionalPathPoint": {"coordinate": Successor(30505, "socket_coordinate")},
     "MovingPathPoint": {
-        f"{axis}_coordinate": Successor(30505, f"socket_{axis}_coordinate") for axis in ("x", "y", "z")
+        f"{axis}_coordinate": Successor(30505, f"socket_{axis}_coordinate")
+        for axis in ("x", "y", "z")
     },
     "ContactGeometry": {
         "body_name": Successor(30505, "socket_frame"),
@@ -60,7 +64,9 @@ _OLD: Final[dict[str, dict[str, Successor]]] = {
     },
     "Probe": {"isDisabled": Successor(30511, "enabled", "with the opposite value")},
     "PointConstraint": {f"body_{n}": Successor(30500, f"socket_body_{n}") for n in (1, 2)},
-    "ConstantDistanceConstraint": {f"body_{n}": Successor(30500, f"socket_body_{n}") for n in (1, 2)},
+    "ConstantDistanceConstraint": {
+        f"body_{n}": Successor(30500, f"socket_body_{n}") for n in (1, 2)
+    },
     "PointToPointSpring": {f"body{n}": Successor(30500, f"socket_body{n}") for n in (1, 2)},
     "TwoFrameLinker": {f"body_{n}": Successor(30505, f"socket_frame{n}") for n in (1, 2)},
     "WeldConstraint": {f"body_{n}": Successor(30505, f"socket_frame{n}") for n in (1, 2)},
@@ -69,7 +75,9 @@ _OLD: Final[dict[str, dict[str, Successor]]] = {
 _UNUSED: Final[dict[str, dict[str, str]]] = {
     "MovingPathPoint": {"location": "its functions give the place"},
     "Component": {"VisibleObject": "OpenSim 4 draws by attached_geometry and Appearance"},
-    "Thelen2003Muscle": {tag: "this muscle has never had it" for tag in ("Vmax", "Vmax0", "damping", "muscle_model")},
+    "Thelen2003Muscle": {
+        tag: "this muscle has never had it" for tag in ("Vmax", "Vmax0", "damping", "muscle_model")
+    },
     "Millard2012EquilibriumMuscle": {
         tag: "this muscle has no such part"
         for tag in (
@@ -96,7 +104,17 @@ _UNUSED: Final[dict[str, dict[str, str]]] = {
 }
 """Tags of real files that OpenSim 4.6 reads in no version of a document, and what does their work."""
 _COMMENTS: Final = frozenset(
-    ("annotation", "annotations", "comment", "comments", "note", "notes", "remark", "remarks", "todo")
+    (
+        "annotation",
+        "annotations",
+        "comment",
+        "comments",
+        "note",
+        "notes",
+        "remark",
+        "remarks",
+        "todo",
+    )
 )
 """Tags, in small letters, of elements that programs write for comments."""
 _CONNECTEE = re.compile(r"(?:socket|connector)_(\w+?)(?:_connectee_name)?s?")

@@ -10,8 +10,12 @@ BEGINNING = 1 << 16
 """Bytes of a file that tell whose it is."""
 
 _ROOT = re.compile(r"<(?:[\w.-]+:)?OpenSimDocument\b")
-_TAGS = re.compile(r"<(?:!--.*?-->|!\[CDATA\[.*?\]\]>|[?!][^>]*+>|(/?)([A-Za-z_][\w:.-]*)[^<>]*?(/?)>)", re.DOTALL)
-_TOP = re.compile(r"\w*(?:Tool|TaskSet|MarkerSet|ExternalLoads|ControlSet|ForceSet|ScaleSet)", re.IGNORECASE)
+_TAGS = re.compile(
+    r"<(?:!--.*?-->|!\[CDATA\[.*?\]\]>|[?!][^>]*+>|(/?)([A-Za-z_][\w:.-]*)[^<>]*?(/?)>)", re.DOTALL
+)
+_TOP = re.compile(
+    r"\w*(?:Tool|TaskSet|MarkerSet|ExternalLoads|ControlSet|ForceSet|ScaleSet)", re.IGNORECASE
+)
 # A name of several words, or of letters and digits, is hardly another program's.
 _COMPOUND = re.compile(r"[a-z][A-Z]|[A-Z]{2}|_|\d")
 
@@ -19,7 +23,8 @@ _COMPOUND = re.compile(r"[a-z][A-Z]|[A-Z]{2}|_|\d")
 def is_ours(beginning: bytes) -> bool:
     """Whether XML that begins so is OpenSim's: by its root, also if that is misspelt, or by what it holds.
 
-    What it holds is OpenSim's if two elements at least are properties of the class that they stand in.
+    What it holds is OpenSim's if two elements at least are properties of the class that they stand
+    in.
     """
     # A file in UTF-16 is read as well, and reported.
     text = beginning.replace(b"\0", b"").decode("latin-1")
@@ -27,7 +32,9 @@ def is_ours(beginning: bytes) -> bool:
         return True
     open_tags: list[str] = []
     evidence: set[tuple[str, str]] = set()
-    for number, (closing, name, empty) in enumerate(result for result in _TAGS.findall(text) if result[1]):
+    for number, (closing, name, empty) in enumerate(
+        result for result in _TAGS.findall(text) if result[1]
+    ):
         tag = name.rpartition(":")[2]
         if closing:
             while open_tags and open_tags.pop() != tag:

@@ -1,7 +1,8 @@
 """What of a text the measures of a model depend on: a part for each path, and one for all that the paths move with.
 
-What was measured is kept by these parts, in memory and, where findings are kept, beside them: a path is measured again
-when its own element has changed, and all of them when anything else has but for what no path depends on.
+What was measured is kept by these parts, in memory and, where findings are kept, beside them: a
+path is measured again when its own element has changed, and all of them when anything else has but
+for what no path depends on.
 """
 
 from __future__ import annotations
@@ -44,7 +45,10 @@ class Known(NamedTuple):
 
     def of(self, parts: Parts) -> Measures:
         """What still holds of it: of the paths that are as they were."""
-        return of_owners(self.measures, {path for path, own in self.paths.items() if parts.paths.get(path) == own})
+        return of_owners(
+            self.measures,
+            {path for path, own in self.paths.items() if parts.paths.get(path) == own},
+        )
 
 
 remembered: OrderedDict[str, Known] = OrderedDict()
@@ -53,7 +57,12 @@ remembered: OrderedDict[str, Known] = OrderedDict()
 def parts_of(subject: Subject) -> Parts | None:
     """The parts of a text; None of what is no text, or does not stand in one file alone."""
     source = subject.source
-    if source is None or not source.well_formed or subject.config.classes or subject.notes_of("include"):
+    if (
+        source is None
+        or not source.well_formed
+        or subject.config.classes
+        or subject.notes_of("include")
+    ):
         return None
     places: list[tuple[int, int, str]] = []
     for cls, items in subject.by_class.items():
@@ -69,11 +78,14 @@ def parts_of(subject: Subject) -> Parts | None:
     rest, paths, seen = blake2b(str(subject.version).encode(), digest_size=16), dict[str, str](), 0
     for start, end, path in sorted(places):
         if start >= seen:
-            # Space around an element says nothing, so that one more does not change what is around it.
+            # Space around an element says nothing, so that one more does not change what is around
+            # it.
             rest.update(source.text[seen:start].strip().encode("utf-8", "replace"))
             seen = end
         if path:
-            paths[path] = blake2b(source.text[start:end].encode("utf-8", "replace"), digest_size=16).hexdigest()
+            paths[path] = blake2b(
+                source.text[start:end].encode("utf-8", "replace"), digest_size=16
+            ).hexdigest()
     rest.update(source.text[seen:].strip().encode("utf-8", "replace"))
     return Parts(rest.hexdigest(), paths)
 

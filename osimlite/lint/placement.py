@@ -1,11 +1,12 @@
 """Where bodies are in a pose, as far as it can be told without the numeric library.
 
-That is not needed to validate. So what takes it has no known place: a joint along a smoothing spline, and one whose
-motion is a rule of its class; and what hangs on another joint, on a prescribed coordinate or on a frame laid through
-stations. Constraints, which may move the model when it is assembled, are left out.
+That is not needed to validate. So what takes it has no known place: a joint along a smoothing
+spline, and one whose motion is a rule of its class; and what hangs on another joint, on a
+prescribed coordinate or on a frame laid through stations. Constraints, which may move the model
+when it is assembled, are left out.
 
-Where centimetres do not matter, smoothing splines are taken for straight lines between their points, and prescribed
-coordinates have the values they are given.
+Where centimetres do not matter, smoothing splines are taken for straight lines between their
+points, and prescribed coordinates have the values they are given.
 """
 
 from __future__ import annotations
@@ -107,16 +108,17 @@ def default_poses(subject: Subject) -> dict[int, Pose]:
 def _ends(subject: Subject) -> dict[int, tuple[End, End]]:
     """Where the frames of the joints are, by the identities of these."""
     links = skeleton(subject).links
-    return {id(link.joint): (on_base(subject, link.parent), on_base(subject, link.child)) for link in links}
+    return {
+        id(link.joint): (on_base(subject, link.parent), on_base(subject, link.child))
+        for link in links
+    }
 
 
 def poses_at(subject: Subject, values: Mapping[str, float] | None = None) -> dict[int, Pose]:
     """The pose in ground of each body (by identity) whose place is known.
 
-    Args:
-        subject: the model.
-        values: those of coordinates, rad or m; others have their default values. Given, places may be off by some
-            centimetres.
+    Args: subject: the model. values: those of coordinates, rad or m; others have their default
+        values. Given, places may be off by some centimetres.
     """
     bones, ends, ways = skeleton(subject), _ends(subject), _ways(subject, values is not None)
     poses: dict[int, Pose] = {id(bones.ground): Pose()}
@@ -125,13 +127,22 @@ def poses_at(subject: Subject, values: Mapping[str, float] | None = None) -> dic
         base = pending.pop(0)
         for link in bones.of(base):
             parent, child = ends[id(link.joint)]
-            if parent is None or child is None or (id(parent[0]) in poses and id(child[0]) in poses):
-                continue
-            if id(link.joint) not in ways or any(
-                isinstance(item, Unknown) or (item.prescribed and values is None) for item in link.joint.coordinates
+            if (
+                parent is None
+                or child is None
+                or (id(parent[0]) in poses and id(child[0]) in poses)
             ):
                 continue
-            across = parent[1].then(_motion(link.joint, ways[id(link.joint)], values)).then(child[1].inverse())
+            if id(link.joint) not in ways or any(
+                isinstance(item, Unknown) or (item.prescribed and values is None)
+                for item in link.joint.coordinates
+            ):
+                continue
+            across = (
+                parent[1]
+                .then(_motion(link.joint, ways[id(link.joint)], values))
+                .then(child[1].inverse())
+            )
             end, step = (child[0], across) if parent[0] is base else (parent[0], across.inverse())
             poses[id(end)] = poses[id(base)].then(step)
             pending.append(end)
@@ -172,7 +183,11 @@ def _ways(subject: Subject, rough: bool) -> dict[int, list[_Way]]:
                     )
                     for (place, axis), function in zip(axes, known, strict=True)
                 ]
-        elif joint.moves is not None and len(words := joint.moves.split()) == len(names) and "r" not in words:
+        elif (
+            joint.moves is not None
+            and len(words := joint.moves.split()) == len(names)
+            and "r" not in words
+        ):
             result[id(joint)] = [
                 _Way(word[0] == "r", (X, Y, Z)["xyz".index(word[1])], [name])
                 for word, name in zip(words, names, strict=True)
@@ -186,7 +201,11 @@ def _function(axis: TransformAxis, rough: bool) -> Function | None:
 
     function: Any = axis.function
     if isinstance(function, GCVSpline):
-        function = PiecewiseLinearFunction.build({"x": function.x, "y": function.y}, set()) if rough else None
+        function = (
+            PiecewiseLinearFunction.build({"x": function.x, "y": function.y}, set())
+            if rough
+            else None
+        )
     count = len(axis.coordinates)
     try:
         # Of several coordinates, which should not be, a curve takes the first.
@@ -198,7 +217,9 @@ def _function(axis: TransformAxis, rough: bool) -> Function | None:
 
 def _motion(joint: Joint, ways: list[_Way], given: Mapping[str, float] | None) -> Pose:
     """The child frame of a joint in its parent frame."""
-    values = {item.name: (given or {}).get(item.name, item.default_value) for item in joint.coordinates}
+    values = {
+        item.name: (given or {}).get(item.name, item.default_value) for item in joint.coordinates
+    }
     axes, place = (X, Y, Z), ZERO
     for way in ways:
         amount = way.amount(values)
@@ -214,9 +235,9 @@ def _motion(joint: Joint, ways: list[_Way], given: Mapping[str, float] | None) -
 def turning_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector]]:
     """What the rotations of a gimbal or custom joint turn about in the default pose.
 
-    Returns:
-        The coordinate of each rotation and its axis, a unit vector in the parent frame. Nothing for a joint of another
-        class, and where a rotation does not follow one coordinate of its own or cannot be computed.
+    Returns: The coordinate of each rotation and its axis, a unit vector in the parent frame.
+        Nothing for a joint of another class, and where a rotation does not follow one coordinate of
+        its own or cannot be computed.
     """
     values = {item.name: item.default_value for item in coordinates_of(joint)}
     result: dict[str, Vector] = {}
@@ -228,4 +249,6 @@ def turning_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector]]:
             return []
         result[way.names[0]] = along_axes(axes, way.axis)
         axes = turned_axes(axes, about_axis(way.axis, *_sine_cosine(way.amount(values))))
-    return list(result.items()) if isinstance(joint, GimbalJoint) or is_a(joint, "CustomJoint") else []
+    return (
+        list(result.items()) if isinstance(joint, GimbalJoint) or is_a(joint, "CustomJoint") else []
+    )

@@ -15,9 +15,10 @@ _TOLD = 50
 class Fault(NamedTuple):
     """Something wrong in the rows: of what kind, in which column of the table, where it is met first, and how often.
 
-    `kind` is ``cell`` (no number), ``row`` (`number` says how many cells, `text` more), ``comment``, ``blank``,
-    ``order``, ``time`` (no number), ``part`` (a part of a marker), ``zero`` (a marker at the origin) or ``frame`` (a
-    wrong number). `others` is how many more columns have such a fault that is not told.
+    `kind` is ``cell`` (no number), ``row`` (`number` says how many cells, `text` more),
+    ``comment``, ``blank``, ``order``, ``time`` (no number), ``part`` (a part of a marker), ``zero``
+    (a marker at the origin) or ``frame`` (a wrong number). `others` is how many more columns have
+    such a fault that is not told.
     """
 
     kind: str
@@ -31,8 +32,12 @@ class Fault(NamedTuple):
 
     def more(self, noun: str = "row") -> str:
         """What to say of further rows, and of further columns."""
-        rows = [f"; so it is in {counted(self.times - 1, f'more {noun}')}"] if self.times > 1 else []
-        columns = [f"; there is such in {counted(self.others, 'more column')}"] if self.others else []
+        rows = (
+            [f"; so it is in {counted(self.times - 1, f'more {noun}')}"] if self.times > 1 else []
+        )
+        columns = (
+            [f"; there is such in {counted(self.others, 'more column')}"] if self.others else []
+        )
         return "".join(rows + columns)
 
 
@@ -40,8 +45,8 @@ class Fault(NamedTuple):
 class Rows:
     """What is known of the rows of a table.
 
-    `cells` is how many cells a row should have, `samples` are the numbers of a few rows (NaN for what is none),
-    `unseen` the markers that no row has.
+    `cells` is how many cells a row should have, `samples` are the numbers of a few rows (NaN for
+    what is none), `unseen` the markers that no row has.
     """
 
     cells: int = 0
@@ -54,7 +59,10 @@ class Rows:
 
     def of(self, *kinds: str) -> list[Fault]:
         """The faults of some kinds, by place; of very many the first."""
-        result = sorted((fault for fault in self.faults.values() if fault.kind in kinds), key=lambda fault: fault.line)
+        result = sorted(
+            (fault for fault in self.faults.values() if fault.kind in kinds),
+            key=lambda fault: fault.line,
+        )
         if len(result) > _TOLD:
             result[_TOLD - 1 :] = [result[_TOLD - 1]._replace(others=len(result) - _TOLD)]
         return result

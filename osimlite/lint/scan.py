@@ -1,7 +1,7 @@
 """Going once through the rows of a table: what is no number, what is missing, and the times.
 
-Rows are looked at by the block. Those that look as rows of numbers do are known by that alone; others are looked at
-cell by cell.
+Rows are looked at by the block. Those that look as rows of numbers do are known by that alone;
+others are looked at cell by cell.
 """
 
 from __future__ import annotations
@@ -35,11 +35,10 @@ _FRAME = re.compile(rb"^[^\t\r\n ]", re.MULTILINE)
 class Scan:
     """Goes once through the rows of a table.
 
-    Args:
-        cells: how many numbers a row has; of a marker table with the number of the frame.
-        parts: how many numbers, with commas between, make a cell.
-        markers: whether these are markers (.trc): a tab ends every cell, cells may be empty, and the time is the
-            second. Else blanks and tabs separate, and the time comes first.
+    Args: cells: how many numbers a row has; of a marker table with the number of the frame. parts:
+        how many numbers, with commas between, make a cell. markers: whether these are markers
+        (.trc): a tab ends every cell, cells may be empty, and the time is the second. Else blanks
+        and tabs separate, and the time comes first.
     """
 
     cells: int
@@ -64,14 +63,18 @@ class Scan:
         for block in _blocks(data, start):
             lines = block.split(b"\n")
             lines.pop()
-            looks, zeros = _looks(block, layout) if len(block) < _LONGEST else (b"!\n" * len(lines), False)
+            looks, zeros = (
+                _looks(block, layout) if len(block) < _LONGEST else (b"!\n" * len(lines), False)
+            )
             if looks == (whole + b"\n") * len(lines):
                 self._take(lines, [whole] * len(lines), line, zeros)
             else:
                 forms = looks.split(b"\n")
                 # Where markers were not seen, a good row has another form than a whole one.
                 kinds = [
-                    form and (form == whole or (self.markers and _seen(form, self.cells) is not None)) for form in forms
+                    form
+                    and (form == whole or (self.markers and _seen(form, self.cells) is not None))
+                    for form in forms
                 ]
                 for kind, group in groupby(range(len(lines)), kinds.__getitem__):
                     places = list(group)
@@ -95,7 +98,9 @@ class Scan:
         if self.markers:
             times = self._marker_times(lines, line)
             looks = set(forms)
-            rows.unseen.difference_update(*(_seen(form, self.cells) or () for form in looks if rows.unseen))
+            rows.unseen.difference_update(
+                *(_seen(form, self.cells) or () for form in looks if rows.unseen)
+            )
             if zeros or any(b"\t\t" in form for form in looks):
                 for number, (text, form) in enumerate(zip(lines, forms, strict=True)):
                     if b"\t\t" in form or b"\t\t\t" in text.translate(None, b"0.-+"):
@@ -116,7 +121,9 @@ class Scan:
     def _marker_times(self, lines: list[bytes], line: int) -> list[float]:
         """The times of frames, which are looked at; of one without a time the next number after that before."""
         heads = [text.split(b"\t", 2)[:2] for text in lines]
-        if [frame for frame, _ in heads] != [b"%d" % (self._frame + number) for number in range(1, len(heads) + 1)]:
+        if [frame for frame, _ in heads] != [
+            b"%d" % (self._frame + number) for number in range(1, len(heads) + 1)
+        ]:
             for number, (frame, _) in enumerate(heads, line):
                 self._expect_frame(frame.strip(), number)
         else:
@@ -144,7 +151,9 @@ class Scan:
 
     def _samples(self) -> int:
         """How many more rows are samples."""
-        return max(2, min(_SAMPLES, _SAMPLED // max(1, self.cells * self.parts))) - len(self.rows.samples)
+        return max(2, min(_SAMPLES, _SAMPLED // max(1, self.cells * self.parts))) - len(
+            self.rows.samples
+        )
 
     def _numbers(self, text: bytes, read: Callable[[bytes], float]) -> list[float]:
         """The numbers of a row, NaN where there is none."""
@@ -161,14 +170,27 @@ class Scan:
                 self._note("blank", 0, line, 0, b"")
             return
         rows = self.rows
-        if text.lstrip()[:1] in (b"#", b"/", b"%", b";") or (_LETTER.search(text) and not _OF_ROW.search(text)):
+        if text.lstrip()[:1] in (b"#", b"/", b"%", b";") or (
+            _LETTER.search(text) and not _OF_ROW.search(text)
+        ):
             self._note("comment", 0, line, 0, b"")
             return
         cells, count = self._cells_of(text)
         if count != self.cells:
             end = cells[self.cells][0] if count > self.cells else len(text.rstrip())
-            blanks = self.markers and b"\t" not in text and len(text.split(None, self.cells)) == self.cells
-            self._note("row", count, line, end, b"", "; blanks separate them, and tabs must" if blanks else "")
+            blanks = (
+                self.markers
+                and b"\t" not in text
+                and len(text.split(None, self.cells)) == self.cells
+            )
+            self._note(
+                "row",
+                count,
+                line,
+                end,
+                b"",
+                "; blanks separate them, and tabs must" if blanks else "",
+            )
             if blanks:
                 self._expect_frame(text.split(None, 1)[0], line)
                 return
@@ -184,7 +206,9 @@ class Scan:
                     self._order(text, line, value, self._last())
             elif not (self.markers and cell.lower() in (b"", b"nan")):
                 parts = cell.split(b",", self.parts) if self.parts > 1 else [cell]
-                if len(parts) != self.parts or any(number_in(part) != number_in(part) for part in parts):
+                if len(parts) != self.parts or any(
+                    number_in(part) != number_in(part) for part in parts
+                ):
                     self._note("cell", number, line, start, cell)
         if count == self.cells > time:
             self._begin(line)
@@ -192,7 +216,9 @@ class Scan:
             rows.times.append(value if value == value else nextafter(self._last(), inf))
             rows.count += 1
             if self.markers:
-                form = b"\t".join(b"" if cell.lower() in (b"", b"nan") else b"0" for _, cell in cells)
+                form = b"\t".join(
+                    b"" if cell.lower() in (b"", b"nan") else b"0" for _, cell in cells
+                )
                 rows.unseen -= _seen(form, self.cells) or set()
                 self._look_at_markers(text, line)
             if self._samples() > 0:
@@ -234,7 +260,14 @@ class Scan:
         self._note("order", int(time < before), line, start, word, f"{time:.9g} {before:.9g}")
 
     def _note(
-        self, kind: str, number: int, line: int, start: int, cell: bytes, text: str | None = None, times: int = 1
+        self,
+        kind: str,
+        number: int,
+        line: int,
+        start: int,
+        cell: bytes,
+        text: str | None = None,
+        times: int = 1,
     ) -> None:
         faults = self.rows.faults
         if (kind, number) in faults:
@@ -242,7 +275,9 @@ class Scan:
             faults[kind, number] = known._replace(times=known.times + times)
         else:
             told = cell.decode("latin-1") if text is None else text
-            faults[kind, number] = Fault(kind, number, line, start + 1, max(1, len(cell)), told, times)
+            faults[kind, number] = Fault(
+                kind, number, line, start + 1, max(1, len(cell)), told, times
+            )
 
 
 def _looks(block: bytes, layout: Layout) -> tuple[bytes, bool]:
@@ -251,7 +286,11 @@ def _looks(block: bytes, layout: Layout) -> tuple[bytes, bool]:
         block = block.replace(b"\r\n", b"\n")
     if layout is MARKERS and b"N" in block:
         # Twice, since one of two that follow on each other takes the tab from the other.
-        block = block.replace(b"\tNaN\t", b"\t\t").replace(b"\tNaN\t", b"\t\t").replace(b"\tNaN\n", b"\t\n")
+        block = (
+            block.replace(b"\tNaN\t", b"\t\t")
+            .replace(b"\tNaN\t", b"\t\t")
+            .replace(b"\tNaN\n", b"\t\n")
+        )
     return shapes(block, layout)
 
 
@@ -263,7 +302,11 @@ def _seen(form: bytes, cells: int) -> frozenset[int] | None:
         numbers.pop()
     if len(numbers) != cells or set(numbers) - {b"", b"0"}:
         return None
-    return frozenset(marker for marker in range((cells - 2) // 3) if all(numbers[3 * marker + 2 : 3 * marker + 5]))
+    return frozenset(
+        marker
+        for marker in range((cells - 2) // 3)
+        if all(numbers[3 * marker + 2 : 3 * marker + 5])
+    )
 
 
 def _blocks(data: bytes, start: int) -> Iterator[bytes]:
@@ -272,7 +315,11 @@ def _blocks(data: bytes, start: int) -> Iterator[bytes]:
     while size > start and data[size - 1] in b"\r\n" and data[size - 2] in b"\r\n":
         size -= 1
     while start < size:
-        end = data.rfind(b"\n", start, min(start + BLOCK, size)) + 1 or data.find(b"\n", start, size) + 1 or size
+        end = (
+            data.rfind(b"\n", start, min(start + BLOCK, size)) + 1
+            or data.find(b"\n", start, size) + 1
+            or size
+        )
         block = data[start:end]
         yield block if block.endswith(b"\n") else block + b"\n"
         start = end

@@ -81,15 +81,22 @@ def _settings(file: Path, table: dict[str, Any]) -> Settings:
         if key not in _KNOWN:
             every = listed(_KNOWN, most=len(_KNOWN))
             raise OsimliteError(
-                f"there is no setting '{key}'{did_you_mean(key, _KNOWN)} Settings are {every}", file=str(file)
+                f"there is no setting '{key}'{did_you_mean(key, _KNOWN)} Settings are {every}",
+                file=str(file),
             )
     try:
         return Settings(
             file,
             checked_words(_words(table, "select")),
             checked_words(_words(table, "ignore")),
-            {pattern: checked_words(words) for pattern, words in _mapping(table, "per-file-ignores").items()},
-            {checked_words([code])[0]: _severity(word) for code, word in _mapping(table, "severity").items()},
+            {
+                pattern: checked_words(words)
+                for pattern, words in _mapping(table, "per-file-ignores").items()
+            },
+            {
+                checked_words([code])[0]: _severity(word)
+                for code, word in _mapping(table, "severity").items()
+            },
             tuple(str(file.parent.resolve() / path) for path in _words(table, "mesh-paths")),
             _severity(table["fail-on"]) if "fail-on" in table else None,
             Config(thresholds=_mapping(table, "thresholds")).thresholds,

@@ -1,7 +1,7 @@
 """A setup under check: what a tool is told to do, or a set of tasks, loads, markers that a tool reads.
 
-What a setup names is looked for where OpenSim looks for it; a set that a tool reads is checked with the model of the
-tool that names it.
+What a setup names is looked for where OpenSim looks for it; a set that a tool reads is checked with
+the model of the tool that names it.
 """
 
 from __future__ import annotations
@@ -175,13 +175,17 @@ class Setup(Subject):
         here = os.path.realpath(self.file)
         for file, top in self.neighbours:
             folder = os.path.dirname(file)
-            if any(os.path.realpath(os.path.join(folder, name)) == here for name in _files_read_by(top)):
+            if any(
+                os.path.realpath(os.path.join(folder, name)) == here for name in _files_read_by(top)
+            ):
                 yield file, top
 
     @cached_property
     def model_file(self) -> str | None:
         """Where the model is that the tool works on; None if there is no tool, or it names none."""
-        return None if self.tool is None else self._place_by_tool(_model_named_by(self.tool[1]) or "")
+        return (
+            None if self.tool is None else self._place_by_tool(_model_named_by(self.tool[1]) or "")
+        )
 
     @cached_property
     def tree(self) -> Tree | None:  # type: ignore[override]
@@ -217,7 +221,10 @@ class Setup(Subject):
                     spec = spec._replace(kind=names)
                 value = getattr(item, spec.name)
                 if isinstance(value, tuple):
-                    result += [Use(item, owner, spec, word, position) for position, word in enumerate(value)]
+                    result += [
+                        Use(item, owner, spec, word, position)
+                        for position, word in enumerate(value)
+                    ]
                 elif value:
                     result.append(Use(item, owner, spec, value))
         return result
@@ -240,7 +247,9 @@ class Setup(Subject):
         if self.tree is None or self.tool is None:
             return set()
         names = {item.name for item in self.tree.of_class(target).values()}
-        return names | {item.name for _, added in self.added for item in added.walk() if is_a(item, target)}
+        return names | {
+            item.name for _, added in self.added for item in added.walk() if is_a(item, target)
+        }
 
     def is_bound(self, name: str) -> bool:
         """Whether a coordinate of the model is locked, prescribed, or follows from others."""
@@ -272,13 +281,18 @@ class Setup(Subject):
             folder = os.path.dirname(file)
             results = getattr(top, "results_directory", "") or "."
             within = os.path.realpath(os.path.join(folder, results))
-            # Tools that run through time call their tables by their own name, which may begin with that of another.
-            is_own = os.path.dirname(wanted) == within and os.path.basename(wanted).startswith(f"{top.name}_")
+            # Tools that run through time call their tables by their own name, which may begin with
+            # that of another.
+            is_own = os.path.dirname(wanted) == within and os.path.basename(wanted).startswith(
+                f"{top.name}_"
+            )
             if is_own and not wanted.endswith(".osim"):
                 named[len(top.name)] = file
             for item in top.walk():
                 for _, name in files_of(item, "output-file"):
-                    if wanted in (os.path.realpath(os.path.join(place, name)) for place in (folder, within)):
+                    if wanted in (
+                        os.path.realpath(os.path.join(place, name)) for place in (folder, within)
+                    ):
                         return file
         return named[max(named)] if named else None
 
@@ -310,7 +324,9 @@ def motion_of(file: str, tool: Object) -> str:
 
 def members(owner: Any, target: str) -> list[Any]:
     """The objects of a set, or of a list, that are of a class: a text may put anything there."""
-    return [item for item in (owner if isinstance(owner, list) else owner.objects) if is_a(item, target)]
+    return [
+        item for item in (owner if isinstance(owner, list) else owner.objects) if is_a(item, target)
+    ]
 
 
 def _files_read_by(top: Object) -> Iterator[str]:

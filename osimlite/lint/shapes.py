@@ -1,9 +1,10 @@
 """Which lines are rows of numbers, told for many lines at once.
 
-A block of lines becomes one large integer, a byte for each character: a shift by eight bits goes on to the next
-character, and an addition carries a mark over a run of characters to what follows on it. So the rules of how numbers
-are written are checked at hundreds of megabytes a second. The method is that of R. D. Cameron et al., "Bitwise data
-parallelism in regular expression matching" (PACT 2014).
+A block of lines becomes one large integer, a byte for each character: a shift by eight bits goes on
+to the next character, and an addition carries a mark over a run of characters to what follows on
+it. So the rules of how numbers are written are checked at hundreds of megabytes a second. The
+method is that of R. D. Cameron et al., "Bitwise data parallelism in regular expression matching"
+(PACT 2014).
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ class Layout(NamedTuple):
 def _layout(kept: bytes, *more: tuple[bytes, int, int]) -> Layout:
     """A layout in which some separators are kept.
 
-    Some characters are said to follow on each other never, though they may: that tells separators from each other.
+    Some characters are said to follow on each other never, though they may: that tells separators
+    from each other.
     """
     codes, shown = bytearray(256), bytearray(256)
     for characters, what, never in (*_CHARACTERS, *more):
@@ -51,7 +53,9 @@ def _layout(kept: bytes, *more: tuple[bytes, int, int]) -> Layout:
     for value in range(256):
         if value & 2:
             shown[value] = 10 if shown[value ^ 2] == 10 else ord("!")
-    return Layout(bytes(codes), bytes(shown), bytes(value for value in range(256) if not shown[value]))
+    return Layout(
+        bytes(codes), bytes(shown), bytes(value for value in range(256) if not shown[value])
+    )
 
 
 ROWS = _layout(b"", (b"\n", _SPACE, _POWER | _POINT))
@@ -73,8 +77,8 @@ _NO_SEPARATORS = bytes(set(range(256)) - set(b" \t\n"))
 def shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
     """What lines look like: a ``0`` for each number, the separators that are kept, and ``!`` where something is wrong.
 
-    Nothing is wrong with a line without ``!``: its numbers are such as C++ reads (no NaN, no infinity, no hexadecimal
-    digits). A line with one needs to be looked at.
+    Nothing is wrong with a line without ``!``: its numbers are such as C++ reads (no NaN, no
+    infinity, no hexadecimal digits). A line with one needs to be looked at.
 
     Args:
         block: lines, each with its end.
@@ -89,7 +93,9 @@ def shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
     solid = ones ^ spaces
     behind_space = spaces << 8 | 1
     others = solid ^ points
-    runs = (others << 8) - others  # all bits of every other character: a mark that is added is carried to their end
+    runs = (
+        others << 8
+    ) - others  # all bits of every other character: a mark that is added is carried to their end
     # Two characters that must not follow on each other, and two points in one number.
     wrong = (text << 4 | _POWER) & text & fifteens | (points << 8) + runs & points
     powers = text >> 1 & ones if text & twos else 0
@@ -99,7 +105,8 @@ def shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
         wrong |= (powers << 8) + (others << 8) - others & (points | powers)
     last_points = points & (spaces | powers) >> 8
     if last_points:
-        # Before the point must be a digit then: neither point nor sign, and no sign may follow on it.
+        # Before the point must be a digit then: neither point nor sign, and no sign may follow on
+        # it.
         digits = (text >> 4 & solid | points | text & ones) ^ (points | text & ones)
         wrong |= last_points ^ (last_points & digits << 8)
     if layout is ROWS and not wrong and not spaces & behind_space:

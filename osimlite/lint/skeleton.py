@@ -37,7 +37,9 @@ class Skeleton:
     @property
     def complete(self) -> bool:
         """Whether every joint's frames lead to a body."""
-        return all(link.parent_base is not None and link.child_base is not None for link in self.links)
+        return all(
+            link.parent_base is not None and link.child_base is not None for link in self.links
+        )
 
     def pairs(self) -> Iterator[tuple[Link, Component, Component]]:
         """The joints that connect two bodies, with the parent and the child."""
@@ -77,10 +79,10 @@ class Growth(NamedTuple):
     """How OpenSim makes a tree of the bodies of a skeleton."""
 
     loops: list[Link]  # the joints that close loops, in the order of the joints
-    # whether it refuses the model, or crashes, for the bodies that no joint connects to ground. It gives each of
-    # them, or one of each group, a joint to ground. With each joint that it makes it forgets the order of all joints
-    # before, which it then adds to the system last, in the order of the document: too late for offset frames, and for
-    # joints, on the bodies that they carry.
+    # whether it refuses the model, or crashes, for the bodies that no joint connects to ground. It
+    # gives each of them, or one of each group, a joint to ground. With each joint that it makes it
+    # forgets the order of all joints before, which it then adds to the system last, in the order of
+    # the document: too late for offset frames, and for joints, on the bodies that they carry.
     fails: bool
 
 
@@ -88,7 +90,10 @@ class Growth(NamedTuple):
 def growth(subject: Subject) -> Growth:
     """What OpenSim does with a skeleton, as far as its joints lead anywhere."""
     bones = skeleton(subject)
-    ground, masses = subject.path(bones.ground), {subject.path(body): body.mass for body in bones.bodies}
+    ground, masses = (
+        subject.path(bones.ground),
+        {subject.path(body): body.mass for body in bones.bodies},
+    )
     edges = [
         # OpenSim asks an empty joint of the class how many coordinates it has.
         _Edge(
@@ -111,7 +116,9 @@ def growth(subject: Subject) -> Growth:
             break
         edges.append(_Edge(ground, new_base(loose, edges)))
     closing = [edge.link for edge in loops if edge.link is not None]
-    return Growth(closing, any(edge.link is None for edge in edges) and _fails(subject, edges, order))
+    return Growth(
+        closing, any(edge.link is None for edge in edges) and _fails(subject, edges, order)
+    )
 
 
 def _fails(subject: Subject, edges: list[_Edge], order: dict[str, _Edge]) -> bool:
@@ -119,8 +126,12 @@ def _fails(subject: Subject, edges: list[_Edge], order: dict[str, _Edge]) -> boo
     last = max(index for index, edge in enumerate(order.values()) if edge.link is None)
     late = {*paths[:last]}
     frames = chain(subject.named("PhysicalOffsetFrame"), subject.named("StationDefinedFrame"))
-    framed = {subject.path(base) for frame in frames if (base := base_of(subject, frame)) is not None}
-    if not late.isdisjoint(framed) or any(not late.isdisjoint(order[path][:2]) for path in paths[last:]):
+    framed = {
+        subject.path(base) for frame in frames if (base := base_of(subject, frame)) is not None
+    }
+    if not late.isdisjoint(framed) or any(
+        not late.isdisjoint(order[path][:2]) for path in paths[last:]
+    ):
         return True
     carried = {id(edge): path for path, edge in order.items() if path in late}
     for edge in edges:
@@ -141,7 +152,9 @@ def skeleton(subject: Subject) -> Skeleton:
             continue
         parent = subject.target_of(joint, "socket_parent_frame")
         child = subject.target_of(joint, "socket_child_frame")
-        bones.links.append(Link(joint, parent, child, base_of(subject, parent), base_of(subject, child)))
+        bones.links.append(
+            Link(joint, parent, child, base_of(subject, parent), base_of(subject, child))
+        )
     return bones
 
 
@@ -149,7 +162,11 @@ def has_unknown_joints(subject: Subject) -> bool:
     """Whether a joint or a body is of a class that is not known, so that the graph has gaps."""
     model = subject.model
     assert model is not None
-    members: list[Object] = [*model.joint_set.objects, *model.body_set.objects, *model.subcomponents]
+    members: list[Object] = [
+        *model.joint_set.objects,
+        *model.body_set.objects,
+        *model.subcomponents,
+    ]
     return any(isinstance(item, Unknown) for item in [*members, *model.component_set.objects])
 
 
@@ -164,7 +181,9 @@ def base_of(subject: Subject, frame: Component | None) -> Component | None:
         way.add(id(frame))
         if isinstance(frame, StationDefinedFrame):
             station = subject.target_of(frame, "socket_point_a")
-            frame = subject.target_of(station, "socket_parent_frame") if station is not None else None
+            frame = (
+                subject.target_of(station, "socket_parent_frame") if station is not None else None
+            )
         else:
             is_laid = "socket_parent" in type(frame).field_specs()
             frame = subject.target_of(frame, "socket_parent") if is_laid else None

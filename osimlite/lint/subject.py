@@ -49,8 +49,9 @@ def once(make: Callable[Concatenate[S, P], Made]) -> Callable[Concatenate[S, P],
 class Subject(Checked):
     """One model under check. `source` is None for a model made in Python, `model` for a text that cannot be read.
 
-    `top` is the object at the top of the document, whatever it is; `kept_in` the folder for what is measured of it. If
-    there was no machine code to measure it with, it `is_unsettled`: the next check may find more.
+    `top` is the object at the top of the document, whatever it is; `kept_in` the folder for what is
+    measured of it. If there was no machine code to measure it with, it `is_unsettled`: the next
+    check may find more.
     """
 
     def __init__(self, found: Survey | Model, config: Config | None = None) -> None:
@@ -84,7 +85,10 @@ class Subject(Checked):
     def _is_sure(self, note: Note) -> bool:
         """Whether a note is about what stands before a syntax error; only there elements are numbered rightly."""
         assert self.source is not None and self.sure_until is not None
-        return note.number < len(self.source.spans) and self.source.of_tag(note.number).line < self.sure_until
+        return (
+            note.number < len(self.source.spans)
+            and self.source.of_tag(note.number).line < self.sure_until
+        )
 
     def is_for(self, rule: Rule) -> bool:
         """Whether a rule has anything to look at; of a text with a syntax error only what is said in one place."""
@@ -113,14 +117,16 @@ class Subject(Checked):
     @cached_property
     def folder(self) -> Path | None:
         """The folder of the file, None for a model that is in no file."""
-        return Path(self.file).parent if self.file is not None and Path(self.file).is_file() else None
+        return (
+            Path(self.file).parent if self.file is not None and Path(self.file).is_file() else None
+        )
 
     @cached_property
     def tree(self) -> Tree:
         """The component tree."""
         assert self.model is not None
-        # A model that was read for this check alone is not tied to its tree in a cycle, which only the garbage
-        # collector could undo.
+        # A model that was read for this check alone is not tied to its tree in a cycle, which only
+        # the garbage collector could undo.
         return self.model.tree() if self.source is None else Tree(self.model)
 
     @property
@@ -215,7 +221,11 @@ class Subject(Checked):
 
     def notes_of(self, kind: str) -> list[tuple[Note, Object]]:
         """What the reader noticed of a kind about objects, with the objects."""
-        return [(note, note.owner) for note in self.notes if note.kind == kind and note.owner is not None]
+        return [
+            (note, note.owner)
+            for note in self.notes
+            if note.kind == kind and note.owner is not None
+        ]
 
     def noted(self, item: Object, spec: FieldSpec) -> bool:
         """Whether the reader noticed something about the text of this property."""
@@ -223,7 +233,11 @@ class Subject(Checked):
 
     @cached_property
     def _noted(self) -> set[tuple[int, str]]:
-        return {(id(note.owner), note.spec.name) for note in self.notes if note.owner is not None and note.spec}
+        return {
+            (id(note.owner), note.spec.name)
+            for note in self.notes
+            if note.owner is not None and note.spec
+        }
 
     def element_of(self, item: Object, tag: str) -> int | None:
         """The number of the element that gives a property of an object."""
@@ -243,12 +257,10 @@ class Subject(Checked):
     ) -> Position | None:
         """Where something is in the text.
 
-        Args:
-            item: the object concerned; alone, its start tag.
-            tag: a property of it: its text, or the object's start tag where the property is not given.
-            word: the `nth` occurrence of this word in that text.
-            attribute: the value of an attribute instead.
-            number: the number of an element, in place of `item`.
+        Args: item: the object concerned; alone, its start tag. tag: a property of it: its text, or
+            the object's start tag where the property is not given. word: the `nth` occurrence of
+            this word in that text. attribute: the value of an attribute instead. number: the number
+            of an element, in place of `item`.
         """
         if self.source is None:
             return None
@@ -279,7 +291,9 @@ class Subject(Checked):
         if folder is None or self.model is None:
             return []
         # OpenSim looks for data files in the working folder as well.
-        places = [os.path.abspath(folder / place) for place in (".", "Geometry", *self.config.mesh_paths)]
+        places = [
+            os.path.abspath(folder / place) for place in (".", "Geometry", *self.config.mesh_paths)
+        ]
         places.append(os.getcwd())
         result: dict[str, None] = {}
         for cls, items in self.by_class.items():
@@ -307,7 +321,9 @@ class Subject(Checked):
         if self.source is None:
             return None
         result = self.source.attributes_of(number).get(name)
-        return self.source.position(result.start, len(name)) if result else self.source.of_tag(number)
+        return (
+            self.source.position(result.start, len(name)) if result else self.source.of_tag(number)
+        )
 
     def _given(self, item: Object | None) -> int | None:
         """The element of an object; of one the text does not give, that of the component above it."""

@@ -36,12 +36,11 @@ def project_files(
 ) -> list[str]:
     """The files that are named, and OpenSim's files with some suffixes below the folders that are named, each once.
 
-    With `only_ours`, XML of other programs is passed over even where it is named. What is passed over is added to
-    `passed`.
+    With `only_ours`, XML of other programs is passed over even where it is named. What is passed
+    over is added to `passed`.
 
-    Raises:
-        MissingFileError: a path is not there; MissingFolderError of one that ends as those of folders do.
-        OsimliteError: there is none in a folder.
+    Raises: MissingFileError: a path is not there; MissingFolderError of one that ends as those of
+        folders do. OsimliteError: there is none in a folder.
     """
     result: list[str] = []
     others: list[str] = [] if passed is None else passed
@@ -57,7 +56,9 @@ def project_files(
                 )
             result += below
             others += sorted({*inside}.difference(below))
-        elif str(path) != "-" and not os.path.lexists(path) and os.path.realpath(path) not in unsaved:
+        elif (
+            str(path) != "-" and not os.path.lexists(path) and os.path.realpath(path) not in unsaved
+        ):
             raise no_such(path, may_be_folder=True)
         elif not only_ours or begins_as_ours(str(path)):
             result.append(str(path))

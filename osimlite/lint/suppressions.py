@@ -44,8 +44,8 @@ class Suppression:
 def suppressions(source: Source) -> list[Suppression]:
     """Every ignoring comment of a text.
 
-    Before the root element it speaks of the whole file, alone on its line of the element that follows, at the end of a
-    line of that line.
+    Before the root element it speaks of the whole file, alone on its line of the element that
+    follows, at the end of a line of that line.
     """
     if "osimlite:" not in source.text:
         return []
@@ -72,7 +72,9 @@ def suppressions_in_header(lines: list[str]) -> list[Suppression]:
     for number, line in enumerate(lines, 1):
         match = _LINE.match(line)
         if match:
-            result.append(Suppression(Position(number, 1, match.end()), _codes(match[1]), 1, LAST_LINE))
+            result.append(
+                Suppression(Position(number, 1, match.end()), _codes(match[1]), 1, LAST_LINE)
+            )
     return result
 
 

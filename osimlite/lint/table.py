@@ -120,7 +120,13 @@ class Table(Checked):
     def label_of(self, number: int) -> str:
         """The label of a column by its number; of a marker file its marker's."""
         place = (number - 2) // 3 if self.is_markers else number
-        return "Time" if place < 0 else self.labels[place].text if place < len(self.labels) else str(number)
+        return (
+            "Time"
+            if place < 0
+            else self.labels[place].text
+            if place < len(self.labels)
+            else str(number)
+        )
 
     def time_at(self, line: int) -> Position:
         """Where the time of the row in a line is."""

@@ -1,6 +1,7 @@
 """A file of a finished trial under check: what was measured of it, for rules that compare this with limits.
 
-The linter computes without a numeric library: the numbers come from :mod:`osimlite.tools.trials`, which stands above.
+The linter computes without a numeric library: the numbers come from :mod:`osimlite.tools.trials`,
+which stands above.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ TRIAL = "trial"
 """What rules are about that need such numbers."""
 
 HICKS = "Hicks et al. 2015"
-"""Is my model good enough? Best practices for verification and validation of musculoskeletal models and simulations of
-movement. J Biomech Eng 137(2), 020905, https://doi.org/10.1115/1.4029304"""
+"""Is my model good enough? Best practices for verification and validation of musculoskeletal models
+and simulations of movement. J Biomech Eng 137(2), 020905, https://doi.org/10.1115/1.4029304
+"""
 OPENSIM = "OpenSim's best practices"
 """Simulation with OpenSim - Best Practices, https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686"""
 CHECKLIST = "OpenSim's checklist"
@@ -34,7 +36,9 @@ GOOD, OKAY, BAD = VERDICTS = ("good", "okay", "bad")
 LEAST = 0.001
 """What is less is not shown with its digits."""
 
-KINDS = {"peak": "the peak of "} | dict.fromkeys(("rms", "rms-translation"), "the root mean square of ")
+KINDS = {"peak": "the peak of "} | dict.fromkeys(
+    ("rms", "rms-translation"), "the root mean square of "
+)
 """What stands before the name of what was measured."""
 
 
@@ -49,7 +53,8 @@ class Number(NamedTuple):
     scale: float = nan  # what a limit may be a part of, in the `unit`; NaN if that is not known
     where: str = ""  # at which time, of which marker, in words
     at: Position | None = None  # where that is in the file
-    is_final: bool = True  # whether the trial goes on with it; else it is worth no more than an info
+    # whether the trial goes on with it; else it is worth no more than an info
+    is_final: bool = True
     side: str = ""  # what else is known, in words
 
 
@@ -104,13 +109,20 @@ class Trial(Checked):
     about: ClassVar[str] = TRIAL
     file: str
 
-    def __init__(self, file: str, data: bytes, numbers: Sequence[Number], config: Config | None = None) -> None:
+    def __init__(
+        self, file: str, data: bytes, numbers: Sequence[Number], config: Config | None = None
+    ) -> None:
         super().__init__(config)
         self.file, self.data, self.numbers = file, data, numbers
         self.verdicts: list[Verdict] = []
 
     def judge(
-        self, found: FindingSink, limits: Sequence[Threshold | float], source: str, advice: str, kind: str = ""
+        self,
+        found: FindingSink,
+        limits: Sequence[Threshold | float],
+        source: str,
+        advice: str,
+        kind: str = "",
     ) -> None:
         """Compare the numbers of a rule with limits: beyond the largest they are bad, beyond the least they are okay.
 
@@ -126,7 +138,8 @@ class Trial(Checked):
             if number.rule != rule.name or number.kind != kind:
                 continue
             parts = [
-                self.config.value_of(limit) * (number.scale / 100.0 if limit.unit == "%" != number.unit else 1.0)
+                self.config.value_of(limit)
+                * (number.scale / 100.0 if limit.unit == "%" != number.unit else 1.0)
                 if isinstance(limit, Threshold)
                 else limit
                 for limit in limits
@@ -139,10 +152,20 @@ class Trial(Checked):
             verdict = GOOD if number.value <= good else OKAY if number.value <= bad else BAD
             self.verdicts.append(
                 Verdict(
-                    rule.code, rule.name, f"{KINDS.get(kind, '')}{number.of}", number.value, number.unit, good, bad,
-                    verdict, source, number.where, self.file, number.at.line if number.at is not None else None,
+                    rule.code,
+                    rule.name,
+                    f"{KINDS.get(kind, '')}{number.of}",
+                    number.value,
+                    number.unit,
+                    good,
+                    bad,
+                    verdict,
+                    source,
+                    number.where,
+                    self.file,
+                    number.at.line if number.at is not None else None,
                 )
-            )  # fmt: skip
+            )
             if verdict != GOOD:
                 unit = "" if not number.unit else f" {number.unit}" if number.unit != "%" else " %"
                 more = f", and more than {bad:.3g}{unit} is bad" if bad > good else ""

@@ -23,7 +23,10 @@ def a(noun: str) -> str:
 def quantity(value: float | tuple[float, ...], unit: str | None = None) -> str:
     """A number, or several, in few digits and with the unit."""
     values = value if isinstance(value, tuple) else (value,)
-    text = " ".join(f"{item:.6g}" if item == item and abs(item) != float("inf") else shortest(item) for item in values)
+    text = " ".join(
+        f"{item:.6g}" if item == item and abs(item) != float("inf") else shortest(item)
+        for item in values
+    )
     return f"{text} {unit}" if unit else text
 
 

@@ -19,11 +19,22 @@ UPPER, FORE = 0.3, 0.25
 def arm() -> Model:
     """A forearm with a weight, a muscle that bends the elbow and one that stretches it."""
     model = Model(name="Arm", gravity=(0.0, -9.80665, 0.0))
-    fore = Body(name="forearm", mass=2.0, mass_center=(0.0, -0.15, 0.0), inertia=(0.02, 0.002, 0.02, 0.0, 0.0, 0.0))
-    fore.attached_geometry.append(Cylinder(name="bone", radius=0.03, half_height=FORE / 2.0, socket_frame=".."))
+    fore = Body(
+        name="forearm",
+        mass=2.0,
+        mass_center=(0.0, -0.15, 0.0),
+        inertia=(0.02, 0.002, 0.02, 0.0, 0.0, 0.0),
+    )
+    fore.attached_geometry.append(
+        Cylinder(name="bone", radius=0.03, half_height=FORE / 2.0, socket_frame="..")
+    )
     model.add(fore)
     elbow = Coordinate(name="elbow", range=(0.0, pi * 0.8), default_value=0.5)
-    model.add(PinJoint(name="elbow", coordinates=[elbow]).between(model.ground, fore, at=(0.0, 1.0 - UPPER, 0.0)))
+    model.add(
+        PinJoint(name="elbow", coordinates=[elbow]).between(
+            model.ground, fore, at=(0.0, 1.0 - UPPER, 0.0)
+        )
+    )
     for name, force, fiber, slack, points in (
         ("flexor", 900.0, 0.12, 0.20, (("ground", 0.03, 0.98), ("forearm", 0.02, -0.05))),
         ("extensor", 900.0, 0.12, 0.15, (("ground", -0.03, 0.98), ("forearm", -0.02, 0.02))),
@@ -36,8 +47,14 @@ def arm() -> Model:
             )
         model.add(
             DeGrooteFregly2016Muscle(
-                name=name, max_isometric_force=force, optimal_fiber_length=fiber, tendon_slack_length=slack,
-                ignore_tendon_compliance=True, fiber_damping=0.01, default_activation=0.05, geometry_path=path,
+                name=name,
+                max_isometric_force=force,
+                optimal_fiber_length=fiber,
+                tendon_slack_length=slack,
+                ignore_tendon_compliance=True,
+                fiber_damping=0.01,
+                default_activation=0.05,
+                geometry_path=path,
             )
-        )  # fmt: skip
+        )
     return model

@@ -1,8 +1,8 @@
 """The exercise "Building a Dynamic Walker": a passive walker with knees on a slope.
 
-Six rigid bodies: the platform, and on it a pelvis that carries two legs of thigh and shank, hinged in the sagittal
-plane. Nothing drives it but gravity; it stands on its feet, knees and hips through Hunt-Crossley contact, and
-coordinate limit forces stop hips and knees.
+Six rigid bodies: the platform, and on it a pelvis that carries two legs of thigh and shank, hinged
+in the sagittal plane. Nothing drives it but gravity; it stands on its feet, knees and hips through
+Hunt-Crossley contact, and coordinate limit forces stop hips and knees.
 """
 
 from __future__ import annotations
@@ -23,15 +23,16 @@ SIDES = (("Right", 1.0, 30.0), ("Left", -1.0, -10.0))
 
 
 def dynamic_walker(
-    pelvis_width: float = 0.20, thigh_length: float = 0.40, shank_length: float = 0.435, slope: float = 10.0
+    pelvis_width: float = 0.20,
+    thigh_length: float = 0.40,
+    shank_length: float = 0.435,
+    slope: float = 10.0,
 ) -> Model:
     """Build the walker of the exercise "Building a Dynamic Walker": passive, with knees, on a slope.
 
-    Args:
-        pelvis_width: distance from the middle of the pelvis to each hip (m); the exercise's pelvisWidth.
-        thigh_length: from hip to knee (m).
-        shank_length: from knee to foot (m).
-        slope: how far the platform falls towards +x (deg).
+    Args: pelvis_width: distance from the middle of the pelvis to each hip (m); the exercise's
+        pelvisWidth. thigh_length: from hip to knee (m). shank_length: from knee to foot (m). slope:
+        how far the platform falls towards +x (deg).
     """
     model = Model(name="DynamicWalkerModel", gravity=(0.0, -9.80665, 0.0))
 
@@ -41,16 +42,25 @@ def dynamic_walker(
     pelvis.attach(Sphere(radius=pelvis_width))
     thighs, shanks = [], []
     for side, _, _ in SIDES:
-        thighs.append(model.add(Body(name=f"{side}Thigh", mass=1.0, inertia=(2.0, 2.0, 0.02, 0.0, 0.0, 0.0))))
+        thighs.append(
+            model.add(Body(name=f"{side}Thigh", mass=1.0, inertia=(2.0, 2.0, 0.02, 0.0, 0.0, 0.0)))
+        )
     for side, _, _ in SIDES:
-        shanks.append(model.add(Body(name=f"{side}Shank", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))))
+        shanks.append(
+            model.add(Body(name=f"{side}Shank", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+        )
     for segment in (*thighs, *shanks):
         segment.attach(Ellipsoid(radii=(thigh_length / 10, thigh_length / 2, thigh_length / 10)))
 
     incline = Coordinate(
-        name="platform_rz", range=(radians(-100), radians(100)), default_value=radians(-slope), locked=True
+        name="platform_rz",
+        range=(radians(-100), radians(100)),
+        default_value=radians(-slope),
+        locked=True,
     )
-    model.add(PinJoint(name="PlatformToGround", coordinates=[incline]).between(model.ground, platform))
+    model.add(
+        PinJoint(name="PlatformToGround", coordinates=[incline]).between(model.ground, platform)
+    )
     model.add(
         PlanarJoint(
             name="PelvisToPlatform",
@@ -59,23 +69,46 @@ def dynamic_walker(
             coordinates=[
                 Coordinate(name="Pelvis_rz", range=(radians(-180), radians(180))),
                 Coordinate(name="Pelvis_tx", range=(0.0, 10.0)),
-                Coordinate(name="Pelvis_ty", range=(-5.0, 5.0), default_value=thigh_length + shank_length),
+                Coordinate(
+                    name="Pelvis_ty", range=(-5.0, 5.0), default_value=thigh_length + shank_length
+                ),
             ],
         )
     )
     hips, knees = [], []
     for (side, z, angle), thigh in zip(SIDES, thighs, strict=True):
-        hip = Coordinate(name=f"{side[0]}Hip_rz", range=(radians(-100), radians(100)), default_value=radians(angle))
+        hip = Coordinate(
+            name=f"{side[0]}Hip_rz",
+            range=(radians(-100), radians(100)),
+            default_value=radians(angle),
+        )
         joint = PinJoint(name=f"{side}ThighToPelvis", coordinates=[hip])
-        model.add(joint.between(pelvis, thigh, at=(0.0, 0.0, z * pelvis_width), child_at=(0.0, thigh_length / 2, 0.0)))
+        model.add(
+            joint.between(
+                pelvis,
+                thigh,
+                at=(0.0, 0.0, z * pelvis_width),
+                child_at=(0.0, thigh_length / 2, 0.0),
+            )
+        )
         hips.append(hip)
     for (side, _, _), thigh, shank in zip(SIDES, thighs, shanks, strict=True):
-        knee = Coordinate(name=f"{side[0]}Knee_rz", range=(radians(-100), 0.0), default_value=radians(-30))
+        knee = Coordinate(
+            name=f"{side[0]}Knee_rz", range=(radians(-100), 0.0), default_value=radians(-30)
+        )
         joint = PinJoint(name=f"{side}ShankToThigh", coordinates=[knee])
-        model.add(joint.between(thigh, shank, at=(0.0, -thigh_length / 2, 0.0), child_at=(0.0, shank_length / 2, 0.0)))
+        model.add(
+            joint.between(
+                thigh,
+                shank,
+                at=(0.0, -thigh_length / 2, 0.0),
+                child_at=(0.0, shank_length / 2, 0.0),
+            )
+        )
         knees.append(knee)
 
-    # The exercise turns the plane by -1.57, not by a right angle, and lays it at half the brick's height.
+    # The exercise turns the plane by -1.57, not by a right angle, and lays it at half the brick's
+    # height.
     ground_plane = model.add(
         ContactHalfSpace(
             name="PlatformContact",
@@ -85,7 +118,10 @@ def dynamic_walker(
         )
     )
     spheres = [
-        *(_sphere(f"{side[0]}HipContact", pelvis, (0.0, 0.0, z * pelvis_width)) for side, z, _ in SIDES),
+        *(
+            _sphere(f"{side[0]}HipContact", pelvis, (0.0, 0.0, z * pelvis_width))
+            for side, z, _ in SIDES
+        ),
         *(
             _sphere(f"{side[0]}KneeContact", shank, (0.0, thigh_length / 2, 0.0))
             for (side, _, _), shank in zip(SIDES, shanks, strict=True)

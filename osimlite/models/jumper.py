@@ -1,11 +1,13 @@
 """A human who jumps by the muscles of both legs, in the sagittal plane.
 
-In the style of the Dynamic Jumper that comes with OpenSim, and made anew. Masses, mass centers and radii of gyration
-are near those that D. A. Winter gives for a human of 75 kg and 1.78 m (Biomechanics and Motor Control of Human
-Movement), strengths and fiber lengths near those of OpenSim's Gait10dof18musc. Each tendon is as long as it must be for
-the fibers to be at their optimal length in a pose from the middle of the muscle's range.
+In the style of the Dynamic Jumper that comes with OpenSim, and made anew. Masses, mass centers and
+radii of gyration are near those that D. A. Winter gives for a human of 75 kg and 1.78 m
+(Biomechanics and Motor Control of Human Movement), strengths and fiber lengths near those of
+OpenSim's Gait10dof18musc. Each tendon is as long as it must be for the fibers to be at their
+optimal length in a pose from the middle of the muscle's range.
 
-The frame of the torso stands between the hips, those of femur, tibia and foot in hip, knee and ankle.
+The frame of the torso stands between the hips, those of femur, tibia and foot in hip, knee and
+ankle.
 """
 
 from __future__ import annotations
@@ -94,8 +96,8 @@ MUSCLES = {
 def jumper(driven: bool = True) -> Model:
     """Build the human who squats and jumps by the muscles of the legs.
 
-    Args:
-        driven: whether the controller is there that makes it jump; without it, the muscles are there to be driven.
+    Args: driven: whether the controller is there that makes it jump; without it, the muscles are
+        there to be driven.
     """
     model = Model(name="Jumper", gravity=(0.0, -9.80665, 0.0))
     model.model_visual_preferences.model_display_hints.show_wrap_geometry = False
@@ -106,8 +108,14 @@ def jumper(driven: bool = True) -> Model:
     turn = Coordinate(name="pelvis_tilt", range=(-pi, pi), default_value=radians(PELVIS_TILT))
     forward = Coordinate(name="pelvis_tx", range=(-5.0, 5.0))
     up = Coordinate(name="pelvis_ty", range=(-1.0, 3.0), default_value=PELVIS_HEIGHT)
-    model.add(PlanarJoint(name="ground_pelvis", coordinates=[turn, forward, up]).between(model.ground, torso))
-    floor = model.add(ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0.0, 0.0, -pi / 2)))
+    model.add(
+        PlanarJoint(name="ground_pelvis", coordinates=[turn, forward, up]).between(
+            model.ground, torso
+        )
+    )
+    floor = model.add(
+        ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0.0, 0.0, -pi / 2))
+    )
     for side, z in SIDES:
         _add_leg(model, torso, side, z, floor)
     if driven:
@@ -141,8 +149,20 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
     femur = _body(model, f"femur_{side}", 7.5, (0.0, -0.186, 0.0), 0.145)
     tibia = _body(model, f"tibia_{side}", 3.5, (0.0, -0.186, 0.0), 0.059)
     foot = _body(model, f"foot_{side}", 1.1, (0.05, -0.04, 0.0), 0.005)
-    _draw(model, femur, f"thigh_{side}", (0.0, -THIGH / 2, 0.0), Ellipsoid(radii=(0.03, THIGH / 2 + 0.02, 0.03)))
-    _draw(model, tibia, f"shank_{side}", (0.0, -SHANK / 2, 0.0), Ellipsoid(radii=(0.025, SHANK / 2 + 0.02, 0.025)))
+    _draw(
+        model,
+        femur,
+        f"thigh_{side}",
+        (0.0, -THIGH / 2, 0.0),
+        Ellipsoid(radii=(0.03, THIGH / 2 + 0.02, 0.03)),
+    )
+    _draw(
+        model,
+        tibia,
+        f"shank_{side}",
+        (0.0, -SHANK / 2, 0.0),
+        Ellipsoid(radii=(0.025, SHANK / 2 + 0.02, 0.025)),
+    )
     _draw(model, foot, f"shoe_{side}", (0.05, -0.045, 0.0), Ellipsoid(radii=(0.13, 0.025, 0.035)))
     for name, coordinate, parent, child, at, low, high in (
         ("hip", "hip_flexion", torso, femur, (0.0, 0.0, z), -15.0, 120.0),
@@ -150,9 +170,13 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
         ("ankle", "ankle_angle", tibia, foot, (0.0, -SHANK, 0.0), -45.0, 35.0),
     ):
         angle = Coordinate(
-            name=f"{coordinate}_{side}", range=(radians(low), radians(high)), default_value=radians(SQUAT[coordinate])
+            name=f"{coordinate}_{side}",
+            range=(radians(low), radians(high)),
+            default_value=radians(SQUAT[coordinate]),
         )
-        model.add(PinJoint(name=f"{name}_{side}", coordinates=[angle]).between(parent, child, at=at))
+        model.add(
+            PinJoint(name=f"{name}_{side}", coordinates=[angle]).between(parent, child, at=at)
+        )
         model.add(
             CoordinateLimitForce(
                 name=f"{name}_limit_{side}",
@@ -168,7 +192,9 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
     for name, x, radius in (("heel", -0.05, 0.03), ("ball", 0.15, 0.025)):
         place = (x, radius - ANKLE, 0.0)
         _add_contact(
-            model, ContactSphere(name=f"{name}_{side}", socket_frame=foot, location=place, radius=radius), floor
+            model,
+            ContactSphere(name=f"{name}_{side}", socket_frame=foot, location=place, radius=radius),
+            floor,
         )
     for body, name, at, radius, quadrant in (
         (femur, "hip_back", (0.0, 0.0, 0.0), 0.06, "-x"),
@@ -176,16 +202,29 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
         (femur, "knee", (0.0, -THIGH, 0.0), 0.042, "+x"),
     ):
         body.wrap_object_set.objects.append(
-            WrapCylinder(name=f"{name}_{side}", translation=at, radius=radius, length=0.2, quadrant=quadrant)
+            WrapCylinder(
+                name=f"{name}_{side}", translation=at, radius=radius, length=0.2, quadrant=quadrant
+            )
         )
-    places = {"torso": (torso, z), "femur": (femur, 0.0), "tibia": (tibia, 0.0), "foot": (foot, 0.0)}
+    places = {
+        "torso": (torso, z),
+        "femur": (femur, 0.0),
+        "tibia": (tibia, 0.0),
+        "foot": (foot, 0.0),
+    }
     for name, muscle in MUSCLES.items():
         _add_muscle(model, f"{name}_{side}", muscle, places, side)
 
 
-def _add_muscle(model: Model, name: str, muscle: Muscle, places: dict[str, tuple[Body, float]], side: str) -> None:
+def _add_muscle(
+    model: Model, name: str, muscle: Muscle, places: dict[str, tuple[Body, float]], side: str
+) -> None:
     points: list[AbstractPathPoint] = [
-        PathPoint(name=f"{name}-P{number}", socket_parent_frame=places[body][0], location=(x, y, places[body][1]))
+        PathPoint(
+            name=f"{name}-P{number}",
+            socket_parent_frame=places[body][0],
+            location=(x, y, places[body][1]),
+        )
         for number, (body, x, y) in enumerate(muscle.path, 1)
     ]
     wraps = [PathWrap(name="pathwrap", wrap_object=f"{muscle.wrap}_{side}")] if muscle.wrap else []
@@ -193,7 +232,9 @@ def _add_muscle(model: Model, name: str, muscle: Muscle, places: dict[str, tuple
         Millard2012EquilibriumMuscle(
             name=name,
             geometry_path=GeometryPath(
-                name="path", path_point_set=PathPointSet(objects=points), path_wrap_set=PathWrapSet(objects=wraps)
+                name="path",
+                path_point_set=PathPointSet(objects=points),
+                path_wrap_set=PathWrapSet(objects=wraps),
             ),
             max_isometric_force=muscle.force,
             optimal_fiber_length=muscle.fiber,
@@ -207,7 +248,9 @@ def _add_muscle(model: Model, name: str, muscle: Muscle, places: dict[str, tuple
 
 def _body(model: Model, name: str, mass: float, center: Vec3, inertia: float) -> Body:
     """Add a body; only the inertia across the plane does something."""
-    body = Body(name=name, mass=mass, mass_center=center, inertia=(inertia, inertia, inertia, 0.0, 0.0, 0.0))
+    body = Body(
+        name=name, mass=mass, mass_center=center, inertia=(inertia, inertia, inertia, 0.0, 0.0, 0.0)
+    )
     return model.add(body)
 
 

@@ -1,6 +1,7 @@
 """A human who walks because a step is cheap: the jumper's body made smooth, and the study of Moco that finds its gait.
 
-Nothing of a walk is given but its speed, how far the trunk may lean, and that the second step mirrors the first.
+Nothing of a walk is given but its speed, how far the trunk may lean, and that the second step
+mirrors the first.
 """
 
 from __future__ import annotations
@@ -60,7 +61,8 @@ def human_walks() -> Model:
             coordinate.range = (radians(limits[0]), radians(limits[1]))
     model = modify(model, muscles="degroote", tendon="rigid", paths="polynomial", contact="smooth")
     for contact in model.components(SmoothSphereHalfSpaceForce):
-        # A shoe and the fat under the heel: softer than what bounces off the ground for a thousandth of a second.
+        # A shoe and the fat under the heel: softer than what bounces off the ground for a
+        # thousandth of a second.
         contact.stiffness, contact.dissipation = 1e6, 2.0
         contact.static_friction = contact.dynamic_friction = 0.8
         contact.transition_velocity = 0.2
@@ -82,12 +84,18 @@ def walking_study(model: Model, file: str, guess: str) -> MocoStudy:
     """
     states, controls = _names(model)
     pairs = {
-        kind: [MocoPeriodicityGoalPair(initial_variable=name, final_variable=_mirrored(name)) for name in names]
+        kind: [
+            MocoPeriodicityGoalPair(initial_variable=name, final_variable=_mirrored(name))
+            for name in names
+        ]
         for kind, names in (("state", states), ("control", controls))
     }
     forward = f"{PELVIS}pelvis_tx/value"
     # A muscle that is twice as large takes twice as much energy.
-    sizes = {f"/forceset/{m.name}": m.max_isometric_force * m.optimal_fiber_length for m in _muscles(model)}
+    sizes = {
+        f"/forceset/{m.name}": m.max_isometric_force * m.optimal_fiber_length
+        for m in _muscles(model)
+    }
     mean = sum(sizes.values()) / len(sizes)
     weights = [MocoWeight(name=name, weight=round(size / mean, 3)) for name, size in sizes.items()]
     goals = [
@@ -105,7 +113,11 @@ def walking_study(model: Model, file: str, guess: str) -> MocoStudy:
         ),
         # Without it the feet stamp: what a muscle does not do, the ground does.
         MocoOutputGoal(
-            name="roughness", weight=0.1, output_path="/|com_acceleration", exponent=2, divide_by_displacement=True
+            name="roughness",
+            weight=0.1,
+            output_path="/|com_acceleration",
+            exponent=2,
+            divide_by_displacement=True,
         ),
     ]
     phase = MocoPhase(
@@ -118,7 +130,9 @@ def walking_study(model: Model, file: str, guess: str) -> MocoStudy:
             MocoVariableInfo(name=f"{PELVIS}pelvis_ty/value", bounds=(0.75, 1.1)),
             MocoVariableInfo(name=f"{PELVIS}pelvis_tx/speed", bounds=(0.3, 2.5)),
         ],
-        state_infos_pattern=[MocoVariableInfo(name=".*(flexion|angle)_[rl]/speed", bounds=(-15.0, 15.0))],
+        state_infos_pattern=[
+            MocoVariableInfo(name=".*(flexion|angle)_[rl]/speed", bounds=(-15.0, 15.0))
+        ],
         control_infos_pattern=[MocoVariableInfo(name=".*", bounds=(0.01, 1.0))],
         goals=goals,
     )
@@ -154,7 +168,9 @@ def stepping(model: Model) -> MocoTrajectory:
         owner, _, what = name.rpartition("/")
         values = angles.get(owner.rpartition("/")[2], np.full(21, 0.05))
         columns[name] = np.gradient(values, STEP * part) if what == "speed" else values
-    return MocoTrajectory(STEP * part, columns, {"states": tuple(states), "controls": tuple(controls)})
+    return MocoTrajectory(
+        STEP * part, columns, {"states": tuple(states), "controls": tuple(controls)}
+    )
 
 
 def write_study(model: Model, file: Path) -> list[Path]:
@@ -170,7 +186,9 @@ def write_study(model: Model, file: Path) -> list[Path]:
 
 
 def _muscles(model: Model) -> list[DeGrooteFregly2016Muscle]:
-    return [force for force in model.force_set.objects if isinstance(force, DeGrooteFregly2016Muscle)]
+    return [
+        force for force in model.force_set.objects if isinstance(force, DeGrooteFregly2016Muscle)
+    ]
 
 
 def _names(model: Model) -> tuple[list[str], list[str]]:
@@ -185,5 +203,6 @@ def _mirrored(name: str) -> str:
     """The path of the same on the other side."""
     swap = str.maketrans("rl", "lr")
     return "/".join(
-        part[:-1] + part[-1].translate(swap) if part[-2:] in ("_r", "_l") else part for part in name.split("/")
+        part[:-1] + part[-1].translate(swap) if part[-2:] in ("_r", "_l") else part
+        for part in name.split("/")
     )

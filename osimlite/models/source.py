@@ -23,22 +23,26 @@ _WORDS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0"
 def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Model:
     """Make the model that `source` describes.
 
-    Args:
-        source: a built-in name (``dynamic-walker``), ``file.py``, ``file.py:function``, ``package.module:function``,
-            or a ``.yaml`` or ``.json`` model.
-        parameters: arguments of the model function, as text; a data file takes none.
+    Args: source: a built-in name (``dynamic-walker``), ``file.py``, ``file.py:function``,
+        ``package.module:function``, or a ``.yaml`` or ``.json`` model. parameters: arguments of the
+        model function, as text; a data file takes none.
 
-    Raises:
-        OsimliteError: there is no such source, it has no such parameter, or it does not return a Model.
+    Raises: OsimliteError: there is no such source, it has no such parameter, or it does not return
+        a Model.
     """
     if source.endswith(SUFFIXES):
         if parameters:
-            raise OsimliteError(f"'{source}' is data and takes no parameters; edit the file, or build from Python")
+            raise OsimliteError(
+                f"'{source}' is data and takes no parameters; edit the file, or build from Python"
+            )
         return read_data(source)
     function = _function(source)
     arguments = _arguments(function, parameters or {}, source)
     file = inspect.getsourcefile(function)
-    with errors_placed(str(file)), nullcontext() if source in BUILT_IN else imports_beside(str(file)):
+    with (
+        errors_placed(str(file)),
+        nullcontext() if source in BUILT_IN else imports_beside(str(file)),
+    ):
         model = function(**arguments)
     if not isinstance(model, Model):
         raise OsimliteError(f"'{source}' returned a {type(model).__name__}, not an osimlite.Model")
@@ -65,7 +69,10 @@ def parameters_of(source: str) -> dict[str, Any]:
     """
     if source.endswith(SUFFIXES):
         return {}
-    return {name: parameter.default for name, parameter in inspect.signature(_function(source)).parameters.items()}
+    return {
+        name: parameter.default
+        for name, parameter in inspect.signature(_function(source)).parameters.items()
+    }
 
 
 def describe(name: str) -> str:
@@ -74,8 +81,12 @@ def describe(name: str) -> str:
         function = _function(name)
     except MissingDependency as error:
         return error.message
-    summary = (inspect.getdoc(function) or "").split("\n")[0].removeprefix("Build the ").removesuffix(".")
-    parameters = ", ".join(f"{p.name}={p.default}" for p in inspect.signature(function).parameters.values())
+    summary = (
+        (inspect.getdoc(function) or "").split("\n")[0].removeprefix("Build the ").removesuffix(".")
+    )
+    parameters = ", ".join(
+        f"{p.name}={p.default}" for p in inspect.signature(function).parameters.values()
+    )
     return f"{summary} ({parameters})" if parameters else summary
 
 
@@ -92,11 +103,15 @@ def _function(source: str) -> Callable[..., Any]:
         module = module_named(place)
     else:
         known = did_you_mean(source, BUILT_IN) or f"; the built-in models are {listed(BUILT_IN)}"
-        raise OsimliteError(f"'{source}' is no built-in model, Python file, module:function or data file{known}")
+        raise OsimliteError(
+            f"'{source}' is no built-in model, Python file, module:function or data file{known}"
+        )
     if name:
         result = getattr(module, name, None)
         if not callable(result):
-            raise OsimliteError(f"'{place}' has no function '{name}'{did_you_mean(name, _functions(module))}")
+            raise OsimliteError(
+                f"'{place}' has no function '{name}'{did_you_mean(name, _functions(module))}"
+            )
         return result
     return _only_function(module, place)
 
@@ -120,7 +135,9 @@ def _functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
     return {
         name: value
         for name, value in vars(module).items()
-        if inspect.isfunction(value) and value.__module__ == module.__name__ and not name.startswith("_")
+        if inspect.isfunction(value)
+        and value.__module__ == module.__name__
+        and not name.startswith("_")
     }
 
 
@@ -137,7 +154,8 @@ def _only_function(module: ModuleType, place: str) -> Callable[..., Any]:
     if not candidates:
         raise OsimliteError("the file has no function that returns a Model", file=place)
     raise OsimliteError(
-        f"the file has several functions ({listed(candidates)}); say which one with {place}:FUNCTION", file=place
+        f"the file has several functions ({listed(candidates)}); say which one with {place}:FUNCTION",
+        file=place,
     )
 
 
@@ -148,7 +166,9 @@ def _returns_model(function: Callable[..., Any]) -> bool:
         return False
 
 
-def _arguments(function: Callable[..., Any], parameters: Mapping[str, str], source: str) -> dict[str, Any]:
+def _arguments(
+    function: Callable[..., Any], parameters: Mapping[str, str], source: str
+) -> dict[str, Any]:
     known = inspect.signature(function).parameters
     arguments = {}
     for name, text in parameters.items():
@@ -162,7 +182,9 @@ def _arguments(function: Callable[..., Any], parameters: Mapping[str, str], sour
             parameter.VAR_KEYWORD,
         )
         if name not in arguments and not optional:
-            raise OsimliteError(f"'{source}' needs its parameter '{name}'; give it with -p {name}=VALUE")
+            raise OsimliteError(
+                f"'{source}' needs its parameter '{name}'; give it with -p {name}=VALUE"
+            )
     return arguments
 
 

@@ -1,7 +1,8 @@
 """Walkers that walk, and the exercise's own from the start from which it gets furthest.
 
-Each is the model of the exercise (:func:`osimlite.models.dynamic_walker.dynamic_walker`) with few other numbers, and
-starts at its default values and speeds in the middle of a step. ``docs/gaits.md`` tells how they were found.
+Each is the model of the exercise (:func:`osimlite.models.dynamic_walker.dynamic_walker`) with few
+other numbers, and starts at its default values and speeds in the middle of a step.
+``docs/gaits.md`` tells how they were found.
 """
 
 from __future__ import annotations
@@ -64,8 +65,9 @@ def furthest_walker() -> Model:
 def steady_walker(shank_inertia: float = 0.0921, foot_ahead: float = 0.0744) -> Model:
     """Build the walker that differs from the exercise in two properties and never stops.
 
-    Its shanks have a smaller moment of inertia about the knee's axis (1 kg·m² in the exercise), and its feet stand out
-    to the front (not at all in the exercise). It walks down the exercise's slope of 10 degrees.
+    Its shanks have a smaller moment of inertia about the knee's axis (1 kg·m² in the exercise), and
+    its feet stand out to the front (not at all in the exercise). It walks down the exercise's slope
+    of 10 degrees.
 
     Args:
         shank_inertia: of each shank about its mass centre and the axis of the knee (kg·m²).
@@ -84,19 +86,21 @@ def steady_walker(shank_inertia: float = 0.0921, foot_ahead: float = 0.0744) -> 
 
 
 def human_walker(
-    slope: float = 2.71, foot_radius: float = 0.121, foot_ahead: float = 0.0455, knee_stiffness: float = 20.1
+    slope: float = 2.71,
+    foot_radius: float = 0.121,
+    foot_ahead: float = 0.0455,
+    knee_stiffness: float = 20.1,
 ) -> Model:
     """Build the walker whose mass is distributed as in a human, on a gentle slope.
 
-    71.3 kg: head, arms and trunk weigh 47.5 kg and stand on the hips, a thigh weighs 7.9 kg and a shank with its foot
-    4 kg. The mass centres and the radii of gyration are near those that D. A. Winter gives for humans (Biomechanics and
-    Motor Control of Human Movement). The feet are round, as McGeer's were.
+    71.3 kg: head, arms and trunk weigh 47.5 kg and stand on the hips, a thigh weighs 7.9 kg and a
+    shank with its foot 4 kg. The mass centres and the radii of gyration are near those that D. A.
+    Winter gives for humans (Biomechanics and Motor Control of Human Movement). The feet are round,
+    as McGeer's were.
 
-    Args:
-        slope: how far the platform falls towards +x (deg).
-        foot_radius: of the sphere of each foot (m); its lowest point stays where it is in the exercise.
-        foot_ahead: how far the sphere is in front of the shank's axis (m).
-        knee_stiffness: of what stops the knees (N·m/deg).
+    Args: slope: how far the platform falls towards +x (deg). foot_radius: of the sphere of each
+        foot (m); its lowest point stays where it is in the exercise. foot_ahead: how far the sphere
+        is in front of the shank's axis (m). knee_stiffness: of what stops the knees (N·m/deg).
     """
     model = dynamic_walker(slope=slope)
     model.name = "HumanWalker"
@@ -104,9 +108,17 @@ def human_walker(
         if body.name == "Pelvis":
             body.mass = 47.5
         elif body.name.endswith("Thigh"):
-            body.mass, body.mass_center, body.inertia = 7.9, (0.0, 0.027, 0.0), (2.0, 2.0, 0.11, 0.0, 0.0, 0.0)
+            body.mass, body.mass_center, body.inertia = (
+                7.9,
+                (0.0, 0.027, 0.0),
+                (2.0, 2.0, 0.11, 0.0, 0.0, 0.0),
+            )
         elif body.name.endswith("Shank"):
-            body.mass, body.mass_center, body.inertia = 4.0, (0.0, -0.046, 0.0), (1.0, 1.0, 0.133, 0.0, 0.0, 0.0)
+            body.mass, body.mass_center, body.inertia = (
+                4.0,
+                (0.0, -0.046, 0.0),
+                (1.0, 1.0, 0.133, 0.0, 0.0, 0.0),
+            )
     for sphere in model.components(ContactSphere):
         if sphere.name.endswith("FootContact"):
             _, y, z = sphere.location
@@ -117,7 +129,11 @@ def human_walker(
             parameters.stiffness, parameters.dissipation = 1.55e7, 5.2
     for limit in model.components(CoordinateLimitForce):
         if limit.name.endswith("KneeLimitTorque"):
-            limit.upper_stiffness, limit.lower_stiffness, limit.damping = knee_stiffness, 20.0, 0.265
+            limit.upper_stiffness, limit.lower_stiffness, limit.damping = (
+                knee_stiffness,
+                20.0,
+                0.265,
+            )
     return _ready(model, HUMAN_START, 100.0)
 
 

@@ -78,7 +78,9 @@ class Asked:
         name = f" '{part.name}'" if part.name else ""
         return DocumentError(f"{_tag(part)}{name}: {reason}", **self._placed(part))
 
-    def expect(self, part: Object, name: str, known: Iterable[str], what: str, whose: str = "the model") -> None:
+    def expect(
+        self, part: Object, name: str, known: Iterable[str], what: str, whose: str = "the model"
+    ) -> None:
         """Refuse a name that is none, with the nearest one that is.
 
         Raises:
@@ -98,7 +100,9 @@ class Asked:
             if isinstance(part, Component) and part.model is not None:
                 continue
             if isinstance(part, Unknown):
-                near = did_you_mean(part.class_name, MODULES) if part.class_name not in MODULES else ""
+                near = (
+                    did_you_mean(part.class_name, MODULES) if part.class_name not in MODULES else ""
+                )
                 raise self.wrong(part, f"no object of this class has its place here{near}")
             for spec in value_specs(type(part)):
                 value = getattr(part, spec.name)
@@ -116,7 +120,9 @@ class Asked:
                     and len(value) == 2
                     and value[0] > value[1]
                 ):
-                    raise self.wrong(part, f"{spec.name} from {value[0]:g} to {value[1]:g} leave no value")
+                    raise self.wrong(
+                        part, f"{spec.name} from {value[0]:g} to {value[1]:g} leave no value"
+                    )
 
     def pattern(self, part: Object, text: str) -> Callable[[str], Any]:
         """What tells whether a name matches a pattern.

@@ -57,7 +57,10 @@ class _Infos:
     """What the study says of each of some variables."""
 
     def __init__(
-        self, patterns: Iterable[MocoVariableInfo], infos: Iterable[MocoVariableInfo], names: Sequence[str]
+        self,
+        patterns: Iterable[MocoVariableInfo],
+        infos: Iterable[MocoVariableInfo],
+        names: Sequence[str],
     ) -> None:
         self.said: dict[str, MocoVariableInfo] = {}
         for info in patterns:
@@ -76,19 +79,28 @@ class _Infos:
         )
 
 
-def control_bounds(phase: MocoPhase, names: Sequence[str], components: Mapping[str, Component]) -> dict[str, Bounds]:
+def control_bounds(
+    phase: MocoPhase, names: Sequence[str], components: Mapping[str, Component]
+) -> dict[str, Bounds]:
     """Of controls; without any word of the study those of the actuator."""
     infos = _Infos(phase.control_infos_pattern, phase.control_infos, names)
     result = {}
     for name in names:
         actuator = components.get(name)
-        own = (actuator.min_control, actuator.max_control) if isinstance(actuator, ScalarActuator) else FREE
+        own = (
+            (actuator.min_control, actuator.max_control)
+            if isinstance(actuator, ScalarActuator)
+            else FREE
+        )
         result[name] = infos.bounds(name, own)
     return result
 
 
 def state_bounds(
-    phase: MocoPhase, names: Sequence[str], components: Mapping[str, Component], controls: Mapping[str, Bounds]
+    phase: MocoPhase,
+    names: Sequence[str],
+    components: Mapping[str, Component],
+    controls: Mapping[str, Bounds],
 ) -> dict[str, Bounds]:
     """Of states; values without a word have the range of the coordinate, activations that of the excitation."""
     infos = _Infos(phase.state_infos_pattern, phase.state_infos, names)
@@ -106,15 +118,24 @@ def state_bounds(
             otherwise = LEAST_TENDON_FORCE, MOST_TENDON_FORCE
         elif what == "activation" and isinstance(owner, ActivationCoordinateActuator):
             otherwise = owner.min_control, owner.max_control
-        elif what == "activation" and isinstance(owner, Muscle) and phase.bound_activation_from_excitation:
-            otherwise = controls[path].within if path in controls else (owner.min_control, owner.max_control)
+        elif (
+            what == "activation"
+            and isinstance(owner, Muscle)
+            and phase.bound_activation_from_excitation
+        ):
+            otherwise = (
+                controls[path].within
+                if path in controls
+                else (owner.min_control, owner.max_control)
+            )
         result[name] = infos.bounds(name, otherwise)
     return result
 
 
 def scaling(low: float, high: float) -> tuple[float, float]:
-    """Factor and offset that a variable has by its scaled self, as Moco makes them: the width of its bounds, and the
-    middle between them with the other sign."""
+    """Factor and offset that a variable has by its scaled self, as Moco makes them: the width of
+    its bounds, and the middle between them with the other sign.
+    """
     width = high - low
     if not math.isfinite(width):
         return 1.0, 0.0

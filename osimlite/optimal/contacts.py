@@ -22,8 +22,8 @@ Goal = MocoContactTrackingGoal | MocoContactImpulseTrackingGoal
 
 
 def measured_groups(goal: Goal, problem: Problem) -> list[tuple[list[str], list[Series], Array]]:
-    """For each group the paths of its contacts, the measured force along x, y and z of ground (N), and the greatest
-    size (3,) that this has along each.
+    """For each group the paths of its contacts, the measured force along x, y and z of ground (N),
+    and the greatest size (3,) that this has along each.
 
     Raises:
         DocumentError: there are no loads, or no such force or contact.
@@ -44,13 +44,19 @@ def measured_groups(goal: Goal, problem: Problem) -> list[tuple[list[str], list[
         force = known.get(group.external_force_name)
         if force is None:
             near = did_you_mean(group.external_force_name, known)
-            raise problem.wrong(goal, f"the loads have no force '{group.external_force_name}'{near}")
+            raise problem.wrong(
+                goal, f"the loads have no force '{group.external_force_name}'{near}"
+            )
         if force.force_expressed_in_body not in ("ground", "/ground"):
-            raise problem.refused(goal, f"the force '{force.name}' is along axes of {force.force_expressed_in_body}")
+            raise problem.refused(
+                goal, f"the force '{force.name}' is along axes of {force.force_expressed_in_body}"
+            )
         labels = [f"{force.force_identifier}{axis}" for axis in "xyz"]
         if not group.contact_force_paths:
             raise problem.wrong(group, "it names no contact_force_paths")
-        paths = [_path(goal, problem, str(path), force, group) for path in group.contact_force_paths]
+        paths = [
+            _path(goal, problem, str(path), force, group) for path in group.contact_force_paths
+        ]
         series = splines(problem, table, labels)
         groups.append((paths, series, np.array([np.abs(table[name]).max() for name in labels])))
     return groups
@@ -66,8 +72,13 @@ def _path(goal: Goal, problem: Problem, name: str, force: Any, group: Any) -> st
     """The contact's path; its sphere has to be on the body that the measured force pushes."""
     path, sphere = contact_at(goal, problem, name)
     frames = str(sphere.socket_frame).split("/")
-    wanted = [force.applied_to_body, *(str(frame).rpartition("/")[2] for frame in group.alternative_frame_paths)]
+    wanted = [
+        force.applied_to_body,
+        *(str(frame).rpartition("/")[2] for frame in group.alternative_frame_paths),
+    ]
     if not any(each.rpartition("/")[2] in frames for each in wanted):
         message = f"the sphere of '{path}' is on {'/'.join(frames)}, and '{force.name}' pushes {force.applied_to_body}"
-        raise problem.refused(goal, f"{message}; contacts whose half space is pushed are not followed here")
+        raise problem.refused(
+            goal, f"{message}; contacts whose half space is pushed are not followed here"
+        )
     return path

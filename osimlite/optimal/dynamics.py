@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 class Dynamics:
     """What rates are, and what must be zero, at a point.
 
-    Multipliers are variables of their own at all points, and push as ``Gᵀ multipliers``; the model's constraints are
-    equations of points of the mesh (M. Posa et al., ICRA 2016), accelerations of all points if intervals lead to states
-    that are moved onto them (R. Bordalba et al., IEEE Transactions on Robotics 39, 2023).
+    Multipliers are variables of their own at all points, and push as ``Gᵀ multipliers``; the
+    model's constraints are equations of points of the mesh (M. Posa et al., ICRA 2016),
+    accelerations of all points if intervals lead to states that are moved onto them (R. Bordalba et
+    al., IEEE Transactions on Robotics 39, 2023).
 
     Attributes:
         is_implicit: whether accelerations are variables.
@@ -51,9 +52,13 @@ class Dynamics:
             accelerations = casadi.SX.sym("udot", size)
             none, others = casadi.SX.zeros(size), casadi.SX.zeros(len(f.states) - 2 * size)
             udot = casadi.vertcat(none, accelerations, others)
-            rows = f.residual(point.t, point.x, udot, point.u, point.p, point.multipliers)[size : 2 * size]
+            rows = f.residual(point.t, point.x, udot, point.u, point.p, point.multipliers)[
+                size : 2 * size
+            ]
             point.solved.append((accelerations, rows))
-        return self._with_rates(point, casadi.vertcat(speeds, accelerations, self._auxiliary(point)))
+        return self._with_rates(
+            point, casadi.vertcat(speeds, accelerations, self._auxiliary(point))
+        )
 
     def _with_rates(self, point: Point, rates: Formula) -> Formula:
         """Rates of tendon forces that are variables, in their places."""
@@ -65,7 +70,9 @@ class Dynamics:
     def _auxiliary(self, point: Point) -> Formula:
         """Rates of the auxiliary states by the laws."""
         none, f = casadi.SX.zeros(len(self.functions.states)), self.functions
-        return -f.residual(point.t, point.x, none, point.u, point.p, point.multipliers)[2 * self.size :]
+        return -f.residual(point.t, point.x, none, point.u, point.p, point.multipliers)[
+            2 * self.size :
+        ]
 
     def corrected(self, point: Point) -> Formula:
         """The rates, with the correction of velocities that keeps states on the constraints."""
@@ -81,8 +88,12 @@ class Dynamics:
         if not self.is_implicit:
             return names, errors
         f, size, point = self.functions, self.size, point.reached
-        rows = f.residual(point.t, point.x, point.rates, point.u, point.p, point.multipliers)[size : 2 * size]
-        return [*(f"{path} residual" for path in f.coordinates), *names], casadi.vertcat(rows, errors)
+        rows = f.residual(point.t, point.x, point.rates, point.u, point.p, point.multipliers)[
+            size : 2 * size
+        ]
+        return [*(f"{path} residual" for path in f.coordinates), *names], casadi.vertcat(
+            rows, errors
+        )
 
     def constraint_errors(self, point: Point, is_mesh: bool) -> tuple[list[str], Formula]:
         """Errors of the model's constraints at a point, with their names."""
@@ -109,7 +120,9 @@ class Dynamics:
 
         return formula
 
-    def generalized_forces(self, pushing: Sequence[str], coordinates: Sequence[str]) -> Callable[[Point], Formula]:
+    def generalized_forces(
+        self, pushing: Sequence[str], coordinates: Sequence[str]
+    ) -> Callable[[Point], Formula]:
         """What coordinates take beyond gravity and the forces of some paths, N and N m."""
         missing, rows = (
             self.functions.generalized_forces(pushing),
@@ -119,7 +132,9 @@ class Dynamics:
 
     def _bound(self, point: Point) -> Sequence[Formula]:
         """Errors of positions, speeds and accelerations, and the matrix G."""
-        found: Sequence[Formula] = self.functions.constraints(point.t, point.x, point.rates, point.p)
+        found: Sequence[Formula] = self.functions.constraints(
+            point.t, point.x, point.rates, point.p
+        )
         return found
 
     def projection_errors(self, point: Point) -> tuple[list[str], Formula]:

@@ -25,14 +25,10 @@ from osimlite.schema.tools.processors import TableProcessor
 class Followed:
     """What of frames follows what.
 
-    Attributes:
-        goal: that asks for it.
-        file: with a column for each frame; none if empty.
-        states: a motion of the model, from which the same is computed if there is no file; None if there cannot be one.
-        paths: of the frames.
-        weights: by these.
-        kind: of the values in the file, as its header names it.
-        part: of the result of ``functions.frames`` that is followed.
+    Attributes: goal: that asks for it. file: with a column for each frame; none if empty. states: a
+        motion of the model, from which the same is computed if there is no file; None if there
+        cannot be one. paths: of the frames. weights: by these. kind: of the values in the file, as
+        its header names it. part: of the result of ``functions.frames`` that is followed.
     """
 
     goal: MocoGoal
@@ -60,14 +56,18 @@ class Followed:
             raise problem.wrong(goal, "frame_paths names no frames, which OpenSim refuses, too")
         table = self._table(problem, paths)
         size = len(suffixes(self.kind))
-        series = splines(problem, table, [f"{path}{end}" for path in paths for end in suffixes(self.kind)])
+        series = splines(
+            problem, table, [f"{path}{end}" for path in paths for end in suffixes(self.kind)]
+        )
         known = {weight.name: weight.weight for weight in self.weights.objects}
 
         def integrand(point: Point) -> Formula:
             total = casadi.SX(0.0)
             for number, path in enumerate(paths):
                 given = [point.at(own) for own in series[size * number : size * number + size]]
-                total += known.get(path, 1.0) * error(point, point.frame(path), casadi.vertcat(*given))
+                total += known.get(path, 1.0) * error(
+                    point, point.frame(path), casadi.vertcat(*given)
+                )
             return total
 
         return integral(integrand)
@@ -91,14 +91,20 @@ class Followed:
             raise problem.wrong(goal, "it names no file to follow")
         motion = table_of(problem, goal, self.states)
         columns = tuple(f"{path}{end}" for path in paths for end in ends)
-        return StoTable("", motion.times, columns, self._computed(problem, motion, paths), file=motion.file)
+        return StoTable(
+            "", motion.times, columns, self._computed(problem, motion, paths), file=motion.file
+        )
 
     def _computed(self, problem: Problem, motion: StoTable, paths: Sequence[str]) -> Array:
         """What is followed (n, values) in a motion; states that it leaves out are those of the model."""
         functions = problem.functions
         for column in motion.columns:
             problem.expect(self.goal, column, functions.states, "state")
-        if missing := [f"{path}/value" for path in functions.coordinates if f"{path}/value" not in motion.columns]:
+        if missing := [
+            f"{path}/value"
+            for path in functions.coordinates
+            if f"{path}/value" not in motion.columns
+        ]:
             raise problem.wrong(self.goal, f"its states_reference has no column '{missing[0]}'")
         frames, rows = functions.frames(paths), []
         x = np.array(functions.x)

@@ -1,8 +1,8 @@
 """A motion that is given exactly: only actuators are left to be found, as with OpenSim's PositionMotion.
 
-What the motion takes, what each actuator pushes and how long its path is are numbers over time then, from the kernels.
-The laws of the actuators become formulas on a test bench: a model in which each pulls a carriage of its own, whose
-place stands for the length of its path.
+What the motion takes, what each actuator pushes and how long its path is are numbers over time
+then, from the kernels. The laws of the actuators become formulas on a test bench: a model in which
+each pulls a carriage of its own, whose place stands for the length of its path.
 """
 
 from __future__ import annotations
@@ -92,7 +92,9 @@ class GivenMotion:
         self.bench = functions_of(bench_of(actuators, own))
         size = len(self.bench.coordinates)
         known = dict(zip(own, self._paths, strict=True))
-        self.states = self.in_system = tuple(_renamed(name, known) for name in self.bench.states[2 * size :])
+        self.states = self.in_system = tuple(
+            _renamed(name, known) for name in self.bench.states[2 * size :]
+        )
         self.controls = tuple(_renamed(name, known) for name in self.bench.controls)
         # The carriages have an order of their own.
         names = [path.rpartition("/")[2] for path in self.bench.coordinates]
@@ -115,17 +117,23 @@ class GivenMotion:
         Raises:
             UnsupportedError: always.
         """
-        raise UnsupportedError("goals of poses, outputs or markers are not computed where the motion is given")
+        raise UnsupportedError(
+            "goals of poses, outputs or markers are not computed where the motion is given"
+        )
 
     frames = outputs
 
     def _numbers(self, times: Array) -> Array:
-        """What is known at times (t,), one row each: lengths and speeds of m paths, what n coordinates need, what each
-        of the paths gives each of them by 1 N, and the equations of the constraints."""
+        """What is known at times (t,), one row each: lengths and speeds of m paths, what n
+        coordinates need, what each of the paths gives each of them by 1 N, and the equations of the
+        constraints.
+        """
         values, speeds, accelerations = self._motion(times)
         needed, *matrices = self._pushing.balance(times, values, speeds, accelerations)
         lengths, rates = self._pulling.path_lengths(times, values, speeds)
-        return np.hstack([lengths, rates, needed, *(item.reshape(len(times), -1) for item in matrices)])
+        return np.hstack(
+            [lengths, rates, needed, *(item.reshape(len(times), -1) for item in matrices)]
+        )
 
     @cached_property
     def whole(self) -> Any:
@@ -140,12 +148,11 @@ class GivenMotion:
     def linear(self, function: Callable[..., Any], times: Array) -> Array:
         """What depends on forces in a motion, at times (t,).
 
-        Args:
-            function: ``function(t, x, xdot, u, p, multipliers) -> (k, t)`` of `whole`, that has no squares of forces.
-            times: s.
+        Args: function: ``function(t, x, xdot, u, p, multipliers) -> (k, t)`` of `whole`, that has
+            no squares of forces. times: s.
 
-        Returns:
-            One row each (t, (1 + a + c) k): without them, and what 1 N of each actuator and 1 of each multiplier add.
+        Returns: One row each (t, (1 + a + c) k): without them, and what 1 N of each actuator and 1
+            of each multiplier add.
         """
         whole, infos = self.whole, [info.path for info in self.mechanism.coordinates]
         order = [infos.index(path) for path in whole.coordinates]
@@ -167,8 +174,11 @@ class GivenMotion:
         """Values and speeds of all coordinates over time, by paths of states."""
         values, speeds, _ = self._motion(times)
         infos = self.mechanism.coordinates
-        own = ((f"{info.path}/{what}", rows[:, k]) for k, info in enumerate(infos)
-               for what, rows in (("value", values), ("speed", speeds)))  # fmt: skip
+        own = (
+            (f"{info.path}/{what}", rows[:, k])
+            for k, info in enumerate(infos)
+            for what, rows in (("value", values), ("speed", speeds))
+        )
         return dict(own)
 
 
@@ -181,7 +191,9 @@ class GivenDynamics(Dynamics):
         super().__init__(problem)
         self.is_implicit, self._first_rate = False, 0
         if any(low != high for low, high in problem.times):
-            raise problem.refused(problem.phase, "where the motion is given, initial and final time must be fixed")
+            raise problem.refused(
+                problem.phase, "where the motion is given, initial and final time must be fixed"
+            )
         given: GivenMotion = self.functions
         start, end = problem.times[0][0], problem.times[1][0]
         self._times = start + problem.grid.places * (end - start)
@@ -191,7 +203,10 @@ class GivenDynamics(Dynamics):
         """Of numbers (t, m) at times (t,) those that are not zero: most actuators push few coordinates."""
         found = numbers(self._times)
         matters = np.abs(found).max(axis=0) > NOTHING * np.abs(found).max()
-        return [self.problem.given(partial(_column, numbers, k)) if own else None for k, own in enumerate(matters)]
+        return [
+            self.problem.given(partial(_column, numbers, k)) if own else None
+            for k, own in enumerate(matters)
+        ]
 
     def elements(self) -> list[tuple[str, Any]]:
         """The actuators, by their paths in the model."""
@@ -211,7 +226,14 @@ class GivenDynamics(Dynamics):
         lengths, speeds = self.path_lengths(point)
         places = np.argsort(self.functions.carriages)
         x = casadi.vertcat(lengths[places.tolist()], speeds[places.tolist()], point.x)
-        return bench.residual(point.t, x, casadi.SX.zeros(len(bench.states)), point.u, casadi.SX(0, 1), casadi.SX(0, 1))
+        return bench.residual(
+            point.t,
+            x,
+            casadi.SX.zeros(len(bench.states)),
+            point.u,
+            casadi.SX(0, 1),
+            casadi.SX(0, 1),
+        )
 
     def rates(self, point: Point) -> Formula:
         """Of the auxiliary states."""
@@ -226,7 +248,9 @@ class GivenDynamics(Dynamics):
         needed = self._known(point, 2 * count, len(moving))
         pushes = casadi.reshape(self._known(point, first, size), count, -1).T
         bound = casadi.reshape(
-            self._known(point, first + size, point.multipliers.numel() * len(moving)), len(moving), -1
+            self._known(point, first + size, point.multipliers.numel() * len(moving)),
+            len(moving),
+            -1,
         )
         rows = needed - pushes @ self._forces(point) + bound @ point.multipliers
         return [*(f"{name} residual" for name in moving), *names], casadi.vertcat(rows, errors)
@@ -244,7 +268,9 @@ class GivenDynamics(Dynamics):
 
         return self._linear(function, 6)
 
-    def generalized_forces(self, pushing: Sequence[str], coordinates: Sequence[str]) -> Callable[[Point], Formula]:
+    def generalized_forces(
+        self, pushing: Sequence[str], coordinates: Sequence[str]
+    ) -> Callable[[Point], Formula]:
         """As the motion and the actuators make them."""
         missing = self.functions.whole.generalized_forces(pushing)
         rows = [self.functions.whole.coordinates.index(path) for path in coordinates]
@@ -265,12 +291,16 @@ class GivenDynamics(Dynamics):
         count = len(self.functions.path_names)
         pull = -self._residual(point)[count : 2 * count][self.functions.carriages]
         # Muscles shorten what they pull at.
-        return casadi.vertcat(*(-pull[k] if muscle else pull[k] for k, muscle in enumerate(self.functions.is_muscle)))
+        return casadi.vertcat(
+            *(-pull[k] if muscle else pull[k] for k, muscle in enumerate(self.functions.is_muscle))
+        )
 
 
 def _at(point: Point, entries: Sequence[Series | None]) -> Formula:
     """The numbers of series, of which those that are None are zero."""
-    return casadi.vertcat(*(casadi.SX(1, 1) if entry is None else point.at(entry) for entry in entries))
+    return casadi.vertcat(
+        *(casadi.SX(1, 1) if entry is None else point.at(entry) for entry in entries)
+    )
 
 
 def _once(numbers: Callable[[Array], Array]) -> Callable[[Array], Array]:
@@ -294,22 +324,27 @@ def _column(numbers: Callable[[Array], Array], number: int, times: Array) -> Arr
 def bench_of(actuators: Sequence[Any], names: Sequence[str]) -> Model:
     """A model without gravity in which each actuator pulls at a carriage of its own.
 
-    Args:
-        actuators: muscles, and others whose force is proportional to their control or their activation.
-        names: of each on the bench, of its carriage and of the coordinate.
+    Args: actuators: muscles, and others whose force is proportional to their control or their
+        activation. names: of each on the bench, of its carriage and of the coordinate.
     """
     model = Model(name="bench", gravity=(0.0, 0.0, 0.0))
     for item, name in zip(actuators, names, strict=True):
-        body = Body(name=name, mass=1.0, mass_center=(0.0, 0.0, 0.0), inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+        body = Body(
+            name=name, mass=1.0, mass_center=(0.0, 0.0, 0.0), inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+        )
         model.add(body)
-        slider = SliderJoint(name=f"{name}_slider", socket_parent_frame=model.ground, socket_child_frame=body)
+        slider = SliderJoint(
+            name=f"{name}_slider", socket_parent_frame=model.ground, socket_child_frame=body
+        )
         slider.coordinates[0].name, slider.coordinates[0].default_value = name, 1.0
         model.add(slider)
         if isinstance(item, Muscle):
             own: Any = item.copy_deep()
             own.geometry_path = GeometryPath(name="path")
             for end, frame in enumerate(("/ground", f"/bodyset/{name}")):
-                own.geometry_path.path_point_set.objects.append(PathPoint(name=f"p{end}", socket_parent_frame=frame))
+                own.geometry_path.path_point_set.objects.append(
+                    PathPoint(name=f"p{end}", socket_parent_frame=frame)
+                )
         elif isinstance(item, ActivationCoordinateActuator):
             own = item.copy_deep()
             own.coordinate = name

@@ -35,7 +35,8 @@ class Hessian:
         # What depends on an end and on an integral together couples that end with all points.
         self._mixed = [tuple(pair) for pair in np.argwhere(pattern[:direct, direct:])]
         far = [
-            np.unique(program._jacobian_columns[program._jacobian_rows == program._rows + k]) for _, k in self._mixed
+            np.unique(program._jacobian_columns[program._jacobian_rows == program._rows + k])
+            for _, k in self._mixed
         ]
         self._far = far
         near = [
@@ -48,7 +49,9 @@ class Hessian:
         self._map = SparseMatrix.from_entries(
             inverse, np.arange(len(keys)), np.ones(len(keys)), (len(unique), len(keys))
         )
-        self.sparsity = casadi.Sparsity.triplet(width, width, (unique % width).tolist(), (unique // width).tolist())
+        self.sparsity = casadi.Sparsity.triplet(
+            width, width, (unique % width).tolist(), (unique // width).tolist()
+        )
 
     def numbers(self, w: Array, factor: float, multipliers: Array) -> Array:
         """In the order of `sparsity`."""
@@ -62,7 +65,9 @@ class Hessian:
         parts = []
         for sort, first in zip(program.sorts, program._offsets, strict=False):
             count = sort.rows * len(sort.numbers)
-            parts.append(sort.curvature(*program._given(sort, w), push[first : first + count])[0].ravel())
+            parts.append(
+                sort.curvature(*program._given(sort, w), push[first : first + count])[0].ravel()
+            )
         # It is symmetric.
         (ends,) = program._end_curvature(*given, np.array(factor), at_ends)
         parts.append(ends[self._ends])

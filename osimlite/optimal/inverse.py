@@ -76,10 +76,14 @@ def problem_of_inverse(
     phase = study.problem.phases
     reserves = MocoWeight(name=".*/reserve_.*", weight=tool.reserves_weight)
     effort = MocoControlGoal(name="excitation_effort")
-    effort.control_weights_pattern = MocoWeightSet(name="control_weights_pattern", objects=[reserves])
+    effort.control_weights_pattern = MocoWeightSet(
+        name="control_weights_pattern", objects=[reserves]
+    )
     phase.goals += [effort, MocoInitialActivationGoal(name="initial_activation")]
     if tool.minimize_sum_squared_activations:
-        phase.goals.append(MocoSumSquaredStateGoal(name="activation_effort", pattern=".*activation$"))
+        phase.goals.append(
+            MocoSumSquaredStateGoal(name="activation_effort", pattern=".*activation$")
+        )
     table, motion = _kinematics(asked, tool, model)
     set_times(asked, tool, [table], study)
     if more is not None:
@@ -91,7 +95,8 @@ def problem_of_inverse(
             if label not in known:
                 near = did_you_mean(label, known)
                 raise asked.wrong(
-                    tool, f"'{label}' is no state{near}; set kinematics_allow_extra_columns to leave it out"
+                    tool,
+                    f"'{label}' is no state{near}; set kinematics_allow_extra_columns to leave it out",
                 )
     return problem
 
@@ -123,7 +128,9 @@ def inverse(
 
 
 def solved_inverse(
-    problem: Problem, tell: Callable[[Progress], None] | None, refine: float | str | Refinement | None = None
+    problem: Problem,
+    tell: Callable[[Progress], None] | None,
+    refine: float | str | Refinement | None = None,
 ) -> MocoSolution:
     """The solution of the problem of the tool, with the values and speeds of the motion that was given."""
     given: GivenMotion = problem.functions
@@ -131,10 +138,14 @@ def solved_inverse(
     trajectory = solution.trajectory
     states = given.inserted(trajectory.times)
     names = trajectory.names | {"states": (*trajectory.names["states"], *states)}
-    return replace(solution, trajectory=replace(trajectory, columns=states | trajectory.columns, names=names))
+    return replace(
+        solution, trajectory=replace(trajectory, columns=states | trajectory.columns, names=names)
+    )
 
 
-def _kinematics(asked: Asked, tool: MocoInverse, model: Model) -> tuple[StoTable, Callable[[Array], Array]]:
+def _kinematics(
+    asked: Asked, tool: MocoInverse, model: Model
+) -> tuple[StoTable, Callable[[Array], Array]]:
     """The table of a tool, and the motion of all coordinates through its poses, which fulfil the constraints."""
     mechanism = build_mechanism(model)
     infos = mechanism.coordinates
@@ -146,9 +157,13 @@ def _kinematics(asked: Asked, tool: MocoInverse, model: Model) -> tuple[StoTable
     table = processed_table(asked, tool.kinematics, processor, states, mechanism)
     own = [name for name in names if name in table.columns]
     if not own:
-        raise asked.wrong(tool, "its kinematics have no column such as " + (names[0] if names else "a coordinate"))
+        raise asked.wrong(
+            tool, "its kinematics have no column such as " + (names[0] if names else "a coordinate")
+        )
     expect_columns(table, own)
     values = np.tile([info.default_value for info in infos], (len(table.times), 1))
     values[:, [names.index(name) for name in own]] = np.column_stack([table[name] for name in own])
-    poses = np.array([mechanism.assemble(q, t) for t, q in zip(table.times.tolist(), values, strict=True)])
+    poses = np.array(
+        [mechanism.assemble(q, t) for t, q in zip(table.times.tolist(), values, strict=True)]
+    )
     return table, Curves(table.times, poses).at

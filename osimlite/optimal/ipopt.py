@@ -90,7 +90,9 @@ class Found:
     duration: float
 
 
-def violations(program: Program, w: Array, rows: Array | None = None, most: int = 10) -> list[Violation]:
+def violations(
+    program: Program, w: Array, rows: Array | None = None, most: int = 10
+) -> list[Violation]:
     """The largest ones, the largest first.
 
     Args:
@@ -112,7 +114,11 @@ def violations(program: Program, w: Array, rows: Array | None = None, most: int 
 
 
 def solve(
-    program: Program, guess: Array, tell: Callable[[Progress], None] | None = None, *, near: bool = False
+    program: Program,
+    guess: Array,
+    tell: Callable[[Progress], None] | None = None,
+    *,
+    near: bool = False,
 ) -> Found:
     """Look for the least objective from a guess.
 
@@ -125,10 +131,12 @@ def solve(
         near: whether the guess is nearly a solution, so that it is not moved away from its bounds.
     """
     search = _Search(program, tell)
-    # Without a name Ipopt reads no file of options. By default it reads `ipopt.opt` in the current folder, which may
-    # name a file to write to and a library to load.
+    # Without a name Ipopt reads no file of options. By default it reads `ipopt.opt` in the current
+    # folder, which may name a file to write to and a library to load.
     options = {
-        "ipopt": _options(program) | (NEARLY if near else {}) | {"print_level": 0, "sb": "yes", "option_file_name": ""},
+        "ipopt": _options(program)
+        | (NEARLY if near else {})
+        | {"print_level": 0, "sb": "yes", "option_file_name": ""},
         "print_time": False,
         "show_eval_warnings": False,
         "no_nlp_grad": True,
@@ -164,8 +172,9 @@ def solve(
 
 @cache
 def _load() -> None:
-    """Ipopt, whose BLAS asks when it is loaded how many threads it may have: matrices are small, and sums of as many
-    parts as there are cores would be others on each machine."""
+    """Ipopt, whose BLAS asks when it is loaded how many threads it may have: matrices are small,
+    and sums of as many parts as there are cores would be others on each machine.
+    """
     before = os.environ.get(THREADS)
     os.environ[THREADS] = before or "1"
     casadi.load_nlpsol("ipopt")
@@ -183,7 +192,8 @@ def _options(program: Program) -> dict[str, Any]:
     settings, options = program.problem.solver, dict[str, Any]()
     is_exact = _is_exact(program)
     options["hessian_approximation"] = "exact" if is_exact else "limited-memory"
-    # The same steps; what the update adds is a part of the one matrix, in the place of a dozen of solutions for each.
+    # The same steps; what the update adds is a part of the one matrix, in the place of a dozen of
+    # solutions for each.
     options["limited_memory_aug_solver"] = "extended"
     if len(program.layout.lower) > MANY:
         # METIS orders what hangs together over time in half of what MUMPS takes by its own choice.
@@ -192,9 +202,12 @@ def _options(program: Program) -> dict[str, Any]:
         options["max_iter"] = settings.optim_max_iterations
     if (tolerance := settings.optim_convergence_tolerance) != -1.0:
         both = ("", "dual_inf_", "compl_inf_")
-        # Newton's last steps are so few that they end where the barrier still costs up to 1e-2 of the objective.
+        # Newton's last steps are so few that they end where the barrier still costs up to 1e-2 of
+        # the objective.
         wanted = min(tolerance, max(CLOSER * tolerance, LEAST)) if is_exact else tolerance
-        options |= {f"{each}tol": wanted for each in both} | {f"acceptable_{each}tol": tolerance for each in both}
+        options |= {f"{each}tol": wanted for each in both} | {
+            f"acceptable_{each}tol": tolerance for each in both
+        }
     if (tolerance := settings.optim_constraint_tolerance) != -1.0:
         options |= {f"{sort}constr_viol_tol": tolerance for sort in ("", "acceptable_")}
     return options
@@ -211,7 +224,9 @@ def _no_number(program: Program, guess: Array) -> str:
 class _Function(casadi.Callback):  # type: ignore[misc]
     """A function of CasADi that computes with arrays."""
 
-    def __init__(self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], law: Callable[..., Any]) -> None:
+    def __init__(
+        self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], law: Callable[..., Any]
+    ) -> None:
         casadi.Callback.__init__(self)
         self._inputs, self._outputs, self._law = inputs, outputs, law
         self.construct(name, {})
@@ -239,7 +254,9 @@ class _Function(casadi.Callback):  # type: ignore[misc]
 
     def eval_buffer(self, given: Any, results: Any) -> int:
         # What is not given, or not asked for, is None.
-        arrays = [np.zeros(0) if item is None else np.frombuffer(item, dtype=float) for item in given]
+        arrays = [
+            np.zeros(0) if item is None else np.frombuffer(item, dtype=float) for item in given
+        ]
         for place, result in zip(results, self._law(*arrays), strict=True):
             if place is not None:
                 np.frombuffer(place, dtype=float)[:] = result
@@ -267,10 +284,17 @@ class _Search:
         # Ipopt asks for what belongs to one x in parts.
         self._values_at = once(lambda x: program.values(self.real(x)))
         self._slopes_at = once(lambda x: program.slopes(self.real(x)))
-        self.program_itself = _Function("nlp", given, {"f": scalar, "g": _column(rows)}, self._values)
-        self.gradient = _Function("nlp_grad_f", given, {"f": scalar, "grad_f_x": across}, self._gradient)
+        self.program_itself = _Function(
+            "nlp", given, {"f": scalar, "g": _column(rows)}, self._values
+        )
+        self.gradient = _Function(
+            "nlp_grad_f", given, {"f": scalar, "grad_f_x": across}, self._gradient
+        )
         self.jacobian = _Function(
-            "nlp_jac_g", given, {"g": _column(rows), "jac_g_x": program.jacobian_sparsity}, self._jacobian
+            "nlp_jac_g",
+            given,
+            {"g": _column(rows), "jac_g_x": program.jacobian_sparsity},
+            self._jacobian,
         )
         found = [casadi.nlpsol_out(place) for place in range(casadi.nlpsol_n_out())]
         outputs = {name: _column(sizes.get(name, 0)) for name in found}
@@ -328,7 +352,9 @@ class _Search:
 
 def _curved(program: Program, search: _Search) -> Any:
     hessian = Hessian(program)
-    first, second = (search.scale[np.array(places, dtype=int)] for places in hessian.sparsity.get_triplet())
+    first, second = (
+        search.scale[np.array(places, dtype=int)] for places in hessian.sparsity.get_triplet()
+    )
     given = {
         "x": _column(len(program.layout.lower)),
         "p": casadi.Sparsity(0, 0),

@@ -38,7 +38,11 @@ class Layout:
         functions, grid, solver = problem.functions, problem.grid, problem.solver
         self.problem = problem
         multipliers = [f"lambda_{name}" for name in problem.constraint_names]
-        accelerations = [f"{path}/accel" for path in functions.coordinates] if problem.dynamics.is_implicit else []
+        accelerations = (
+            [f"{path}/accel" for path in functions.coordinates]
+            if problem.dynamics.is_implicit
+            else []
+        )
         self.names: dict[str, list[str]] = {
             "states": [*functions.states],
             "controls": [*problem.controls],
@@ -50,7 +54,11 @@ class Layout:
         force = range_of(problem.phase.multiplier_bounds) or (-np.inf, np.inf)
         acceleration = range_of(solver.implicit_multibody_acceleration_bounds) or (-np.inf, np.inf)
         rate = range_of(solver.implicit_auxiliary_derivative_bounds) or (-np.inf, np.inf)
-        of_slacks = solver.projection_slack_variable_bounds if problem.projects else solver.velocity_correction_bounds
+        of_slacks = (
+            solver.projection_slack_variable_bounds
+            if problem.projects
+            else solver.velocity_correction_bounds
+        )
         correction = range_of(of_slacks) or (-np.inf, np.inf)
         self.bounds: dict[str, list[Bounds]] = {
             "states": [*problem.states.values()],
@@ -67,10 +75,15 @@ class Layout:
         ranges = [*problem.times, *problem.parameters.values()]
         lower, upper = ([each[k] for each in ranges] for k in range(2))
         self.places: list[Any] = []
-        self.places_of = {kind: np.full((len(grid.places), len(self.names[kind])), -1) for kind in KINDS}
+        self.places_of = {
+            kind: np.full((len(grid.places), len(self.names[kind])), -1) for kind in KINDS
+        }
         size, end = self.shared, len(grid.places) - 1
         lows, highs = [np.array(lower)], [np.array(upper)]
-        limits = {kind: np.array([[b.within, b.first, b.last] for b in own]) for kind, own in self.bounds.items()}
+        limits = {
+            kind: np.array([[b.within, b.first, b.last] for b in own])
+            for kind, own in self.bounds.items()
+        }
         for point in range(len(grid.places)):
             first = size
             for kind, own in limits.items():
@@ -88,16 +101,20 @@ class Layout:
             raise problem.wrong(problem.phase, message)
 
     def has(self, kind: str, point: int) -> bool:
-        """Whether a point has variables of a kind: corrections of velocities are between nodes, projections at the ends
-        of intervals."""
+        """Whether a point has variables of a kind: corrections of velocities are between nodes,
+        projections at the ends of intervals.
+        """
         if kind == "slacks" and not self.problem.projects:
             return not self.problem.grid.is_mesh[point]
-        return kind not in ("slacks", "projections") or bool(point and self.problem.grid.is_mesh[point])
+        return kind not in ("slacks", "projections") or bool(
+            point and self.problem.grid.is_mesh[point]
+        )
 
     @cached_property
     def scaling(self) -> tuple[Array, Array]:
-        """Factors (n,) and offsets (n,) that the variables have by those that the search takes: each by its own bounds,
-        where Moco 4.6 takes those of the last one of its kind for all."""
+        """Factors (n,) and offsets (n,) that the variables have by those that the search takes:
+        each by its own bounds, where Moco 4.6 takes those of the last one of its kind for all.
+        """
         scale, shift = np.ones(len(self.lower)), np.zeros(len(self.lower))
         if not self.problem.solver.scale_variables_using_bounds:
             return scale, shift

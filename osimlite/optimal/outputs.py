@@ -56,12 +56,16 @@ KNOWN: dict[type[Any], dict[str, Callable[[Point, str], Formula]]] = {
         "linear_velocity": lambda point, path: point.frame(path).velocity,
         "angular_velocity": lambda point, path: point.frame(path).angular_velocity,
         "linear_acceleration": lambda point, path: _rate(point, point.frame(path).velocity),
-        "angular_acceleration": lambda point, path: _rate(point, point.frame(path).angular_velocity),
+        "angular_acceleration": lambda point, path: _rate(
+            point, point.frame(path).angular_velocity
+        ),
     },
     Station: {
         "location": lambda point, path: _vector(point, "stations", path),
         "velocity": lambda point, path: _vector(point, "station_velocities", path),
-        "acceleration": lambda point, path: _rate(point, _vector(point, "station_velocities", path)),
+        "acceleration": lambda point, path: _rate(
+            point, _vector(point, "station_velocities", path)
+        ),
     },
     Coordinate: {
         "value": lambda point, path: point.state(f"{path}/value"),
@@ -72,26 +76,29 @@ KNOWN: dict[type[Any], dict[str, Callable[[Point, str], Formula]]] = {
 """By classes of components, their outputs that are formulas here, besides what forces record of themselves."""
 
 
-def output_value(part: MocoOutputBase | MocoOutputBoundConstraint, problem: Problem) -> Callable[[Point], Formula]:
+def output_value(
+    part: MocoOutputBase | MocoOutputBoundConstraint, problem: Problem
+) -> Callable[[Point], Formula]:
     """What a goal or a constraint makes of one output or of two.
 
     Args:
         part: that names them.
         problem: with the components.
 
-    Returns:
-        A number at a point: the component of the index or the length of what comes of the operation, to the exponent.
+    Returns: A number at a point: the component of the index or the length of what comes of the
+        operation, to the exponent.
 
-    Raises:
-        DocumentError: there is no such component, or index, operation and exponent do not go with it.
-        UnsupportedError: the output has no formula.
+    Raises: DocumentError: there is no such component, or index, operation and exponent do not go
+        with it. UnsupportedError: the output has no formula.
     """
     index, exponent = part.output_index, part.exponent
     if exponent < 1:
         raise problem.wrong(part, f"its exponent is {exponent}, and has to be 1 at least")
     if bool(part.second_output_path) != bool(part.operation):
         raise problem.wrong(part, "a second_output_path and an operation need each other")
-    outputs = [_output(part, problem, text) for text in (part.output_path, part.second_output_path) if text]
+    outputs = [
+        _output(part, problem, text) for text in (part.output_path, part.second_output_path) if text
+    ]
     if not outputs:
         raise problem.wrong(part, "it names no output_path")
     sizes = {size for size, _ in outputs}
@@ -108,25 +115,38 @@ def output_value(part: MocoOutputBase | MocoOutputBoundConstraint, problem: Prob
         if result.numel() > 1:
             square = casadi.sumsqr(result)
             return square if exponent == 2 else casadi.sqrt(casadi.fmax(square, TINY)) ** exponent
-        return result if exponent == 1 else result**exponent if exponent % 2 == 0 else casadi.fabs(result) ** exponent
+        return (
+            result
+            if exponent == 1
+            else result**exponent
+            if exponent % 2 == 0
+            else casadi.fabs(result) ** exponent
+        )
 
     return value
 
 
-def _output(part: Any, problem: Problem, text: str) -> tuple[int, tuple[Callable[[Point, str], Formula], str]]:
+def _output(
+    part: Any, problem: Problem, text: str
+) -> tuple[int, tuple[Callable[[Point, str], Formula], str]]:
     """Count of the numbers of an output, what gives it, and the path of its component."""
     path, _, name = text.strip().rpartition("|")
     path = f"/{path.strip('/')}"
     component: Any = problem.model if path == "/" else problem.components.get(path)
     if component is None:
-        raise problem.wrong(part, f"the model has no component '{path}'{did_you_mean(path, problem.components)}")
+        raise problem.wrong(
+            part, f"the model has no component '{path}'{did_you_mean(path, problem.components)}"
+        )
     for kind, known in KNOWN.items():
         if isinstance(component, kind) and name in known:
             return 1 if kind is Coordinate else 3, (known[name], path)
     # Motions that are given have no outputs, and say so.
     problem.functions.outputs  # noqa: B018
     forces: Any = problem.functions.forces.elements
-    law = next((each.kind for each in forces if each.path == path and isinstance(each, DeclaredForce)), None)
+    law = next(
+        (each.kind for each in forces if each.path == path and isinstance(each, DeclaredForce)),
+        None,
+    )
     place = law.known_of.get(name) if law is not None else None
     if law is None or place is None:
         raise problem.refused(part, f"the output '{name}' of {path} has no formula here")

@@ -21,10 +21,9 @@ Formula = Any
 class Series:
     """A function of time that is given, such as a measured angle.
 
-    Attributes:
-        number: among those of the problem.
-        values: at times (n,) the value and both of its derivatives (3, n).
-        factor: place among the parameters of the problem of the one that it is multiplied by; None if by none.
+    Attributes: number: among those of the problem. values: at times (n,) the value and both of its
+        derivatives (3, n). factor: place among the parameters of the problem of the one that it is
+        multiplied by; None if by none.
     """
 
     number: int
@@ -50,21 +49,17 @@ class Frame(NamedTuple):
 class Point:
     """Symbols, and what follows from them, at one moment of the motion.
 
-    Attributes:
-        problem: that is solved.
-        t: time, s, and behind it the loads of the model (`problem.functions.loads`).
-        x: the whole state in the order of `problem.functions.states`, what is prescribed included.
-        u: controls, in the order of `problem.functions.controls`.
-        multipliers: of the model's constraints.
-        derivatives: that are variables: accelerations, and rates of auxiliary states; empty if explicit.
-        slacks: of velocity corrections or projections, if the point has them.
-        p: parameters, one for each number of the model that they stand for.
-        parameters: as the problem has them.
-        known: what the series are made of: the time that they are expanded about, and three numbers for each.
-        projections: values and speeds that the interval leads to, before they are moved onto the constraints, if the
-            point has them.
-        solved: symbols in the formulas for what linear equations with a symmetric matrix determine, each with what is
-            zero then: accelerations.
+    Attributes: problem: that is solved. t: time, s, and behind it the loads of the model
+        (`problem.functions.loads`). x: the whole state in the order of `problem.functions.states`,
+        what is prescribed included. u: controls, in the order of `problem.functions.controls`.
+        multipliers: of the model's constraints. derivatives: that are variables: accelerations, and
+        rates of auxiliary states; empty if explicit. slacks: of velocity corrections or
+        projections, if the point has them. p: parameters, one for each number of the model that
+        they stand for. parameters: as the problem has them. known: what the series are made of: the
+        time that they are expanded about, and three numbers for each. projections: values and
+        speeds that the interval leads to, before they are moved onto the constraints, if the point
+        has them. solved: symbols in the formulas for what linear equations with a symmetric matrix
+        determine, each with what is zero then: accelerations.
     """
 
     problem: Problem
@@ -165,12 +160,12 @@ CONSTRAINT = "endpoint_constraint", "cost"
 class Terms:
     """What a goal consists of.
 
-    Attributes:
-        value: from both ends, and from the integral over time, the value or the column of values of the goal.
-        integrand: at a point; None if nothing is integrated.
-        modes: that the goal can have, first the one that it has where the study says nothing: COST, BOTH, CONSTRAINT.
-            The cost of a goal that is a constraint first is the sum of the squares of its values, of others the sum.
-        is_sum: whether the integrand is added up over all points in the place of being integrated.
+    Attributes: value: from both ends, and from the integral over time, the value or the column of
+        values of the goal. integrand: at a point; None if nothing is integrated. modes: that the
+        goal can have, first the one that it has where the study says nothing: COST, BOTH,
+        CONSTRAINT. The cost of a goal that is a constraint first is the sum of the squares of its
+        values, of others the sum. is_sum: whether the integrand is added up over all points in the
+        place of being integrated.
     """
 
     value: Callable[[Ends], Formula]

@@ -51,19 +51,14 @@ class Problem(Asked):
         motion: that is given exactly, as if the model had a PositionMotion.
         scaled: by names of scale factors the columns of references that these multiply.
 
-    Attributes:
-        study: as given; `phase` and `solver` are its parts.
-        model: that moves.
-        functions: of the model (:class:`~osimlite.derivatives.functions.CasadiModel`).
-        states: bounds by paths of states, in the order of `functions.states`.
-        controls: likewise of the controls of actuators that act; the others are zero.
-        times: ranges of the initial and the final time, s.
-        parameters: ranges by names of parameters.
-        constraint_names: of the equations that the model's constraints make, as OpenSim numbers them.
-        grid: the points.
-        goals: those that count, with what they consist of.
-        path_rows: of the path constraints.
-        loads: the functions of time of the model's forces (`functions.loads`).
+    Attributes: study: as given; `phase` and `solver` are its parts. model: that moves. functions:
+        of the model (:class:`~osimlite.derivatives.functions.CasadiModel`). states: bounds by paths
+        of states, in the order of `functions.states`. controls: likewise of the controls of
+        actuators that act; the others are zero. times: ranges of the initial and the final time, s.
+        parameters: ranges by names of parameters. constraint_names: of the equations that the
+        model's constraints make, as OpenSim numbers them. grid: the points. goals: those that
+        count, with what they consist of. path_rows: of the path constraints. loads: the functions
+        of time of the model's forces (`functions.loads`).
 
     Raises:
         UnsupportedError: there is something that is not solved here; it says where in the file.
@@ -86,22 +81,30 @@ class Problem(Asked):
         self.expect_sound(study)
         self.phase = study.problem.phases
         self.series: list[Series] = []
-        # What programs on other meshes share, by whether it is of points of the mesh, and of such that are moved.
+        # What programs on other meshes share, by whether it is of points of the mesh, and of such
+        # that are moved.
         self.formulas: dict[tuple[bool, bool], Any] = {}
         if not isinstance(study.solver, MocoCasADiSolver):
             raise self.refused(study.solver, "of solvers only MocoCasADiSolver is known")
         self.solver: MocoCasADiSolver = study.solver
         self.model = self._model()
         motion = motion or self._motion()
-        self.components = {part.path: part for part in self.model.walk() if isinstance(part, Component)}
+        self.components = {
+            part.path: part for part in self.model.walk() if isinstance(part, Component)
+        }
         self._refuse_parts()
         self.loads: list[Series] = []
-        paths = {parameter.name: self.parameter_paths(parameter) for parameter in self.phase.parameters}
-        self.functions: Any = self._functions([path for own in paths.values() for path in own], motion)
+        paths = {
+            parameter.name: self.parameter_paths(parameter) for parameter in self.phase.parameters
+        }
+        self.functions: Any = self._functions(
+            [path for own in paths.values() for path in own], motion
+        )
         if not self.functions.states:
             raise self.wrong(self.phase, "its model has no states: nothing moves in it")
         self.parameters: dict[str, Range] = {
-            parameter.name: range_of(parameter.moco_bounds) or FREE for parameter in self.phase.parameters
+            parameter.name: range_of(parameter.moco_bounds) or FREE
+            for parameter in self.phase.parameters
         }
         self.parameter_owners = [place for place, own in enumerate(paths.values()) for _ in own]
         self._add_factors()
@@ -109,14 +112,18 @@ class Problem(Asked):
         acting = [name for name in self.functions.controls if self._acts(name)]
         self._expect_infos(acting)
         self.controls = control_bounds(self.phase, acting, self.components)
-        self.states = state_bounds(self.phase, self.functions.states, self.components, self.controls)
+        self.states = state_bounds(
+            self.phase, self.functions.states, self.components, self.controls
+        )
         self.times: tuple[Range, Range] = (
             range_of(self.phase.time_initial_bounds) or FREE,
             range_of(self.phase.time_final_bounds) or FREE,
         )
         if self.times[1][1] <= self.times[0][0]:
             ends = self.times[1][1], self.times[0][0]
-            message = "the phase ends at {:g} s at the latest, and begins at {:g} s at the earliest".format(*ends)
+            message = "the phase ends at {:g} s at the latest, and begins at {:g} s at the earliest".format(
+                *ends
+            )
             raise self.wrong(self.phase.time_final_bounds, message)
         self.constraint_names = self._constraint_names()
         self.grid = Grid.of(scheme_named(self.solver.transcription_scheme), self._mesh())
@@ -133,7 +140,12 @@ class Problem(Asked):
 
     # --------------------------------------------------------------------------------------- for goals and tools
     def weights(
-        self, part: Object, by_name: MocoWeightSet, by_pattern: MocoWeightSet | None, names: Sequence[str], what: str
+        self,
+        part: Object,
+        by_name: MocoWeightSet,
+        by_pattern: MocoWeightSet | None,
+        names: Sequence[str],
+        what: str,
     ) -> list[float]:
         """How much each of some names counts: by its name, else by the last pattern that matches, else one."""
         own = {weight.name: weight.weight for weight in by_name.objects}
@@ -153,7 +165,9 @@ class Problem(Asked):
             label: of the column that it is, which a scale factor of the goal may multiply.
         """
         factor = self._factors.get(label)
-        series = Series(len(self.series), values, None if factor is None else [*self.parameters].index(factor))
+        series = Series(
+            len(self.series), values, None if factor is None else [*self.parameters].index(factor)
+        )
         self.series.append(series)
         return series
 
@@ -163,7 +177,10 @@ class Problem(Asked):
             raise self.wrong(parameter, "it names no component")
         element = parameter.property_element
         behind = "" if element is None else f"/{element}"
-        return [f"{str(path).rstrip('/')}/{parameter.property_name}{behind}" for path in parameter.component_paths]
+        return [
+            f"{str(path).rstrip('/')}/{parameter.property_name}{behind}"
+            for path in parameter.component_paths
+        ]
 
     # ------------------------------------------------------------------------------------------------- parts
     def _model(self) -> Model:
@@ -180,7 +197,9 @@ class Problem(Asked):
                 motion = motion_of(part, self.model)
                 self.model.remove(part)
                 if isinstance(motion, str):
-                    raise self.wrong(self.phase, f"PositionMotion '{place}' has no function for '{motion}'")
+                    raise self.wrong(
+                        self.phase, f"PositionMotion '{place}' has no function for '{motion}'"
+                    )
                 return motion
         return None
 
@@ -189,21 +208,31 @@ class Problem(Asked):
             try:
                 functions = CasadiModel(self.model, parameters, self.folder, loads_given=True)
             except SettingError as error:
-                owners = (part for part in self.phase.parameters if any(
-                    f"'{path}'" in error.message for path in self.parameter_paths(part)))  # fmt: skip
+                owners = (
+                    part
+                    for part in self.phase.parameters
+                    if any(f"'{path}'" in error.message for path in self.parameter_paths(part))
+                )
                 raise self.wrong(next(owners, self.phase), error.message) from None
             self.loads = [self.given(partial(over_time, load)) for load in functions.loads]
             return functions
         if parameters:
-            raise self.refused(self.phase, f"parameters ({parameters[0]}) where the motion is given")
+            raise self.refused(
+                self.phase, f"parameters ({parameters[0]}) where the motion is given"
+            )
         return GivenMotion(self.model, motion, self.folder)
 
     def _refuse_parts(self) -> None:
         for part in self.components.values():
             if isinstance(part, Coordinate) and part.locked:
-                raise self.wrong(self.phase, f"{part.path} is locked, which Moco refuses; take a WeldJoint instead")
+                raise self.wrong(
+                    self.phase,
+                    f"{part.path} is locked, which Moco refuses; take a WeldJoint instead",
+                )
             if isinstance(part, Controller) and part.enabled:
-                message = f"the model's {type(part).tag} '{part.path}' would set controls; leave it out"
+                message = (
+                    f"the model's {type(part).tag} '{part.path}' would set controls; leave it out"
+                )
                 raise self.refused(self.phase, message)
             if type(part).tag in NO_RATES:
                 message = f"{type(part).tag} '{part.path}' has speeds that are no rates, which Moco refuses, too"
@@ -211,13 +240,20 @@ class Problem(Asked):
 
     def _refuse_settings(self) -> None:
         if self.solver.optim_solver != "ipopt":
-            raise self.refused(self.solver, f"of optimizers only ipopt is known, not {self.solver.optim_solver}")
+            raise self.refused(
+                self.solver, f"of optimizers only ipopt is known, not {self.solver.optim_solver}"
+            )
 
     def _costs_of_solver(self) -> Iterator[tuple[MocoGoal, Terms]]:
         """Squares of variables that the solver's own settings make a cost, named as in Moco."""
-        solver, first = self.solver, len(self.functions.coordinates) if self.dynamics.is_implicit else 0
+        solver, first = (
+            self.solver,
+            len(self.functions.coordinates) if self.dynamics.is_implicit else 0,
+        )
         if solver.minimize_lagrange_multipliers and not self.constraint_names:
-            raise self.wrong(solver, "minimize_lagrange_multipliers needs constraints, and the model has none")
+            raise self.wrong(
+                solver, "minimize_lagrange_multipliers needs constraints, and the model has none"
+            )
         for name, wanted, weight, part, bounds in (
             (
                 "multipliers",
@@ -235,7 +271,8 @@ class Problem(Asked):
             ),
             (
                 "auxiliary_derivatives",
-                solver.minimize_implicit_auxiliary_derivatives and bool(self.dynamics.tendons.names),
+                solver.minimize_implicit_auxiliary_derivatives
+                and bool(self.dynamics.tendons.names),
                 solver.implicit_auxiliary_derivatives_weight,
                 slice(first, None),
                 solver.implicit_auxiliary_derivative_bounds,
@@ -243,10 +280,19 @@ class Problem(Asked):
         ):
             if wanted:
                 # What Moco makes a cost are the variables as they are scaled.
-                by = scaling(*(range_of(bounds) or FREE)) if solver.scale_variables_using_bounds else (1.0, 0.0)
-                yield MocoControlGoal(name=name, weight=weight), integral(partial(_squares, part, by))
+                by = (
+                    scaling(*(range_of(bounds) or FREE))
+                    if solver.scale_variables_using_bounds
+                    else (1.0, 0.0)
+                )
+                yield (
+                    MocoControlGoal(name=name, weight=weight),
+                    integral(partial(_squares, part, by)),
+                )
         if solver.minimize_state_projection_distance and self.projects:
-            goal = MocoControlGoal(name="state_projection", weight=solver.state_projection_distance_weight)
+            goal = MocoControlGoal(
+                name="state_projection", weight=solver.state_projection_distance_weight
+            )
             yield goal, replace(integral(_way), is_sum=True)
 
     def _acts(self, control: str) -> bool:
@@ -281,12 +327,20 @@ class Problem(Asked):
         solver = self.solver
         if solver.kinematic_constraint_method == "Bordalba2023":
             if not solver.enforce_constraint_derivatives:
-                raise self.wrong(solver, "Bordalba2023 needs enforce_constraint_derivatives, as in Moco")
-        elif solver.transcription_scheme != "hermite-simpson" and solver.enforce_constraint_derivatives:
+                raise self.wrong(
+                    solver, "Bordalba2023 needs enforce_constraint_derivatives, as in Moco"
+                )
+        elif (
+            solver.transcription_scheme != "hermite-simpson"
+            and solver.enforce_constraint_derivatives
+        ):
             message = "constraints of the model with Posa2016 need transcription_scheme hermite-simpson, as in Moco"
             raise self.wrong(solver, message)
         if self.functions.constraints.size1_out(0) != count:
-            raise self.refused(self.phase, "the model has constraints that bind speeds alone, which is not solved here")
+            raise self.refused(
+                self.phase,
+                "the model has constraints that bind speeds alone, which is not solved here",
+            )
 
     def _mesh(self) -> Array:
         solver = self.solver
@@ -317,10 +371,14 @@ class Problem(Asked):
         used = [item.factor for item in self.series[first:]]
         for factor in goal.scale_factors:
             if [*self.parameters].index(factor.name) not in used:
-                raise self.wrong(factor, f"the goal follows no column '{self._scaled[factor.name]}'")
+                raise self.wrong(
+                    factor, f"the goal follows no column '{self._scaled[factor.name]}'"
+                )
         self._factors = {}
         if goal.mode is not None and goal.mode not in terms.modes:
-            raise self.wrong(goal, f"it cannot be of mode '{goal.mode}', as in Moco; it is a {terms.modes[0]}")
+            raise self.wrong(
+                goal, f"it cannot be of mode '{goal.mode}', as in Moco; it is a {terms.modes[0]}"
+            )
         return terms
 
     def _add_factors(self) -> None:
@@ -328,7 +386,9 @@ class Problem(Asked):
         for factor in [factor for goal in self.phase.goals for factor in goal.scale_factors]:
             if factor.name not in self._scaled:
                 # OpenSim's method that adds it is told so, and its files are not.
-                message = "no file says which column it is for, and OpenSim applies none that it reads"
+                message = (
+                    "no file says which column it is for, and OpenSim applies none that it reads"
+                )
                 raise self.refused(factor, f"{message}; osimlite.moco is told by `scaled`")
             if factor.name in self.parameters:
                 raise self.wrong(factor, "there is another parameter of its name")

@@ -1,10 +1,11 @@
 """The nonlinear program of a problem, with its sparse exact derivatives.
 
-At each point k of the grid one function of CasADi, F(s, z_k), has all that is not linear: rates times the duration,
-residuals, integrands times the duration. s are the times and the parameters, z_k the variables of the point. What must
-be zero is ``A w + B F`` with constant sparse A and B; so Jacobian and Hessian are constant sparse maps of the numbers
-that the functions' own derivatives have, and nothing is differentiated twice. What depends on both ends is one more
-function, E(s, z_0, z_n, integrals).
+At each point k of the grid one function of CasADi, F(s, z_k), has all that is not linear: rates
+times the duration, residuals, integrands times the duration. s are the times and the parameters,
+z_k the variables of the point. What must be zero is ``A w + B F`` with constant sparse A and B; so
+Jacobian and Hessian are constant sparse maps of the numbers that the functions' own derivatives
+have, and nothing is differentiated twice. What depends on both ends is one more function, E(s, z_0,
+z_n, integrals).
 """
 
 from __future__ import annotations
@@ -70,7 +71,9 @@ class PointFormula:
     def __init__(self, program: Program, number: int, size: int) -> None:
         problem, layout = program.problem, program.layout
         is_mesh = bool(problem.grid.is_mesh[number])
-        self.projected = len(layout.names["projections"]) if layout.has("projections", number) else 0
+        self.projected = (
+            len(layout.names["projections"]) if layout.has("projections", number) else 0
+        )
         s, z = SX.sym("s", layout.shared), SX.sym("z", size)
         place, known = SX.sym("place"), SX.sym("known", program.known_size)
         point = program.point(s, z, place, known, number)
@@ -98,20 +101,30 @@ class PointFormula:
             for _, terms in program.integrals
         ]
         column = casadi.vertcat(duration * casadi.vertcat(*rates), *rows, *integrands)
-        # What is common is found before anything is differentiated: later that takes ten times as long, and finds less.
-        solved, equations = (casadi.vertcat(SX(0, 1), *(pair[k] for pair in point.solved)) for k in range(2))
+        # What is common is found before anything is differentiated: later that takes ten times as
+        # long, and finds less.
+        solved, equations = (
+            casadi.vertcat(SX(0, 1), *(pair[k] for pair in point.solved)) for k in range(2)
+        )
         self.labels, self.limits, self.rows = labels, limits, column.numel()
         parts = casadi.cse(casadi.densify(casadi.vertcat(column, equations)))
         self._given, self._both, self._unknown = [s, z, place, known], casadi.vertcat(s, z), solved
         self._column, self._equations = parts[: self.rows], parts[self.rows :]
-        slopes, width = casadi.jacobian(parts, casadi.vertcat(self._both, solved)), self._both.numel()
+        slopes, width = (
+            casadi.jacobian(parts, casadi.vertcat(self._both, solved)),
+            self._both.numel(),
+        )
         jacobian, self._by_solved = slopes[: self.rows, :width], slopes[: self.rows, width:]
         self._value, self._moved = SX(0, 1), SX(0, width)
         if solved.numel():
             # Not differentiated is how the equations are solved: slopes follow from theirs.
             self._factors = casadi.ldl(slopes[self.rows :, width:])
-            self._value = casadi.ldl_solve(-casadi.substitute(self._equations, solved, 0), *self._factors)
-            self._moved = -casadi.sparsify(casadi.ldl_solve(slopes[self.rows :, :width], *self._factors))
+            self._value = casadi.ldl_solve(
+                -casadi.substitute(self._equations, solved, 0), *self._factors
+            )
+            self._moved = -casadi.sparsify(
+                casadi.ldl_solve(slopes[self.rows :, :width], *self._factors)
+            )
             jacobian += self._by_solved @ self._moved
         self.jacobian_entries = [*map(np.array, jacobian.sparsity().get_triplet())]
         self.value = self._function("F", self._given, self._column)
@@ -124,7 +137,10 @@ class PointFormula:
     @cached_property
     def curvature(self) -> tuple[Any, list[Any]]:
         """The second derivatives, with their rows and columns; they are only made if they are asked for."""
-        multipliers, pushes = SX.sym("multipliers", self.rows), SX.sym("pushes", self._unknown.numel())
+        multipliers, pushes = (
+            SX.sym("multipliers", self.rows),
+            SX.sym("pushes", self._unknown.numel()),
+        )
         combined = casadi.dot(multipliers, self._column) + casadi.dot(pushes, self._equations)
         hessian = casadi.hessian(combined, casadi.vertcat(self._both, self._unknown))[0]
         if self._unknown.numel():
@@ -133,7 +149,9 @@ class PointFormula:
             along = casadi.vertcat(SX.eye(self._both.numel()), self._moved)
             hessian = casadi.substitute(along.T @ hessian @ along, pushes, found)
         hessian = casadi.triu(hessian)
-        function = self._function("H", [*self._given, multipliers], casadi.vertcat(*hessian.nonzeros()))
+        function = self._function(
+            "H", [*self._given, multipliers], casadi.vertcat(*hessian.nonzeros())
+        )
         return function, [*map(np.array, hessian.sparsity().get_triplet())]
 
 
@@ -151,7 +169,9 @@ class PointFunction:
         self.projected = formula.projected
         self.labels, self.limits, self.rows = formula.labels, formula.limits, formula.rows
         self.jacobian_rows, self.jacobian_columns = formula.jacobian_entries
-        self.value, self.slope = (Buffered(each.map(len(numbers))) for each in (formula.value, formula.slope))
+        self.value, self.slope = (
+            Buffered(each.map(len(numbers))) for each in (formula.value, formula.slope)
+        )
 
     def at(self, program: Program, w: Array, places: Array, z: Array) -> Array:
         """F (n, rows) at other places (n,), from 0 to 1, with these variables (n, ...)."""
@@ -167,14 +187,9 @@ class PointFunction:
 class Program:
     """The nonlinear program: minimize f(w) with lower <= g(w) <= upper.
 
-    Attributes:
-        problem: that is solved.
-        layout: of the variables w.
-        labels: of the rows of g.
-        times: of the rows, from 0 at the start to 1 at the end; of what concerns both ends not a number.
-        lower: bounds of g.
-        upper: bounds of g.
-        costs: names of the parts of f.
+    Attributes: problem: that is solved. layout: of the variables w. labels: of the rows of g.
+        times: of the rows, from 0 at the start to 1 at the end; of what concerns both ends not a
+        number. lower: bounds of g. upper: bounds of g. costs: names of the parts of f.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -186,10 +201,14 @@ class Program:
         self.lower: Array = np.zeros(0)
         self.upper: Array = np.zeros(0)
         self.known_size = 1 + 3 * len(problem.series)
-        self.integrals: list[Any] = [(goal, terms) for goal, terms in problem.goals if terms.integrand is not None]
+        self.integrals: list[Any] = [
+            (goal, terms) for goal, terms in problem.goals if terms.integrand is not None
+        ]
         points, is_mesh = range(len(problem.grid.places)), problem.grid.is_mesh
         sorts = [[k for k in points if is_mesh[k]], [k for k in points if not is_mesh[k]]]
-        inside = problem.solver.enforce_path_constraint_mesh_interior_points or not problem.path_rows
+        inside = (
+            problem.solver.enforce_path_constraint_mesh_interior_points or not problem.path_rows
+        )
         if inside and not problem.binds:
             sorts = [[*points]]
         if problem.projects:
@@ -257,7 +276,9 @@ class Program:
             if bounds and len(bounds) != count:
                 raise problem.wrong(goal, f"it has {count} values and bounds for {len(bounds)}")
             limits += bounds or [(0.0, 0.0)] * count
-            self.end_labels += [goal.name if count == 1 else f"{goal.name} {k}" for k in range(count)]
+            self.end_labels += [
+                goal.name if count == 1 else f"{goal.name} {k}" for k in range(count)
+            ]
         given = [s, z0, z1, totals, *known]
         cost = casadi.densify(casadi.vertcat(*costs)) if costs else SX.zeros(0, 1)
         wanted = casadi.densify(casadi.vertcat(*rows)) if rows else SX.zeros(0, 1)
@@ -273,10 +294,14 @@ class Program:
         self._end_value = Buffered(casadi.Function("E", given, [cost, wanted]))
         slopes = [casadi.densify(casadi.jacobian(each, both)) for each in (total, wanted)]
         self._end_slope = Buffered(casadi.Function("dE", given, slopes))
-        self._end_pattern = np.array(casadi.DM(casadi.jacobian(wanted, both).sparsity(), 1.0).full(), dtype=bool)
+        self._end_pattern = np.array(
+            casadi.DM(casadi.jacobian(wanted, both).sparsity(), 1.0).full(), dtype=bool
+        )
         hessian = casadi.hessian(lagrangian, both)[0]
         self._end_hessian_pattern = np.array(casadi.DM(hessian.sparsity(), 1.0).full(), dtype=bool)
-        self._end_curvature = Buffered(casadi.Function("HE", [*given, factor, multipliers], [casadi.densify(hessian)]))
+        self._end_curvature = Buffered(
+            casadi.Function("HE", [*given, factor, multipliers], [casadi.densify(hessian)])
+        )
         self.labels += self.end_labels
         self.times = np.append(self.times, np.full(len(self.end_labels), np.nan))
         self.lower = np.append(self.lower, [low for low, _ in limits])
@@ -300,7 +325,9 @@ class Program:
             start_of[sort.numbers] = offset + sort.rows * np.arange(len(sort.numbers))
         a: list[tuple[Any, Any, Any]] = []
         b: list[tuple[Any, Any, Any]] = []
-        lines = scheme.controls if self.problem.solver.interpolate_control_mesh_interior_points else ()
+        lines = (
+            scheme.controls if self.problem.solver.interpolate_control_mesh_interior_points else ()
+        )
         many, moved = len(grid.lengths), len(layout.names["projections"])
         points = np.array([grid.points_of(interval) for interval in range(many)])
         labels = [f"{name} defect" for name in states] * len(scheme.states)
@@ -313,16 +340,26 @@ class Program:
                 if moved and k == len(points[0]) - 1:
                     # What the interval leads to is moved onto the constraints afterwards.
                     ends = layout.places_of["projections"][points[:, k]]
-                    places, of = np.hstack([ends, places[:, moved:]]), np.concatenate([count + at[:moved], at[moved:]])
+                    places, of = (
+                        np.hstack([ends, places[:, moved:]]),
+                        np.concatenate([count + at[:moved], at[moved:]]),
+                    )
                 if own:
                     a.append((rows, places, np.full(rows.shape, own)))
                 if rate:
                     each = np.broadcast_to(grid.lengths[:, None] * rate, rows.shape)
                     b.append((rows, start_of[points[:, k]][:, None] + of, each))
         for number, line in enumerate(lines):
-            rows = first + len(scheme.states) * count + number * len(controls) + np.arange(len(controls))
+            rows = (
+                first
+                + len(scheme.states) * count
+                + number * len(controls)
+                + np.arange(len(controls))
+            )
             for k in np.flatnonzero(line).tolist():
-                a.append((rows, layout.places_of["controls"][points[:, k]], np.full(rows.shape, line[k])))
+                a.append(
+                    (rows, layout.places_of["controls"][points[:, k]], np.full(rows.shape, line[k]))
+                )
         self.labels += labels * many
         middles = 0.5 * (grid.places[points[:, 0]] + grid.places[points[:, -1]])
         times, row = [np.repeat(middles, len(labels))], len(labels) * many
@@ -345,7 +382,8 @@ class Program:
 
         def matrix(parts: list[tuple[Any, Any, Any]], width: int) -> SparseMatrix:
             found: list[Any] = [
-                np.concatenate([np.ravel(part[k]) for part in parts]) if parts else [] for k in range(3)
+                np.concatenate([np.ravel(part[k]) for part in parts]) if parts else []
+                for k in range(3)
             ]
             return SparseMatrix.from_entries(found[0], found[1], found[2], (size, width))
 
@@ -359,7 +397,11 @@ class Program:
         for sort, start in zip(self.sorts, self._offsets, strict=False):
             r, c, count = getattr(sort, rows), getattr(sort, columns), len(sort.numbers)
             places = np.hstack([np.tile(np.arange(self.layout.shared), (count, 1)), sort.columns])
-            own = start + sort.rows * np.arange(count)[:, None] + r if rows == "jacobian_rows" else places[:, r]
+            own = (
+                start + sort.rows * np.arange(count)[:, None] + r
+                if rows == "jacobian_rows"
+                else places[:, r]
+            )
             first.append(own.ravel())
             second.append(places[:, c].ravel())
         return np.concatenate(first), np.concatenate(second)
@@ -370,14 +412,19 @@ class Program:
         rows, columns = self._entries("jacobian_rows", "jacobian_columns")
         spread, own = self._b.select_columns(rows.astype(np.int64)), self._a
         keys = np.concatenate(
-            [spread.rows * np.int64(width) + columns[spread.columns], own.rows * np.int64(width) + own.columns]
+            [
+                spread.rows * np.int64(width) + columns[spread.columns],
+                own.rows * np.int64(width) + own.columns,
+            ]
         )
         unique, inverse = np.unique(keys, return_inverse=True)
         count = len(spread.rows)
         self._jacobian_map = SparseMatrix.from_entries(
             inverse[:count], spread.columns, spread.values, (len(unique), len(rows))
         )
-        self._jacobian_constant = np.bincount(inverse[count:], weights=own.values, minlength=len(unique))
+        self._jacobian_constant = np.bincount(
+            inverse[count:], weights=own.values, minlength=len(unique)
+        )
         self._jacobian_rows, self._jacobian_columns = unique // width, unique % width
         self._of_g = self._jacobian_rows < self._rows
 
@@ -396,7 +443,10 @@ class Program:
         # CasADi's columns come one after the other.
         self._jacobian_order = np.lexsort((rows, columns))
         self.jacobian_sparsity = casadi.Sparsity.triplet(
-            len(self.labels), width, rows[self._jacobian_order].tolist(), columns[self._jacobian_order].tolist()
+            len(self.labels),
+            width,
+            rows[self._jacobian_order].tolist(),
+            columns[self._jacobian_order].tolist(),
         )
 
     # ------------------------------------------------------------------------------------------------- numbers
@@ -420,7 +470,9 @@ class Program:
         return [np.tile(s, len(places)), z, places, self._known(times)]
 
     def _all(self, name: str, w: Array) -> Array:
-        return np.concatenate([getattr(sort, name)(*self._given(sort, w))[0].ravel() for sort in self.sorts])
+        return np.concatenate(
+            [getattr(sort, name)(*self._given(sort, w))[0].ravel() for sort in self.sorts]
+        )
 
     def _end_given(self, w: Array, totals: Array) -> list[Array]:
         known = self._known(w[:2])

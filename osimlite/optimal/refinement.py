@@ -1,7 +1,8 @@
 """Meshes that are as fine as a motion needs: the error of each interval is estimated, and where it is large they split.
 
-After J. T. Betts, Practical Methods for Optimal Control, 2010, section 4.7: within an interval the states are the
-polynomial that the scheme stands for, and what their rates are off there from the equations of motion is the error.
+After J. T. Betts, Practical Methods for Optimal Control, 2010, section 4.7: within an interval the
+states are the polynomial that the scheme stands for, and what their rates are off there from the
+equations of motion is the error.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ HESSIANS = "exact", "limited-memory"
 class Refinement:
     """How fine a mesh becomes.
 
-    Attributes:
-        tolerance: of the error of a state within an interval, over one more than the largest size of that state.
-        hessian: second derivatives of all searches but the first: "exact" or "limited-memory".
+    Attributes: tolerance: of the error of a state within an interval, over one more than the
+        largest size of that state. hessian: second derivatives of all searches but the first:
+        "exact" or "limited-memory".
     """
 
     tolerance: float
@@ -59,11 +60,15 @@ class Refinement:
         try:
             result = cls(float(text), hessian or "exact")
         except ValueError:
-            raise SettingError(f"a mesh is refined to a tolerance such as 1e-3, not '{text}'") from None
+            raise SettingError(
+                f"a mesh is refined to a tolerance such as 1e-3, not '{text}'"
+            ) from None
         if not 0.0 < result.tolerance < inf:
             raise SettingError(f"a mesh is refined to a tolerance above 0, not {text}")
         if result.hessian not in HESSIANS:
-            raise SettingError(f"meshes are not refined with '{hessian}'{or_known(hessian, HESSIANS)}")
+            raise SettingError(
+                f"meshes are not refined with '{hessian}'{or_known(hessian, HESSIANS)}"
+            )
         return result
 
 
@@ -82,7 +87,10 @@ class Round(NamedTuple):
 
 
 def refined(
-    program: Program, guess: Array, refinement: Refinement, tell: Callable[[Progress], None] | None = None
+    program: Program,
+    guess: Array,
+    refinement: Refinement,
+    tell: Callable[[Progress], None] | None = None,
 ) -> tuple[Program, Found, list[Round]]:
     """Solve on finer and finer meshes, each from the solution before, until no interval's error is above the tolerance.
 
@@ -108,7 +116,10 @@ def refined(
         cost = float(program.values(found.w)[0].sum())
         rounds.append(Round(len(error), float(error.max()), cost, found.iterations, found.duration))
         mesh = split(program.problem.grid, error, refinement.tolerance)
-        is_good, is_enough = len(mesh) == len(error) + 1, len(rounds) > MOST_ROUNDS or len(mesh) > MOST_INTERVALS
+        is_good, is_enough = (
+            len(mesh) == len(error) + 1,
+            len(rounds) > MOST_ROUNDS or len(mesh) > MOST_INTERVALS,
+        )
         if not found.success or is_good or is_enough:
             return program, found, rounds
         finer = _on(program.problem, mesh, refinement.hessian)
@@ -123,12 +134,16 @@ def refuse(problem: Problem) -> None:
         UnsupportedError: there is such a thing.
     """
     if problem.dynamics.tendons.names:
-        raise problem.refused(problem.solver, "meshes are not refined where tendons are implicit; take explicit ones")
+        raise problem.refused(
+            problem.solver, "meshes are not refined where tendons are implicit; take explicit ones"
+        )
     if problem.projects:
         message = "meshes are refined with kinematic_constraint_method Posa2016 only, which leaves no steps in states"
         raise problem.refused(problem.solver, message)
     if problem.dynamics.is_implicit:
-        raise problem.refused(problem.solver, "meshes are refined with multibody_dynamics_mode explicit only")
+        raise problem.refused(
+            problem.solver, "meshes are refined with multibody_dynamics_mode explicit only"
+        )
 
 
 def errors(program: Program, w: Array) -> Array:
@@ -166,7 +181,9 @@ def carried(program: Program, w: Array, finer: Program) -> Array:
     starts = np.concatenate([[0.0], np.cumsum(grid.lengths)[:-1]])
     places = finer.problem.grid.places
     interval = np.clip(np.searchsorted(starts, places, side="right") - 1, 0, len(starts) - 1)
-    values = _Polynomial(program, w).at((places - starts[interval]) / grid.lengths[interval], interval)
+    values = _Polynomial(program, w).at(
+        (places - starts[interval]) / grid.lengths[interval], interval
+    )
     result = layout.guess()
     result[: layout.shared] = w[: layout.shared]
     for kind in KINDS:
@@ -205,7 +222,9 @@ class _Polynomial:
             rates[sort.numbers] = sort.value(*program._given(sort, w))[0][:, :count]
         self.rates = rates[points[:, used]]
         self._lines = program.problem.solver.interpolate_control_mesh_interior_points
-        self._values = {kind: w[layout.places_of[kind]][points] for kind in KINDS if kind != "slacks"}
+        self._values = {
+            kind: w[layout.places_of[kind]][points] for kind in KINDS if kind != "slacks"
+        }
 
     def at(self, places: Array, intervals: Any) -> dict[str, Array]:
         """By kind the variables (n, of that kind) at places (n,), from 0 to 1, of intervals (n,)."""
@@ -230,7 +249,9 @@ def _basis(nodes: Array, places: Array) -> Array:
 
 def _integrals(nodes: Array, places: Array) -> Array:
     """Their integrals from 0 to each place."""
-    powers = np.polynomial.polynomial.polyvander(places, len(nodes))[:, 1:] / np.arange(1, len(nodes) + 1)
+    powers = np.polynomial.polynomial.polyvander(places, len(nodes))[:, 1:] / np.arange(
+        1, len(nodes) + 1
+    )
     return powers @ _coefficients(nodes)
 
 

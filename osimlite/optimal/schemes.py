@@ -1,7 +1,7 @@
 """Schemes of transcription: how states, their rates and controls hang together within an interval of the mesh.
 
-Moco's, as its ``CasOCTranscription`` has them; T. Betts, Practical Methods for Optimal Control, 2010, and for those of
-Legendre D. Garg et al., Automatica 46, 2010.
+Moco's, as its ``CasOCTranscription`` has them; T. Betts, Practical Methods for Optimal Control,
+2010, and for those of Legendre D. Garg et al., Automatica 46, 2010.
 """
 
 from __future__ import annotations
@@ -38,7 +38,9 @@ def scheme_named(name: str) -> Scheme:
     """The scheme of a name that the schema allows."""
     if name == "trapezoidal":
         half = np.array([0.5, 0.5])
-        return Scheme(name, np.array([0.0, 1.0]), half, np.array([[-1.0, 1.0]]), -half[None], np.zeros((0, 2)))
+        return Scheme(
+            name, np.array([0.0, 1.0]), half, np.array([[-1.0, 1.0]]), -half[None], np.zeros((0, 2))
+        )
     if name == "hermite-simpson":
         between = [-0.5, 1.0, -0.5]
         simpson = np.array([1.0, 4.0, 1.0]) / 6.0

@@ -60,13 +60,17 @@ def simulated(problem: Problem, trajectory: MocoTrajectory) -> Simulated:
         problem: whose model moves.
         trajectory: that was found.
 
-    Raises:
-        OsimliteError: the motion is given, begins later than at 0 s, or has parameters; the model cannot be simulated.
+    Raises: OsimliteError: the motion is given, begins later than at 0 s, or has parameters; the
+        model cannot be simulated.
     """
     if isinstance(problem.functions, GivenMotion):
         raise OsimliteError("the motion was given")
     if trajectory.times[0] != 0.0 or trajectory.parameters:
-        what = "has parameters of its own" if trajectory.parameters else f"begins at {trajectory.times[0]:g} s"
+        what = (
+            "has parameters of its own"
+            if trajectory.parameters
+            else f"begins at {trajectory.times[0]:g} s"
+        )
         raise OsimliteError(f"the motion {what}")
     end = float(trajectory.times[-1])
     start = {name: float(trajectory.columns[name][0]) for name in trajectory.names["states"]}
@@ -81,7 +85,10 @@ def simulated(problem: Problem, trajectory: MocoTrajectory) -> Simulated:
     )
     columns = {info.path: found.values[:, k] for k, info in enumerate(found.mechanism.coordinates)}
     apart = {
-        path: np.abs(np.interp(trajectory.times, found.times, columns[path]) - trajectory.columns[f"{path}/value"])
+        path: np.abs(
+            np.interp(trajectory.times, found.times, columns[path])
+            - trajectory.columns[f"{path}/value"]
+        )
         for path in problem.functions.coordinates
     }
     return Simulated(trajectory.times, apart)

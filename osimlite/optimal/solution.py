@@ -26,17 +26,13 @@ from osimlite.schema.moco.studies import MocoStudy
 class MocoSolution:
     """What came out of a study.
 
-    Attributes:
-        trajectory: the motion, with everything that was varied.
-        success: whether it is a solution to the tolerances of the study.
-        status: in Ipopt's words.
-        objective: what was made small.
-        terms: the parts of it, by the names of the goals.
-        violations: the largest of what is not fulfilled, the largest first.
-        iterations: that were taken, on all meshes.
-        duration: of the search, s.
-        rounds: what was done on each mesh, and the largest error of its intervals; empty if none was refined.
-        stride: the motion and what follows it, if a MocoPeriodicityGoal says that; None otherwise.
+    Attributes: trajectory: the motion, with everything that was varied. success: whether it is a
+        solution to the tolerances of the study. status: in Ipopt's words. objective: what was made
+        small. terms: the parts of it, by the names of the goals. violations: the largest of what is
+        not fulfilled, the largest first. iterations: that were taken, on all meshes. duration: of
+        the search, s. rounds: what was done on each mesh, and the largest error of its intervals;
+        empty if none was refined. stride: the motion and what follows it, if a MocoPeriodicityGoal
+        says that; None otherwise.
     """
 
     trajectory: MocoTrajectory
@@ -85,18 +81,16 @@ def solve(
 ) -> MocoSolution:
     """Solve a study of Moco: the same nonlinear program as Moco's, with exact derivatives.
 
-    Args:
-        study: a file, or the study itself.
-        guess: to start from, in place of the study's; without either the middle between the bounds of each variable.
-        folder: that the files are in which a study names that is in no file; the current folder if None.
-        tell: is told of each iteration. Ctrl-C ends the search, and the best so far is what comes out.
-        refine: split intervals of the mesh until the error of none is above this, see :class:`Refinement`; None for
-            the mesh as it is.
-        scaled: by names of the goals' scale factors the column of the goal's table that each multiplies: what OpenSim's
-            ``addScaleFactor`` is told, and no file.
+    Args: study: a file, or the study itself. guess: to start from, in place of the study's; without
+        either the middle between the bounds of each variable. folder: that the files are in which a
+        study names that is in no file; the current folder if None. tell: is told of each iteration.
+        Ctrl-C ends the search, and the best so far is what comes out. refine: split intervals of
+        the mesh until the error of none is above this, see :class:`Refinement`; None for the mesh
+        as it is. scaled: by names of the goals' scale factors the column of the goal's table that
+        each multiplies: what OpenSim's ``addScaleFactor`` is told, and no file.
 
-    Returns:
-        What came out; `success` says whether it is a solution, and `violations` what is not fulfilled otherwise.
+    Returns: What came out; `success` says whether it is a solution, and `violations` what is not
+        fulfilled otherwise.
 
     Raises:
         UnsupportedError: there is something in it that is not solved here; it says what and where.
@@ -107,7 +101,9 @@ def solve(
 
 
 def problem_of(
-    study: str | Path | MocoStudy, folder: str | Path | None = None, scaled: Mapping[str, str] | None = None
+    study: str | Path | MocoStudy,
+    folder: str | Path | None = None,
+    scaled: Mapping[str, str] | None = None,
 ) -> Problem:
     """The problem of a study.
 
@@ -170,7 +166,9 @@ def solved(
     )
 
 
-def evaluated(program: Program, trajectory: MocoTrajectory) -> tuple[dict[str, float], list[Violation]]:
+def evaluated(
+    program: Program, trajectory: MocoTrajectory
+) -> tuple[dict[str, float], list[Violation]]:
     """The parts of the objective of a trajectory, and the largest violations of what the problem demands.
 
     Args:

@@ -1,7 +1,7 @@
 """Constant sparse matrices that are multiplied by vectors.
 
-The few operations that a nonlinear program needs, by NumPy alone: to import `scipy.sparse` takes a fifth of the process
-that solves a small study.
+The few operations that a nonlinear program needs, by NumPy alone: to import `scipy.sparse` takes a
+fifth of the process that solves a small study.
 """
 
 from __future__ import annotations
@@ -56,7 +56,11 @@ class SparseMatrix:
         starts = np.searchsorted(self.columns[order], np.arange(self.shape[1] + 1))
         counts = (starts[1:] - starts[:-1])[places]
         # The entries of each column follow one another in the order.
-        first = np.repeat(starts[:-1][places] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
+        first = np.repeat(
+            starts[:-1][places] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts
+        )
         chosen = order[first + np.arange(counts.sum())]
         columns = np.repeat(np.arange(len(places)), counts)
-        return SparseMatrix.from_entries(self.rows[chosen], columns, self.values[chosen], (self.shape[0], len(places)))
+        return SparseMatrix.from_entries(
+            self.rows[chosen], columns, self.values[chosen], (self.shape[0], len(places))
+        )

@@ -34,8 +34,14 @@ def contact_at(goal: MocoGoal, problem: Problem, name: str) -> tuple[str, Contac
     path = f"/{name.strip('/')}"
     contact: Any = problem.components.get(path)
     if not isinstance(contact, SmoothSphereHalfSpaceForce):
-        known = [key for key, part in problem.components.items() if isinstance(part, SmoothSphereHalfSpaceForce)]
-        raise problem.wrong(goal, f"the model has no SmoothSphereHalfSpaceForce '{path}'{did_you_mean(path, known)}")
+        known = [
+            key
+            for key, part in problem.components.items()
+            if isinstance(part, SmoothSphereHalfSpaceForce)
+        ]
+        raise problem.wrong(
+            goal, f"the model has no SmoothSphereHalfSpaceForce '{path}'{did_you_mean(path, known)}"
+        )
     sphere = problem.model.tree().target(contact, "socket_sphere", contact.socket_sphere)
     assert isinstance(sphere, ContactSphere)
     return path, sphere

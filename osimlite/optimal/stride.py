@@ -12,8 +12,9 @@ from osimlite.schema.moco.goals import MocoPeriodicityGoal
 def stride(problem: Problem, trajectory: MocoTrajectory) -> MocoTrajectory | None:
     """The motion and what follows it; None unless a goal says that it ends as it began, or as its mirror image.
 
-    The variable that at the end is what another was at the start goes on as that did. What no goal speaks of, such as
-    the way, goes on from where it has come. Multipliers, slacks and derivatives are left out.
+    The variable that at the end is what another was at the start goes on as that did. What no goal
+    speaks of, such as the way, goes on from where it has come. Multipliers, slacks and derivatives
+    are left out.
 
     Args:
         problem: with the goals.

@@ -53,11 +53,17 @@ def table_of(problem: Problem, part: Object, processor: TableProcessor) -> StoTa
     given = problem.tables.get(part.name)
     if given is not None:
         return given
-    return processed_table(problem, part, processor, problem.functions.states, problem.functions.mechanism)
+    return processed_table(
+        problem, part, processor, problem.functions.states, problem.functions.mechanism
+    )
 
 
 def processed_table(
-    problem: Asked, part: Object, processor: TableProcessor, states: Sequence[str], mechanism: Mechanism
+    problem: Asked,
+    part: Object,
+    processor: TableProcessor,
+    states: Sequence[str],
+    mechanism: Mechanism,
 ) -> StoTable:
     """The table as its processor makes it, given the paths of states; errors as of :func:`table_of`."""
     if not processor.filepath.strip():
@@ -84,7 +90,9 @@ def read_table(path: Path) -> StoTable:
         return read_sto(path)
     markers = MarkerData.of(path)
     labels = tuple(f"{name}_{k}" for name in markers.names for k in (1, 2, 3))
-    return StoTable("", markers.times, labels, markers.positions.reshape(len(markers.times), -1), file=str(path))
+    return StoTable(
+        "", markers.times, labels, markers.positions.reshape(len(markers.times), -1), file=str(path)
+    )
 
 
 def _filtered(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
@@ -93,7 +101,8 @@ def _filtered(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
     times, rows = table.times, table.rows
     step = float(np.diff(times).min())
     if float(times[-1] - times[0]) / (len(times) - 1) - step > np.finfo(float).eps:
-        # Made even before it is continued at both ends: OpenSim's tools for storage files do the one after the other.
+        # Made even before it is continued at both ends: OpenSim's tools for storage files do the
+        # one after the other.
         even = times[0] + step * np.arange(int((times[-1] - times[0]) / step + 1e-9) + 1)
         (rows,) = SampledCurves(times, rows).derivatives(even, (0,))
         times = even
@@ -106,7 +115,10 @@ def _filtered(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
 
 
 def _with_coupled(
-    problem: Asked, operator: TabOpAppendCoupledCoordinateValues, table: StoTable, mechanism: Mechanism
+    problem: Asked,
+    operator: TabOpAppendCoupledCoordinateValues,
+    table: StoTable,
+    mechanism: Mechanism,
 ) -> StoTable:
     """With the values of coordinates that enforced constraints make functions of others, behind the other columns."""
     paths = [f"{info.path}/value" for info in mechanism.coordinates]
@@ -154,11 +166,11 @@ def splines(problem: Problem, table: StoTable, columns: list[str]) -> list[Serie
     first, last = float(table.times[0]), float(table.times[-1])
     start, end = problem.times[0][1], problem.times[1][0]
     if start < first - SLACK or end > last + SLACK:
-        message = (
-            f"it has data from {first:g} s to {last:g} s, and the motion is at least from {start:g} s to {end:g} s"
-        )
+        message = f"it has data from {first:g} s to {last:g} s, and the motion is at least from {start:g} s to {end:g} s"
         raise DocumentError(message, file=table.file)
-    curves = Curves(table.times, np.column_stack([table.times, *(table[name] for name in columns)])[:, 1:])
+    curves = Curves(
+        table.times, np.column_stack([table.times, *(table[name] for name in columns)])[:, 1:]
+    )
     return [problem.given(partial(_column, curves, k), name) for k, name in enumerate(columns)]
 
 
@@ -202,5 +214,8 @@ class Curves:
     def at(self, times: Array) -> Array:
         """Value and two derivatives (3, n, m) at n times of m columns."""
         if self._times is None or not np.array_equal(self._times, times):
-            self._times, self._values = times.copy(), np.array(self._curves.derivatives(times, (0, 1, 2)))
+            self._times, self._values = (
+                times.copy(),
+                np.array(self._curves.derivatives(times, (0, 1, 2))),
+            )
         return self._values

@@ -42,7 +42,9 @@ class Tendons:
         names: of the rates, as Moco has them.
     """
 
-    def __init__(self, problem: Problem, elements: Iterable[tuple[str, Any]], mode: str = IMPLICIT) -> None:
+    def __init__(
+        self, problem: Problem, elements: Iterable[tuple[str, Any]], mode: str = IMPLICIT
+    ) -> None:
         self.problem = problem
         self.muscles: list[tuple[str, SmoothMuscle, SmoothTendon]] = []
         for path, element in elements:
@@ -60,7 +62,8 @@ class Tendons:
     def residuals(self, point: Point, rates: Formula) -> tuple[list[str], Formula]:
         """By how much each tendon's force exceeds what the fibers bear, over the muscle's strength.
 
-        The tendon lengthens by what its force's rate asks for, and the fibers by the rest of what the path does.
+        The tendon lengthens by what its force's rate asks for, and the fibers by the rest of what
+        the path does.
         """
         if not self.muscles:
             return [], casadi.SX(0, 1)
@@ -70,35 +73,57 @@ class Tendons:
         for number, (path, muscle, tendon) in enumerate(self.muscles):
             place = functions.path_names.index(path)
             force = point.state(f"{path}/normalized_tendon_force")
-            activation = point.state(f"{path}/activation") if muscle.follows else point.control(path)
+            activation = (
+                point.state(f"{path}/activation") if muscle.follows else point.control(path)
+            )
             stretch = muscle.slack * rates[number] / (tendon.growth * (force + BELOW))
-            given = lengths[place], speeds[place] - stretch, point.control(path), activation, 0.0, 0.0, force
+            given = (
+                lengths[place],
+                speeds[place] - stretch,
+                point.control(path),
+                activation,
+                0.0,
+                0.0,
+                force,
+            )
             rows.append(residual(force, MuscleInputs(*given), muscle, tendon))
         return [f"{path} equilibrium" for path in self.paths], casadi.vertcat(*rows)
 
     def drifts(self, point: Point) -> Formula:
         """By how much the rate of the force of the fibers along each tendon exceeds that of the tendon, N/s.
 
-        Fibers are springs there: neither the activation nor the force's factor by the velocity changes
-        (M. Millard et al., Journal of Biomechanical Engineering 135, 2013, A6).
+        Fibers are springs there: neither the activation nor the force's factor by the velocity
+        changes (M. Millard et al., Journal of Biomechanical Engineering 135, 2013, A6).
         """
         functions, rows = self.problem.functions, [casadi.SX(0, 1)]
         lengths, speeds = self.problem.dynamics.path_lengths(point)
         for path, muscle, tendon in self.muscles:
             place, state = functions.path_names.index(path), f"{path}/normalized_tendon_force"
             force, rate = point.state(state), point.rates[functions.states.index(state)]
-            activation = point.state(f"{path}/activation") if muscle.follows else point.control(path)
+            activation = (
+                point.state(f"{path}/activation") if muscle.follows else point.control(path)
+            )
             along = casadi.SX.sym("along")
             length = casadi.sqrt(along**2 + muscle.height**2)
             fiber = speeds[place] - muscle.slack * rate / (tendon.growth * (force + BELOW))
             velocity = casadi.SX.sym("velocity")
             active = activation * on_symbols(degroote_active)(length / muscle.optimal, muscle.scale)
-            passive, _ = on_symbols(degroote_passive)(length / muscle.optimal, tendon.passive_strain)
+            passive, _ = on_symbols(degroote_passive)(
+                length / muscle.optimal, tendon.passive_strain
+            )
             springs = passive * muscle.passive + muscle.damping * velocity
             borne = active * on_symbols(degroote_factor)(velocity) + springs
             stiffness = casadi.jacobian(borne * along / length, along)
-            now = lengths[place] - muscle.slack * on_symbols(smooth_tendon_length)(force, tendon.growth)
-            moves = fiber * casadi.substitute(along / length, along, now) / (muscle.fastest * muscle.optimal)
-            stiffness = casadi.substitute(stiffness, casadi.vertcat(along, velocity), casadi.vertcat(now, moves))
+            now = lengths[place] - muscle.slack * on_symbols(smooth_tendon_length)(
+                force, tendon.growth
+            )
+            moves = (
+                fiber
+                * casadi.substitute(along / length, along, now)
+                / (muscle.fastest * muscle.optimal)
+            )
+            stiffness = casadi.substitute(
+                stiffness, casadi.vertcat(along, velocity), casadi.vertcat(now, moves)
+            )
             rows.append(muscle.strength * (stiffness * fiber - rate))
         return casadi.vertcat(*rows)

@@ -25,7 +25,9 @@ from osimlite.schema.tools.processors import ModelProcessor
 def study_of(tool: MocoInverse | MocoTrack, model: Model, solver: MocoCasADiSolver) -> MocoStudy:
     """A study of a model that is processed, without goals."""
     phase = MocoPhase(name="phases", model=ModelProcessor(name="model", model=model))
-    return MocoStudy(name=tool.name, problem=MocoProblem(name="problem", phases=phase), solver=solver)
+    return MocoStudy(
+        name=tool.name, problem=MocoProblem(name="problem", phases=phase), solver=solver
+    )
 
 
 def set_times(
@@ -45,7 +47,10 @@ def set_times(
         raise asked.wrong(tool, message)
     assert isinstance(study.solver, MocoCasADiSolver)
     # The quotient of a tiny interval is no integer any more, or infinite.
-    if not 0.0 < tool.mesh_interval < np.inf or (end - start) / MAX_MESH_INTERVALS > tool.mesh_interval:
+    if (
+        not 0.0 < tool.mesh_interval < np.inf
+        or (end - start) / MAX_MESH_INTERVALS > tool.mesh_interval
+    ):
         message = f"mesh_interval is {tool.mesh_interval:g} s; at most {MAX_MESH_INTERVALS} intervals are solved"
         raise asked.wrong(tool, message)
     study.solver.num_mesh_intervals = math.ceil((end - start) / tool.mesh_interval)

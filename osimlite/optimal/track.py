@@ -63,7 +63,9 @@ def problem_of_track(
     tables: dict[str, StoTable] = {}
     states, mechanism = bare.functions.states, bare.functions.mechanism
     if tool.states_reference.filepath.strip():
-        table = processed_table(bare, tool.states_reference, tool.states_reference, states, mechanism)
+        table = processed_table(
+            bare, tool.states_reference, tool.states_reference, states, mechanism
+        )
         if tool.track_reference_position_derivatives:
             table = _with_speeds(table)
         tables["state_tracking"] = table
@@ -73,14 +75,20 @@ def problem_of_track(
                 weight=tool.states_global_tracking_weight,
                 allow_unused_references=tool.allow_unused_references,
                 scale_weights_with_range=tool.scale_state_weights_with_range,
-                state_weights=MocoWeightSet(name="state_weights", objects=_weights(bare, tool, table)),
+                state_weights=MocoWeightSet(
+                    name="state_weights", objects=_weights(bare, tool, table)
+                ),
             )
         )
     if tool.markers_reference.filepath.strip():
-        tables["marker_tracking"] = processed_table(bare, tool.markers_reference, tool.markers_reference, (), mechanism)
+        tables["marker_tracking"] = processed_table(
+            bare, tool.markers_reference, tool.markers_reference, (), mechanism
+        )
         phase.goals.append(_marker_goal(tool))
     if not tables:
-        raise bare.wrong(tool, "it has nothing to follow; give it a states_reference or a markers_reference")
+        raise bare.wrong(
+            tool, "it has nothing to follow; give it a states_reference or a markers_reference"
+        )
     if tool.minimize_control_effort:
         weights = [weight.copy_deep() for weight in tool.controls_weight_set.objects]
         phase.goals.append(
@@ -99,7 +107,8 @@ def problem_of_track(
     problem = Problem(study, file, place, tables, scaled=scaled)
     if tool.apply_tracked_states_to_guess and "state_tracking" in tables:
         table = tables["state_tracking"]
-        # Moco takes the rows one after the other from the first time to the last, whenever they were measured.
+        # Moco takes the rows one after the other from the first time to the last, whenever they
+        # were measured.
         times = np.linspace(first, last, len(table.times))
         states = {name: table[name] for name in table.columns if name in problem.states}
         if guess is not None:
@@ -130,15 +139,20 @@ def track(
     Raises:
         OsimliteError: as of :func:`problem_of_track`.
     """
-    problem, guess = problem_of_track(tool, None, None if folder is None else Path(folder), more, scaled)
+    problem, guess = problem_of_track(
+        tool, None, None if folder is None else Path(folder), more, scaled
+    )
     return solved(Program(problem), guess, tell, refine)
 
 
 def _marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
     """What follows markers; one without a weight counts 1."""
-    weights = [MarkerWeight(name=item.name, weight=item.weight) for item in tool.markers_weight_set.objects]
+    weights = [
+        MarkerWeight(name=item.name, weight=item.weight) for item in tool.markers_weight_set.objects
+    ]
     reference = MarkersReference(
-        name="markers_reference", marker_weights=MarkerWeightSet(name="marker_weights", objects=weights)
+        name="markers_reference",
+        marker_weights=MarkerWeightSet(name="marker_weights", objects=weights),
     )
     return MocoMarkerTrackingGoal(
         name="marker_tracking",
@@ -150,7 +164,11 @@ def _marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
 
 def _with_speeds(table: StoTable) -> StoTable:
     """With the derivatives of those values that have no speeds."""
-    ends = [(name, f"{name.removesuffix('/value')}/speed") for name in table.columns if name.endswith("/value")]
+    ends = [
+        (name, f"{name.removesuffix('/value')}/speed")
+        for name in table.columns
+        if name.endswith("/value")
+    ]
     missing = [(value, speed) for value, speed in ends if speed not in table.columns]
     if not missing:
         return table

@@ -15,7 +15,15 @@ from osimlite.io.tables.storage import StoTable, adapter_lines, read_sto
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.layout import Layout
 
-COUNTS = ("states", "controls", "input_controls", "multipliers", "derivatives", "slacks", "parameters")
+COUNTS = (
+    "states",
+    "controls",
+    "input_controls",
+    "multipliers",
+    "derivatives",
+    "slacks",
+    "parameters",
+)
 """What the header counts, in the order of the columns."""
 
 
@@ -41,7 +49,8 @@ class MocoTrajectory:
     def of(cls, layout: Layout, w: Array, header: dict[str, str] | None = None) -> MocoTrajectory:
         """Of the variables of a nonlinear program.
 
-        What only points between nodes have, corrections of velocities, is spread over all times as Moco does.
+        What only points between nodes have, corrections of velocities, is spread over all times as
+        Moco does.
         """
         times = w[0] + layout.problem.grid.places * (w[1] - w[0])
         columns: dict[str, Array] = {}
@@ -54,13 +63,22 @@ class MocoTrajectory:
                     own = np.interp(times, np.linspace(times[0], times[-1], len(own)), own)
                 columns[name] = own
         # Of a guess Moco takes the columns as they come, whatever their names.
-        rank = {name.removesuffix("/value"): k for k, name in enumerate(layout.problem.functions.in_system)}
+        rank = {
+            name.removesuffix("/value"): k
+            for k, name in enumerate(layout.problem.functions.in_system)
+        }
         names = {
-            kind: tuple(sorted(own, key=lambda name: rank.get(re.sub("/(value|accel)$", "", name), len(rank))))
+            kind: tuple(
+                sorted(
+                    own, key=lambda name: rank.get(re.sub("/(value|accel)$", "", name), len(rank))
+                )
+            )
             for kind, own in layout.names.items()
             if kind in COUNTS
         }
-        parameters = dict(zip(layout.problem.parameters, w[2 : layout.shared].tolist(), strict=True))
+        parameters = dict(
+            zip(layout.problem.parameters, w[2 : layout.shared].tolist(), strict=True)
+        )
         return cls(times, columns, names, parameters, header or {})
 
     @classmethod
@@ -77,7 +95,9 @@ class MocoTrajectory:
         said = {f"num_{kind}": table.header.get(f"num_{kind}", "0") for kind in COUNTS}
         for name, word in said.items():
             if not word.isdecimal():
-                raise DocumentError(f"the header says {name}={word}, which is no count", file=str(path))
+                raise DocumentError(
+                    f"the header says {name}={word}, which is no count", file=str(path)
+                )
         counts = [*map(int, said.values())]
         if not any(counts):
             counts[0] = len(table.columns)
@@ -96,13 +116,20 @@ class MocoTrajectory:
         """The columns of one kind, or of all."""
         kinds: Iterable[str] = [kind] if kind else COUNTS[:-1]
         names = [name for each in kinds for name in self.names.get(each, ())]
-        rows = np.column_stack([self.columns[name] for name in names]) if names else np.zeros((len(self.times), 0))
+        rows = (
+            np.column_stack([self.columns[name] for name in names])
+            if names
+            else np.zeros((len(self.times), 0))
+        )
         header = {}
         if not kind:
             # OpenSim has the values of parameters in the first row.
             first = np.full((len(self.times), len(self.parameters)), np.nan)
             first[0] = [*self.parameters.values()]
-            rows, counted = np.hstack([rows, first]), self.names | {"parameters": tuple(self.parameters)}
+            rows, counted = (
+                np.hstack([rows, first]),
+                self.names | {"parameters": tuple(self.parameters)},
+            )
             names += self.parameters
             said = self.header | {f"num_{each}": str(len(counted.get(each, ()))) for each in COUNTS}
             header = {"inDegrees": "no", **dict(sorted(said.items()))}

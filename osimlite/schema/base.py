@@ -57,8 +57,8 @@ def made(cls: type[Object], **values: Any) -> Any:
     )
 
 
-# A docstring of its own would stand in the place of the property. Type checkers see the arguments of constructors only
-# if the very metaclass is decorated, not one that it derives from.
+# A docstring of its own would stand in the place of the property. Type checkers see the arguments
+# of constructors only if the very metaclass is decorated, not one that it derives from.
 @dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
 class ObjectType(ModelMetaclass):  # noqa: D101
     @property
@@ -75,15 +75,20 @@ class ObjectType(ModelMetaclass):  # noqa: D101
 class Object(BaseModel, metaclass=ObjectType):
     """Anything with a name and properties that an OpenSim document can hold.
 
-    A subclass is declared with its properties in the order OpenSim prints them. ``tag`` gives the XML element when it
-    is not the name of the class: ``class ContactParameters(Object, tag="HuntCrossleyForce::ContactParameters")``;
-    ``abstract=True`` marks classes that never stand in a file.
+    A subclass is declared with its properties in the order OpenSim prints them. ``tag`` gives the
+    XML element when it is not the name of the class: ``class ContactParameters(Object,
+    tag="HuntCrossleyForce::ContactParameters")``; ``abstract=True`` marks classes that never stand
+    in a file.
     """
 
     __slots__ = _SLOTS
 
     model_config = ConfigDict(
-        extra="forbid", defer_build=True, validate_assignment=True, validate_default=False, protected_namespaces=()
+        extra="forbid",
+        defer_build=True,
+        validate_assignment=True,
+        validate_default=False,
+        protected_namespaces=(),
     )
 
     tag: ClassVar[str] = ""
@@ -132,14 +137,20 @@ class Object(BaseModel, metaclass=ObjectType):
 
     @classmethod
     def build(
-        cls, values: dict[str, Any], present: set[str], index: int | None = None, home: Home | None = None
+        cls,
+        values: dict[str, Any],
+        present: set[str],
+        index: int | None = None,
+        home: Home | None = None,
     ) -> Self:
         """Make an instance from values already of the stored form, without validation.
 
-        `values` may leave out properties, `present` names those the text gave; the rest take their defaults. This is
-        the reader's way in, several times faster than ``cls(...)`` and tested to be equal to it.
+        `values` may leave out properties, `present` names those the text gave; the rest take their
+        defaults. This is the reader's way in, several times faster than ``cls(...)`` and tested to
+        be equal to it.
         """
-        # Default objects and lists are made when someone asks for them, see `__getattr__`: most are never asked for.
+        # Default objects and lists are made when someone asks for them, see `__getattr__`: most are
+        # never asked for.
         state = defaults(cls)[0].copy()
         state.update(values)
         self = _new(cls)
@@ -235,7 +246,8 @@ class Object(BaseModel, metaclass=ObjectType):
     def assign(self, name: str, value: Any) -> None:
         """Set a property to a value that is already of the stored form, without validation.
 
-        Pydantic compiles the validation of a class when a property is set for the first time, which takes milliseconds.
+        Pydantic compiles the validation of a class when a property is set for the first time, which
+        takes milliseconds.
 
         Args:
             name: of the property in Python.
@@ -302,7 +314,12 @@ class Object(BaseModel, metaclass=ObjectType):
 _new = object.__new__
 _put_state, _put_present, _put_extra, _put_private = (
     BaseModel.__dict__[name].__set__
-    for name in ("__dict__", "__pydantic_fields_set__", "__pydantic_extra__", "__pydantic_private__")
+    for name in (
+        "__dict__",
+        "__pydantic_fields_set__",
+        "__pydantic_extra__",
+        "__pydantic_private__",
+    )
 )
 put_model, put_index, _put_layout = (Object.__dict__[name].__set__ for name in _SLOTS)
 
@@ -356,11 +373,13 @@ class Unknown(ModelComponent, abstract=True):
         return ObjectList()
 
 
-# Pydantic evaluates the annotations of all bases for every class, but those of their fields: evaluated here once, they
-# cost it little. What is no field it has noted for all classes below.
+# Pydantic evaluates the annotations of all bases for every class, but those of their fields:
+# evaluated here once, they cost it little. What is no field it has noted for all classes below.
 for _base in (Object, Component):
     _hints = get_type_hints(_base, include_extras=True)
-    _base.__annotations__ = {name: _hints[name] for name in _base.__annotations__ if name in _base.model_fields}
+    _base.__annotations__ = {
+        name: _hints[name] for name in _base.__annotations__ if name in _base.model_fields
+    }
 
 _set = object.__setattr__
 
@@ -381,7 +400,9 @@ _NAMING = -1
 _PLAIN = frozenset((str, float, int, bool, type(None)))
 
 
-def _cloned(item: T, memo: dict[int, Any], naming: list[tuple[dict[str, Any], str]], home: Home | None) -> T:
+def _cloned(
+    item: T, memo: dict[int, Any], naming: list[tuple[dict[str, Any], str]], home: Home | None
+) -> T:
     """A copy of an object and of all that it owns; what names components is noted, to be seen to at the end."""
     if id(item) in memo:
         return cast("T", memo[id(item)])

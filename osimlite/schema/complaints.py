@@ -18,7 +18,11 @@ def misspelt(cls: type[Object], name: str) -> str:
     known = [field_name for field_name in cls.model_fields]
     # Sockets are known by the middle of their names: ``frame`` is ``socket_frame``.
     within = [field_name for field_name in known if f"_{name}_" in f"{field_name}_"]
-    better = f"; did you mean '{min(within, key=len)}'?" if within and len(name) > 3 else did_you_mean(name, known)
+    better = (
+        f"; did you mean '{min(within, key=len)}'?"
+        if within and len(name) > 3
+        else did_you_mean(name, known)
+    )
     return f"{cls.__name__} has no property '{name}'{better}"
 
 
@@ -29,7 +33,9 @@ def explained(cls: type[Object], error: ValidationError) -> str:
     reason = first["msg"].removeprefix("Value error, ")
     given = first.get("input")
     angle = re.fullmatch(r"\s*([-+.\d]+)\s*(deg|°)\s*", given) if isinstance(given, str) else None
-    hint = f"; give the number alone, and what is in rad as math.radians({angle[1]})" if angle else ""
+    hint = (
+        f"; give the number alone, and what is in rad as math.radians({angle[1]})" if angle else ""
+    )
     return f"{cls.__name__}.{place}: {reason}{hint}"
 
 

@@ -38,7 +38,9 @@ class ElasticFoundationContactParameters(Object, tag="ElasticFoundationForce::Co
     """Friction over normal force per slip velocity (s/m), added to the others at any slip."""
 
 
-class ElasticFoundationContactParametersSet(Set, tag="ElasticFoundationForce::ContactParametersSet"):
+class ElasticFoundationContactParametersSet(
+    Set, tag="ElasticFoundationForce::ContactParametersSet"
+):
     """The layers of one elastic foundation force."""
 
     objects: LegacyMany[ElasticFoundationContactParameters] = none()
@@ -102,7 +104,14 @@ class ExponentialContactForce(Force):
     Friction is a spring that slips.
     """
 
-    contact_plane_transform: Annotated[Vec6, Value("double", "Transform")] = (-0.0, 0.0, -0.0, 0.0, 0.0, 0.0)
+    contact_plane_transform: Annotated[Vec6, Value("double", "Transform")] = (
+        -0.0,
+        0.0,
+        -0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
     """The plane in ground: body-fixed X-Y-Z angles (rad), then origin (m); its Z axis is the normal."""
     exponential_shape_parameters: Annotated[Vec3, vec3("m, N, 1/m")] = (0.0065905, 0.5336, 1150.0)
     """d0, d1, d2 of the normal force d1 exp(-d2 (z - d0)) at height z."""

@@ -34,7 +34,8 @@ class TransformAxis(Object):
     def in_place_of_none(cls, spec: FieldSpec, values: Mapping[str, Any]) -> Function:
         """The function where an element ``<function>`` is there and empty: then the axis moves as its coordinate does.
 
-        Where there is no such element, the axis does not move. (Where it names several coordinates, OpenSim gives up.)
+        Where there is no such element, the axis does not move. (Where it names several coordinates,
+        OpenSim gives up.)
         """
         if len(values.get("coordinates", ())) == 1:
             return LinearFunction(name=spec.tag, coefficients=(1.0, 0.0))

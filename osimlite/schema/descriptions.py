@@ -58,7 +58,13 @@ def _shown(value: object) -> str:
         return "nothing"
     if isinstance(value, tuple):
         return " ".join(map(_shown, value))
-    return f"{value:g}" if isinstance(value, float) else str(value).lower() if isinstance(value, bool) else str(value)
+    return (
+        f"{value:g}"
+        if isinstance(value, float)
+        else str(value).lower()
+        if isinstance(value, bool)
+        else str(value)
+    )
 
 
 @cache

@@ -20,7 +20,8 @@ from osimlite.schema.tree import Tree, Use
 class Difference(NamedTuple):
     """One change. `what` is the property, with the way to it inside the component; empty for a whole component.
 
-    `old` is None for what was added, `new` for what was removed; a component counts as its class name.
+    `old` is None for what was added, `new` for what was removed; a component counts as its class
+    name.
     """
 
     path: str
@@ -65,26 +66,42 @@ class _Comparison:
                 yield from _compare_contents(path, way, old.content, new.content)
             return
         # Of components of two classes, what both have.
-        for spec in [spec for tag, spec in field_specs(type(new)).items() if tag in field_specs(type(old))]:
+        for spec in [
+            spec for tag, spec in field_specs(type(new)).items() if tag in field_specs(type(old))
+        ]:
             place = f"{way}.{spec.tag}" if way else spec.tag
             one, other = getattr(old, spec.name), getattr(new, spec.name)
             if isinstance(spec.kind, Held):
-                yield from self._held(path, place, spec.kind.form == "list", _listed(one), _listed(other))
+                yield from self._held(
+                    path, place, spec.kind.form == "list", _listed(one), _listed(other)
+                )
             elif isinstance(spec.kind, Reference):
-                names = self._names(self.old, old, spec, one), self._names(self.new, new, spec, other)
+                names = (
+                    self._names(self.old, old, spec, one),
+                    self._names(self.new, new, spec, other),
+                )
                 if names[0] != names[1]:
                     yield Difference(path, place, *names)
             elif not _equal(one, other):
                 yield Difference(path, place, one, other)
 
-    def _held(self, path: str, way: str, named: bool, old: list[Object], new: list[Object]) -> Iterator[Difference]:
+    def _held(
+        self, path: str, way: str, named: bool, old: list[Object], new: list[Object]
+    ) -> Iterator[Difference]:
         """Compare objects without a path; components are compared at their own path. `named`: their names count."""
         before = [item for item in old if self.old is None or not isinstance(item, Component)]
         after = [item for item in new if self.new is None or not isinstance(item, Component)]
-        if self.old is None and named and (old_names := _unique(before)) and (new_names := _unique(after)):
+        if (
+            self.old is None
+            and named
+            and (old_names := _unique(before))
+            and (new_names := _unique(after))
+        ):
             # Outside of models members have no paths: they go by their names.
             for name in dict.fromkeys([*old_names, *new_names]):
-                yield from self._pair(path, f"{way}[{name}]", old_names.get(name), new_names.get(name))
+                yield from self._pair(
+                    path, f"{way}[{name}]", old_names.get(name), new_names.get(name)
+                )
             return
         many = max(len(before), len(after)) > 1
         for number, (one, other) in enumerate(zip_longest(before, after)):
@@ -93,7 +110,9 @@ class _Comparison:
                 yield Difference(path, f"{place}.name", one.name, other.name)
             yield from self._pair(path, place, one, other)
 
-    def _pair(self, path: str, place: str, old: Object | None, new: Object | None) -> Iterator[Difference]:
+    def _pair(
+        self, path: str, place: str, old: Object | None, new: Object | None
+    ) -> Iterator[Difference]:
         """Compare two objects of which one may not be there."""
         if old is not None and new is not None:
             yield from self._object(path, place, old, new)
@@ -151,7 +170,9 @@ def _flatten_content(content: str) -> dict[str, str]:
         if match["tag"] is None:
             continue
         if not match["close"]:
-            attributes = {name: value[1:-1] for name, value in _ATTRIBUTE.findall(match["attributes"])}
+            attributes = {
+                name: value[1:-1] for name, value in _ATTRIBUTE.findall(match["attributes"])
+            }
             name = attributes.pop("name", "")
             place = ""
             if levels:
@@ -219,7 +240,11 @@ def _only_in(tree: Tree, other: Tree) -> Iterator[str]:
     """Paths of a tree that the other has not, and that are not below another of them, nor parts of a class."""
     given = {path for path in tree.by_path if path not in other.by_path}
     for path, component in tree.by_path.items():
-        if path in given and not tree.is_internal(component) and not any(above in given for above in _above(path)):
+        if (
+            path in given
+            and not tree.is_internal(component)
+            and not any(above in given for above in _above(path))
+        ):
             yield path
 
 

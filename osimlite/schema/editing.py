@@ -12,7 +12,9 @@ from osimlite.schema.model import Model
 from osimlite.schema.resolution import RULES, nothing_to_resolve
 from osimlite.schema.tree import ILLEGAL_CHARACTERS, Tree, Use
 
-_NAME_NOTHING = frozenset(rule for rule, follow in RULES.items() if follow is nothing_to_resolve) - {"input"}
+_NAME_NOTHING = frozenset(
+    rule for rule, follow in RULES.items() if follow is nothing_to_resolve
+) - {"input"}
 
 _OF_INPUT = Reference("socket", "Component")
 """How the text of an input names a component, before the bar and the output."""
@@ -21,7 +23,8 @@ _OF_INPUT = Reference("socket", "Component")
 def rename(model: Model, component: Component, name: str) -> None:
     """Give a component another name and rewrite every reference that leads to it, or through it.
 
-    A reference keeps its form (relative stays relative) where the new text still leads to the same component.
+    A reference keeps its form (relative stays relative) where the new text still leads to the same
+    component.
 
     Raises:
         ModelError: the component is not in the model, the name is illegal, or a sibling has it.
@@ -29,7 +32,9 @@ def rename(model: Model, component: Component, name: str) -> None:
     tree = model.tree()
     path = _path_in(model, component)
     if not name or any(character in name for character in ILLEGAL_CHARACTERS):
-        raise ModelError(f"'{name}' is no name of a component: it is empty, or has a blank, '/', '\\', '*' or '+'")
+        raise ModelError(
+            f"'{name}' is no name of a component: it is empty, or has a blank, '/', '\\', '*' or '+'"
+        )
     parent = tree.parent_of(component)
     wanted = f"{'' if parent is None else path.rsplit('/', 1)[0]}/{name}"
     taken = tree.by_path.get(wanted)
@@ -52,9 +57,8 @@ def rename(model: Model, component: Component, name: str) -> None:
 def remove(model: Model, component: Component) -> None:
     """Take a component, and all below it, out of the model.
 
-    Raises:
-        ModelError: it is not in the model, has a fixed place (the ground, a set), or others name it; the message
-            lists them.
+    Raises: ModelError: it is not in the model, has a fixed place (the ground, a set), or others
+        name it; the message lists them.
     """
     tree = model.tree()
     path = _path_in(model, component)
@@ -67,7 +71,9 @@ def remove(model: Model, component: Component) -> None:
         }
     )
     if users:
-        raise ModelError(f"cannot remove '{path}': {listed(users)} {'names' if len(users) == 1 else 'name'} it")
+        raise ModelError(
+            f"cannot remove '{path}': {listed(users)} {'names' if len(users) == 1 else 'name'} it"
+        )
     for holder in model.walk():
         for spec, item in holder.objects_held():
             members = getattr(holder, spec.name)

@@ -10,7 +10,9 @@ def same(left: Any, right: Any) -> bool:
     if left is right:
         return True
     if isinstance(left, dict):
-        return left.keys() == right.keys() and all(same(value, right[key]) for key, value in left.items())
+        return left.keys() == right.keys() and all(
+            same(value, right[key]) for key, value in left.items()
+        )
     if isinstance(left, (tuple, list)):
         return (
             isinstance(right, (tuple, list))

@@ -1,8 +1,8 @@
 """Field kinds: what the text of one property may hold, written as annotation markers on the component classes.
 
-A field of a component class is declared once, ``radius: Annotated[float, real("m", ">= 0")] = 0.0``; the reader, the
-printer, the linter and the catalogue test all work from the marker. Markers hold facts only: how text becomes a value
-is the business of :mod:`osimlite.io.document.lexical`.
+A field of a component class is declared once, ``radius: Annotated[float, real("m", ">= 0")] =
+0.0``; the reader, the printer, the linter and the catalogue test all work from the marker. Markers
+hold facts only: how text becomes a value is the business of :mod:`osimlite.io.document.lexical`.
 """
 
 from __future__ import annotations
@@ -40,17 +40,20 @@ class Kind:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
         accepts = class_in(source)
-        return core_schema.no_info_plain_validator_function(lambda value: self.check(value, accepts))
+        return core_schema.no_info_plain_validator_function(
+            lambda value: self.check(value, accepts)
+        )
 
 
 @dataclass(frozen=True, slots=True)
 class Value(Kind):
     """Words of one scalar type: a number, a switch, a text, a vector, a list.
 
-    `least` and `most` bound the number of words of a list (`most` None: no bound). `domain` is a condition on every
-    number such as ``"> 0"``; it is what a sane model satisfies, not something the reader enforces. `choices` lists
-    the words or numbers that have a meaning. `legacy` marks properties of OpenSim's first property system, which are
-    printed after the others and read by stricter rules. An `optional` vector may be left out.
+    `least` and `most` bound the number of words of a list (`most` None: no bound). `domain` is a
+    condition on every number such as ``"> 0"``; it is what a sane model satisfies, not something
+    the reader enforces. `choices` lists the words or numbers that have a meaning. `legacy` marks
+    properties of OpenSim's first property system, which are printed after the others and read by
+    stricter rules. An `optional` vector may be left out.
     """
 
     scalar: Scalar
@@ -89,10 +92,17 @@ class Value(Kind):
 
     def words(self) -> str:
         """What the text must hold, in words: ``"3 numbers"``, ``"true or false"``."""
-        nouns = {"double": "numbers", "int": "whole numbers", "bool": "true or false", "string": "words"}[self.scalar]
+        nouns = {
+            "double": "numbers",
+            "int": "whole numbers",
+            "bool": "true or false",
+            "string": "words",
+        }[self.scalar]
         if self.size == 1:
             return {"bool": nouns, "string": "a text"}.get(self.scalar, f"one {nouns[:-1]}")
-        exact = self.size if self.size is not None else self.most if self.most == self.least else None
+        exact = (
+            self.size if self.size is not None else self.most if self.most == self.least else None
+        )
         if exact is not None:
             return f"{exact} {nouns}"
         if self.most is not None:
@@ -104,11 +114,11 @@ class Value(Kind):
 class Reference(Kind):
     """A text, or a list of words, by which one component names another.
 
-    `rule` is one of the resolution kinds of :mod:`osimlite.schema.references`, `target` the OpenSim class that the
-    named component must be; OpenSim insists on one if it is `required`. In Python the component itself may be given;
-    the printer turns it into the right text. `words` may stand there besides names, of some properties in `any_case`;
-    in a setup `fate` says what OpenSim does with a name that leads to nothing: refuse it, leave it out, or ignore the
-    property anyway.
+    `rule` is one of the resolution kinds of :mod:`osimlite.schema.references`, `target` the OpenSim
+    class that the named component must be; OpenSim insists on one if it is `required`. In Python
+    the component itself may be given; the printer turns it into the right text. `words` may stand
+    there besides names, of some properties in `any_case`; in a setup `fate` says what OpenSim does
+    with a name that leads to nothing: refuse it, leave it out, or ignore the property anyway.
     """
 
     rule: str
@@ -128,7 +138,9 @@ class Reference(Kind):
         """Return the text or the component, or a tuple of them; ValueError if a component is of another class."""
         if self.shape == "list":
             if isinstance(value, str) or not isinstance(value, Iterable):
-                raise ValueError(f"expected a list of {self.target} components or their names, got {value!r}")
+                raise ValueError(
+                    f"expected a list of {self.target} components or their names, got {value!r}"
+                )
             return tuple(self._one(item) for item in value)
         if value is None and self.shape == "optional":
             return None
@@ -140,15 +152,17 @@ class Reference(Kind):
         names = {base.__name__ for base in type(value).__mro__}
         if "Component" in names and (self.target in names or "Unknown" in names):
             return value
-        raise ValueError(f"expected a {self.target} or the text that names one, got {type(value).__name__}")
+        raise ValueError(
+            f"expected a {self.target} or the text that names one, got {type(value).__name__}"
+        )
 
 
 @dataclass(frozen=True, slots=True)
 class Held(Kind):
     """One or several objects that belong to this one; `form` is how the file holds them.
 
-    ``single`` prints ``<Class name="property">``, ``unnamed`` prints ``<Class>``, ``optional`` and ``list`` print
-    ``<property><Class/>...</property>``.
+    ``single`` prints ``<Class name="property">``, ``unnamed`` prints ``<Class>``, ``optional`` and
+    ``list`` print ``<property><Class/>...</property>``.
     """
 
     form: Form
@@ -165,7 +179,9 @@ class Held(Kind):
             return None
         if self.form == "unnamed" and isinstance(value, accepts) and type(value) is not accepts:
             # Its tag is what tells the property.
-            raise ValueError(f"expected a {accepts.__name__} and no class derived from it, got {type(value).__name__}")
+            raise ValueError(
+                f"expected a {accepts.__name__} and no class derived from it, got {type(value).__name__}"
+            )
         return _instance(value, accepts)
 
 
@@ -188,7 +204,8 @@ LEGACY: Final = Legacy()
 class NamesOf:
     """Says of what a property holds names: its words, the names of its objects, the labels of its table.
 
-    Classes such as sets of weights are used for many things; only the property that holds them tells for what.
+    Classes such as sets of weights are used for many things; only the property that holds them
+    tells for what.
     """
 
     reference: Reference
@@ -197,7 +214,8 @@ class NamesOf:
 def note_change(owner: Any, *, numbers_only: bool = False) -> None:
     """Tell the model that an object or list was last seen in that it is about to change.
 
-    What was in no index yet changes none: it came, or comes, into a model by a change of what is there.
+    What was in no index yet changes none: it came, or comes, into a model by a change of what is
+    there.
     """
     model = None if owner is None else owner.model
     if model is not None:
@@ -207,8 +225,8 @@ def note_change(owner: Any, *, numbers_only: bool = False) -> None:
 class ObjectList(list[T]):
     """A list of objects that notes every change, so that paths and look-ups stay right.
 
-    Two objects with the same properties are equal but not the same: `index` and `remove` go by identity. `owner` is
-    the model that the list was last seen in.
+    Two objects with the same properties are equal but not the same: `index` and `remove` go by
+    identity. `owner` is the model that the list was last seen in.
     """
 
     __slots__ = ("owner",)
@@ -240,7 +258,17 @@ def _noting(name: str) -> Callable[..., Any]:
     return method
 
 
-for _name in ("append", "extend", "insert", "pop", "clear", "sort", "reverse", "__setitem__", "__delitem__"):
+for _name in (
+    "append",
+    "extend",
+    "insert",
+    "pop",
+    "clear",
+    "sort",
+    "reverse",
+    "__setitem__",
+    "__delitem__",
+):
     setattr(ObjectList, _name, _noting(_name))
 for _name in ("__iadd__", "__imul__"):
     setattr(ObjectList, _name, _noting(_name))
@@ -278,7 +306,12 @@ def _scalar(scalar: Scalar, value: Any) -> Any:
             return float(value)
         if scalar == "int" and hasattr(value, "__index__"):
             return int(value)
-    noun = {"double": "a number", "int": "a whole number", "bool": "True or False", "string": "a text"}[scalar]
+    noun = {
+        "double": "a number",
+        "int": "a whole number",
+        "bool": "True or False",
+        "string": "a text",
+    }[scalar]
     raise ValueError(f"expected {noun}, got {value!r}")
 
 
@@ -292,7 +325,9 @@ def vec3(unit: str | None = None, domain: str = "") -> Value:
     return Value("double", "Vec3", unit=unit, domain=domain)
 
 
-def reals(unit: str | None = None, *, least: int = 0, most: int | None = None, legacy: bool = False) -> Value:
+def reals(
+    unit: str | None = None, *, least: int = 0, most: int | None = None, legacy: bool = False
+) -> Value:
     """Marker of a list of numbers."""
     return Value("double", "list", unit=unit, least=least, most=most, legacy=legacy)
 

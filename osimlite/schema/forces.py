@@ -25,7 +25,9 @@ class ForceProducer(Force, abstract=True):
 class HuntCrossleyContactParameters(Object, tag="HuntCrossleyForce::ContactParameters"):
     """The material of some contact surfaces."""
 
-    facts = Facts(outside={TOUCHING: "stiffness"}, doubts={"dissipation": "each impact adds energy"})
+    facts = Facts(
+        outside={TOUCHING: "stiffness"}, doubts={"dissipation": "each impact adds energy"}
+    )
 
     geometry: ContactGeometryNames = ()
     """Contact surfaces of this material; all surfaces of one force touch each other."""

@@ -1,6 +1,7 @@
 """Joints: how the child frame may move in the parent frame.
 
-The transform of M (child frame) in F (parent frame) is written X_FM; every class says what its coordinates are.
+The transform of M (child frame) in F (parent frame) is written X_FM; every class says what its
+coordinates are.
 """
 
 import math
@@ -29,9 +30,10 @@ class Joint(ModelComponent, abstract=True):
     facts = Facts(outputs="power reaction_on_child:SpatialVec reaction_on_parent:SpatialVec")
 
     moves: ClassVar[str | None] = None
-    """What each coordinate in order does: r turns and t shifts, about or along an axis of the parent frame, about one
-    that is turned by those before it; a letter alone by a rule of the class; None if the joint's own properties decide.
-    The shifts come first."""
+    """What each coordinate in order does: r turns and t shifts, about or along an axis of the
+    parent frame, about one that is turned by those before it; a letter alone by a rule of the
+    class; None if the joint's own properties decide. The shifts come first.
+    """
     motion_types: ClassVar[tuple[MotionType, ...] | None] = None
     """The motion of each coordinate by `moves`."""
     speeds_are_rates: ClassVar[bool] = True
@@ -49,7 +51,9 @@ class Joint(ModelComponent, abstract=True):
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
         if cls.moves is not None:
-            cls.motion_types = tuple("rotational" if word[0] == "r" else "translational" for word in cls.moves.split())
+            cls.motion_types = tuple(
+                "rotational" if word[0] == "r" else "translational" for word in cls.moves.split()
+            )
 
     def between(
         self,
@@ -84,7 +88,10 @@ class Joint(ModelComponent, abstract=True):
             name=f"{parent.name}_offset", socket_parent=parent, translation=at, orientation=turned
         )
         outer = PhysicalOffsetFrame(
-            name=f"{child.name}_offset", socket_parent=child, translation=child_at, orientation=child_turned
+            name=f"{child.name}_offset",
+            socket_parent=child,
+            translation=child_at,
+            orientation=child_turned,
         )
         self.frames = [inner, outer]
         self.socket_parent_frame = inner
@@ -95,7 +102,9 @@ class Joint(ModelComponent, abstract=True):
 def _coordinates(count: int) -> Any:
     """The default coordinates of a joint: `count` of them, named as OpenSim names what a file leaves out."""
     return Field(
-        default_factory=lambda: ObjectList(Coordinate.build({"name": f"_coord_{i}"}, set()) for i in range(count))
+        default_factory=lambda: ObjectList(
+            Coordinate.build({"name": f"_coord_{i}"}, set()) for i in range(count)
+        )
     )
 
 
@@ -167,7 +176,9 @@ class EllipsoidJoint(Joint):
     """The child's origin stays on an ellipsoid about the parent's; rotations as a GimbalJoint, Z along the normal."""
 
     facts = Facts(
-        missing={NAN: "radii_x_y_z"}, doubts={"radii_x_y_z": FLAT}, scales={"radii_x_y_z": "socket_parent_frame"}
+        missing={NAN: "radii_x_y_z"},
+        doubts={"radii_x_y_z": FLAT},
+        scales={"radii_x_y_z": "socket_parent_frame"},
     )
 
     moves = "rx ry rz"
@@ -196,9 +207,16 @@ class ScapulothoracicJoint(Joint):
     speeds_are_rates = False
 
     coordinates: Many[Coordinate] = _coordinates(4)
-    thoracic_ellipsoid_radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (math.nan, math.nan, math.nan)
+    thoracic_ellipsoid_radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (
+        math.nan,
+        math.nan,
+        math.nan,
+    )
     """Half axes of the ellipsoid of the chest along the axes of the parent frame."""
-    scapula_winging_axis_origin: Annotated[tuple[float, float], reals("m", least=2, most=2)] = (0.0, 0.0)
+    scapula_winging_axis_origin: Annotated[tuple[float, float], reals("m", least=2, most=2)] = (
+        0.0,
+        0.0,
+    )
     """x and y of a point on the axis of winging, in the plane of the shoulder blade."""
     scapula_winging_axis_direction: Annotated[float, real("rad")] = 0.0
     """Angle of the axis of winging in that plane, from Y towards -X."""

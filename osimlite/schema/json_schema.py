@@ -1,8 +1,9 @@
 """The JSON Schema of models and other documents as plain data, generated from the declarations.
 
-``python -m osimlite.schema.json_schema > schemas/osim-4.6.schema.json`` writes the file that editors use; a test
-keeps it current. :mod:`osimlite.io.document.data` reads what the schema describes. With the tag of another class, such
-as ``ScaleTool``, the schema is that of its documents.
+``python -m osimlite.schema.json_schema > schemas/osim-4.6.schema.json`` writes the file that
+editors use; a test keeps it current. :mod:`osimlite.io.document.data` reads what the schema
+describes. With the tag of another class, such as ``ScaleTool``, the schema is that of its
+documents.
 """
 
 from __future__ import annotations
@@ -36,9 +37,17 @@ def json_schema(tag: str = "Model") -> dict[str, Any]:
     definitions: dict[str, Any] = {"Unknown": _unknown()}
     for cls in classes:
         definitions[cls.tag] = _definition(cls, classes)
-    for cls in {spec.accepts for each in classes for spec in field_specs(each).values() if spec.accepts is not None}:
+    for cls in {
+        spec.accepts
+        for each in classes
+        for spec in field_specs(each).values()
+        if spec.accepts is not None
+    }:
         if cls.abstract:
-            held = [*(_said(other) for other in classes if issubclass(other, cls)), {"$ref": "#/$defs/Unknown"}]
+            held = [
+                *(_said(other) for other in classes if issubclass(other, cls)),
+                {"$ref": "#/$defs/Unknown"},
+            ]
             definitions[cls.tag] = {"description": _summary(cls), "anyOf": held}
     return {
         "$schema": DIALECT,
@@ -49,7 +58,9 @@ def json_schema(tag: str = "Model") -> dict[str, Any]:
 
 
 def _classes() -> list[type[Object]]:
-    result: list[type[Object]] = [getattr(import_module(module), name) for name, module in MODULES.items()]
+    result: list[type[Object]] = [
+        getattr(import_module(module), name) for name, module in MODULES.items()
+    ]
     return sorted((cls for cls in result if not cls.abstract), key=lambda cls: cls.tag)
 
 
@@ -77,7 +88,9 @@ def _unknown() -> dict[str, Any]:
     return {
         "description": _summary(Unknown),
         "type": "object",
-        "properties": {name: {"const": "Unknown"} if name == "class" else {"type": "string"} for name in names},
+        "properties": {
+            name: {"const": "Unknown"} if name == "class" else {"type": "string"} for name in names
+        },
         "required": ["class", "class_name"],
         "additionalProperties": False,
     }
@@ -92,7 +105,11 @@ def _content(spec: FieldSpec, classes: list[type[Object]]) -> dict[str, Any]:
     if isinstance(spec.kind, Held):
         return _held(spec, spec.kind, classes)
     if isinstance(spec.kind, Reference):
-        return {"type": "array", "items": {"type": "string"}} if spec.kind.shape == "list" else {"type": "string"}
+        return (
+            {"type": "array", "items": {"type": "string"}}
+            if spec.kind.shape == "list"
+            else {"type": "string"}
+        )
     assert isinstance(spec.kind, Value)
     result = _value(spec.kind)
     return {**result, "default": spec.default} if _is_plain(spec.default) else result
@@ -130,7 +147,11 @@ def _value(kind: Value) -> dict[str, Any]:
     if kind.shape == "optional":
         return {"anyOf": [scalar, {"type": "null"}]}
     bounds = {"minItems": kind.size or kind.least, "maxItems": kind.size or kind.most}
-    result = {"type": "array", "items": scalar, **{key: bound for key, bound in bounds.items() if bound}}
+    result = {
+        "type": "array",
+        "items": scalar,
+        **{key: bound for key, bound in bounds.items() if bound},
+    }
     return {"anyOf": [result, {"type": "null"}]} if kind.optional else result
 
 

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 class Layout:
     """What a file said about one object beyond its properties, kept so that nothing is lost on writing.
 
-    `comments` stand before the object itself. `before` holds, per tag, the comments and unknown elements that stood
-    before that property (key None: at the end). `raw` keeps, per field, text that reads only partly, together with
-    the value it was read as: while the value is unchanged the text is written back. `attributes` are unknown ones,
-    `after` is what followed the last member of a list, `version` the version of a whole document and `file` where
-    that was read from,
-    `prolog` and `epilog` the comments before and behind its root element. `defaults` is the ``<defaults>`` block of a
-    document; `inherited` names the fields whose value an object took from it. `include` is there if the object was
-    read from a file of its own.
+    `comments` stand before the object itself. `before` holds, per tag, the comments and unknown
+    elements that stood before that property (key None: at the end). `raw` keeps, per field, text
+    that reads only partly, together with the value it was read as: while the value is unchanged the
+    text is written back. `attributes` are unknown ones, `after` is what followed the last member of
+    a list, `version` the version of a whole document and `file` where that was read from, `prolog`
+    and `epilog` the comments before and behind its root element. `defaults` is the ``<defaults>``
+    block of a document; `inherited` names the fields whose value an object took from it. `include`
+    is there if the object was read from a file of its own.
     """
 
     comments: list[str] = field(default_factory=list)
@@ -42,7 +42,9 @@ class Layout:
     @property
     def unknown(self) -> list[str]:
         """The unknown child elements, as XML text."""
-        return [remark.text for remarks in self.before.values() for remark in remarks if remark.element]
+        return [
+            remark.text for remarks in self.before.values() for remark in remarks if remark.element
+        ]
 
 
 class Include(NamedTuple):
@@ -53,8 +55,8 @@ class Include(NamedTuple):
     held: Object
 
     def __deepcopy__(self, memo: object) -> Include:
-        # What was read does not change. Were it copied with each object around it, files that name each other deeply
-        # would be copied without end.
+        # What was read does not change. Were it copied with each object around it, files that name
+        # each other deeply would be copied without end.
         return self
 
 

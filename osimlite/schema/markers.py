@@ -16,7 +16,10 @@ class Point(ModelComponent, abstract=True):
 class Station(Point):
     """A point fixed in a physical frame, `location` given in that frame."""
 
-    facts = Facts(outputs="acceleration:Vec3 location:Vec3 velocity:Vec3", scales={"location": "socket_parent_frame"})
+    facts = Facts(
+        outputs="acceleration:Vec3 location:Vec3 velocity:Vec3",
+        scales={"location": "socket_parent_frame"},
+    )
 
     socket_parent_frame: PhysicalFrameSocket = ""
     """The frame that the point is fixed in."""
@@ -41,7 +44,9 @@ class MarkerSet(ModelComponentSet):
 class IMU(ModelComponent):
     """An inertial measurement unit at the origin of a frame."""
 
-    facts = Facts(outputs="accelerometer_signal:Vec3 gyroscope_signal:Vec3 orientation_as_quaternion:Quaternion")
+    facts = Facts(
+        outputs="accelerometer_signal:Vec3 gyroscope_signal:Vec3 orientation_as_quaternion:Quaternion"
+    )
 
     socket_frame: PhysicalFrameSocket = ""
     """The frame that the sensor is fixed in, at its origin and along its axes."""

@@ -79,9 +79,9 @@ class Umberger2010MuscleMetabolicsProbe(Probe):
     """Whether heat is added to a muscle where its power would be negative."""
     report_total_metabolics_only: Flag = True
     """Whether only the sum is reported, without the basal rate and each muscle."""
-    metabolic_muscle_parameter_set: Unnamed[Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet] = made(
+    metabolic_muscle_parameter_set: Unnamed[
         Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet
-    )
+    ] = made(Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet)
     """The muscles that count, and what the probe must know of them."""
 
 
@@ -153,9 +153,9 @@ class Bhargava2004MuscleMetabolicsProbe(Probe):
     """Whether heat is added to a muscle where its power would be negative."""
     report_total_metabolics_only: Flag = True
     """Whether only the sum is reported, without the basal rate and each muscle."""
-    metabolic_muscle_parameter_set: Unnamed[Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet] = made(
+    metabolic_muscle_parameter_set: Unnamed[
         Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet
-    )
+    ] = made(Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet)
     """The muscles that count, and what the probe must know of them."""
 
 
@@ -210,7 +210,9 @@ class Bhargava2004SmoothedMuscleMetabolics(ModelComponent):
     """Whether heat is added to a muscle where its power would be negative."""
     use_smoothing: MaybeFlag = False
     """Whether the switches of the model are replaced by smooth transitions."""
-    smoothing_type: Annotated[str | None, Value("string", "optional", choices=("tanh", "huber"))] = "tanh"
+    smoothing_type: Annotated[
+        str | None, Value("string", "optional", choices=("tanh", "huber"))
+    ] = "tanh"
     """Shape of the transitions: hyperbolic tangent, or the function of Huber."""
     velocity_smoothing: Annotated[float | None, maybe(domain="> 0")] = 10.0
     """How sharply shortening turns into lengthening; higher is sharper."""

@@ -47,7 +47,9 @@ class Model(ModelComponent):
     assembly_accuracy: Annotated[float, real(domain="> 0")] = 1e-9
     """How well assembly at the start of a simulation must satisfy constraints; it fails where it cannot."""
     ground: Single[Ground] = made(
-        Ground, name="ground", wrap_object_set=lambda: WrapObjectSet.build({"name": "wrapobjectset"}, set())
+        Ground,
+        name="ground",
+        wrap_object_set=lambda: WrapObjectSet.build({"name": "wrapobjectset"}, set()),
     )
     """The inertial frame: bodies hang on it, and gravity is given in it."""
     gravity: Annotated[Vec3, vec3("m/s^2")] = (0.0, -9.80665, 0.0)
@@ -72,7 +74,9 @@ class Model(ModelComponent):
     """Everything that pushes or pulls but gravity: forces, contact, actuators, muscles."""
     marker_set: Unnamed[MarkerSet] = made(MarkerSet, name="markerset")
     """Points that motion capture sees."""
-    contact_geometry_set: Unnamed[ContactGeometrySet] = made(ContactGeometrySet, name="contactgeometryset")
+    contact_geometry_set: Unnamed[ContactGeometrySet] = made(
+        ContactGeometrySet, name="contactgeometryset"
+    )
     """Surfaces that contact forces name."""
     probe_set: Unnamed[ProbeSet] = made(ProbeSet, name="probeset")
     """Quantities that a simulation reports."""
@@ -153,13 +157,17 @@ class Model(ModelComponent):
     def add(self, *components: C) -> C:
         """Add components to the sets they belong in, in order, and return the first of them.
 
-        Raises:
-            ModelError: the component is of a kind that no set of a model takes, or another beside it has its name.
+        Raises: ModelError: the component is of a kind that no set of a model takes, or another
+            beside it has its name.
         """
         for component in components:
             for spec, holder in self.objects_held():
                 members = type(holder).field_specs().get("objects")
-                if members is not None and spec.name != "component_set" and isinstance(component, members.accepts):  # type: ignore[arg-type]
+                if (
+                    members is not None
+                    and spec.name != "component_set"
+                    and isinstance(component, members.accepts)  # type: ignore[arg-type]
+                ):
                     _append(cast("Any", holder).objects, component)
                     break
             else:
@@ -184,14 +192,20 @@ def expect_model(given: object) -> None:
     if isinstance(given, Model):
         return
     if isinstance(given, str | PurePath):
-        raise OsimliteError(f"a Model is wanted here, not a path; read the file first: osimlite.read('{given}')")
-    raise OsimliteError(f"a Model is wanted here, not a {type(given).__name__}; osimlite.read(path) returns one")
+        raise OsimliteError(
+            f"a Model is wanted here, not a path; read the file first: osimlite.read('{given}')"
+        )
+    raise OsimliteError(
+        f"a Model is wanted here, not a {type(given).__name__}; osimlite.read(path) returns one"
+    )
 
 
 def _append(members: list[Any], component: Component) -> None:
     for member in members:
         if member is component:
-            raise ModelError(f"{type(component).__name__} '{component.name}' is in the model already")
+            raise ModelError(
+                f"{type(component).__name__} '{component.name}' is in the model already"
+            )
         if component.name and member.name == component.name:
             raise ModelError(
                 f"there is a {type(member).__name__} '{component.name}' in the model already; "

@@ -1,6 +1,7 @@
 """The curves of the Millard muscles (Millard et al. 2013): dimensionless, smooth, given by what a person can measure.
 
-A `curviness` lies between 0 (straight pieces) and 1 (as round as it gets). Numbers left out are chosen by OpenSim.
+A `curviness` lies between 0 (straight pieces) and 1 (as round as it gets). Numbers left out are
+chosen by OpenSim.
 """
 
 from typing import Annotated
@@ -34,7 +35,9 @@ class ActiveForceLengthCurve(Function):
 class FiberForceLengthCurve(Function):
     """Passive force of a fiber over its length."""
 
-    facts = Facts(refused="strain_at_one_norm_force stiffness_at_low_force stiffness_at_one_norm_force curviness")
+    facts = Facts(
+        refused="strain_at_one_norm_force stiffness_at_low_force stiffness_at_one_norm_force curviness"
+    )
 
     strain_at_zero_force: Number = 0.0
     """Strain up to which the fiber is slack."""
@@ -52,7 +55,10 @@ class ForceVelocityCurve(Function):
     """Force multiplier of a fiber over its velocity, both normalised."""
 
     facts = Facts(
-        domains={"concentric_slope_near_vmax": "> 1.49e-8", "eccentric_slope_near_vmax": "> 1.49e-8"},
+        domains={
+            "concentric_slope_near_vmax": "> 1.49e-8",
+            "eccentric_slope_near_vmax": "> 1.49e-8",
+        },
         refused="concentric_slope_at_vmax concentric_slope_near_vmax isometric_slope eccentric_slope_at_vmax "
         "eccentric_slope_near_vmax max_eccentric_velocity_force_multiplier concentric_curviness "
         "eccentric_curviness",
@@ -100,7 +106,9 @@ class ForceVelocityInverseCurve(Function):
 class TendonForceLengthCurve(Function):
     """Force of a tendon over its length, both normalised."""
 
-    facts = Facts(refused="strain_at_one_norm_force stiffness_at_one_norm_force norm_force_at_toe_end curviness")
+    facts = Facts(
+        refused="strain_at_one_norm_force stiffness_at_one_norm_force norm_force_at_toe_end curviness"
+    )
 
     strain_at_one_norm_force: Annotated[float, real(domain="> 0")] = 0.049
     """Strain at which the tendon bears `max_isometric_force`."""

@@ -25,7 +25,10 @@ class MuscleFixedWidthPennationModel(ModelComponent):
     """Fibers that keep the width of the muscle: length times sine of pennation stays what it is at optimal length."""
 
     facts = Facts(
-        domains={"pennation_angle_at_optimal": BELOW_QUARTER_TURN, "maximum_pennation_angle": UP_TO_QUARTER_TURN},
+        domains={
+            "pennation_angle_at_optimal": BELOW_QUARTER_TURN,
+            "maximum_pennation_angle": UP_TO_QUARTER_TURN,
+        },
         refused="optimal_fiber_length pennation_angle_at_optimal maximum_pennation_angle",
     )
 

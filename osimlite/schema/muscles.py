@@ -1,7 +1,7 @@
 """Muscles of Hill's type: fiber and tendon in series, along a path.
 
-Forces are normalised by `max_isometric_force`, fiber lengths by `optimal_fiber_length`, tendon lengths by
-`tendon_slack_length`.
+Forces are normalised by `max_isometric_force`, fiber lengths by `optimal_fiber_length`, tendon
+lengths by `tendon_slack_length`.
 """
 
 from collections.abc import Iterator
@@ -65,7 +65,9 @@ class Muscle(PathActuator, abstract=True):
     min_control: Number = 0.0
     max_control: Number = 1.0
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
-        GeometryPath, name="path", appearance=lambda: Appearance.build({"color": (0.8, 0.1, 0.1)}, set())
+        GeometryPath,
+        name="path",
+        appearance=lambda: Appearance.build({"color": (0.8, 0.1, 0.1)}, set()),
     )
     max_isometric_force: Annotated[float, real("N", "> 0")] = 1000.0
     """Force of fully active fibers at optimal length and rest; all forces are measured by it."""
@@ -156,7 +158,10 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
         """Its tendon is elastic, its activation never at once, and force over velocity a line near its end only."""
         yield from whole_dynamics(self)
         if self.fv_linear_extrap_threshold <= (least := 1 / self.Flen):
-            yield "fv_linear_extrap_threshold", f"its fv_linear_extrap_threshold is not above 1/Flen, {least:.4g}"
+            yield (
+                "fv_linear_extrap_threshold",
+                f"its fv_linear_extrap_threshold is not above 1/Flen, {least:.4g}",
+            )
         yield from _full_activation(self.minimum_activation)
 
 
@@ -167,7 +172,10 @@ class Millard2012EquilibriumMuscle(Muscle):
         states="activation?!ignore_activation_dynamics fiber_length?!ignore_tendon_compliance",
         outputs="passive_fiber_damping_force passive_fiber_damping_force_along_tendon passive_fiber_elastic_force "
         "passive_fiber_elastic_force_along_tendon",
-        domains={"pennation_angle_at_optimal": BELOW_QUARTER_TURN, "maximum_pennation_angle": UP_TO_QUARTER_TURN},
+        domains={
+            "pennation_angle_at_optimal": BELOW_QUARTER_TURN,
+            "maximum_pennation_angle": UP_TO_QUARTER_TURN,
+        },
         refused="optimal_fiber_length pennation_angle_at_optimal activation_time_constant "
         "deactivation_time_constant minimum_activation maximum_pennation_angle",
         zero={STUCK: "tendon_slack_length"},
@@ -198,9 +206,13 @@ class Millard2012EquilibriumMuscle(Muscle):
         ActiveForceLengthCurve, name="ActiveForceLengthCurve"
     )
     """Active force over fiber length."""
-    force_velocity_curve: Unnamed[ForceVelocityCurve] = made(ForceVelocityCurve, name="ForceVelocityCurve")
+    force_velocity_curve: Unnamed[ForceVelocityCurve] = made(
+        ForceVelocityCurve, name="ForceVelocityCurve"
+    )
     """Factor of the active force over fiber velocity."""
-    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(FiberForceLengthCurve, name="FiberForceLengthCurve")
+    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(
+        FiberForceLengthCurve, name="FiberForceLengthCurve"
+    )
     """Passive force of the fiber over its length."""
     tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = made(
         TendonForceLengthCurve, name="TendonForceLengthCurve"
@@ -217,7 +229,9 @@ class Millard2012EquilibriumMuscle(Muscle):
         """What of its curves would make its equations singular, or would keep them from that."""
         if self.is_classic:
             return {"minimum_value": max(self.active_force_length_curve.minimum_value, 0.1)}
-        return dict.fromkeys(("minimum_value", "concentric_slope_at_vmax", "eccentric_slope_at_vmax"), 0.0)
+        return dict.fromkeys(
+            ("minimum_value", "concentric_slope_at_vmax", "eccentric_slope_at_vmax"), 0.0
+        )
 
     def contradictions(self) -> Iterator[Contradiction]:
         """Its equations need some activation where they are singular, and a curve that can be inverted."""
@@ -228,7 +242,10 @@ class Millard2012EquilibriumMuscle(Muscle):
                 "without fiber damping needs",
             )
         if self.force_velocity_curve.concentric_slope_near_vmax == 1:
-            yield None, "the concentric_slope_near_vmax of its ForceVelocityCurve is not less than 1"
+            yield (
+                None,
+                "the concentric_slope_near_vmax of its ForceVelocityCurve is not less than 1",
+            )
         yield from _full_activation(self.minimum_activation)
 
 
@@ -254,17 +271,21 @@ class Millard2012AccelerationMuscle(Muscle):
     """Fiber length at the start, unless a tool brings fiber and tendon into equilibrium."""
     default_fiber_velocity: Number = 0.0
     """Fiber velocity at the start of a simulation; lengthening is positive."""
-    muscle_first_order_activation_dynamic_model: Unnamed[MuscleFirstOrderActivationDynamicModel] = made(
-        MuscleFirstOrderActivationDynamicModel, name="_activation", minimum_activation=0.0
+    muscle_first_order_activation_dynamic_model: Unnamed[MuscleFirstOrderActivationDynamicModel] = (
+        made(MuscleFirstOrderActivationDynamicModel, name="_activation", minimum_activation=0.0)
     )
     """How activation follows the control."""
     active_force_length_curve: Unnamed[ActiveForceLengthCurve] = made(
         ActiveForceLengthCurve, name="ActiveForceLengthCurve", minimum_value=0.0
     )
     """Active force over fiber length."""
-    force_velocity_curve: Unnamed[ForceVelocityCurve] = made(ForceVelocityCurve, name="ForceVelocityCurve")
+    force_velocity_curve: Unnamed[ForceVelocityCurve] = made(
+        ForceVelocityCurve, name="ForceVelocityCurve"
+    )
     """Factor of the active force over fiber velocity."""
-    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(FiberForceLengthCurve, name="FiberForceLengthCurve")
+    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(
+        FiberForceLengthCurve, name="FiberForceLengthCurve"
+    )
     """Passive force of the fiber over its length."""
     tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = made(
         TendonForceLengthCurve, name="TendonForceLengthCurve"
@@ -274,8 +295,11 @@ class Millard2012AccelerationMuscle(Muscle):
         FiberCompressiveForceLengthCurve, name="default_FiberCompressiveForceLengthCurve"
     )
     """Force along the fiber that keeps it from becoming too short."""
-    fiber_compressive_force_cos_pennation_curve: Unnamed[FiberCompressiveForceCosPennationCurve] = made(
-        FiberCompressiveForceCosPennationCurve, name="default_FiberCompressiveForceCosPennationCurve"
+    fiber_compressive_force_cos_pennation_curve: Unnamed[FiberCompressiveForceCosPennationCurve] = (
+        made(
+            FiberCompressiveForceCosPennationCurve,
+            name="default_FiberCompressiveForceCosPennationCurve",
+        )
     )
     """Force along the tendon that keeps fibers from standing across it."""
     tendon_force_length_damping: Annotated[float, real(domain=">= 0")] = 0.1
@@ -308,7 +332,9 @@ class DeGrooteFregly2016Muscle(Muscle):
         refused="pennation_angle_at_optimal activation_time_constant deactivation_time_constant default_activation "
         "default_normalized_tendon_force fiber_damping passive_fiber_strain_at_one_norm_force "
         "tendon_strain_at_one_norm_force activation_dynamics_smoothing active_force_width_scale",
-        zero={NAN: "max_isometric_force optimal_fiber_length tendon_slack_length max_contraction_velocity"},
+        zero={
+            NAN: "max_isometric_force optimal_fiber_length tendon_slack_length max_contraction_velocity"
+        },
     )
 
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.015
@@ -385,5 +411,7 @@ class RigidTendonMuscle(Muscle):
         default_factory=partial(passive_force_length, "passive_force_length_curve")
     )
     """Passive force over fiber length, both normalised; kept between 0 and 10."""
-    force_velocity_curve: Single[Function] = Field(default_factory=partial(force_velocity, "force_velocity_curve"))
+    force_velocity_curve: Single[Function] = Field(
+        default_factory=partial(force_velocity, "force_velocity_curve")
+    )
     """Factor of the active force over fiber velocity, normalised."""

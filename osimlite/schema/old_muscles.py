@@ -111,7 +111,9 @@ class Delp1990Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     """Force of the tendon over its strain."""
     active_force_length_curve: LegacyOptional[Function] = Field(default_factory=active_force_length)
     """Active force over fiber length, both normalised."""
-    passive_force_length_curve: LegacyOptional[Function] = Field(default_factory=passive_force_length)
+    passive_force_length_curve: LegacyOptional[Function] = Field(
+        default_factory=passive_force_length
+    )
     """Passive force over fiber length, both normalised."""
     force_velocity_curve: LegacyOptional[Function] = Field(default_factory=force_velocity)
     """Factor of the active force over fiber velocity, normalised."""

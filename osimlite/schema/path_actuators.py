@@ -13,9 +13,13 @@ from osimlite.schema.paths import AbstractGeometryPath, GeometryPath
 class PathActuator(ScalarActuator):
     """Pulls along its path with `optimal_force` times the control."""
 
-    facts = Facts(outputs="tension", domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE})
+    facts = Facts(
+        outputs="tension", domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE}
+    )
 
-    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(GeometryPath, name="path")
+    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
+        GeometryPath, name="path"
+    )
     """The line along which the actuator pulls."""
     optimal_force: Annotated[float, real("N")] = 1.0
     """Tension at a control of 1; classes with a law of their own do without it."""

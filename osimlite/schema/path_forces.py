@@ -44,7 +44,9 @@ class PathSpring(ForceProducer):
 class ExpressionBasedPathForce(ForceProducer):
     """A tension by a formula in the path's stretch `s` and its lengthening speed `ldot`."""
 
-    facts = Facts(outputs="length lengthening_speed stretch tension", scales={"resting_length": PATH})
+    facts = Facts(
+        outputs="length lengthening_speed stretch tension", scales={"resting_length": PATH}
+    )
 
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
         GeometryPath, name="path", appearance=_green
@@ -61,15 +63,23 @@ class ExpressionBasedPathForce(ForceProducer):
 class Ligament(ForceProducer):
     """A ligament: `pcsa_force` times a curve of its length over `resting_length`."""
 
-    facts = Facts(domains={"resting_length": "> 0"}, zero={NAN: "resting_length"}, scales={"resting_length": PATH})
+    facts = Facts(
+        domains={"resting_length": "> 0"},
+        zero={NAN: "resting_length"},
+        scales={"resting_length": PATH},
+    )
 
-    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(GeometryPath, name="path")
+    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
+        GeometryPath, name="path"
+    )
     """The line along which the ligament pulls."""
     resting_length: Annotated[float, real("m", ">= 0")] = 0.0
     """Length of the path up to which the ligament is slack."""
     pcsa_force: Annotated[float, real("N", ">= 0")] = 0.0
     """Factor of the curve, from the cross-section of the ligament."""
-    force_length_curve: Single[Function] = Field(default_factory=partial(passive_force_length, "force_length_curve"))
+    force_length_curve: Single[Function] = Field(
+        default_factory=partial(passive_force_length, "force_length_curve")
+    )
     """Tension over `pcsa_force`, as a function of length over resting length."""
 
 
@@ -84,7 +94,9 @@ class Blankevoort1991Ligament(ForceProducer):
         scales={"slack_length": PATH},
     )
 
-    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(GeometryPath, name="path")
+    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
+        GeometryPath, name="path"
+    )
     """The line along which the ligament pulls."""
     linear_stiffness: Annotated[float, real("N", ">= 0")] = 1.0
     """Tension per strain beyond the transition."""

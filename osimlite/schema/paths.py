@@ -1,7 +1,8 @@
 """Paths: the lines along which muscles, springs and cables pull.
 
-The property that holds a path is called ``path`` in a file. In Python it is `geometry_path`, because `path` is where
-a component stands in the tree; the word ``path`` is understood when a component is made or a path is assigned.
+The property that holds a path is called ``path`` in a file. In Python it is `geometry_path`,
+because `path` is where a component stands in the tree; the word ``path`` is understood when a
+component is made or a path is assigned.
 """
 
 from typing import Annotated
@@ -41,7 +42,10 @@ class AbstractPathPoint(Point, abstract=True):
 class PathPoint(AbstractPathPoint):
     """A point fixed in a frame."""
 
-    facts = Facts(outputs="acceleration:Vec3 location:Vec3 velocity:Vec3", scales={"location": "socket_parent_frame"})
+    facts = Facts(
+        outputs="acceleration:Vec3 location:Vec3 velocity:Vec3",
+        scales={"location": "socket_parent_frame"},
+    )
 
     internal = (("station", Station),)
 

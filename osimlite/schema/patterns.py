@@ -2,10 +2,10 @@
 
 Moco matches the names of states and controls as wholes by `std::regex` (ECMAScript). An engine that
 backtracks, as Python's `re` and `std::regex` do, takes exponential time for patterns such as
-`(.*)*(.*)*!`, and a study may come from a stranger. This one follows all alternatives at once
-(K. Thompson, "Regular expression search algorithm", CACM 11(6), 1968): the time is at most the product
-of the lengths of the name and of the pattern. Look-ahead assertions keep to that: one pass from the end
-of the name finds all places where an assertion holds. It has ECMAScript's syntax but for back
+`(.*)*(.*)*!`, and a study may come from a stranger. This one follows all alternatives at once (K.
+Thompson, "Regular expression search algorithm", CACM 11(6), 1968): the time is at most the product
+of the lengths of the name and of the pattern. Look-ahead assertions keep to that: one pass from the
+end of the name finds all places where an assertion holds. It has ECMAScript's syntax but for back
 references, which need memory.
 """
 
@@ -55,7 +55,10 @@ class _State:
 
     test: CharacterTest | None = None
     anchor: str = ""  # "^", "$", "b", "B", "=" or "!": it leads on only where that holds
-    inside: tuple[int, int] = (0, 0)  # of a look-ahead assertion, the first and the last state of its pattern
+    inside: tuple[int, int] = (
+        0,
+        0,
+    )  # of a look-ahead assertion, the first and the last state of its pattern
     following: list[int] = field(default_factory=list)
 
 
@@ -87,7 +90,11 @@ class Pattern:
             following = None if self._looks_around else self._steps.get(key)
             if following is None:
                 states = [self._states[number] for number in reached]
-                read = [state.following[0] for state in states if state.test is not None and state.test(character)]
+                read = [
+                    state.following[0]
+                    for state in states
+                    if state.test is not None and state.test(character)
+                ]
                 following = self._lead_on(read, name, index + 1, known)
                 if not self._looks_around:
                     self._steps[key] = following
@@ -119,13 +126,18 @@ class Pattern:
             case "$":
                 return index == len(name)
             case "b" | "B":
-                before, after = name[max(index - 1, 0) : index] in _WORD, name[index : index + 1] in _WORD
+                before, after = (
+                    name[max(index - 1, 0) : index] in _WORD,
+                    name[index : index + 1] in _WORD,
+                )
                 return (before != after) == (state.anchor == "b")
         if number not in known:
             known[number] = self._find_matching_starts(state.inside[1], name, known)
         return (state.inside[0] in known[number][index]) == (state.anchor == "=")
 
-    def _find_matching_starts(self, final: int, name: str, known: dict[int, list[set[int]]]) -> list[set[int]]:
+    def _find_matching_starts(
+        self, final: int, name: str, known: dict[int, list[set[int]]]
+    ) -> list[set[int]]:
         """Return, before each character of a name and at its end, the states that lead to a final one."""
         result: list[set[int]] = [set() for _ in range(len(name) + 1)]
         for index in range(len(name), -1, -1):
@@ -160,7 +172,9 @@ class _Compiler:
 
     def _add(self, test: CharacterTest | None = None, anchor: str = "") -> int:
         if len(self.states) >= MAX_STATES:
-            raise UnsupportedPatternError(f"the pattern has more than {MAX_STATES} states; shorten its repetitions")
+            raise UnsupportedPatternError(
+                f"the pattern has more than {MAX_STATES} states; shorten its repetitions"
+            )
         self.states.append(_State(test, anchor))
         return len(self.states) - 1
 
@@ -205,10 +219,8 @@ class _Compiler:
     def _repeat_part(self, begin: int, start: int, end: int) -> tuple[int, int]:
         """Return a part as often as the quantifier that comes next says.
 
-        Args:
-            begin: index of the part in the text, from which it is compiled again for each repetition.
-            start: its first state.
-            end: its last state.
+        Args: begin: index of the part in the text, from which it is compiled again for each
+            repetition. start: its first state. end: its last state.
         """
         part_end = self.index
         least, most = self._quantifier()
@@ -229,7 +241,8 @@ class _Compiler:
                 last = piece_end
         finish = self._add()
         if most is None:
-            # The last piece may come again and again; without a least number it may also be left out.
+            # The last piece may come again and again; without a least number it may also be left
+            # out.
             self._link(last, finish, pieces[-1][0])
         else:
             self._link(last, finish)
@@ -268,7 +281,9 @@ class _Compiler:
         while self._peek() in _DIGITS:
             digits += self._take()
         if not digits or len(digits) > 4:
-            raise PatternError(f"a number of repetitions is missing or too large at character {self.index + 1}")
+            raise PatternError(
+                f"a number of repetitions is missing or too large at character {self.index + 1}"
+            )
         return int(digits)
 
     def _atom(self) -> tuple[int, int]:
@@ -298,7 +313,9 @@ class _Compiler:
         if self._takes("?") and not self._takes(":"):
             assertion = self._take()
             if assertion not in "=!":
-                raise PatternError(f"'(?{assertion}' begins no group; OpenSim knows '(?:', '(?=' and '(?!'")
+                raise PatternError(
+                    f"'(?{assertion}' begins no group; OpenSim knows '(?:', '(?=' and '(?!'"
+                )
         self.level += 1
         if self.level > MAX_NESTING:
             raise UnsupportedPatternError(f"groups nest more than {MAX_NESTING} levels deep")
@@ -340,7 +357,11 @@ class _Compiler:
         tests: list[CharacterTest] = []
         while not self._takes("]"):
             low = self._bracket_item(tests)
-            if low is None or self._peek() != "-" or self.text[self.index + 1 : self.index + 2] in ("]", ""):
+            if (
+                low is None
+                or self._peek() != "-"
+                or self.text[self.index + 1 : self.index + 2] in ("]", "")
+            ):
                 if low is not None:
                     tests.append(frozenset(low).__contains__)
                 continue

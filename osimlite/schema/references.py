@@ -1,7 +1,7 @@
 """Typed references: a field's type says what it may name and by which of OpenSim's rules the text is resolved.
 
-The rules themselves are in :mod:`osimlite.schema.resolution`. In Python every such field also takes the component
-itself.
+The rules themselves are in :mod:`osimlite.schema.resolution`. In Python every such field also takes
+the component itself.
 """
 
 from __future__ import annotations
@@ -36,13 +36,19 @@ VectorInputs = Annotated[tuple[str, ...], Reference("input", "Vector", "list", r
 
 # Names and paths that OpenSim looks up in one place each.
 CoordinateName = Annotated[Named, Reference("coordinate-name", "Coordinate")]
-MaybeCoordinateName = Annotated[Named | None, Reference("coordinate-name", "Coordinate", "optional")]
+MaybeCoordinateName = Annotated[
+    Named | None, Reference("coordinate-name", "Coordinate", "optional")
+]
 CoordinateNames = Annotated[Names, Reference("coordinate-name", "Coordinate", "list")]
 CoordinatePaths = Annotated[Names, Reference("model-path", "Coordinate", "list")]
-OwnJointCoordinates = Annotated[Names, Reference("own-joint-coordinate", "Coordinate", "list", required=False)]
+OwnJointCoordinates = Annotated[
+    Names, Reference("own-joint-coordinate", "Coordinate", "list", required=False)
+]
 MaybeBodyName = Annotated[Named | None, Reference("body-name", "Body", "optional")]
 FrameName = Annotated[Named, Reference("frame-path-or-body-name", "PhysicalFrame")]
-MaybeFrameName = Annotated[Named | None, Reference("frame-path-or-body-name", "PhysicalFrame", "optional")]
+MaybeFrameName = Annotated[
+    Named | None, Reference("frame-path-or-body-name", "PhysicalFrame", "optional")
+]
 ExpressedInFrame = Annotated[
     Named, Reference("frame-path-or-body-name", "PhysicalFrame", required=False, fate="left out")
 ]
@@ -50,10 +56,16 @@ ContactGeometryNames = Annotated[
     Names, Reference("contactgeometry-path-or-name", "ContactGeometry", "list", required=False)
 ]
 WrapObjectName = Annotated[Named, Reference("wrap-object-name", "WrapObject")]
-ActuatorNames = Annotated[Names, Reference("actuator-name", "Actuator", "list", False, words=("all",), any_case=True)]
-JointNames = Annotated[Names, Reference("joint-name", "Joint", "list", False, words=("all",), any_case=True)]
+ActuatorNames = Annotated[
+    Names, Reference("actuator-name", "Actuator", "list", False, words=("all",), any_case=True)
+]
+JointNames = Annotated[
+    Names, Reference("joint-name", "Joint", "list", False, words=("all",), any_case=True)
+]
 PathActuatorPath = Annotated[Named, Reference("owner-path", "PathActuator")]
-SetMemberNames = Annotated[Names, Reference("set-member", "Object", "list", required=False, legacy=True)]
+SetMemberNames = Annotated[
+    Names, Reference("set-member", "Object", "list", required=False, legacy=True)
+]
 
 # What lies outside the model: files and the columns and tables in them.
 FileName = Annotated[str, Reference("file", "file", required=False)]
@@ -73,7 +85,12 @@ def writes(content: str, *, legacy: bool = False, required: bool = False) -> Ref
 
 
 def several(
-    rule: str, target: str, *words: str, any_case: bool = False, legacy: bool = True, fate: Fate = "refused"
+    rule: str,
+    target: str,
+    *words: str,
+    any_case: bool = False,
+    legacy: bool = True,
+    fate: Fate = "refused",
 ) -> Reference:
     """Marker of a list of names, or of `words`, in what a tool is told."""
     return Reference(rule, target, "list", False, legacy, words, fate, any_case)
@@ -82,7 +99,9 @@ def several(
 # What tools name in the model that they work on, and the files that they are given and write.
 BodyName = Annotated[Named, Reference("body-name", "Body", required=False, legacy=True)]
 LegacyCoordinateName = Annotated[CoordinateName, LEGACY]
-LegacyJointNames = Annotated[Names, several("joint-name", "Joint", "ALL", any_case=True, fate="left out")]
+LegacyJointNames = Annotated[
+    Names, several("joint-name", "Joint", "ALL", any_case=True, fate="left out")
+]
 InputModel = Annotated[str, reads("Model", required=True)]
 LegacyInputModel = Annotated[str, reads("Model", legacy=True, required=True)]
 LegacyOutputModel = Annotated[str, writes("Model", legacy=True)]

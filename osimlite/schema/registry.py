@@ -1,7 +1,7 @@
 """Which class stands for which XML tag, and the module that declares it.
 
-Modules are imported when a tag is first met, so that reading a model costs only the areas it uses. A test holds this
-table to the classes that exist.
+Modules are imported when a tag is first met, so that reading a model costs only the areas it uses.
+A test holds this table to the classes that exist.
 """
 
 from __future__ import annotations
@@ -176,7 +176,9 @@ _TAGS = {
 }
 """Tags that are not the name of their class."""
 
-MODULES = {name: f"osimlite.schema.{area}" for area, names in _AREAS.items() for name in names.split()}
+MODULES = {
+    name: f"osimlite.schema.{area}" for area, names in _AREAS.items() for name in names.split()
+}
 """The module of every class, by class name."""
 
 
@@ -235,11 +237,15 @@ def tags() -> tuple[str, ...]:
 def classes_mentioning(word: str) -> tuple[type[Object], ...]:
     """Return the classes, abstract ones too, in whose modules a word stands, and those of plug-ins.
 
-    A property is declared in such a module. Only these modules are imported, and only their classes are built: to look
-    into all of them takes a third of a second.
+    A property is declared in such a module. Only these modules are imported, and only their classes
+    are built: to look into all of them takes a third of a second.
     """
     modules = {module for module in MODULES.values() if _mentions(module, word)}
-    own = [getattr(import_module(module), name) for name, module in MODULES.items() if module in modules]
+    own = [
+        getattr(import_module(module), name)
+        for name, module in MODULES.items()
+        if module in modules
+    ]
     return (*own, *_further.values())
 
 

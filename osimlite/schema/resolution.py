@@ -1,7 +1,7 @@
 """The rules by which the text of a reference resolves to a component.
 
-Every rule is OpenSim 4.6's (``schemas/references.json`` names the source of each): sockets walk exactly, other
-properties look a bare name up in one set, and nothing searches.
+Every rule is OpenSim 4.6's (``schemas/references.json`` names the source of each): sockets walk
+exactly, other properties look a bare name up in one set, and nothing searches.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ _NEVER_IN_PATHS = frozenset(ILLEGAL_CHARACTERS) - {"/"}
 class Resolution(NamedTuple):
     """What a reference leads to.
 
-    `target` is the component, or None with the `failure`: nothing there, a component of another class (`found`), no
-    text, or a text that is not a path.
+    `target` is the component, or None with the `failure`: nothing there, a component of another
+    class (`found`), no text, or a text that is not a path.
     """
 
     target: Component | None
@@ -71,10 +71,14 @@ def _socket(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
     if _is_no_path(text):
         return Resolution(None, "illegal")
     if target == "Frame":
-        # While connecting, a frame puts itself into the socket of every geometry it draws, whatever path the file
-        # gives; not of one that it merely holds among its components.
+        # While connecting, a frame puts itself into the socket of every geometry it draws, whatever
+        # path the file gives; not of one that it merely holds among its components.
         parent = tree.parent_of(owner)
-        if parent is not None and is_a(parent, "Frame") and not any(item is owner for item in parent.subcomponents):
+        if (
+            parent is not None
+            and is_a(parent, "Frame")
+            and not any(item is owner for item in parent.subcomponents)
+        ):
             return Resolution(parent)
     if not text:
         return Resolution(None, "empty")
@@ -99,13 +103,18 @@ def _path_or_member(*set_paths: str) -> Callable[[Tree, str, Component, str], Re
     def rule(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
         if not text:
             return Resolution(None, "empty")
-        tried = [tree.walk(f"{path}{text}", "", target) for path in ("", *(f"{path}/" for path in set_paths))]
+        tried = [
+            tree.walk(f"{path}{text}", "", target)
+            for path in ("", *(f"{path}/" for path in set_paths))
+        ]
         return min(tried, key=lambda each: (each.target is None, each.failure != "wrong-type"))
 
     return rule
 
 
-def _bare(members: Callable[[Tree, Component, str], dict[str, Component]]) -> Callable[..., Resolution]:
+def _bare(
+    members: Callable[[Tree, Component, str], dict[str, Component]],
+) -> Callable[..., Resolution]:
     """A bare name among `members`; a path is no name."""
 
     def rule(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
@@ -135,7 +144,9 @@ def _pattern(tree: Tree, text: str, owner: Component, target: str) -> Resolution
         return Resolution(owner)
     except PatternError:
         return Resolution(None, "illegal")
-    result = next((item for name, item in variables(tree, target).items() if pattern.fullmatch(name)), None)
+    result = next(
+        (item for name, item in variables(tree, target).items() if pattern.fullmatch(name)), None
+    )
     return Resolution(result, None if result is not None else "missing")
 
 
@@ -147,7 +158,9 @@ def nothing_to_resolve(tree: Tree, text: str, owner: Component, target: str) -> 
 PATH_RULES = frozenset(("socket", "owner-path", "model-path"))
 """The rules by which an absolute path leads to the same component from everywhere."""
 
-EVERYWHERE = frozenset(f"{kind}-name" for kind in ("coordinate", "body", "joint", "actuator", "muscle", "wrap-object"))
+EVERYWHERE = frozenset(
+    f"{kind}-name" for kind in ("coordinate", "body", "joint", "actuator", "muscle", "wrap-object")
+)
 """The rules by which a bare name leads to the same component from everywhere."""
 
 RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
@@ -161,9 +174,13 @@ RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
     "actuator-name": _bare(lambda tree, owner, target: tree.members("/forceset", "Actuator")),
     "muscle-name": _bare(lambda tree, owner, target: tree.members("/forceset", "Muscle")),
     "wrap-object-name": _bare(lambda tree, owner, target: tree.of_class("WrapObject")),
-    "own-joint-coordinate": _bare(lambda tree, owner, target: tree.members(tree.path_of(owner) or "/", "Coordinate")),
+    "own-joint-coordinate": _bare(
+        lambda tree, owner, target: tree.members(tree.path_of(owner) or "/", "Coordinate")
+    ),
     "marker-name": _bare(lambda tree, owner, target: tree.members("/markerset", "Marker")),
-    "set-member": _bare(lambda tree, owner, target: tree.members(tree.path_of(owner) or "/", "Component")),
+    "set-member": _bare(
+        lambda tree, owner, target: tree.members(tree.path_of(owner) or "/", "Component")
+    ),
     "frame-path-or-body-name": _path_or_member("/bodyset"),
     "frame-path-or-member": _path_or_member("/bodyset", "/jointset"),
     "contactgeometry-path-or-name": _path_or_member("/contactgeometryset"),

@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 class FieldSpec(NamedTuple):
     """One property of a class as the reader, the printer and the linter see it.
 
-    `name` is the Python attribute, `tag` the XML element, `accepts` the class of the objects held (None for text).
-    `factory` makes the default value of an object property; `default` is the value of the others. `names` says what the
-    words, objects or columns in it are names of, where that is not said by their class.
+    `name` is the Python attribute, `tag` the XML element, `accepts` the class of the objects held
+    (None for text). `factory` makes the default value of an object property; `default` is the value
+    of the others. `names` says what the words, objects or columns in it are names of, where that is
+    not said by their class.
     """
 
     name: str
@@ -68,12 +69,20 @@ def field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
             kind = replace(kind, legacy=True)
         held = isinstance(kind, Held)
         accepts = class_in(info.annotation) if held else None
-        tag = accepts.tag if accepts is not None and isinstance(kind, Held) and kind.form == "unnamed" else name
+        tag = (
+            accepts.tag
+            if accepts is not None and isinstance(kind, Held) and kind.form == "unnamed"
+            else name
+        )
         tag = next((item.text for item in info.metadata if isinstance(item, Tag)), tag)
-        declared = tuple(base for base in cls.__mro__ if name in getattr(base, "__annotations__", {}))
+        declared = tuple(
+            base for base in cls.__mro__ if name in getattr(base, "__annotations__", {})
+        )
         default = info.default if info.default_factory is None else None
         names = next((item.reference for item in info.metadata if isinstance(item, NamesOf)), None)
-        specs.append(FieldSpec(name, tag, kind, accepts, default, info.default_factory, declared, names))
+        specs.append(
+            FieldSpec(name, tag, kind, accepts, default, info.default_factory, declared, names)
+        )
     specs.sort(key=lambda spec: spec.legacy)
     return {spec.tag: spec for spec in specs}
 
@@ -82,18 +91,30 @@ def field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
 def checks(cls: type[Object]) -> dict[str, Callable[[Any], Any]] | None:
     """Return what checks the value of each property, by attribute, as pydantic's validator of the class would.
 
-    To build that validator takes milliseconds for every class, to call these functions nothing. Each returns the value
-    in the form that is stored, or raises ValueError.
+    To build that validator takes milliseconds for every class, to call these functions nothing.
+    Each returns the value in the form that is stored, or raises ValueError.
 
     Returns:
         None for a class with validators of its own, which pydantic alone runs.
     """
     decorators = cls.__pydantic_decorators__
-    own = (decorators.validators, decorators.field_validators, decorators.root_validators, decorators.model_validators)
+    own = (
+        decorators.validators,
+        decorators.field_validators,
+        decorators.root_validators,
+        decorators.model_validators,
+    )
     if any(own) or cls.__pydantic_post_init__ is not None:
         return None
-    result = {spec.name: partial(spec.kind.check, accepts=spec.accepts) for spec in field_specs(cls).values()}
-    texts = (name for name, info in cls.model_fields.items() if info.annotation is str and not info.metadata)
+    result = {
+        spec.name: partial(spec.kind.check, accepts=spec.accepts)
+        for spec in field_specs(cls).values()
+    }
+    texts = (
+        name
+        for name, info in cls.model_fields.items()
+        if info.annotation is str and not info.metadata
+    )
     return {**dict.fromkeys(texts, _check_text), **result}
 
 
@@ -112,7 +133,8 @@ def object_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
 class Holding(NamedTuple):
     """A property that holds objects, and what it holds as long as no one asks for it.
 
-    Either a list, which is empty, or an object, which is plain if nothing in it has a path or names another.
+    Either a list, which is empty, or an object, which is plain if nothing in it has a path or names
+    another.
     """
 
     spec: FieldSpec
@@ -124,7 +146,10 @@ class Holding(NamedTuple):
 @cache
 def holding(cls: type[Object]) -> tuple[Holding, ...]:
     """The properties of `cls` that hold objects."""
-    return tuple(Holding(spec, spec.name, spec.factory is ObjectList, _is_plain(spec)) for spec in object_specs(cls))
+    return tuple(
+        Holding(spec, spec.name, spec.factory is ObjectList, _is_plain(spec))
+        for spec in object_specs(cls)
+    )
 
 
 def _is_plain(spec: FieldSpec) -> bool:
@@ -167,7 +192,8 @@ def naming_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
     return tuple(
         spec if spec.names is None else spec._replace(kind=spec.names)
         for spec in field_specs(cls).values()
-        if isinstance(spec.kind, Reference) or (spec.names is not None and isinstance(spec.kind, Value))
+        if isinstance(spec.kind, Reference)
+        or (spec.names is not None and isinstance(spec.kind, Value))
     )
 
 

@@ -15,15 +15,24 @@ if TYPE_CHECKING:
 
 def states_of(component: Component) -> list[str]:
     """The names of the state variables of one component, in OpenSim's order."""
-    known = (base.__dict__["facts"].states for base in type(component).__mro__ if "facts" in base.__dict__)
+    known = (
+        base.__dict__["facts"].states
+        for base in type(component).__mro__
+        if "facts" in base.__dict__
+    )
     words = [word.partition("?") for word in next(filter(None, known), "").split()]
-    return [name for name, _, flag in words if not flag or getattr(component, flag.lstrip("!")) != flag.startswith("!")]
+    return [
+        name
+        for name, _, flag in words
+        if not flag or getattr(component, flag.lstrip("!")) != flag.startswith("!")
+    ]
 
 
 def motions_of(joint: Joint) -> dict[str, MotionType]:
     """How the joint moves with each of its coordinates, by their names.
 
-    A coordinate of a CustomJoint is rotational or translational if it drives an axis with a slope of 1 or -1.
+    A coordinate of a CustomJoint is rotational or translational if it drives an axis with a slope
+    of 1 or -1.
     """
     names = [coordinate.name for coordinate in joint.coordinates]
     if joint.motion_types is not None:
@@ -31,18 +40,21 @@ def motions_of(joint: Joint) -> dict[str, MotionType]:
     result: dict[str, MotionType] = dict.fromkeys(names, "coupled")
     transform: Any = getattr(joint, "spatial_transform", None)
     for place, axis in transform.axes().items() if transform is not None else ():
-        if type(axis.function).__name__ == "LinearFunction" and abs(axis.function.coefficients[0]) == 1.0:
-            result |= dict.fromkeys(axis.names, "rotational" if place.startswith("r") else "translational")
+        if (
+            type(axis.function).__name__ == "LinearFunction"
+            and abs(axis.function.coefficients[0]) == 1.0
+        ):
+            result |= dict.fromkeys(
+                axis.names, "rotational" if place.startswith("r") else "translational"
+            )
     return result
 
 
 def variables(tree: Tree, kind: str) -> dict[str, Component]:
     """The components of a model by the names of their variables.
 
-    Args:
-        tree: that of the model.
-        kind: ``state variable``, ``control``, ``state or control variable``, ``generalized force`` or ``output``; of a
-            class of components their paths.
+    Args: tree: that of the model. kind: ``state variable``, ``control``, ``state or control
+        variable``, ``generalized force`` or ``output``; of a class of components their paths.
     """
     return tree.named(f"variables: {kind}", lambda: _variables(tree, kind))
 

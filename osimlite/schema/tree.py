@@ -102,15 +102,16 @@ class Tree:
         self.by_class: dict[type[Object], list[Object]] = {}
         """Every object of the model by its exact class, in tree order.
 
-        Left out are the parts that OpenSim makes for itself, and default objects that no one has asked for, unless
-        something in them has a path or names another.
+        Left out are the parts that OpenSim makes for itself, and default objects that no one has
+        asked for, unless something in them has a path or names another.
         """
         self.renamed: list[Renamed] = []
         self._paths: dict[int, str] = {}
         self._parents: dict[int, Component] = {}
         self._owners: dict[int, Component] = {}
         self._naming: list[tuple[Object, Component]] = []
-        # By class: what its objects are put into, whether they can name others, and what they can hold.
+        # By class: what its objects are put into, whether they can name others, and what they can
+        # hold.
         self._shelves: dict[type[Object], tuple[list[Object], bool, tuple[Holding, ...]]] = {}
         self._spellings: dict[tuple[str, str], list[str]] = {}
         self._of_class: dict[str, list[Component]] = {}
@@ -189,7 +190,8 @@ class Tree:
             cls = type(holder)
             if cls.name_reference is not None and holder.name:
                 yield Use(holder, owner, name_spec(cls), holder.name)
-            # Plain values are in the dictionary of their object; through getattr they would cost several times as much.
+            # Plain values are in the dictionary of their object; through getattr they would cost
+            # several times as much.
             state = holder.__dict__
             for spec in reference_specs(cls):
                 value = state[spec.name]
@@ -211,7 +213,8 @@ class Tree:
         text, rule, target = text.strip(" \t\n\r\f\v"), reference.rule, reference.target
         if not text.startswith("/") or rule not in PATH_RULES or target == "Frame":
             return RULES[rule](self, text, owner, target)
-        # An absolute path leads to the same component from everywhere, and hundreds of points name one body.
+        # An absolute path leads to the same component from everywhere, and hundreds of points name
+        # one body.
         known = self._resolved.get((rule, target, text))
         if known is None:
             known = self._resolved[rule, target, text] = RULES[rule](self, text, owner, target)
@@ -254,8 +257,13 @@ class Tree:
             return path
         parent = self.parent_of(component)
         bare = path.rsplit("/", 1)[1]
-        wanted = {"contactgeometry-path-or-name": "contactgeometryset", "frame-path-or-body-name": "bodyset"}
-        if reference.rule in wanted and (parent is None or self.path_of(parent) != "/" + wanted[reference.rule]):
+        wanted = {
+            "contactgeometry-path-or-name": "contactgeometryset",
+            "frame-path-or-body-name": "bodyset",
+        }
+        if reference.rule in wanted and (
+            parent is None or self.path_of(parent) != "/" + wanted[reference.rule]
+        ):
             return path
         return bare
 
@@ -264,7 +272,9 @@ class Tree:
         """By the name at the end of its path, the first component of each class."""
         result: dict[str, dict[type[Component], Component]] = {}
         for component in self.components:
-            result.setdefault(last_name(self._paths[id(component)]), {}).setdefault(type(component), component)
+            result.setdefault(last_name(self._paths[id(component)]), {}).setdefault(
+                type(component), component
+            )
         return {name: list(components.values()) for name, components in result.items()}
 
     def spellings(self, use: Use) -> list[str]:
@@ -275,7 +285,10 @@ class Tree:
             return self._spellings[key]
         names = set()
         for component in self._all_of(reference.target):
-            if reference.rule == "own-joint-coordinate" and self._parents.get(id(component)) is not use.owner:
+            if (
+                reference.rule == "own-joint-coordinate"
+                and self._parents.get(id(component)) is not use.owner
+            ):
                 continue
             text = self.text_for(use.owner, reference, component)
             if self.lookup(reference, text, use.owner).target is component:
@@ -320,7 +333,9 @@ class Tree:
         self.by_path[path] = component
         self._paths[id(component)] = path
 
-    def _enter(self, holder: Object, owner: Component, children: list[tuple[str, Component]]) -> None:
+    def _enter(
+        self, holder: Object, owner: Component, children: list[tuple[str, Component]]
+    ) -> None:
         """Enter an object of the model, and those without a path in it, which add no level.
 
         The components in it are added to `children`, with their names.
@@ -340,7 +355,8 @@ class Tree:
         for spec, name, is_list, is_plain in holds:
             value = state.get(name)
             if value is None:
-                # Of what no one has asked for, lists are empty and plain objects have no part in the tree.
+                # Of what no one has asked for, lists are empty and plain objects have no part in
+                # the tree.
                 if is_list or is_plain or name in state:
                     continue
                 value = getattr(holder, name)
@@ -386,7 +402,9 @@ class Tree:
             return Resolution(None, "illegal")
         return self._typed(self.by_path.get(path), target)
 
-    def named(self, key: str, members: Callable[[], Iterator[tuple[str, Component]]]) -> dict[str, Component]:
+    def named(
+        self, key: str, members: Callable[[], Iterator[tuple[str, Component]]]
+    ) -> dict[str, Component]:
         """Components by name, of equal names the first; made once for each `key`."""
         if key not in self._names:
             names: dict[str, Component] = {}
@@ -397,12 +415,16 @@ class Tree:
 
     def of_class(self, target: str) -> dict[str, Component]:
         """The components of a class by name, of equal names the first."""
-        return self.named(target, lambda: ((last_name(self._paths[id(c)]), c) for c in self._all_of(target)))
+        return self.named(
+            target, lambda: ((last_name(self._paths[id(c)]), c) for c in self._all_of(target))
+        )
 
     def _all_of(self, target: str) -> list[Component]:
         """The components of a class."""
         if target not in self._of_class:
-            self._of_class[target] = [component for component in self.components if is_a(component, target)]
+            self._of_class[target] = [
+                component for component in self.components if is_a(component, target)
+            ]
         return self._of_class[target]
 
     def members(self, path: str, target: str) -> dict[str, Component]:

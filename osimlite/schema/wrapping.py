@@ -22,9 +22,9 @@ class WrapObject(ModelComponent, abstract=True):
     """Body-fixed X-Y-Z angles of the surface in the frame that owns it."""
     translation: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
     """Where the middle of the surface is, in the frame that owns it."""
-    quadrant: Annotated[str, word("all", "x", "+x", "-x", "y", "+y", "-y", "z", "+z", "-z", "Unassigned")] = (
-        "Unassigned"
-    )
+    quadrant: Annotated[
+        str, word("all", "x", "+x", "-x", "y", "+y", "-y", "z", "+z", "-z", "Unassigned")
+    ] = "Unassigned"
     """Keeps paths to the half where this coordinate of the surface has this sign; `all` leaves both."""
     appearance: Unnamed[Appearance] = made(Appearance, opacity=0.5, color=(0.0, 1.0, 1.0))
     """How the surface is drawn."""
@@ -80,7 +80,10 @@ class WrapTorus(WrapObject):
         """Without a hole it is no torus."""
         inner, outer = self.inner_radius, self.outer_radius
         if outer <= inner < inf:
-            yield "outer_radius", f"outer_radius, {outer:.6g} m, should be more than inner_radius, {inner:.6g} m"
+            yield (
+                "outer_radius",
+                f"outer_radius, {outer:.6g} m, should be more than inner_radius, {inner:.6g} m",
+            )
 
 
 class WrapObjectSet(ModelComponentSet):

@@ -15,8 +15,8 @@ from osimlite.mechanics.multibody.spatial import Array
 def free_coordinates(mechanism: Mechanism) -> list[int]:
     """Places of the coordinates that are not simply at rest.
 
-    A locked angle of a ball joint whose other angles are free is one of them: the speeds of the joint are not those of
-    its angles, so that it takes a constraint to hold it.
+    A locked angle of a ball joint whose other angles are free is one of them: the speeds of the
+    joint are not those of its angles, so that it takes a constraint to hold it.
     """
     turning = [
         set(motion_places)
@@ -25,16 +25,18 @@ def free_coordinates(mechanism: Mechanism) -> list[int]:
         if not all(mechanism.coordinates[place].locked for place in motion_places)
     ]
     held = set().union(*turning)
-    return [place for place, info in enumerate(mechanism.coordinates) if not info.locked or place in held]
+    return [
+        place
+        for place, info in enumerate(mechanism.coordinates)
+        if not info.locked or place in held
+    ]
 
 
 def constraints_on(mechanism: Mechanism, order: Sequence[int]) -> tuple[list[Constraint], int]:
     """What is kept up on the coordinates of a state, and how many coordinates are locked besides.
 
-    Args:
-        mechanism: whose constraints.
-        order: place in the mechanism of each coordinate of the state; the others are locked, and stay at their
-            defaults.
+    Args: mechanism: whose constraints. order: place in the mechanism of each coordinate of the
+        state; the others are locked, and stay at their defaults.
     """
     kept: list[Constraint] = []
     locks = 0
@@ -50,7 +52,11 @@ def constraints_on(mechanism: Mechanism, order: Sequence[int]) -> tuple[list[Con
 
 
 def kept_state(
-    mechanism: Mechanism, q: Sequence[float], u: Sequence[float], set_values: Sequence[int], set_speeds: Sequence[int]
+    mechanism: Mechanism,
+    q: Sequence[float],
+    u: Sequence[float],
+    set_values: Sequence[int],
+    set_speeds: Sequence[int],
 ) -> tuple[Array, Array]:
     """The state at time 0 nearest to q (n,) and u (n,) in which the constraints hold.
 

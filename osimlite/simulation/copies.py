@@ -44,7 +44,13 @@ class Copies:
     """
 
     def __init__(
-        self, model: Model, count: int, step: float, accuracy: float, integrator: str, longest: float = inf
+        self,
+        model: Model,
+        count: int,
+        step: float,
+        accuracy: float,
+        integrator: str,
+        longest: float = inf,
     ) -> None:
         self.simulation = simulation = Simulation(model, "compiled")
         engine: Any = simulation.engine
@@ -55,13 +61,17 @@ class Copies:
         self.engine.drive(driven)
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
         self.places = places_of(engine, driven)
-        options = BatchOptions(to=step, accuracy=accuracy, integrator=integrator, step_bounds=(0.0, longest))
+        options = BatchOptions(
+            to=step, accuracy=accuracy, integrator=integrator, step_bounds=(0.0, longest)
+        )
         options.check()
         self.batch = Batch(engine, np.tile(self.start, (count, 1)), options, start_holds=True)
         self._first_step = float(self.batch.clocks[0, 1])
         self._parts = [(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE)]
         # Each core works on numbers of the model of its own, which are few enough to be near.
-        self._rooms = [(self.batch.room(), engine.numbers.copy()) for _ in range(min(cores(), count))]
+        self._rooms = [
+            (self.batch.room(), engine.numbers.copy()) for _ in range(min(cores(), count))
+        ]
         self._pool = ThreadPoolExecutor(len(self._rooms) - 1) if len(self._rooms) > 1 else None
 
     @property
@@ -100,7 +110,11 @@ class Copies:
             for first, last in left:
                 said.append(self.batch.hold(law, room, numbers, *given, first, last))
 
-        others = [] if self._pool is None else [self._pool.submit(share, *room) for room in self._rooms[1:]]
+        others = (
+            []
+            if self._pool is None
+            else [self._pool.submit(share, *room) for room in self._rooms[1:]]
+        )
         try:
             share(*self._rooms[0])
         finally:

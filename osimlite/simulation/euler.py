@@ -34,16 +34,12 @@ class SemiImplicitEuler(Stepper):
 
     That is of first order; PyBullet steps like that.
 
-    Args:
-        f: derivative of the state; the part of q is not used.
-        t: initial time, s.
-        y: initial state.
-        nq: number of coordinates in it, and of speeds after them; the rest are auxiliary states.
-        h: step, s. Only a step that would pass the limit is shortened.
-        rates: qdot as a function of (q, u); by default qdot = u.
-        observe: called with (time, state) after each step taken.
-        names: what the entries of y are called in messages.
-        projected: gives the state nearest to one where the constraints hold to a tolerance, if there is one.
+    Args: f: derivative of the state; the part of q is not used. t: initial time, s. y: initial
+        state. nq: number of coordinates in it, and of speeds after them; the rest are auxiliary
+        states. h: step, s. Only a step that would pass the limit is shortened. rates: qdot as a
+        function of (q, u); by default qdot = u. observe: called with (time, state) after each step
+        taken. names: what the entries of y are called in messages. projected: gives the state
+        nearest to one where the constraints hold to a tolerance, if there is one.
     """
 
     def __init__(
@@ -63,7 +59,9 @@ class SemiImplicitEuler(Stepper):
             raise SettingError(f"The fixed step must be positive and finite; {h} s is not.")
         super().__init__(f, t, y, observe, names)
         if len(self.state) < 2 * nq:
-            raise ValueError(f"{nq} coordinates and as many speeds do not fit into {len(self.state)} states")
+            raise ValueError(
+                f"{nq} coordinates and as many speeds do not fit into {len(self.state)} states"
+            )
         self._nq = nq
         self._h = h
         self._rates = rates
@@ -107,7 +105,10 @@ class SemiImplicitEuler(Stepper):
     def _moved(self, h: float) -> list[float]:
         """The state after a step of length h (s), wherever constraints hold."""
         q = self.state[: self._nq]
-        rest = [x + h * a for x, a in zip(self.state[self._nq :], self.derivative[self._nq :], strict=True)]
+        rest = [
+            x + h * a
+            for x, a in zip(self.state[self._nq :], self.derivative[self._nq :], strict=True)
+        ]
         u = rest[: self._nq]
         rates = u if self._rates is None else self._rates(q, u)
         return [x + h * v for x, v in zip(q, rates, strict=True)] + rest

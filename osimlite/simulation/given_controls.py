@@ -62,14 +62,12 @@ def driven(
 ) -> Controls:
     """What a run adds to the controls of a model, as a PrescribedController more would add it.
 
-    Between the rows of a table are straight lines; before and after, its first and last values hold.
+    Between the rows of a table are straight lines; before and after, its first and last values
+    hold.
 
-    Args:
-        controls: of the model.
-        given: by the name or path of an actuator a number, a function of time (s) or ``(times, values)``; or a table
-            of such columns, or the file of one or of a ControlSet.
-        to: end of the motion, s, up to which tables should go.
-        start: of the motion, s.
+    Args: controls: of the model. given: by the name or path of an actuator a number, a function of
+        time (s) or ``(times, values)``; or a table of such columns, or the file of one or of a
+        ControlSet. to: end of the motion, s, up to which tables should go. start: of the motion, s.
         what: what is given, for messages.
 
     Raises:
@@ -85,12 +83,18 @@ def driven(
     begin, end = -inf, inf
     for key, value in _by_name(given).items():
         if key not in known:
-            raise SettingError(f"the model has no actuator '{key}' to control{did_you_mean(key, known)}")
+            raise SettingError(
+                f"the model has no actuator '{key}' to control{did_you_mean(key, known)}"
+            )
         paths = [name for name in controls.names if name.endswith(f"/{key}")]
         if len(paths) > 1:
-            raise SettingError(f"{len(paths)} actuators are called '{key}': {listed(paths)}; give the path of one")
+            raise SettingError(
+                f"{len(paths)} actuators are called '{key}': {listed(paths)}; give the path of one"
+            )
         if known[key] in functions:
-            raise SettingError(f"'{known[key]}' is controlled twice, by its name and by its path; leave one out")
+            raise SettingError(
+                f"'{known[key]}' is controlled twice, by its name and by its path; leave one out"
+            )
         if isinstance(value, tuple):
             functions[known[key]], first, last = _lines(key, *value)
             begin, end = max(begin, first), min(end, last)
@@ -108,8 +112,14 @@ def told(given: Mapping[str, Any] | StoTable | str | Path) -> Any:
     """What is said of such controls in a summary: a file, or numbers by name and other things by what they are."""
     if not isinstance(given, Mapping):
         return "a table" if isinstance(given, StoTable) else str(given)
-    kinds = {name: "a table" if isinstance(value, tuple) else "a function" for name, value in given.items()}
-    return {name: value if isinstance(value, int | float | str) else kinds[name] for name, value in given.items()}
+    kinds = {
+        name: "a table" if isinstance(value, tuple) else "a function"
+        for name, value in given.items()
+    }
+    return {
+        name: value if isinstance(value, int | float | str) else kinds[name]
+        for name, value in given.items()
+    }
 
 
 def words_to_controls(words: Iterable[str]) -> dict[str, Any]:
@@ -125,7 +135,9 @@ def words_to_controls(words: Iterable[str]) -> dict[str, Any]:
             try:
                 more: Mapping[str, Any] = {name: float(value)}
             except ValueError:
-                raise SettingError(f"--controls takes a file, or NAME=VALUE with a number; got '{word}'") from None
+                raise SettingError(
+                    f"--controls takes a file, or NAME=VALUE with a number; got '{word}'"
+                ) from None
         else:
             more = _by_name(word)
         for key in more.keys() & result.keys():
@@ -183,9 +195,13 @@ def _lines(name: str, times: Any, values: Any) -> tuple[Function, float, float]:
     """Straight lines through values at times, and the first and last of these."""
     x, y = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
     if x.ndim != 1 or x.shape != y.shape or not len(x):
-        raise SettingError(f"the control of '{name}' has {x.size} times and {y.size} values; give as many of both")
+        raise SettingError(
+            f"the control of '{name}' has {x.size} times and {y.size} values; give as many of both"
+        )
     if not (np.isfinite(x).all() and np.isfinite(y).all() and (np.diff(x) > 0.0).all()):
-        raise SettingError(f"the control of '{name}' has times that do not increase, or what is no number; mend it")
+        raise SettingError(
+            f"the control of '{name}' has times that do not increase, or what is no number; mend it"
+        )
     line = Constant(float(y[0])) if len(x) == 1 else smoothing_spline(x, y, 1, 0.0)
     return line, float(x[0]), float(x[-1])
 

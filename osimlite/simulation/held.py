@@ -1,8 +1,9 @@
 """Controls that are computed at control steps and held between: what a run is given of a controller, and keeps of it.
 
-What a controller knows of what was (its sensors over as long as they are delayed, states of legs, the controls that are
-held, the step that the integrator would try next) is recorded at each control step, in a table: a run that goes on from
-the table and the state at a control step goes on to the last bit as if it had not ended.
+What a controller knows of what was (its sensors over as long as they are delayed, states of legs,
+the controls that are held, the step that the integrator would try next) is recorded at each control
+step, in a table: a run that goes on from the table and the state at a control step goes on to the
+last bit as if it had not ended.
 """
 
 from __future__ import annotations
@@ -85,7 +86,10 @@ class Held:
     def header(self) -> dict[str, str]:
         """By what the table tells that it is of this very controller: gains, and a sum over all else that counts."""
         others = crc32(self.plan.tobytes() + self.numbers.tobytes())
-        return {"gains": json.dumps({**self.gains, "fixed_control_step_size": self.step}), "reflexes": str(others)}
+        return {
+            "gains": json.dumps({**self.gains, "fixed_control_step_size": self.step}),
+            "reflexes": str(others),
+        }
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -110,7 +114,9 @@ class Held:
         """
         result = controls.driven({path: Constant(0.0) for path in self.paths})
         if not isinstance(result.record()[2], str):
-            raise SettingError("beside a controller, controls are numbers or tables, not functions of Python")
+            raise SettingError(
+                "beside a controller, controls are numbers or tables, not functions of Python"
+            )
         return result
 
     def require_known(self, before: StoTable | None, end: float) -> None:
@@ -124,16 +130,24 @@ class Held:
                 "the run that this one goes on from has left no controller.sto, and so had no controller"
             )
         if before.columns != self.columns:
-            raise SettingError("the run that this one goes on from had a controller with other sensors or actuators")
-        theirs, ours = (json.loads(header.get("gains", "{}")) for header in (before.header, self.header))
+            raise SettingError(
+                "the run that this one goes on from had a controller with other sensors or actuators"
+            )
+        theirs, ours = (
+            json.loads(header.get("gains", "{}")) for header in (before.header, self.header)
+        )
         for name in {**theirs, **ours}:
             if theirs.get(name) != ours.get(name):
-                one, other = (f"{each[name]:g}" if name in each else "none" for each in (theirs, ours))
+                one, other = (
+                    f"{each[name]:g}" if name in each else "none" for each in (theirs, ours)
+                )
                 raise SettingError(
                     f"the run that this one goes on from had '{name}' {one}, and this has {other}; go on with the same"
                 )
         if before.header.get("reflexes") != self.header["reflexes"]:
-            raise SettingError("the run that this one goes on from had other reflexes, states of legs or noise")
+            raise SettingError(
+                "the run that this one goes on from had other reflexes, states of legs or noise"
+            )
         if not 0.0 <= end - before.times[-1] < self.step * (1.0 + NEAR):
             raise SettingError(
                 f"what is known of the controller ends at {before.times[-1]:g} s, the states at {end:g} s"
@@ -154,12 +168,10 @@ class Held:
 class HeldRuns:
     """Runs by a controller.
 
-    Args:
-        helds: of the models of all runs, which differ in numbers only.
-        engine: of one of the models, which is driven by `controls`.
-        controls: in which each of the controller's has a number of its own, see :meth:`Held.open_to`.
-        to: time at which a single run ends, which is recorded, s.
-        before: what was recorded of the run that a single one goes on from.
+    Args: helds: of the models of all runs, which differ in numbers only. engine: of one of the
+        models, which is driven by `controls`. controls: in which each of the controller's has a
+        number of its own, see :meth:`Held.open_to`. to: time at which a single run ends, which is
+        recorded, s. before: what was recorded of the run that a single one goes on from.
 
     Attributes:
         next_step: that the integrator tries first, s.
@@ -167,7 +179,12 @@ class HeldRuns:
     """
 
     def __init__(
-        self, helds: Sequence[Held], engine: Any, controls: Controls, to: float, before: StoTable | None
+        self,
+        helds: Sequence[Held],
+        engine: Any,
+        controls: Controls,
+        to: float,
+        before: StoTable | None,
     ) -> None:
         held, count = helds[0], len(helds)
         self.held, self._before, self.next_step = held, before, INITIAL_STEP
@@ -176,7 +193,10 @@ class HeldRuns:
         plan[REFLEXES.KEPT] = max(each.plan[REFLEXES.KEPT] for each in helds)
         plan[REFLEXES.ROOM] = max(each.plan[REFLEXES.ROOM] for each in helds)
         driven = places_of(engine, controls)[[controls.names.index(path) for path in held.paths]]
-        self._room, rows = np.zeros((count, plan[REFLEXES.ROOM])), np.zeros((count, senses[SENSES.SIZE]))
+        self._room, rows = (
+            np.zeros((count, plan[REFLEXES.ROOM])),
+            np.zeros((count, senses[SENSES.SIZE])),
+        )
         self._room[:, :LEGS] = UNKNOWN if plan[REFLEXES.HAS_STATES] else EARLY_STANCE
         self._excitations = np.zeros((count, len(held.paths)))
         self._progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
@@ -185,7 +205,10 @@ class HeldRuns:
         if to > 0.0:
             plan[REFLEXES.ROWS] = held.steps_in(to) + 2 - plan[REFLEXES.FIRST]
         self._record, self._plan = np.empty((plan[REFLEXES.ROWS], len(held.columns))), plan
-        known, numbers = np.stack([each.known for each in helds]), np.concatenate([each.numbers for each in helds])
+        known, numbers = (
+            np.stack([each.known for each in helds]),
+            np.concatenate([each.numbers for each in helds]),
+        )
         self.parts = (
             *(senses, known, driven, plan, numbers),
             *(self._room, rows, self._excitations, self._record, self._progress),
@@ -199,24 +222,32 @@ class HeldRuns:
         for back, row in enumerate(before.rows[: -1 - kept : -1]):
             history[(frames - 1 - back) % kept] = row[:sensors]
         last = before.rows[-1, sensors:]
-        self._room[0, :LEGS], self._excitations[0], self.next_step = last[:LEGS], last[LEGS:-1], float(last[-1])
+        self._room[0, :LEGS], self._excitations[0], self.next_step = (
+            last[:LEGS],
+            last[LEGS:-1],
+            float(last[-1]),
+        )
         self._progress[0, [STEPS, FRAMES]] = plan[REFLEXES.FIRST] = frames
 
     def table(self, end: float = inf) -> StoTable:
         """What was recorded of a single run, after the last rows of the one before that a further one would need.
 
-        Args:
-            end: of the motion, s; that of one which was interrupted may lie before the last control steps.
+        Args: end: of the motion, s; that of one which was interrupted may lie before the last
+            control steps.
         """
         new = int(self._progress[0, STEPS] - self._plan[REFLEXES.FIRST])
-        times = self.held.step * np.arange(self._progress[0, STEPS] - new, self._progress[0, STEPS], dtype=np.float64)
+        times = self.held.step * np.arange(
+            self._progress[0, STEPS] - new, self._progress[0, STEPS], dtype=np.float64
+        )
         rows = self._record[:new].copy()
         if self._before is not None:
             kept = int(self._plan[REFLEXES.KEPT])
             times = np.concatenate([self._before.times[-kept:], times])
             rows = np.concatenate([self._before.rows[-kept:], rows])
         count = int(np.searchsorted(times, end + NEAR * self.held.step, side="right"))
-        return StoTable("controller", times[:count], self.held.columns, rows[:count], header=self.held.header)
+        return StoTable(
+            "controller", times[:count], self.held.columns, rows[:count], header=self.held.header
+        )
 
     def added_to(self, controls: Controls) -> Controls:
         """Controls with what the controller has added in a single run, as functions of time."""

@@ -15,15 +15,16 @@ INTEGRATORS = {
     "bdf": "BDF",
     "rosenbrock": "Rosenbrock",
 }
-"""The integrators with error control by the names that users give, which their kernels have, with their own names:
-two of Simbody's, of which OpenSim takes the first, and those for stiff motion."""
+"""The integrators with error control by the names that users give, which their kernels have, with
+their own names: two of Simbody's, of which OpenSim takes the first, and those for stiff motion.
+"""
 
 DEFAULT_ACCURACY = 1e-3
 LOOSE = 1e-2
 """The loosest accuracy that keeps motions near the model's own.
 
-The walker ends within 0.01 rad of it after a second, by every integrator; at 0.1 it is 0.05 rad off by Rosenbrock's
-method and 0.07 by Merson's.
+The walker ends within 0.01 rad of it after a second, by every integrator; at 0.1 it is 0.05 rad off
+by Rosenbrock's method and 0.07 by Merson's.
 """
 """What OpenSim's Manager uses where no accuracy was set."""
 

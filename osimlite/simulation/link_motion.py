@@ -32,8 +32,14 @@ def moving(links: Floats, points: Floats) -> Floats:
         links[..., LINK_WORK.VELOCITY : LINK_WORK.VELOCITY + 3],
     )
     rotations = links[..., :9].reshape(*links.shape[:-1], 3, 3)
-    arms = links[..., LINK_WORK.POSITION : LINK_WORK.POSITION + 3] - origin + (rotations @ points[..., None])[..., 0]
-    velocities = links[..., LINK_WORK.VELOCITY + 3 : LINK_WORK.VELOCITY + 6] + np.cross(turning, arms)
+    arms = (
+        links[..., LINK_WORK.POSITION : LINK_WORK.POSITION + 3]
+        - origin
+        + (rotations @ points[..., None])[..., 0]
+    )
+    velocities = links[..., LINK_WORK.VELOCITY + 3 : LINK_WORK.VELOCITY + 6] + np.cross(
+        turning, arms
+    )
     return np.concatenate([arms + origin, velocities], axis=-1)
 
 
@@ -65,8 +71,8 @@ class LinkMotion:
     def of(cls, system: System, moments: Floats, accelerations: Floats) -> LinkMotion:
         """The motion of the links of a system at some times with their states (t, 1 + y), and rates (t, n) of speeds.
 
-        Raises:
-            SimulationError: the rates of coordinates are not defined there, or a force cannot be computed.
+        Raises: SimulationError: the rates of coordinates are not defined there, or a force cannot
+            be computed.
         """
         return cls(system, system.links_in_motion(moments, accelerations))
 
@@ -78,14 +84,18 @@ class LinkMotion:
             count = len(self.links)
             return np.tile(frame[:3, :3], (count, 1, 1)), np.tile(frame[:3, 3], (count, 1))
         rotation = link[:, :9].reshape(-1, 3, 3)
-        return rotation @ frame[:3, :3], link[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] + rotation @ frame[:3, 3]
+        return rotation @ frame[:3, :3], link[
+            :, LINK_WORK.POSITION : LINK_WORK.POSITION + 3
+        ] + rotation @ frame[:3, 3]
 
     def turning(self, body: int) -> tuple[Floats, Floats]:
         """Angular velocity (rad/s) and acceleration (rad/s²) of a body, (t, 3) each."""
         link, _ = self._own(body)
         if link is None:
             return np.zeros((len(self.links), 3)), np.zeros((len(self.links), 3))
-        w, alpha = (link[:, first : first + 3] for first in (LINK_WORK.VELOCITY, LINK_WORK.ACCELERATION))
+        w, alpha = (
+            link[:, first : first + 3] for first in (LINK_WORK.VELOCITY, LINK_WORK.ACCELERATION)
+        )
         return w, alpha
 
     def point(self, body: int, location: Floats) -> tuple[Floats, Floats, Floats]:
@@ -98,7 +108,10 @@ class LinkMotion:
         place, velocity = np.split(moving(link, point), 2, axis=-1)
         w, alpha = self.turning(body)
         # The kernels accelerate everything upwards in place of gravity, about an origin that stays.
-        free = link[:, LINK_WORK.ACCELERATION + 3 : LINK_WORK.ACCELERATION + 6] + self.system.mechanism.gravity
+        free = (
+            link[:, LINK_WORK.ACCELERATION + 3 : LINK_WORK.ACCELERATION + 6]
+            + self.system.mechanism.gravity
+        )
         arm = place - link[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
         return place, velocity, free + np.cross(alpha, arm) + np.cross(w, velocity)
 

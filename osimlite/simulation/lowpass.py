@@ -1,7 +1,7 @@
 """OpenSim's low-pass filter of recorded motions: Butterworth's of third order, run forward and backward.
 
-A record is first continued at both ends by half its length, turned about its first and last point, and sampled evenly
-where it is not.
+A record is first continued at both ends by half its length, turned about its first and last point,
+and sampled evenly where it is not.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ MOST_SAMPLES = 100_000
 """A record is not sampled more finely than this many times."""
 
 
-def lowpassed(times: Array, values: Array, cutoff: float, *, limited: bool = False) -> tuple[Array, Array]:
+def lowpassed(
+    times: Array, values: Array, cutoff: float, *, limited: bool = False
+) -> tuple[Array, Array]:
     """A filtered record, with the continuation at both ends.
 
-    Args:
-        times: (t,), s, increasing.
-        values: (t, n).
-        cutoff: frequency (Hz) of which half the power passes each time the filter is run.
-        limited: whether a frequency that is too high for the times gives way to one that is not, as in OpenSim.
+    Args: times: (t,), s, increasing. values: (t, n). cutoff: frequency (Hz) of which half the power
+        passes each time the filter is run. limited: whether a frequency that is too high for the
+        times gives way to one that is not, as in OpenSim.
 
     Returns:
         Times (s,), evenly spaced, and values (s, n).
@@ -49,7 +49,9 @@ def lowpassed(times: Array, values: Array, cutoff: float, *, limited: bool = Fal
     return times, _filtered(_filtered(values, cutoff * step)[::-1], cutoff * step)[::-1]
 
 
-def lowpassed_by_sinc(times: Array, values: Array, cutoff: float, order: int) -> tuple[Array, Array]:
+def lowpassed_by_sinc(
+    times: Array, values: Array, cutoff: float, order: int
+) -> tuple[Array, Array]:
     """A record through the filter of OpenSim's tracking tools: a sinc of its cut-off under Hamming's window.
 
     Args:
@@ -58,8 +60,8 @@ def lowpassed_by_sinc(times: Array, values: Array, cutoff: float, order: int) ->
         cutoff: frequency, Hz.
         order: so many samples on both sides count.
 
-    Returns:
-        Times (s,), evenly spaced, and values (s, n). A record that is too short is returned as it is, as in OpenSim.
+    Returns: Times (s,), evenly spaced, and values (s, n). A record that is too short is returned as
+        it is, as in OpenSim.
     """
     times, values, step = _even(times, values)
     if len(times) < 2 * order:
@@ -99,12 +101,19 @@ def _filtered(values: Array, cutoff: float) -> Array:
     """Values (t, n) after one run; `cutoff` in parts of the sampling frequency. The first three stay as they are."""
     w = math.tan(math.pi * cutoff)
     scale = (w + 1.0) * (w * w + w + 1.0)
-    sums = [3 * w**3 + 2 * w * w - 2 * w - 3, 3 * w**3 - 2 * w * w - 2 * w + 3, (w - 1.0) * (w * w - w + 1.0)]
+    sums = [
+        3 * w**3 + 2 * w * w - 2 * w - 3,
+        3 * w**3 - 2 * w * w - 2 * w + 3,
+        (w - 1.0) * (w * w - w + 1.0),
+    ]
     one, two, three = (total / scale for total in sums)
     taken = values[3:] + 3.0 * (values[2:-1] + values[1:-2]) + values[:-3]
     result = np.concatenate([values[:3], w**3 / scale * taken])
-    # One after the other: the numbers of slow filters are so near one another that blocks of rows lose seven digits.
-    for row, (third, second, first) in zip(result[3:], zip(result, result[1:], result[2:], strict=False), strict=False):
+    # One after the other: the numbers of slow filters are so near one another that blocks of rows
+    # lose seven digits.
+    for row, (third, second, first) in zip(
+        result[3:], zip(result, result[1:], result[2:], strict=False), strict=False
+    ):
         row -= one * first
         row -= two * second
         row -= three * third

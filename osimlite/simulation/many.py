@@ -1,10 +1,11 @@
 """Many motions at once, on all cores: what is asked of an engine that computes them, and what comes of it.
 
-A batch has W runs of models of one structure. Each starts from a row of numbers, its state in the engine's order
-(:class:`osimlite.simulation.states.StateLayout`), and may have a row of the model's numbers of its own. Every run has
-its own steps, and comes out the same whatever runs beside it and on however many threads. It ends at a time, or where
-a watch stops it, or cannot go on (`ENDINGS`). On its way it leaves states at the report times, events (contacts that
-begin and end, levels that are passed) and the largest forces: `Runs`.
+A batch has W runs of models of one structure. Each starts from a row of numbers, its state in the
+engine's order (:class:`osimlite.simulation.states.StateLayout`), and may have a row of the model's
+numbers of its own. Every run has its own steps, and comes out the same whatever runs beside it and
+on however many threads. It ends at a time, or where a watch stops it, or cannot go on (`ENDINGS`).
+On its way it leaves states at the report times, events (contacts that begin and end, levels that
+are passed) and the largest forces: `Runs`.
 """
 
 from __future__ import annotations
@@ -30,13 +31,23 @@ from osimlite.simulation.runs import Floats, Ints, Runs, Watch
 if TYPE_CHECKING:
     from osimlite.simulation.held import Held
 
-__all__ = ["ENDINGS", "BatchEngine", "BatchOptions", "Renewal", "Renewed", "Runs", "Watch", "run_many"]
+__all__ = [
+    "ENDINGS",
+    "BatchEngine",
+    "BatchOptions",
+    "Renewal",
+    "Renewed",
+    "Runs",
+    "Watch",
+    "run_many",
+]
 
 NO_LIMIT = 2**62
 
 ENDINGS = {0: "done", 1: "failed", 3: "stopped", 4: "too many steps"}
-"""How a run ended, in words: at its time, at a state beyond which there is no step, at a watch, after as many tried
-steps as were allowed."""
+"""How a run ended, in words: at its time, at a state beyond which there is no step, at a watch,
+after as many tried steps as were allowed.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,10 +90,13 @@ class BatchEngine(Engine, Protocol):
 
     mechanism: Mechanism  # of the model
     forces: Forces  # of the model
-    structure: Ints  # what is connected to what, integers; equal for models that differ in numbers only
+    # what is connected to what, integers; equal for models that differ in numbers only
+    structure: Ints
     numbers: Floats  # all numbers of the model (m,)
 
-    def run_many(self, states: ArrayLike, options: BatchOptions, numbers: ArrayLike | None = None) -> Runs:
+    def run_many(
+        self, states: ArrayLike, options: BatchOptions, numbers: ArrayLike | None = None
+    ) -> Runs:
         """Compute a batch; see :func:`run_many`."""
 
     def contact_places(
@@ -131,22 +145,25 @@ class Renewal(Protocol):
     def renewed(self, owners: Sequence[Component]) -> Renewed | None:
         """The model with what its forces and bodies are now; None if more has changed than numbers.
 
-        Args:
-            owners: forces, controllers, bodies and the model itself, if a property of theirs has changed.
+        Args: owners: forces, controllers, bodies and the model itself, if a property of theirs has
+            changed.
         """
 
 
 def run_many(
-    engine: BatchEngine, states: ArrayLike, to: float = 2.0, *, numbers: ArrayLike | None = None, **choices: Any
+    engine: BatchEngine,
+    states: ArrayLike,
+    to: float = 2.0,
+    *,
+    numbers: ArrayLike | None = None,
+    **choices: Any,
 ) -> Runs:
     """Simulate from many states.
 
-    Args:
-        engine: of the model.
-        states: where the runs start (W, y), in the engine's order.
-        to: when they end unless a watch stops them, s.
-        numbers: `engine.numbers` of models of the same structure, one row for each run; by default the engine's own.
-        choices: attributes of :class:`BatchOptions`.
+    Args: engine: of the model. states: where the runs start (W, y), in the engine's order. to: when
+        they end unless a watch stops them, s. numbers: `engine.numbers` of models of the same
+        structure, one row for each run; by default the engine's own. choices: attributes of
+        :class:`BatchOptions`.
 
     Raises:
         SettingError: a setting has no meaning.

@@ -44,4 +44,6 @@ class Movement(Tabular):
         """
         xarray = require("xarray", extra="frame", purpose="a data set of xarray")
         over = {"time": self.times, "coordinate": list(self.coordinates)}
-        return xarray.Dataset({"value": (("time", "coordinate"), self.values)}, over, {"model": self.mechanism.name})
+        return xarray.Dataset(
+            {"value": (("time", "coordinate"), self.values)}, over, {"model": self.mechanism.name}
+        )

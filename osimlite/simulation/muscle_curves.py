@@ -47,11 +47,10 @@ QUANTITIES = {
 class MuscleCurves(Tabular):
     """Muscles in p poses, at rest.
 
-    Attributes:
-        muscles: paths of the m muscles, in the order of the model.
-        values: of the k coordinates that are swept by their names, as they were given, rad or m.
-        columns: numbers (p, m) by the names of :data:`QUANTITIES`, and ``moment_arm_<coordinate>`` for each of the
-            coordinates (m); NaN where a muscle has no equilibrium.
+    Attributes: muscles: paths of the m muscles, in the order of the model. values: of the k
+        coordinates that are swept by their names, as they were given, rad or m. columns: numbers
+        (p, m) by the names of :data:`QUANTITIES`, and ``moment_arm_<coordinate>`` for each of the
+        coordinates (m); NaN where a muscle has no equilibrium.
     """
 
     muscles: tuple[str, ...]
@@ -91,9 +90,13 @@ class MuscleCurves(Tabular):
             MissingDependency: xarray is not installed.
         """
         xarray = require("xarray", extra="frame", purpose="a data set of xarray")
-        over = {name: list(places) for name, places in {**self.values, "muscle": self.muscles}.items()}
+        over = {
+            name: list(places) for name, places in {**self.values, "muscle": self.muscles}.items()
+        }
         shape = [len(places) for places in over.values()]
-        return xarray.Dataset({name: (list(over), rows.reshape(shape)) for name, rows in self.columns.items()}, over)
+        return xarray.Dataset(
+            {name: (list(over), rows.reshape(shape)) for name, rows in self.columns.items()}, over
+        )
 
     def bounds(self, name: str) -> tuple[Array, Array]:
         """What is least and greatest (m,) of a column; NaN where a muscle has no number."""
@@ -103,7 +106,11 @@ class MuscleCurves(Tabular):
     def crossing(self) -> list[int]:
         """Places of the muscles that have a moment arm about a coordinate anywhere; all if none is swept."""
         arms = [self.columns[f"moment_arm_{name}"] for name in self.coordinates]
-        return [k for k in range(len(self.muscles)) if not arms or any(rows[:, k].any() for rows in arms)]
+        return [
+            k
+            for k in range(len(self.muscles))
+            if not arms or any(rows[:, k].any() for rows in arms)
+        ]
 
 
 @any_numbers
@@ -119,24 +126,19 @@ def muscle_curves(
 ) -> MuscleCurves:
     """Lengths, moment arms and forces of muscles while coordinates are swept, as OpenSim's plotter has them.
 
-    The other coordinates have their default values, but for those that constraints move along. Fibers are in
-    equilibrium with their tendons at an activation, the model is at rest.
+    The other coordinates have their default values, but for those that constraints move along.
+    Fibers are in equilibrium with their tendons at an activation, the model is at rest.
 
-    Args:
-        model: whose muscles.
-        values: of coordinates by name or path, rad or m; of several all combinations, the last one changing first.
-        muscles: names or paths; all if there are none.
-        activation: of all muscles, 0 to 1.
-        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
-        folder: where the model's file is, and those that it names.
-        progress: called with the number of poses done and of all.
+    Args: model: whose muscles. values: of coordinates by name or path, rad or m; of several all
+        combinations, the last one changing first. muscles: names or paths; all if there are none.
+        activation: of all muscles, 0 to 1. wrapping: how paths bend around surfaces, see
+        :class:`osimlite.simulation.Options`. folder: where the model's file is, and those that it
+        names. progress: called with the number of poses done and of all.
 
-    Raises:
-        ModelError: there is no such coordinate, or the model is no mechanism.
-        UnsupportedError: a muscle, a joint or a constraint of an unknown class.
-        SimulationError: no pose fulfils the constraints.
-        SettingError: the activation is not from 0 to 1, there is no such muscle or wrapping, or a coordinate is swept
-            twice.
+    Raises: ModelError: there is no such coordinate, or the model is no mechanism. UnsupportedError:
+        a muscle, a joint or a constraint of an unknown class. SimulationError: no pose fulfils the
+        constraints. SettingError: the activation is not from 0 to 1, there is no such muscle or
+        wrapping, or a coordinate is swept twice.
     """
     if not 0.0 <= activation <= 1.0:
         raise SettingError(f"an activation is a number from 0 to 1, not {activation:g}")
@@ -144,19 +146,32 @@ def muscle_curves(
     places = [mechanism.coordinate_index(name) for name in values]
     if len(set(places)) < len(places):
         raise SettingError(f"{listed(values)} are one coordinate; leave one out")
-    forces = force_elements(model, mechanism, skip_unsupported=True, wrapping=wrapping, folder=folder)
+    forces = force_elements(
+        model, mechanism, skip_unsupported=True, wrapping=wrapping, folder=folder
+    )
     tree = model.tree()
-    optimal = {tree.path_of(item) or "": item.optimal_fiber_length for item in model.components(Muscle)}
+    optimal = {
+        tree.path_of(item) or "": item.optimal_fiber_length for item in model.components(Muscle)
+    }
     named = _chosen(list(optimal), muscles)
-    result = {element.path: element for element in forces.elements if isinstance(element, DeclaredForce)}
+    result = {
+        element.path: element for element in forces.elements if isinstance(element, DeclaredForce)
+    }
     missing = [path for path in named if path not in result]
     if missing:
         # Says of which class it is, and why it cannot be computed.
         force_elements(model, mechanism, folder=folder)
-    controls = Controls(forces.controls.names, ((Constant(activation),),) * len(forces.controls.names))
+    controls = Controls(
+        forces.controls.names, ((Constant(activation),),) * len(forces.controls.names)
+    )
     free = mechanism.released()
     alone = [
-        _Muscle(result[path], System(free, Forces((result[path],), (), controls)), activation, optimal[path])
+        _Muscle(
+            result[path],
+            System(free, Forces((result[path],), (), controls)),
+            activation,
+            optimal[path],
+        )
         for path in named
     ]
     paths = Paths(model, wrapping)
@@ -211,7 +226,10 @@ class _Muscle(NamedTuple):
             is_settled = system.realize(0.0, y, STAGE.FORCE) == OUTCOME.OK
         except SimulationError:
             is_settled = False
-        known = {name: system.recorded(element.path, place) for name, place in element.kind.recorded.items()}
+        known = {
+            name: system.recorded(element.path, place)
+            for name, place in element.kind.recorded.items()
+        }
         result = {"length": known["length"]}
         if is_settled:
             cos, fibers = known["cos_pennation"], known["fiber_length"]

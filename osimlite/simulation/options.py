@@ -37,11 +37,13 @@ PER_RUN = (
 class Options:
     """What can be chosen about a simulation, by keyword arguments of :func:`osimlite.simulate` and `Simulation`.
 
-    Those in `PER_RUN` can be chosen for every run of a `Simulation`. What has a help is an option of
-    ``osimlite simulate`` too.
+    Those in `PER_RUN` can be chosen for every run of a `Simulation`. What has a help is an option
+    of ``osimlite simulate`` too.
     """
 
-    accuracy: float | None = option(None, "Of the integrator, as in OpenSim.", shown="0.001", more="0.001 if left out.")
+    accuracy: float | None = option(
+        None, "Of the integrator, as in OpenSim.", shown="0.001", more="0.001 if left out."
+    )
     integrator: str | None = option(
         None,
         "'merson', whose steps are OpenSim's; 'euler2', whose steps are SCONE's; 'adams' for smooth motion, as of few "
@@ -49,13 +51,17 @@ class Options:
         shown="merson",
     )
     fixed_step: float | None = option(
-        None, "Steps of this length (semi-implicit Euler), without error control.", unit="SECONDS",
+        None,
+        "Steps of this length (semi-implicit Euler), without error control.",
+        unit="SECONDS",
         more="They are the engine's own, s.",
-    )  # fmt: skip
+    )
     report_interval: float = option(
-        0.01, "Time between the rows of the result files.", unit="SECONDS",
+        0.01,
+        "Time between the rows of the result files.",
+        unit="SECONDS",
         more="The recorded moments are so far apart, s; the last one is the end in any case.",
-    )  # fmt: skip
+    )
     initial: Mapping[str, float | str] | str | Path | None = option(
         None,
         more='values (rad, m, or a text such as "40deg") of coordinates by name or path that do not start at their '
@@ -67,9 +73,10 @@ class Options:
         None, more="generalized speeds that do not start at their default, likewise."
     )
     equilibrate: bool = option(
-        False, "Start muscles in equilibrium of fibers and tendon.",
+        False,
+        "Start muscles in equilibrium of fibers and tendon.",
         more="So does OpenSim's `equilibrateMuscles`; states that `initial` names stay as it says.",
-    )  # fmt: skip
+    )
     controls: Mapping[str, Any] | StoTable | str | Path | None = option(
         None,
         more="what drives actuators besides the controllers of the model, as a PrescribedController more would: by "
@@ -82,10 +89,13 @@ class Options:
         "those of an integrator.",
     )
     resume: Trajectory | str | Path | None = option(
-        None, "Go on where an earlier simulation ended, whose folder this is.", unit="FOLDER", type=Path | None,
+        None,
+        "Go on where an earlier simulation ended, whose folder this is.",
+        unit="FOLDER",
+        type=Path | None,
         more="Or the trajectory of one; the time goes on, too. With a controller that began a control step there, to "
         "the last bit as if it had not ended.",
-    )  # fmt: skip
+    )
     progress: Progress | None = option(
         None,
         more="called with the simulated time reached and the length of the steps there (both in s), after every step, "
@@ -102,17 +112,24 @@ class Options:
         more="Along a geodesic (where a side is asked for at least a stationary one), all surfaces of a path are taken "
         "together, so that speed and moment arms are derivatives of the length.",
     )
-    skip_unsupported: bool = option(False, "Leave out forces that cannot be computed.", more="The summary lists them.")
+    skip_unsupported: bool = option(
+        False, "Leave out forces that cannot be computed.", more="The summary lists them."
+    )
     opensim_derivatives: bool = option(
-        False, "Repeat OpenSim's mistakes in joints with several turns.",
+        False,
+        "Repeat OpenSim's mistakes in joints with several turns.",
         more="Two second derivatives there are wrong; see :func:`osimlite.mechanics.multibody.build_mechanism`.",
-    )  # fmt: skip
+    )
     rolling: bool = option(
-        False, "Let rolling constraints act, which OpenSim leaves off.",
+        False,
+        "Let rolling constraints act, which OpenSim leaves off.",
         more="So they are until a program turns them on.",
-    )  # fmt: skip
+    )
     external_loads: str | Path | None = option(
-        None, "Measured forces that act too: a file of ExternalLoads.", unit="FILE", type=Path | None
+        None,
+        "Measured forces that act too: a file of ExternalLoads.",
+        unit="FILE",
+        type=Path | None,
     )
     simbody_early_return: bool = option(
         False,
@@ -150,7 +167,9 @@ class Options:
         known = [*vars(self)]
         for name in choices:
             if name not in known:
-                raise SettingError(f"there is no option '{name}' of a simulation{or_known(name, known)}")
+                raise SettingError(
+                    f"there is no option '{name}' of a simulation{or_known(name, known)}"
+                )
         return replace(self, **choices)
 
     def for_run(self, choices: Mapping[str, Any]) -> Options:

@@ -35,9 +35,12 @@ class Packed:
     laws: tuple[str, ...]  # names of the engine's own functions that must be there
     # by place in the structure what computes an item: a name, or a function of Python
     kernels: dict[int, str | Callable[..., None]]
-    equilibria: dict[int, str]  # by place in the structure the name of what brings an item into equilibrium
-    responses: dict[int, str]  # by place in the structure the name of what finds the derivatives of an item
-    runs: dict[int, str]  # by place in the structure the name of what computes several items at once
+    # by place in the structure the name of what brings an item into equilibrium
+    equilibria: dict[int, str]
+    # by place in the structure the name of what finds the derivatives of an item
+    responses: dict[int, str]
+    # by place in the structure the name of what computes several items at once
+    runs: dict[int, str]
     owners: dict[int, int]  # by place in the structure of an item the number of its force element
     order: tuple[int, ...]  # place in the mechanism of the coordinate of each degree of freedom
     placements: list[Placement]  # of every body its link (-1 for ground) and its frame in that
@@ -45,7 +48,9 @@ class Packed:
     items: list[list[tuple[int, int]]]
 
 
-def pack(mechanism: Mechanism, forces: Forces, chain: Chain | None = None, *, apart: bool = False) -> Packed:
+def pack(
+    mechanism: Mechanism, forces: Forces, chain: Chain | None = None, *, apart: bool = False
+) -> Packed:
     """Pack a mechanism and its forces.
 
     Args:
@@ -90,7 +95,10 @@ class Packer(LinkPacker):
         ints[MODEL.STATE_SIZE] = self.state.size
         ints[MODEL.WORK_STATE] = self.room(ints[MODEL.STATE_SIZE] * STATES)
         ints[MODEL.WORK_SIZE] = self.work
-        structure, numbers = np.array(ints, dtype=np.int64), np.array(self.numbers, dtype=np.float64)
+        structure, numbers = (
+            np.array(ints, dtype=np.int64),
+            np.array(self.numbers, dtype=np.float64),
+        )
         laws = tuple(dict.fromkeys(self.laws))
         asked = self.kernels, self.equilibria, self.responses, self.runs, self.owners
         return Packed(structure, numbers, laws, *asked, self.order, self.places.placements, result)
@@ -99,7 +107,9 @@ class Packer(LinkPacker):
         """Write the items; the records of the contacts come first, in their order."""
         groups = [element.items(self.places) for element in self.elements]
         self.ints[MODEL.CONTACTS] = sum(item.is_contact for group in groups for item in group)
-        contact = self.ints[MODEL.WORK_CONTACT] = self.room(CONTACT_WORK.SIZE * self.ints[MODEL.CONTACTS])
+        contact = self.ints[MODEL.WORK_CONTACT] = self.room(
+            CONTACT_WORK.SIZE * self.ints[MODEL.CONTACTS]
+        )
         records: list[int] = []
         pairs: list[int] = []
         settling: dict[int, str] = {}
@@ -111,7 +121,11 @@ class Packer(LinkPacker):
             result.append([])
             first = len(pairs)
             for item in group:
-                place = contact + CONTACT_WORK.SIZE * len(pairs) if item.is_contact else self.room(item.room)
+                place = (
+                    contact + CONTACT_WORK.SIZE * len(pairs)
+                    if item.is_contact
+                    else self.room(item.room)
+                )
                 result[-1].append((place, CONTACT_WORK.SIZE if item.is_contact else item.room))
                 if item.is_contact:
                     pairs.append(len(self.ints))
@@ -120,7 +134,9 @@ class Packer(LinkPacker):
                         runs.append((item.abreast, len(records)))
                     records.append(len(self.ints))
                 if item.kernel or item.python is not None:
-                    self.kernels[len(self.ints)] = item.kernel if item.python is None else item.python
+                    self.kernels[len(self.ints)] = (
+                        item.kernel if item.python is None else item.python
+                    )
                 self.owners[len(self.ints)] = owner
                 if item.equilibrium:
                     settling[len(self.ints)] = item.equilibrium
@@ -147,11 +163,17 @@ class Packer(LinkPacker):
             self.responses[len(self.ints)] = response.kernel
             first_state = ITEM.OWN + response.first_state
             self.ints += RESPONSE.record(
-                KERNEL=0, ITEM=place, FIRST_STATE=first_state, STATES=response.states, SENSE=response.sense
+                KERNEL=0,
+                ITEM=place,
+                FIRST_STATE=first_state,
+                STATES=response.states,
+                SENSE=response.sense,
             )
         room = self.room(LANES * ROWS) if any(kernel for kernel, _ in runs) else 0
         self.ints[MODEL.RUNS], self.ints[MODEL.RUN_AT] = len(runs), len(self.ints)
-        for (kernel, first), end in zip(runs, [*(run[1] for run in runs[1:]), len(records)], strict=False):
+        for (kernel, first), end in zip(
+            runs, [*(run[1] for run in runs[1:]), len(records)], strict=False
+        ):
             if end - first >= FEWEST and kernel:
                 self.runs[len(self.ints)] = kernel
             self.ints += RUN.record(LAW=0, FIRST=first, END=end, ROOM=room)
@@ -159,7 +181,9 @@ class Packer(LinkPacker):
 
     def item_head(self, place: int, first_contact: int) -> list[int]:
         """What stands before an item's own integers, its law not known yet."""
-        return ITEM.record(LAW=0, NUMBERS=len(self.numbers), RECORD=place, FIRST_CONTACT=first_contact)
+        return ITEM.record(
+            LAW=0, NUMBERS=len(self.numbers), RECORD=place, FIRST_CONTACT=first_contact
+        )
 
     def control_record(self) -> None:
         """Write the controls, if there are any, behind all else: some motions have others there."""

@@ -32,8 +32,9 @@ class Chain(NamedTuple):
     joints: Sequence[RobotJoint]  # that move, in the order of that program
     # body, and what its principal moments of inertia are larger by there than in the model (kg·m²)
     excess: Sequence[tuple[int, float]]
-    # kernel in Python. In the work vector it finds values, rates and accelerations of the joints, and writes the
-    # forces behind them that these accelerations take against gravity, and the mass matrix.
+    # kernel in Python. In the work vector it finds values, rates and accelerations of the joints,
+    # and writes the forces behind them that these accelerations take against gravity, and the mass
+    # matrix.
     supply: Callable[..., None]
 
 
@@ -64,10 +65,14 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
         ints += numbers
     entries = ints[ints[MODEL.DOF_AT] + DOF.ROW]
     ints[start : start + CHAIN.SIZE] = CHAIN.record(
-        DYNAMICS=packer.law("chain_dynamics"), SUPPLY=0,
-        WORK_JOINTS=packer.room((4 + count) * count), WORK_SHARES=packer.room(len(shares)),
-        ENTRY_AT=entries, END_ENTRY=entries + packer.entries, **places,
-    )  # fmt: skip
+        DYNAMICS=packer.law("chain_dynamics"),
+        SUPPLY=0,
+        WORK_JOINTS=packer.room((4 + count) * count),
+        WORK_SHARES=packer.room(len(shares)),
+        ENTRY_AT=entries,
+        END_ENTRY=entries + packer.entries,
+        **places,
+    )
 
 
 def _followed(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, list[int]]:
@@ -78,7 +83,9 @@ def _followed(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, list[in
         if operation.joint != joint.source:
             continue
         is_ball = operation.kind in (MOTION.BALL, MOTION.BALL_BACK)
-        if operation.kind == MOTION.ACCELERATION_ERROR and isinstance(function, AccelerationErrorAngle):
+        if operation.kind == MOTION.ACCELERATION_ERROR and isinstance(
+            function, AccelerationErrorAngle
+        ):
             return JOINT_KIND.ERROR, number, function.component, []
         if is_ball and isinstance(function, EllipsoidPoint):
             return JOINT_KIND.ELLIPSOID, number, function.component, freedoms
@@ -118,6 +125,8 @@ def list_excesses(packer: Packer, excess: Sequence[tuple[int, float]]) -> list[i
         while carrier != GROUND and packer.ends[carrier] == packer.ends[carrier + 1]:
             carrier = packer.links[carrier].parent
         if carrier != GROUND:
-            result += EXCESS.record(LINK=link, DOF=packer.ends[carrier + 1] - 1, NUMBER=len(packer.numbers))
+            result += EXCESS.record(
+                LINK=link, DOF=packer.ends[carrier + 1] - 1, NUMBER=len(packer.numbers)
+            )
             packer.numbers.append(moment)
     return result

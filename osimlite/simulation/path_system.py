@@ -56,7 +56,8 @@ class _OnSurface(NamedTuple):
     surface: str  # its name
     node: int  # number of the second tangent point
     order: tuple[int, ...]  # places of the number of nodes, and of the nodes in their order
-    # place of the length before that node, and what the law of the surface says of a piece; -1 without one
+    # place of the length before that node, and what the law of the surface says of a piece; -1
+    # without one
     length: tuple[int, int]
 
 
@@ -75,7 +76,10 @@ class PathSystem(System):
         states = np.zeros((len(poses), len(self._y)))
         states[:, : len(self.order)] = poses[:, self.order]
         forces = np.zeros((len(poses), len(self._items), len(self.order)))
-        pull, parts = self.program.code.entry("pull_each"), (self.numbers, self._w, self._y, self._f)
+        pull, parts = (
+            self.program.code.entry("pull_each"),
+            (self.numbers, self._w, self._y, self._f),
+        )
         with self._computing():
             status = self._run(pull, self.program.ints, *parts, len(poses), states, forces)
         if status != OUTCOME.OK:
@@ -108,18 +112,30 @@ class PathSystem(System):
             result.setdefault(part.path, {})[part.surface] = float(length)
         return result
 
-    def all_on_surfaces(self, poses: Array, routes: Mapping[str, Along]) -> Iterator[tuple[str, str, Array]]:
+    def all_on_surfaces(
+        self, poses: Array, routes: Mapping[str, Along]
+    ) -> Iterator[tuple[str, str, Array]]:
         """Owner and surface with the lengths (k,) of the one on the other in poses (k, n).
 
         NaN as in :meth:`Paths.lengths_on_surfaces`; 0 in a pose in which paths cannot be computed.
         """
         parts = [*self._surfaces(routes)]
-        wanted = sorted({place for part in parts for place in (*part.order, *part.length) if place >= 0})
+        wanted = sorted(
+            {place for part in parts for place in (*part.order, *part.length) if place >= 0}
+        )
         column = {place: k for k, place in enumerate(wanted)}
-        rows = self.watched(poses, wanted, cleared=[part.length[1] for part in parts if part.length[1] >= 0])
+        rows = self.watched(
+            poses, wanted, cleared=[part.length[1] for part in parts if part.length[1] >= 0]
+        )
         for part in parts:
-            lengths = self._length_on(part, lambda places: rows[:, [column[place] for place in places]])
-            yield part.path, part.surface, np.where(np.isnan(rows[:, column[part.order[0]]]), 0.0, lengths)
+            lengths = self._length_on(
+                part, lambda places: rows[:, [column[place] for place in places]]
+            )
+            yield (
+                part.path,
+                part.surface,
+                np.where(np.isnan(rows[:, column[part.order[0]]]), 0.0, lengths),
+            )
 
     def _surfaces(self, routes: Mapping[str, Along]) -> Iterator[_OnSurface]:
         for (name, route), items in zip(routes.items(), self._items, strict=True):
@@ -154,7 +170,11 @@ class PathSystem(System):
         return of_each
 
     def watched(
-        self, poses: Array, places: Sequence[int], paths: Sequence[int] | None = None, cleared: Sequence[int] = ()
+        self,
+        poses: Array,
+        places: Sequence[int],
+        paths: Sequence[int] | None = None,
+        cleared: Sequence[int] = (),
     ) -> Array:
         """What stands at some places of the work vector in poses.
 
@@ -174,10 +194,18 @@ class PathSystem(System):
         self._watch(states, head, np.array(asked, dtype=np.int64), result)
         return result
 
-    def _watch(self, states: Array, head: NDArray[np.int64], asked: NDArray[np.int64], found: Array) -> None:
+    def _watch(
+        self, states: Array, head: NDArray[np.int64], asked: NDArray[np.int64], found: Array
+    ) -> None:
         parts = self.program.ints, self.numbers, self._w, self._y, self._f, len(states)
         try:
-            self._run(self.program.code.entry("watch"), *parts, states, np.concatenate((head, asked)), found)
+            self._run(
+                self.program.code.entry("watch"),
+                *parts,
+                states,
+                np.concatenate((head, asked)),
+                found,
+            )
         except (ArithmeticError, ValueError):
             # Kernels as Python raise what machine code computes as no number.
             if len(states) < 2:

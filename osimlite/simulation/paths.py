@@ -54,8 +54,8 @@ def paths(model: Model, wrapping: str = OPENSIM, mechanism: Mechanism | None = N
 class Paths:
     """The paths of a model, see :func:`paths`.
 
-    Values of coordinates are an array (n,) in the order of the mechanism, or numbers by name or path; those that are
-    left out have their defaults.
+    Values of coordinates are an array (n,) in the order of the mechanism, or numbers by name or
+    path; those that are left out have their defaults.
 
     Args:
         model: whose paths.
@@ -84,16 +84,21 @@ class Paths:
         mechanism = build_mechanism(model) if mechanism is None else mechanism
         builder = ElementBuilder(model, mechanism, Path(), wrapping=wrapping)
         owners = filter(_has_path, builder.tree.components)
-        self._gather(builder, [owner for owner in owners if builder.path(owner) not in left_out], code)
+        self._gather(
+            builder, [owner for owner in owners if builder.path(owner) not in left_out], code
+        )
 
-    def _gather(self, builder: ElementBuilder, owners: Sequence[Component], code: Code | None) -> None:
+    def _gather(
+        self, builder: ElementBuilder, owners: Sequence[Component], code: Code | None
+    ) -> None:
         self.mechanism = builder.mechanism
         self.names = tuple(builder.path(owner) for owner in owners)
         self._coordinates = [info.path for info in self.mechanism.coordinates]
         pairs = zip(self.names, owners, strict=True)
         elements = [MeasuredPath(name, PATH.read(builder, owner)) for name, owner in pairs]
         self._coupled = np.array([element.along.coupled for element in elements], dtype=bool)
-        # A locked coordinate has a moment arm too, which is that of the coordinate once it is not locked.
+        # A locked coordinate has a moment arm too, which is that of the coordinate once it is not
+        # locked.
         self.routes = {element.path: element.along for element in elements}
         self.system = PathSystem(self.mechanism.released(), Forces(tuple(elements)), code=code)
 
@@ -107,22 +112,26 @@ class Paths:
         """
         builder = ElementBuilder(model, self.mechanism, Path(), wrapping=wrapping)
         routes = self.routes.items()
-        names = [name for name, route in routes if isinstance(route, ThroughPoints) and route.surfaces]
+        names = [
+            name for name, route in routes if isinstance(route, ThroughPoints) and route.surfaces
+        ]
         other = object.__new__(Paths)
         other._gather(builder, [builder.tree.at(name) for name in names], code)
         return other
 
     def lengths(self, q: Values) -> dict[str, float]:
         """Length of each path (m)."""
-        lengths = self.system.measured(self.mechanism.values(q), np.zeros(len(self._coordinates)), LENGTH)
+        lengths = self.system.measured(
+            self.mechanism.values(q), np.zeros(len(self._coordinates)), LENGTH
+        )
         return dict(zip(self.names, lengths.tolist(), strict=True))
 
     def speeds(self, q: Values, u: Values) -> dict[str, float]:
         """Lengthening speed of each path (m/s) for generalized speeds u, given as the values are.
 
-        As in OpenSim it is the sum over all pairs of neighbouring points, tangent points moving with their bodies: the
-        rate of the length only where no point comes or goes, and where the path on a surface is the shortest. Along
-        geodesics it is.
+        As in OpenSim it is the sum over all pairs of neighbouring points, tangent points moving
+        with their bodies: the rate of the length only where no point comes or goes, and where the
+        path on a surface is the shortest. Along geodesics it is.
         """
         speeds = self.system.measured(self.mechanism.values(q), self.mechanism.speeds(u), SPEED)
         return dict(zip(self.names, speeds.tolist(), strict=True))
@@ -130,24 +139,26 @@ class Paths:
     def points(self, q: Values) -> dict[str, list[tuple[int, Array]]]:
         """What each path through points runs through, from end to end: numbers, and places (3,) in ground (m).
 
-        Of n points the i-th has number i; the two tangent points of its k-th PathWrap have n + 2 k and n + 2 k + 1.
-        Along geodesics k counts the surfaces of its route, of which there is one for each piece that may be bent.
+        Of n points the i-th has number i; the two tangent points of its k-th PathWrap have n + 2 k
+        and n + 2 k + 1. Along geodesics k counts the surfaces of its route, of which there is one
+        for each piece that may be bent.
         """
         return self.system.nodes(self.mechanism.values(q), self.routes)
 
     def lengths_on_surfaces(self, q: Values) -> dict[str, dict[str, float]]:
         """Length of each path through points on each of its surfaces, by their names (m); 0 where it passes by.
 
-        NaN where OpenSim has the path wrap, finds no points for it, and goes straight through the surface.
+        NaN where OpenSim has the path wrap, finds no points for it, and goes straight through the
+        surface.
         """
         return self.system.on_surfaces(self.mechanism.values(q), self.routes)
 
     def polylines(self, q: Values) -> dict[str, Array]:
         """Corners (k, 3) in ground (m) of each path, from end to end, round its surfaces.
 
-        A path that is a function of coordinates has none. With OpenSim's wrapping there are a helix on a cylinder, a
-        great circle on a sphere, the section of a plane with an ellipsoid, a helix about the tube of a torus; corners
-        there are 0.15 rad apart.
+        A path that is a function of coordinates has none. With OpenSim's wrapping there are a helix
+        on a cylinder, a great circle on a sphere, the section of a plane with an ellipsoid, a helix
+        about the tube of a torus; corners there are 0.15 rad apart.
         """
         state = self.mechanism.at(self.mechanism.values(q))
         corners = self._polylines.at(state.q, state.rotations[:-1], state.origins[:-1])
@@ -164,13 +175,15 @@ class Paths:
     def moment_arms(self, q: Values) -> dict[str, dict[str, float]]:
         """Moment arms of each path about the coordinates by their paths (m, or 1 for a coordinate in m), but for zeros.
 
-        As OpenSim's computeMomentArm has them: what a tension of 1 N does at the coordinate, and at those that must
-        move with it; NaN at one that cannot move. That is the derivative of the length times -1 only where the speed
-        is its rate.
+        As OpenSim's computeMomentArm has them: what a tension of 1 N does at the coordinate, and at
+        those that must move with it; NaN at one that cannot move. That is the derivative of the
+        length times -1 only where the speed is its rate.
         """
         (arms,) = self.all_moment_arms(self.mechanism.values(q)[None])
         return {
-            name: {path: arm for path, arm in zip(self._coordinates, row, strict=True) if arm != 0.0}
+            name: {
+                path: arm for path, arm in zip(self._coordinates, row, strict=True) if arm != 0.0
+            }
             for name, row in zip(self.names, arms.tolist(), strict=True)
         }
 
@@ -211,7 +224,9 @@ class Paths:
 
     @cached_property
     def _locks(self) -> dict[int, Lock]:
-        return {item.coordinate: item for item in self.mechanism.constraints if isinstance(item, Lock)}
+        return {
+            item.coordinate: item for item in self.mechanism.constraints if isinstance(item, Lock)
+        }
 
 
 def _coupled(constraints: Sequence[Constraint], state: Kinematics, places: Sequence[int]) -> Array:
@@ -219,7 +234,9 @@ def _coupled(constraints: Sequence[Constraint], state: Kinematics, places: Seque
     coupling = np.eye(len(state.q))
     if constraints and places:
         rows, wanted = stacked([item.velocity_equations(state) for item in constraints])
-        speeds = coupling[:, places] - shortest(rows, rows[:, places] - wanted[:, None], REDUNDANT * len(rows))
+        speeds = coupling[:, places] - shortest(
+            rows, rows[:, places] - wanted[:, None], REDUNDANT * len(rows)
+        )
         own = speeds[places, range(len(places))]
         coupling[:, places] = speeds / np.where(np.abs(own) > ROUNDING, own, np.nan)
     return coupling
@@ -227,4 +244,6 @@ def _coupled(constraints: Sequence[Constraint], state: Kinematics, places: Seque
 
 def _has_path(owner: Component) -> bool:
     # To ask an object for what it does not have is dear: the answer says what it has.
-    return "geometry_path" in type(owner).model_fields and isinstance(owner.geometry_path, AbstractGeometryPath)
+    return "geometry_path" in type(owner).model_fields and isinstance(
+        owner.geometry_path, AbstractGeometryPath
+    )

@@ -21,8 +21,9 @@ from osimlite.simulation.engines.linking import Code, best
 OF_MOTIONS = "evaluate", "constrained_dynamics", "project"
 OF_SPEEDS = "move_ball", "move_drift"
 OF_CONSTRAINTS = "prescribe", "bind_bodies", "factorise_law", "minimum_norm_law"
-"""Laws that nobody calls here: those that move a mechanism on, and those that only moment arms are found with, about
-any coordinate and about one with which others must move."""
+"""Laws that nobody calls here: those that move a mechanism on, and those that only moment arms are
+found with, about any coordinate and about one with which others must move.
+"""
 
 
 @runtime_checkable
@@ -71,9 +72,20 @@ class Polylines:
     def __init__(self, mechanism: Mechanism, routes: Sequence[Course]) -> None:
         program = self.program = mechanism.program
         self.laws, self.items, self.traces = [""], list[int](), list[int]()
-        ints, numbers, self.work, self.room = [*program.model], [*program.reals], program.model[MODEL.WORK_SIZE], 0
-        self.bound = bool(routes) and not all(isinstance(item, Lock) for item in mechanism.constraints)
-        unused = {*OF_MOTIONS, *(() if routes else OF_SPEEDS), *(() if self.bound else OF_CONSTRAINTS)}
+        ints, numbers, self.work, self.room = (
+            [*program.model],
+            [*program.reals],
+            program.model[MODEL.WORK_SIZE],
+            0,
+        )
+        self.bound = bool(routes) and not all(
+            isinstance(item, Lock) for item in mechanism.constraints
+        )
+        unused = {
+            *OF_MOTIONS,
+            *(() if routes else OF_SPEEDS),
+            *(() if self.bound else OF_CONSTRAINTS),
+        }
         for name in program.laws:
             ints[MODEL.LAWS + LAW_NUMBERS[name]] = 0 if name in unused else self._law(name)
         self._calls: list[int] = []
@@ -90,7 +102,11 @@ class Polylines:
                 ints.append(self._law(curve, len(ints)))
             self.room = max(self.room, route.corners)
         self.structure, self.numbers = np.array(ints, dtype=np.int64), np.array(numbers)
-        self._w, self._y, self._f = np.zeros(self.work), np.zeros(2 * len(program.order)), np.zeros(3 * self.room)
+        self._w, self._y, self._f = (
+            np.zeros(self.work),
+            np.zeros(2 * len(program.order)),
+            np.zeros(3 * self.room),
+        )
         # The first body of each link.
         links, bodies = np.unique(program.links[:-1], return_index=True)
         self._bodies = bodies[links >= 0]
@@ -107,7 +123,9 @@ class Polylines:
     def _linked(self) -> tuple[Code, Ints]:
         """What runs the laws of the paths, and the structure with their addresses."""
         code, ints = best(), self.structure.copy()
-        code.make_ready([self.laws[k] for k in dict.fromkeys((*ints[self._calls].tolist(), *self.traces))])
+        code.make_ready(
+            [self.laws[k] for k in dict.fromkeys((*ints[self._calls].tolist(), *self.traces))]
+        )
         for place in self._calls:
             ints[place] = code.address(self.laws[ints[place]])
         return code, ints
@@ -124,11 +142,15 @@ class Polylines:
         """
         code, ints = self._linked
         s, (bodies, order) = self.structure, (self._bodies, self.program.order)
-        links = self._w[s[MODEL.WORK_LINK] :][: LINK_WORK.SIZE * len(bodies)].reshape(-1, LINK_WORK.SIZE)
+        links = self._w[s[MODEL.WORK_LINK] :][: LINK_WORK.SIZE * len(bodies)].reshape(
+            -1, LINK_WORK.SIZE
+        )
         placed = self.program.frames[bodies]
         turned = rotations[bodies] @ placed[:, :3, :3].swapaxes(1, 2)
         links[:, LINK_WORK.ROTATION : LINK_WORK.ROTATION + 9] = turned.reshape(-1, 9)
-        links[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] = origins[bodies] - (turned @ placed[:, :3, 3:])[:, :, 0]
+        links[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] = (
+            origins[bodies] - (turned @ placed[:, :3, 3:])[:, :, 0]
+        )
         self._y[: len(q)] = q[order]
         given = ints, self.numbers, self._w, self._y, self._f
         result = []

@@ -20,14 +20,14 @@ FEW_POSES = 20
 """So many poses are sooner assembled by Python than the kernel is compiled."""
 
 
-def assemble_motion(mechanism: Mechanism, times: Array, values: Array, code: Code | None = None) -> Array:
+def assemble_motion(
+    mechanism: Mechanism, times: Array, values: Array, code: Code | None = None
+) -> Array:
     """Return the poses nearest to given ones that fulfil the constraints, by the rules of `Mechanism.assemble`.
 
-    Args:
-        mechanism: what moves.
-        times: of the poses (t,), s.
-        values: of all coordinates (t, n), rad and m.
-        code: what runs the kernels; by default machine code, for a few poses only where it is compiled already.
+    Args: mechanism: what moves. times: of the poses (t,), s. values: of all coordinates (t, n), rad
+        and m. code: what runs the kernels; by default machine code, for a few poses only where it
+        is compiled already.
 
     Returns:
         The assembled values (t, n).

@@ -1,7 +1,7 @@
 """What probes report along a motion: values, integrals, rates and extremes of what they read.
 
-Integrals are states. Rates and extremes are those of Simbody's measures: from the ends of the steps that were taken,
-and the moment itself.
+Integrals are states. Rates and extremes are those of Simbody's measures: from the ends of the steps
+that were taken, and the moment itself.
 """
 
 from __future__ import annotations
@@ -74,13 +74,13 @@ def probe_labels(probes: Sequence[DeclaredProbe]) -> list[str]:
     return [label for probe in probes for label in probe.reading.labels]
 
 
-def probe_rows(engine: Engine, moments: Sequence[Moment], steps: Sequence[Moment]) -> Iterator[list[float]]:
+def probe_rows(
+    engine: Engine, moments: Sequence[Moment], steps: Sequence[Moment]
+) -> Iterator[list[float]]:
     """What the probes of an engine report.
 
-    Args:
-        engine: that computed the motion.
-        moments: of the rows.
-        steps: the start of the motion and the ends of its steps; none of a motion that is known from elsewhere.
+    Args: engine: that computed the motion. moments: of the rows. steps: the start of the motion and
+        the ends of its steps; none of a motion that is known from elsewhere.
     """
 
     def memory_of(operation: str) -> Rate | Extreme:
@@ -99,10 +99,15 @@ def probe_rows(engine: Engine, moments: Sequence[Moment], steps: Sequence[Moment
                     item.take(time, value)
         integrals = dict(zip(engine.state.paths, engine.state.auxiliary(y), strict=True))
         row: list[float] = []
-        for probe, memory, values in zip(engine.probes, memories, engine.probe_results(t, y), strict=True):
+        for probe, memory, values in zip(
+            engine.probes, memories, engine.probe_results(t, y), strict=True
+        ):
             if probe.operation == INTEGRATE:
                 paths = [variable.path for variable in probe.states]
-                values = [integrals[path] + start for path, start in zip(paths, probe.initial, strict=True)]
+                values = [
+                    integrals[path] + start
+                    for path, start in zip(paths, probe.initial, strict=True)
+                ]
             elif memory:
                 values = [item.at(t, value) for item, value in zip(memory, values, strict=True)]
             row += [probe.gain * value for value in values]

@@ -58,7 +58,9 @@ class Place:
             return Setter(_object(holder), str(self.steps[-2]), last)
         except (AttributeError, LookupError, TypeError):
             words = "/".join(str(step) for step in self.steps)
-            raise SettingError(f"'{self.component}' has no number '{words}' in every model of the sweep") from None
+            raise SettingError(
+                f"'{self.component}' has no number '{words}' in every model of the sweep"
+            ) from None
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,11 @@ def named(pattern: str, components: Iterable[N]) -> list[N]:
     known = list(components)
     result: dict[int, N] = {}
     for part in pattern.split(","):
-        own = [item for item in known if _is_meant(part, item.path if part.startswith("/") else item.name)]
+        own = [
+            item
+            for item in known
+            if _is_meant(part, item.path if part.startswith("/") else item.name)
+        ]
         if not own:
             return []
         result |= {id(item): item for item in own}
@@ -120,16 +126,22 @@ def each(name: str, model: Model) -> list[str]:
     inner, _, tail = rest.partition("}")
     end = re.split("[/@]", tail)[0]
     form = re.compile(f"{_regular(head)}({_regular(inner)}){_regular(end)}")
-    components = model.components(Actuator if re.match("/control(@|$)", tail[len(end) :]) else Component)
+    components = model.components(
+        Actuator if re.match("/control(@|$)", tail[len(end) :]) else Component
+    )
     known = (item.path if head.startswith("/") else item.name for item in components)
     return [
-        f"{head}{text}{tail}" for text in dict.fromkeys(result[1] for result in map(form.fullmatch, known) if result)
+        f"{head}{text}{tail}"
+        for text in dict.fromkeys(result[1] for result in map(form.fullmatch, known) if result)
     ]
 
 
 def _regular(pattern: str) -> str:
     """A part of a name as a regular expression."""
-    return "".join({"*": "[^/]*", "?": "[^/]", "[": "[", "]": "]"}.get(letter, re.escape(letter)) for letter in pattern)
+    return "".join(
+        {"*": "[^/]*", "?": "[^/]", "[": "[", "]": "]"}.get(letter, re.escape(letter))
+        for letter in pattern
+    )
 
 
 def _is_meant(pattern: str, name: str) -> bool:
@@ -139,8 +151,9 @@ def _is_meant(pattern: str, name: str) -> bool:
 def places(model: Model, path: str) -> tuple[Place, ...]:
     """The numbers that a path means, as of `named` components; none if there are no such.
 
-    A path is that of a component, or its name, and then the names of properties, with ``/``; entries of lists are
-    counted from 0 (``/bodyset/Pelvis/mass_center/1``). What stands alone in a list needs no number.
+    A path is that of a component, or its name, and then the names of properties, with ``/``;
+    entries of lists are counted from 0 (``/bodyset/Pelvis/mass_center/1``). What stands alone in a
+    list needs no number.
 
     Args:
         model: whose.
@@ -159,7 +172,9 @@ def places(model: Model, path: str) -> tuple[Place, ...]:
 def spellings(model: Model) -> list[str]:
     """Paths of all numbers, and what they are called by the names of their components."""
     routes = [(item, route) for item in model.components() for route, _ in _numbers(item)]
-    return [f"{front.rstrip('/')}/{route}" for item, route in routes for front in (item.path, item.name)]
+    return [
+        f"{front.rstrip('/')}/{route}" for item, route in routes for front in (item.path, item.name)
+    ]
 
 
 def _numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ...], str]]]:
@@ -188,7 +203,10 @@ def _numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ...], str]
         names = [str(place), *([item.name] if item.name else []), *([""] if len(held) == 1 else [])]
         for route, (steps, unit) in rest:
             for name in names:
-                yield front + (f"{name}/" if name else "") + route, ((spec.name, place, *steps), unit)
+                yield (
+                    front + (f"{name}/" if name else "") + route,
+                    ((spec.name, place, *steps), unit),
+                )
 
 
 def _at(holder: object, step: Step) -> object:

@@ -47,20 +47,15 @@ def kinematics(
 ) -> RecordedMotion:
     """Follow a motion: its ``bodies()`` and ``markers()`` are tables of where these are, itself of the coordinates.
 
-    Args:
-        model: that moves.
-        motion: a .mot or .sto file; a motion, such as a fitted one or a trajectory; or arrays (t,) in rad and m by the
-            names or paths of coordinates.
-        times: of arrays (t,), s.
-        assemble: whether each pose is changed as little as the model's constraints demand first.
-        lowpass: Hz of OpenSim's filter of the coordinates, if there is to be one.
-        start: first time, s.
-        end: last time, s.
+    Args: model: that moves. motion: a .mot or .sto file; a motion, such as a fitted one or a
+        trajectory; or arrays (t,) in rad and m by the names or paths of coordinates. times: of
+        arrays (t,), s. assemble: whether each pose is changed as little as the model's constraints
+        demand first. lowpass: Hz of OpenSim's filter of the coordinates, if there is to be one.
+        start: first time, s. end: last time, s.
 
-    Raises:
-        OsimliteError: it is no motion of the model.
-        SettingError: no time lies between the first and the last, or the filter does not fit the times.
-        SimulationError: a pose is too far from fulfilling the constraints.
+    Raises: OsimliteError: it is no motion of the model. SettingError: no time lies between the
+        first and the last, or the filter does not fit the times. SimulationError: a pose is too far
+        from fulfilling the constraints.
     """
     return followed(build_mechanism(model), motion, times, assemble, lowpass, start, end)
 
@@ -82,28 +77,22 @@ def inverse_dynamics(
 ) -> GeneralizedForces:
     """The generalized forces (N, N·m) that a motion takes beyond gravity, measured loads and the forces of the model.
 
-    Args:
-        model: that moves.
-        motion: as of :func:`kinematics`.
-        external_loads: measured loads or their file; with `applied_to` a table (.mot, .sto, .c3d) in the axes of
-            ground.
-        times: of arrays (t,), s.
-        applied_to: of such a table, by the names of bodies, for each load on one what the labels of its force, point
-            and moment begin with: ``{"calcn_r": [("f1_", "p1_", "m1_")]}``.
-        exclude: what does not push: names of forces or groups, "All", "Actuators" or "Muscles".
-        lowpass: Hz of OpenSim's filter of the coordinates, if there is to be one.
-        start: first time, s.
-        end: last time, s.
-        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
-        opensim_derivatives: whether the mistakes of OpenSim's CustomJoints are repeated.
-        folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
+    Args: model: that moves. motion: as of :func:`kinematics`. external_loads: measured loads or
+        their file; with `applied_to` a table (.mot, .sto, .c3d) in the axes of ground. times: of
+        arrays (t,), s. applied_to: of such a table, by the names of bodies, for each load on one
+        what the labels of its force, point and moment begin with: ``{"calcn_r": [("f1_", "p1_",
+        "m1_")]}``. exclude: what does not push: names of forces or groups, "All", "Actuators" or
+        "Muscles". lowpass: Hz of OpenSim's filter of the coordinates, if there is to be one. start:
+        first time, s. end: last time, s. wrapping: how paths bend around surfaces, see
+        :class:`osimlite.simulation.Options`. opensim_derivatives: whether the mistakes of OpenSim's
+        CustomJoints are repeated. folder: where the model's file is, for the files that it names;
+        the folder that the program runs in if None.
 
-    Returns:
-        A column for each coordinate; those of ball and free joints are moments about axes of the parent frame.
+    Returns: A column for each coordinate; those of ball and free joints are moments about axes of
+        the parent frame.
 
-    Raises:
-        OsimliteError: it is no motion of the model, or loads cannot be read.
-        SettingError: no time lies between the first and the last, there are too few, or a name is none.
+    Raises: OsimliteError: it is no motion of the model, or loads cannot be read. SettingError: no
+        time lies between the first and the last, there are too few, or a name is none.
         UnsupportedError: a force of the model cannot be computed.
     """
     external_loads = loads_of(external_loads, applied_to)
@@ -113,13 +102,16 @@ def inverse_dynamics(
         exclude_forces(pushed, excluded)
     mechanism = build_mechanism(pushed, opensim_derivatives=opensim_derivatives)
     recorded = followed(mechanism, motion, times, False, lowpass, start, end)
-    forces = force_elements(pushed, mechanism, wrapping=wrapping, external_loads=external_loads, folder=folder)
+    forces = force_elements(
+        pushed, mechanism, wrapping=wrapping, external_loads=external_loads, folder=folder
+    )
     table = recorded.inverse_dynamics(forces)
     return GeneralizedForces(table.name, table.times, table.columns, table.rows, motion=recorded)
 
 
 def loads_of(
-    external_loads: str | Path | ExternalLoads | None, applied_to: Mapping[str, Sequence[Sequence[str]]] | None
+    external_loads: str | Path | ExternalLoads | None,
+    applied_to: Mapping[str, Sequence[Sequence[str]]] | None,
 ) -> str | Path | ExternalLoads | None:
     """The loads, also where they are a table of which `applied_to` says what it pushes; see :func:`inverse_dynamics`.
 
@@ -131,11 +123,15 @@ def loads_of(
     from osimlite.simulation.elements.external_loads import pushing
 
     if not isinstance(external_loads, str | Path):
-        raise SettingError("applied_to says what the columns of a table push; name the table as external_loads")
+        raise SettingError(
+            "applied_to says what the columns of a table push; name the table as external_loads"
+        )
     return pushing(external_loads, applied_to)
 
 
-def add_forces(model: Model, forces: Iterable[str | Path | Force], *, replace: bool = False) -> None:
+def add_forces(
+    model: Model, forces: Iterable[str | Path | Force], *, replace: bool = False
+) -> None:
     """Give a model more forces, from files of ForceSets, or others in the place of its own.
 
     Raises:
@@ -171,7 +167,9 @@ def followed(
         recorded = recorded.lowpassed(lowpass)
     if not (start <= recorded.times[-1] and end >= recorded.times[0]):
         message = f"no time of the motion lies between {start:g} and {end:g} s"
-        raise SettingError(f"{message}; it is from {recorded.times[0]:g} to {recorded.times[-1]:g} s")
+        raise SettingError(
+            f"{message}; it is from {recorded.times[0]:g} to {recorded.times[-1]:g} s"
+        )
     if start > -np.inf or end < np.inf:
         recorded = recorded.between(start, end)
     return recorded.assembled() if assemble else recorded

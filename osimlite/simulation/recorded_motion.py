@@ -1,6 +1,7 @@
 """Motions that were recorded: coordinate values from a file, what follows for bodies and markers, and inverse dynamics.
 
-The quantities, their names and their order are those of OpenSim's BodyKinematics analysis and InverseDynamicsTool.
+The quantities, their names and their order are those of OpenSim's BodyKinematics analysis and
+InverseDynamicsTool.
 """
 
 from __future__ import annotations
@@ -69,7 +70,9 @@ def excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
         if not kind:
             if name not in groups and name not in forces:
                 near = did_you_mean(name, [*forces, *groups])
-                raise SettingError(f"'{model.name}' has no force and no group of forces '{name}'{near}")
+                raise SettingError(
+                    f"'{model.name}' has no force and no group of forces '{name}'{near}"
+                )
             named = [str(getattr(member, "name", member)) for member in groups.get(name, (name,))]
             members = [forces[member] for member in named if member in forces]
         result += members
@@ -80,16 +83,15 @@ def excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
 class RecordedMotion(Movement):
     """Values of all coordinates of a mechanism at t times.
 
-    As a table it is these values; :meth:`bodies`, :meth:`markers` and :meth:`inverse_dynamics` are others.
+    As a table it is these values; :meth:`bodies`, :meth:`markers` and :meth:`inverse_dynamics` are
+    others.
 
-    Attributes:
-        mechanism: whose coordinates they are.
-        times: (t,), s.
-        values: (t, n) in the order of the mechanism's coordinates, rad and m.
-        missing: coordinates that the record does not have; they keep their default values.
-        ignored: columns of the record that name no coordinate.
-        named_by_path: coordinates whose columns have no plain names, but paths as in files of states.
-        around: times (s,) and values (s, n) that are differentiated, where these go on beyond `times`.
+    Attributes: mechanism: whose coordinates they are. times: (t,), s. values: (t, n) in the order
+        of the mechanism's coordinates, rad and m. missing: coordinates that the record does not
+        have; they keep their default values. ignored: columns of the record that name no
+        coordinate. named_by_path: coordinates whose columns have no plain names, but paths as in
+        files of states. around: times (s,) and values (s, n) that are differentiated, where these
+        go on beyond `times`.
     """
 
     mechanism: Mechanism
@@ -101,18 +103,17 @@ class RecordedMotion(Movement):
     named_by_path: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, mechanism: Mechanism, source: Recorded, times: ArrayLike | None = None) -> RecordedMotion:
+    def of(
+        cls, mechanism: Mechanism, source: Recorded, times: ArrayLike | None = None
+    ) -> RecordedMotion:
         """A motion from a file, from arrays, or one that was found, which may be of another model.
 
-        Args:
-            mechanism: that follows it.
-            source: a .mot or .sto file; a motion, such as a fitted one or a trajectory; or arrays (t,) in rad and m by
-                the names or paths of coordinates.
+        Args: mechanism: that follows it. source: a .mot or .sto file; a motion, such as a fitted
+            one or a trajectory; or arrays (t,) in rad and m by the names or paths of coordinates.
             times: of arrays (t,), s.
 
-        Raises:
-            SettingError: the arrays are not as many numbers as there are times, or these are not given.
-            OsimliteError: it is no motion; as of `read`.
+        Raises: SettingError: the arrays are not as many numbers as there are times, or these are
+            not given. OsimliteError: it is no motion; as of `read`.
         """
         if isinstance(source, str | Path):
             return cls.read(mechanism, source)
@@ -124,26 +125,28 @@ class RecordedMotion(Movement):
             for name, column in zip(source, columns, strict=True):
                 if column.shape != moments.shape:
                     had = " × ".join(map(str, column.shape)) or "one"
-                    raise SettingError(f"'{name}' has {had} values for {counted(len(moments), 'time')}; give one each")
+                    raise SettingError(
+                        f"'{name}' has {had} values for {counted(len(moments), 'time')}; give one each"
+                    )
             rows = np.column_stack([np.empty((len(moments), 0)), *columns])
             return cls.of_table(mechanism, StoTable("arrays", moments, tuple(source), rows))
         result = source.mechanism.coordinates
         return cls.of_table(
-            mechanism, StoTable("motion", source.times, tuple(info.path for info in result), source.values)
+            mechanism,
+            StoTable("motion", source.times, tuple(info.path for info in result), source.values),
         )
 
     @classmethod
     def read(cls, mechanism: Mechanism, path: str | Path) -> RecordedMotion:
         """The motion in a .mot or .sto file.
 
-        A column is named as the coordinate, or as its value in a file of states of any age (``/jointset/knee/
-        knee_angle/value``, ``knee/knee_angle/value``). If the file is in degrees, rotational coordinates are
-        converted, coupled ones are not, as in OpenSim.
+        A column is named as the coordinate, or as its value in a file of states of any age
+        (``/jointset/knee/ knee_angle/value``, ``knee/knee_angle/value``). If the file is in
+        degrees, rotational coordinates are converted, coupled ones are not, as in OpenSim.
 
-        Raises:
-            DocumentError: it is not a storage file, has no rows, its times do not increase, a coordinate is no number,
-                or no column names one of the mechanism.
-            ModelError: the mechanism has no coordinates.
+        Raises: DocumentError: it is not a storage file, has no rows, its times do not increase, a
+            coordinate is no number, or no column names one of the mechanism. ModelError: the
+            mechanism has no coordinates.
         """
         return cls.of_table(mechanism, read_sto(path))
 
@@ -155,17 +158,31 @@ class RecordedMotion(Movement):
         values = np.tile(mechanism.values({}), (len(table.times), 1))
         places = {label: place for place, label in reversed([*enumerate(table.columns)])}
         states = columns_of_states(
-            table.columns, [f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")]
+            table.columns,
+            [
+                f"{info.path}/{what}"
+                for info in mechanism.coordinates
+                for what in ("value", "speed")
+            ],
         )
         result: dict[int, int] = {}
         for place, info in enumerate(mechanism.coordinates):
-            columns = (places.get(info.name), places.get(info.path), states.get(f"{info.path}/value"))
-            column = next((one for one in columns if one is not None and one not in result.values()), None)
+            columns = (
+                places.get(info.name),
+                places.get(info.path),
+                states.get(f"{info.path}/value"),
+            )
+            column = next(
+                (one for one in columns if one is not None and one not in result.values()), None
+            )
             if column is not None:
                 result[place] = column
                 turned = table.in_degrees and info.motion_type == "rotational"
-                values[:, place] = np.radians(table.rows[:, column]) if turned else table.rows[:, column]
-        # Speeds in a file of states follow from the values, and states of forces are no part of a pose.
+                values[:, place] = (
+                    np.radians(table.rows[:, column]) if turned else table.rows[:, column]
+                )
+        # Speeds in a file of states follow from the values, and states of forces are no part of a
+        # pose.
         used = {*result.values(), *states.values()}
         ignored = [
             label
@@ -173,7 +190,9 @@ class RecordedMotion(Movement):
             if place not in used and not label.startswith("/forceset/")
         ]
         if not mechanism.coordinates:
-            raise ModelError(f"'{mechanism.name}' has no coordinates: it cannot follow a motion", file=table.file)
+            raise ModelError(
+                f"'{mechanism.name}' has no coordinates: it cannot follow a motion", file=table.file
+            )
         if not result:
             raise DocumentError(
                 f"no column is a coordinate of '{mechanism.name}'; its coordinates are "
@@ -183,7 +202,11 @@ class RecordedMotion(Movement):
         close = (np.abs(np.diff(values, axis=0)) < ALIKE).all(axis=1)
         if len(again := np.flatnonzero((np.diff(table.times) == 0.0) & close)):
             # OpenSim's tools end a motion with two rows that are at one time once they are printed.
-            table = replace(table, times=np.delete(table.times, again), rows=np.delete(table.rows, again, axis=0))
+            table = replace(
+                table,
+                times=np.delete(table.times, again),
+                rows=np.delete(table.rows, again, axis=0),
+            )
             values = np.delete(values, again, axis=0)
         late = np.flatnonzero(np.diff(table.times) <= 0.0)
         if len(late):
@@ -196,9 +219,13 @@ class RecordedMotion(Movement):
             row, place = gaps[0]
             name = mechanism.coordinates[place].name
             told = f"'{name}' is {values[row, place]} at {table.times[row]:g} s; "
-            told += "fill the gaps" if not np.isfinite(values[row, place]) else "no body goes so far"
+            told += (
+                "fill the gaps" if not np.isfinite(values[row, place]) else "no body goes so far"
+            )
             raise DocumentError(told, file=table.file)
-        missing = tuple(info.name for place, info in enumerate(mechanism.coordinates) if place not in result)
+        missing = tuple(
+            info.name for place, info in enumerate(mechanism.coordinates) if place not in result
+        )
         plain = {*table.columns}
         by_path = tuple(mechanism.coordinates[place].name for place in sorted(result))
         by_path = tuple(name for name in by_path if name not in plain)
@@ -220,13 +247,12 @@ class RecordedMotion(Movement):
     def lowpassed(self, cutoff: float, *, continued: bool = False) -> RecordedMotion:
         """The motion through OpenSim's low-pass filter of `cutoff` Hz, at even times.
 
-        Args:
-            cutoff: frequency, Hz.
-            continued: whether what the filter adds at both ends, half the length of the motion each, is part of it, and
-                a frequency that is too high gives way, as in OpenSim's tools.
+        Args: cutoff: frequency, Hz. continued: whether what the filter adds at both ends, half the
+            length of the motion each, is part of it, and a frequency that is too high gives way, as
+            in OpenSim's tools.
 
-        Raises:
-            SettingError: the frequency is not positive, or too high for the times, or there are fewer than six.
+        Raises: SettingError: the frequency is not positive, or too high for the times, or there are
+            fewer than six.
         """
         self._require_times("a filter needs")
         times, values = lowpassed(self.times, self.values, cutoff, limited=continued)
@@ -244,15 +270,27 @@ class RecordedMotion(Movement):
             SettingError: `last` is before `first`.
         """
         if not first <= last:
-            raise SettingError(f"the times from {first:g} s to {last:g} s are none; give the first time first")
-        start, end = (max(0, int(np.searchsorted(self.times, time, side="right")) - 1) for time in (first, last))
+            raise SettingError(
+                f"the times from {first:g} s to {last:g} s are none; give the first time first"
+            )
+        start, end = (
+            max(0, int(np.searchsorted(self.times, time, side="right")) - 1)
+            for time in (first, last)
+        )
         around = self.around or (self.times, self.values)
-        return replace(self, times=self.times[start : end + 1], values=self.values[start : end + 1], around=around)
+        return replace(
+            self,
+            times=self.times[start : end + 1],
+            values=self.values[start : end + 1],
+            around=around,
+        )
 
     def _require_times(self, what: str) -> None:
         count = len(self.around[0] if self.around else self.times)
         if count < 2 * _HALF_ORDER:
-            raise SettingError(f"the motion has {counted(count, 'time')}; {what} at least {2 * _HALF_ORDER}")
+            raise SettingError(
+                f"the motion has {counted(count, 'time')}; {what} at least {2 * _HALF_ORDER}"
+            )
 
     def assembled(self) -> RecordedMotion:
         """The motion with every pose changed as little as the constraints demand.
@@ -268,7 +306,11 @@ class RecordedMotion(Movement):
     def bodies(self) -> StoTable:
         """Mass centre of each body (m) and its body-fixed X-Y-Z angles (degrees) in ground, then the mass centre."""
         mechanism = self.mechanism
-        columns = [f"{body.name}_{what}" for body in mechanism.bodies for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")]
+        columns = [
+            f"{body.name}_{what}"
+            for body in mechanism.bodies
+            for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")
+        ]
         rows = np.empty((len(self.times), len(columns) + 3))
         for row, q in zip(rows, self.values, strict=True):
             state = mechanism.at(q)
@@ -282,7 +324,11 @@ class RecordedMotion(Movement):
     def markers(self) -> StoTable:
         """Position (m) in ground of every marker."""
         mechanism = self.mechanism
-        places = {path: place for path, place in mechanism.stations.items() if path.startswith("/markerset/")}
+        places = {
+            path: place
+            for path, place in mechanism.stations.items()
+            if path.startswith("/markerset/")
+        }
         columns = [f"{path.rsplit('/', 1)[1]}_{axis}" for path in places for axis in "XYZ"]
         rows = np.empty((len(self.times), len(columns)))
         for row, q in zip(rows, self.values, strict=True):
@@ -293,15 +339,16 @@ class RecordedMotion(Movement):
     def inverse_dynamics(self, forces: Forces | None = None) -> StoTable:
         """Generalized forces (N, N·m) that make the bodies move so, beyond gravity and what else pushes them.
 
-        Locks and other constraints are left aside, as in OpenSim. The forces belong to the generalized speeds: for
-        ball and free joints a moment about an axis of the joint's parent frame. There OpenSim's tool takes the
-        rates of the angles for the speeds, which is wrong unless the angles are small.
+        Locks and other constraints are left aside, as in OpenSim. The forces belong to the
+        generalized speeds: for ball and free joints a moment about an axis of the joint's parent
+        frame. There OpenSim's tool takes the rates of the angles for the speeds, which is wrong
+        unless the angles are small.
 
-        Args:
-            forces: of the mechanism: springs, contacts, measured loads; their own states are where they start.
+        Args: forces: of the mechanism: springs, contacts, measured loads; their own states are
+            where they start.
 
-        Raises:
-            SimulationError: a force cannot be computed at one of the states, or a result is NaN or infinite.
+        Raises: SimulationError: a force cannot be computed at one of the states, or a result is NaN
+            or infinite.
         """
         mechanism = self.mechanism
         system = System(mechanism.released(), forces or Forces(()))
@@ -313,10 +360,15 @@ class RecordedMotion(Movement):
                 udot[:] = mechanism.speeds_from_rates(q, udot - mechanism.rate_bias(q, u))
         states = system.state.rows(self.values, speeds)
         rows = np.empty_like(self.values)
-        rows[:, order] = system.missing(np.column_stack([self.times, states]), accelerations[:, order])
+        rows[:, order] = system.missing(
+            np.column_stack([self.times, states]), accelerations[:, order]
+        )
         order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
         infos = [mechanism.coordinates[place] for place in order]
-        labels = [f"{info.name}_{'moment' if info.motion_type == 'rotational' else 'force'}" for info in infos]
+        labels = [
+            f"{info.name}_{'moment' if info.motion_type == 'rotational' else 'force'}"
+            for info in infos
+        ]
         name = "Inverse Dynamics Generalized Forces"
         expect_numbers(name, labels, self.times, rows[:, order])
         return StoTable(name, self.times, tuple(labels), rows[:, order])

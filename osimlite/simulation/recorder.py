@@ -35,8 +35,8 @@ class _Change(NamedTuple):
 class Recorder:
     """Watches the steps of one motion.
 
-    Contacts are those that exert a force. What begins and ends within one step is not seen. The largest force of a
-    contact is that at the end of a step (or at the start of the motion).
+    Contacts are those that exert a force. What begins and ends within one step is not seen. The
+    largest force of a contact is that at the end of a step (or at the start of the motion).
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -107,7 +107,9 @@ class Recorder:
                     low = middle
                 else:
                     high = middle
-            yield ContactEvent(0.5 * (low + high), self._engine.contacts[number], bool(change.after & bit))
+            yield ContactEvent(
+                0.5 * (low + high), self._engine.contacts[number], bool(change.after & bit)
+            )
 
     def _catch_up(self) -> None:
         if self._stepper is not None:

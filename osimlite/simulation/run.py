@@ -50,35 +50,37 @@ if TYPE_CHECKING:
     from osimlite.schema.tree import Tree
 
 
-def simulate(model: Model, to: float = 2.0, engine: str | None = None, **choices: Any) -> Trajectory:
+def simulate(
+    model: Model, to: float = 2.0, engine: str | None = None, **choices: Any
+) -> Trajectory:
     """Simulate a model forward in time, from its default pose and speeds.
 
-    Constraints, prescribed coordinates and loops are kept up to a tenth of the accuracy. Where the start does not
-    fulfil them, it is changed as little as they demand; what `initial` and `initial_speeds` say stays.
+    Constraints, prescribed coordinates and loops are kept up to a tenth of the accuracy. Where the
+    start does not fulfil them, it is changed as little as they demand; what `initial` and
+    `initial_speeds` say stays.
 
-    Args:
-        model: what moves.
-        to: how long, s.
-        engine: what computes the accelerations: "compiled" (the default) or "bullet"; a window (`show`) needs "bullet",
-            which is the default there.
-        choices: attributes of :class:`osimlite.simulation.Options`: `accuracy`, `integrator`, `fixed_step`,
-            `report_interval`, `initial`, `initial_speeds`, `skip_unsupported` and the others.
+    Args: model: what moves. to: how long, s. engine: what computes the accelerations: "compiled"
+        (the default) or "bullet"; a window (`show`) needs "bullet", which is the default there.
+        choices: attributes of :class:`osimlite.simulation.Options`: `accuracy`, `integrator`,
+        `fixed_step`, `report_interval`, `initial`, `initial_speeds`, `skip_unsupported` and the
+        others.
 
-    Raises:
-        Interrupted: Ctrl-C ended the motion; it has the trajectory up to there.
-        ModelError: the model is not a mechanism, or a name does not exist.
-        UnsupportedError: the model has a joint, constraint or force that cannot be computed.
-        SimulationError: the motion cannot be computed any further (`trajectory` is what was recorded up to there), no
-            pose or speeds fulfil the constraints with what was set, or a coordinate that was set is locked or
-            prescribed.
-        SettingError: there is no such option, or a setting has no meaning.
-        MissingDependency: what the engine works with is not installed.
+    Raises: Interrupted: Ctrl-C ended the motion; it has the trajectory up to there. ModelError: the
+        model is not a mechanism, or a name does not exist. UnsupportedError: the model has a joint,
+        constraint or force that cannot be computed. SimulationError: the motion cannot be computed
+        any further (`trajectory` is what was recorded up to there), no pose or speeds fulfil the
+        constraints with what was set, or a coordinate that was set is locked or prescribed.
+        SettingError: there is no such option, or a setting has no meaning. MissingDependency: what
+        the engine works with is not installed.
 
-    What depends on the model alone is computed once and kept until the model changes, so that calls in a loop cost a
-    run each; what reads other files is read every time. Threads may call it with the same model.
+    What depends on the model alone is computed once and kept until the model changes, so that calls
+    in a loop cost a run each; what reads other files is read every time. Threads may call it with
+    the same model.
     """
     with _ready(model, engine, choices) as simulation:
-        trajectory = simulation.run(to, **{name: choices[name] for name in PER_RUN if name in choices})
+        trajectory = simulation.run(
+            to, **{name: choices[name] for name in PER_RUN if name in choices}
+        )
         simulation.hold()
         return trajectory
 
@@ -94,7 +96,8 @@ _READY: list[weakref.ref[Tree]] = []
 def _ready(model: Model, engine: str | None, choices: Mapping[str, Any]) -> Iterator[Simulation]:
     """A simulation of a model as it is, which stays ready until the model changes.
 
-    While it runs nobody else has it, so that threads do not meet in it; whose run fails is not kept.
+    While it runs nobody else has it, so that threads do not meet in it; whose run fails is not
+    kept.
     """
     expect_model(model)
     tree, chosen = model.tree(), Options.of(choices)
@@ -103,7 +106,9 @@ def _ready(model: Model, engine: str | None, choices: Mapping[str, Any]) -> Iter
     is_plain = chosen.external_loads is None and not chosen.show
     simulation = tree.kept.pop(key, None) if is_plain else None
     if simulation is None:
-        simulation = Simulation(model, engine, **{name: choices[name] for name in choices if name not in PER_RUN})
+        simulation = Simulation(
+            model, engine, **{name: choices[name] for name in choices if name not in PER_RUN}
+        )
     elif chosen.initial or chosen.initial_speeds:
         simulation.look_again()
     try:
@@ -123,7 +128,14 @@ def _ready(model: Model, engine: str | None, choices: Mapping[str, Any]) -> Iter
             longest_ago.kept.clear()
 
 
-TOLD = "skip_unsupported", "simbody_early_return", "own_activation_times", "wrapping", "opensim_derivatives", "rolling"
+TOLD = (
+    "skip_unsupported",
+    "simbody_early_return",
+    "own_activation_times",
+    "wrapping",
+    "opensim_derivatives",
+    "rolling",
+)
 """What the summary says besides the settings of the run."""
 
 
@@ -135,12 +147,10 @@ def kept_constraints(mechanism: Mechanism) -> list[str]:
 class Simulation:
     """A model made ready to be simulated, any number of times. Close it after use, or use it in a ``with`` statement.
 
-    Args:
-        model: what moves.
-        engine: what computes the accelerations: "compiled" (the default) or "bullet"; a window (`show`) needs "bullet",
-            which is the default there.
-        choices: attributes of :class:`osimlite.simulation.Options`; those of a run hold where a run does not change
-            them.
+    Args: model: what moves. engine: what computes the accelerations: "compiled" (the default) or
+        "bullet"; a window (`show`) needs "bullet", which is the default there. choices: attributes
+        of :class:`osimlite.simulation.Options`; those of a run hold where a run does not change
+        them.
 
     Errors are those of :func:`simulate`.
 
@@ -181,11 +191,19 @@ class Simulation:
             places = MeshFolders(Path.cwd() if chosen.folder is None else Path(chosen.folder))
             visuals = collect_visuals(model, self.mechanism, mesh_files=MeshFiles(places))
         self.engine: Engine = make(
-            self.mechanism, self.forces, Settings(route=chosen.route, show=chosen.show, visuals=visuals)
+            self.mechanism,
+            self.forces,
+            Settings(route=chosen.route, show=chosen.show, visuals=visuals),
         )
         self.state = self.engine.state
-        self.constraints = [item.name for item in constraints_on(self.mechanism, self.engine.order)[0]]
-        paths = [f"{info.path}/{what}" for info in self.mechanism.coordinates for what in ("value", "speed")]
+        self.constraints = [
+            item.name for item in constraints_on(self.mechanism, self.engine.order)[0]
+        ]
+        paths = [
+            f"{info.path}/{what}"
+            for info in self.mechanism.coordinates
+            for what in ("value", "speed")
+        ]
         named = [variable.path for variable in self.state.variables if variable.is_named]
         self.paths = in_model_order(model, paths + named)
         self._start: tuple[Any, tuple[list[float], list[float]]] | None = None
@@ -199,9 +217,8 @@ class Simulation:
     def run(self, to: float = 2.0, **choices: Any) -> Trajectory:
         """Simulate once.
 
-        Args:
-            to: how long, s.
-            choices: attributes of :class:`osimlite.simulation.Options` that can be chosen for every run.
+        Args: to: how long, s. choices: attributes of :class:`osimlite.simulation.Options` that can
+            be chosen for every run.
 
         Errors are those of :func:`simulate`.
         """
@@ -214,14 +231,18 @@ class Simulation:
         start, before = 0.0, None
         if chosen.resume is not None:
             if initial or chosen.initial_speeds or chosen.equilibrate:
-                raise SettingError("a simulation that goes on starts where the other one ended; say no other start")
+                raise SettingError(
+                    "a simulation that goes on starts where the other one ended; say no other start"
+                )
             earlier, before = ended(chosen.resume)
             start = float(earlier.times[-1]) if len(earlier.times) else 0.0
             initial = self.state_of(earlier)
         held = None
         if chosen.controller is not None:
             if fixed_step is not None:
-                raise SettingError("a controller needs the steps of an integrator; leave out the fixed step")
+                raise SettingError(
+                    "a controller needs the steps of an integrator; leave out the fixed step"
+                )
             if isinstance(chosen.controller, str | Path | Mapping):
                 such = f"osimlite.Feedback({chosen.controller!r})"
                 raise SettingError(f"a controller is an osimlite.Feedback, such as {such}")
@@ -236,7 +257,9 @@ class Simulation:
             check_step(fixed_step, to)
             for name in ("accuracy", "integrator"):
                 if getattr(chosen, name) is not None:
-                    raise SettingError(f"the {name} means nothing for a fixed step; leave one of them out")
+                    raise SettingError(
+                        f"the {name} means nothing for a fixed step; leave one of them out"
+                    )
         accuracy = DEFAULT_ACCURACY if chosen.accuracy is None else chosen.accuracy
         integrator = MERSON if chosen.integrator is None else chosen.integrator
         check_integrator(integrator)
@@ -255,7 +278,9 @@ class Simulation:
                 tell_doubt(suspect_value(info, name, value))
         initial, initial_speeds = (
             {
-                name: float(value) if name in self.paths else in_units_of(self.mechanism, name, value)
+                name: float(value)
+                if name in self.paths
+                else in_units_of(self.mechanism, name, value)
                 for name, value in (given or {}).items()
             }
             for given in (initial, chosen.initial_speeds)
@@ -276,7 +301,9 @@ class Simulation:
         self._require_inertia(y)
         settings = Settings(accuracy, integrator, fixed_step, self.engine.route, chosen.show)
         runs = None if held is None else held.runs(self.engine, opened, to, before)
-        recorder, stepper, states = self._moved(y, replace(settings, held=runs), times, chosen.progress)
+        recorder, stepper, states = self._moved(
+            y, replace(settings, held=runs), times, chosen.progress
+        )
         if runs is not None:
             controls = runs.added_to(controls)
         times = times[: len(states)]
@@ -289,16 +316,26 @@ class Simulation:
         wall = time.perf_counter() - started
         wanted = {
             "to": to,
-            **({"accuracy": accuracy, "integrator": integrator} if fixed_step is None else {"fixed_step": fixed_step}),
+            **(
+                {"accuracy": accuracy, "integrator": integrator}
+                if fixed_step is None
+                else {"fixed_step": fixed_step}
+            ),
             "report_interval": chosen.report_interval,
             "initial": initial,
             "initial_speeds": initial_speeds,
             **({"equilibrate": True} if chosen.equilibrate else {}),
             **given,
             **{name: getattr(chosen, name) for name in TOLD},
-            **({} if chosen.external_loads is None else {"external_loads": str(chosen.external_loads)}),
+            **(
+                {}
+                if chosen.external_loads is None
+                else {"external_loads": str(chosen.external_loads)}
+            ),
         }
-        trajectory = self._trajectory(times, states, stepper, recorder, wanted, wall, controls, table)
+        trajectory = self._trajectory(
+            times, states, stepper, recorder, wanted, wall, controls, table
+        )
         if isinstance(stepper.ended, SimulationError):
             stepper.ended.trajectory = trajectory if stepper.taken else None
             raise stepper.ended
@@ -317,8 +354,8 @@ class Simulation:
             to: end of the motion, s.
             settings: how to step.
 
-        Returns:
-            Times (s) and states of the start and of the ends of all steps, and what ended the motion before its end.
+        Returns: Times (s) and states of the start and of the ends of all steps, and what ended the
+            motion before its end.
 
         Raises:
             SimulationError: it cannot begin.
@@ -373,7 +410,9 @@ class Simulation:
         return recorder, stepper, stepper.table(times, progress)
 
     @any_numbers
-    def _stepper(self, start: float, y: Sequence[float], settings: Settings, observe: Observer) -> Stepper:
+    def _stepper(
+        self, start: float, y: Sequence[float], settings: Settings, observe: Observer
+    ) -> Stepper:
         return self.engine.stepper(start, list(y), settings, observe)
 
     @any_numbers
@@ -385,25 +424,30 @@ class Simulation:
 
     @any_numbers
     def initial_state(
-        self, initial: Mapping[str, float], speeds: Mapping[str, float], *, equilibrate: bool = False
+        self,
+        initial: Mapping[str, float],
+        speeds: Mapping[str, float],
+        *,
+        equilibrate: bool = False,
     ) -> list[float]:
         """State in the engine's order (y,): default values and speeds, and what follows from them, but for those given.
 
-        Args:
-            initial: values (rad, m) of coordinates by name or path, and any states by their paths in ``states.sto``.
-            speeds: generalized speeds of coordinates by name or path.
+        Args: initial: values (rad, m) of coordinates by name or path, and any states by their paths
+            in ``states.sto``. speeds: generalized speeds of coordinates by name or path.
             equilibrate: whether states that are not given start in equilibrium where they have one.
 
-        Raises:
-            ModelError: there is no such coordinate.
-            SimulationError: a coordinate is locked or prescribed, a number is not finite, no pose or speeds fulfil the
-                constraints, or a muscle has no equilibrium.
+        Raises: ModelError: there is no such coordinate. SimulationError: a coordinate is locked or
+            prescribed, a number is not finite, no pose or speeds fulfil the constraints, or a
+            muscle has no equilibrium.
         """
         own = {path: initial[path] for path in self.state.paths if path in initial}
-        q, u, places = starting(self.mechanism, {name: initial[name] for name in initial if name not in own}, speeds)
+        q, u, places = starting(
+            self.mechanism, {name: initial[name] for name in initial if name not in own}, speeds
+        )
         given = u
         if self.constraints:
-            # To find the nearest pose can take as long as the motion: the same start is not looked for again.
+            # To find the nearest pose can take as long as the motion: the same start is not looked
+            # for again.
             start = (q, u, places)
             if self._start is None or self._start[0] != start:
                 values, rates = kept_state(self.mechanism, q, u, *places)
@@ -417,10 +461,16 @@ class Simulation:
             if not isfinite(y[number]):
                 raise SettingError(f"the state '{path}' starts at {y[number]}; give a number")
         if equilibrate:
-            # OpenSim does so in the assembled pose, before it makes the speeds fulfil the constraints.
+            # OpenSim does so in the assembled pose, before it makes the speeds fulfil the
+            # constraints.
             infos = self.mechanism.coordinates
-            given = [u[k] if info.locked or info.prescribed is not None else given[k] for k, info in enumerate(infos)]
-            y[moving:] = self.engine.equilibrated(0.0, [*self.state.pack(q, given)[:moving], *y[moving:]])[moving:]
+            given = [
+                u[k] if info.locked or info.prescribed is not None else given[k]
+                for k, info in enumerate(infos)
+            ]
+            y[moving:] = self.engine.equilibrated(
+                0.0, [*self.state.pack(q, given)[:moving], *y[moving:]]
+            )[moving:]
             for path, value in own.items():
                 y[numbers[path]] = float(value)
         return y
@@ -468,7 +518,9 @@ class Simulation:
             lambda: asked(
                 lambda engine: (
                     probe_labels(engine.probes),
-                    list(probe_rows(engine, list(zip(times, states, strict=True)), recorder.steps())),
+                    list(
+                        probe_rows(engine, list(zip(times, states, strict=True)), recorder.steps())
+                    ),
                 )
             ),
             lambda: asked(summary),
@@ -476,7 +528,15 @@ class Simulation:
         values, speeds = self.state.histories(states)
         auxiliary = self.state.auxiliary_histories(states)
         return Trajectory(
-            self.mechanism, times, values, speeds, report, auxiliary, self.paths, self._snapshot, controller
+            self.mechanism,
+            times,
+            values,
+            speeds,
+            report,
+            auxiliary,
+            self.paths,
+            self._snapshot,
+            controller,
         )
 
 
@@ -487,5 +547,7 @@ def _require_finite_start(mechanism: Mechanism) -> None:
         for info in mechanism.coordinates:
             number = getattr(info, f"default_{what}")
             if not isfinite(number):
-                raise SimulationError(f"the default {what} of coordinate '{info.path}' is {number}; give a number")
+                raise SimulationError(
+                    f"the default {what} of coordinate '{info.path}' is {number}; give a number"
+                )
     require_numbers(mechanism, mechanism.mass_matrix({}))

@@ -29,7 +29,9 @@ def check_step(h: float, to: float) -> None:
             "contacts about 0.001 s"
         )
     if h * MOST_STEPS < to:
-        raise SettingError(f"{to:g} s in fixed steps of {h:g} s are more than a thousand million; take longer steps")
+        raise SettingError(
+            f"{to:g} s in fixed steps of {h:g} s are more than a thousand million; take longer steps"
+        )
 
 
 def report_times(to: float, interval: float, start: float = 0.0) -> list[float]:
@@ -47,7 +49,9 @@ def report_times(to: float, interval: float, start: float = 0.0) -> list[float]:
     if not (isfinite(interval) and interval > 0.0):
         raise SettingError(f"the report interval is a positive time, not {interval:g} s")
     if to / interval > 1e7:
-        raise SettingError(f"a report every {interval:g} s makes more than ten million rows; take a longer interval")
+        raise SettingError(
+            f"a report every {interval:g} s makes more than ten million rows; take a longer interval"
+        )
     times = [number * interval for number in range(floor(to / interval) + 1)]
     # A last moment that differs from `to` only by rounding is `to`.
     if to - times[-1] <= 1e-9 * interval:

@@ -34,10 +34,9 @@ _HALF_ORDER = 3
 class MuscleForces(StoTable):
     """Activations of all actuators: a column for each, which is its control too; NaN at times without a solution.
 
-    Attributes:
-        forces: what the forces of the model and the loads push with (N, N m), labelled as by OpenSim's ForceReporter.
-        shared: which times have a solution, and what is missing at the others.
-        motion: that takes these forces.
+    Attributes: forces: what the forces of the model and the loads push with (N, N m), labelled as
+        by OpenSim's ForceReporter. shared: which times have a solution, and what is missing at the
+        others. motion: that takes these forces.
     """
 
     forces: StoTable | None = field(default=None, repr=False)
@@ -72,7 +71,14 @@ class MuscleForces(StoTable):
         for path, table in zip(paths, (self, self.forces), strict=False):
             # NaN stands for the times without a solution, which the caller reports.
             has_missing = not self.solved.all()
-            write_sto(path, table.name, table.times, table.columns, table.rows.tolist(), has_missing=has_missing)
+            write_sto(
+                path,
+                table.name,
+                table.times,
+                table.columns,
+                table.rows.tolist(),
+                has_missing=has_missing,
+            )
         with written_atomically(paths[-1]) as stream:
             stream.writelines(line.encode() for line in control_set(self))
         return paths
@@ -98,35 +104,30 @@ def static_optimization(
 ) -> MuscleForces:
     """How muscles and other actuators share what a motion takes: the activations with the least sum of |x|ᵖ.
 
-    Each time is solved for itself, exactly: there is one solution or none. The speeds are the rates of the coordinates
-    by splines of fifth degree, and their rates those of such splines through the speeds, as in OpenSim.
+    Each time is solved for itself, exactly: there is one solution or none. The speeds are the rates
+    of the coordinates by splines of fifth degree, and their rates those of such splines through the
+    speeds, as in OpenSim.
 
-    Args:
-        model: whose actuators push within their min_control and max_control.
-        motion: as of :func:`kinematics`.
-        external_loads: as of :func:`inverse_dynamics`.
-        times: of arrays (t,), s.
-        applied_to: as of :func:`inverse_dynamics`.
-        forces: what pushes besides, such as reserve actuators: files of ForceSets, or forces.
-        replace_forces: whether these take the place of the model's own.
-        exponent: p, more than 1.
-        muscles: "active", as in OpenSim: its fibers, along a tendon taken for rigid, without passive forces;
-            "isometric": its max_isometric_force.
-        lowpass: Hz of OpenSim's filter of the coordinates, if there is to be one.
-        start: first time, s.
-        end: last time, s.
-        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
-        opensim_derivatives: whether the mistakes of OpenSim's CustomJoints are repeated.
-        folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
+    Args: model: whose actuators push within their min_control and max_control. motion: as of
+        :func:`kinematics`. external_loads: as of :func:`inverse_dynamics`. times: of arrays (t,),
+        s. applied_to: as of :func:`inverse_dynamics`. forces: what pushes besides, such as reserve
+        actuators: files of ForceSets, or forces. replace_forces: whether these take the place of
+        the model's own. exponent: p, more than 1. muscles: "active", as in OpenSim: its fibers,
+        along a tendon taken for rigid, without passive forces; "isometric": its
+        max_isometric_force. lowpass: Hz of OpenSim's filter of the coordinates, if there is to be
+        one. start: first time, s. end: last time, s. wrapping: how paths bend around surfaces, see
+        :class:`osimlite.simulation.Options`. opensim_derivatives: whether the mistakes of OpenSim's
+        CustomJoints are repeated. folder: where the model's file is, for the files that it names;
+        the folder that the program runs in if None.
 
-    Returns:
-        A column for each actuator; a time without a solution has no numbers, and `unsolved` says what is missing.
+    Returns: A column for each actuator; a time without a solution has no numbers, and `unsolved`
+        says what is missing.
 
-    Raises:
-        OsimliteError: it is no motion of the model, or forces or loads cannot be read.
-        SettingError: no time lies between the first and the last, there are too few, or a choice is none.
-        ModelError: there are no actuators, or fewer than coordinates that they are to accelerate.
-        UnsupportedError: a force cannot be computed, or is not proportional to its control.
+    Raises: OsimliteError: it is no motion of the model, or forces or loads cannot be read.
+        SettingError: no time lies between the first and the last, there are too few, or a choice is
+        none. ModelError: there are no actuators, or fewer than coordinates that they are to
+        accelerate. UnsupportedError: a force cannot be computed, or is not proportional to its
+        control.
     """
     model = model.copy_deep()
     add_forces(model, forces, replace=replace_forces)
@@ -145,11 +146,19 @@ def static_optimization(
     shared = problem.share(recorded.times, values, speeds, accelerations)
     all_forces = problem.records(shared, values, speeds)
     return MuscleForces(
-        TITLE, shared.times, shared.names, shared.activations, forces=all_forces, shared=shared, motion=recorded
+        TITLE,
+        shared.times,
+        shared.names,
+        shared.activations,
+        forces=all_forces,
+        shared=shared,
+        motion=recorded,
     )
 
 
-def _moving(model: Model, mechanism: Mechanism, recorded: RecordedMotion) -> tuple[Array, Array, Array]:
+def _moving(
+    model: Model, mechanism: Mechanism, recorded: RecordedMotion
+) -> tuple[Array, Array, Array]:
     """Values, speeds and accelerations (t, n) of a motion, of which the constraints hold."""
     times, values = recorded.around or (recorded.times, recorded.values)
     around = RecordedMotion(mechanism, times, values)
@@ -166,4 +175,8 @@ def _moving(model: Model, mechanism: Mechanism, recorded: RecordedMotion) -> tup
         # As OpenSim has it: what was recorded of all coordinates has speeds that agree.
         return assembled, speeds, accelerations
     moments = zip(recorded.times.tolist(), assembled, speeds, strict=True)
-    return assembled, np.array([mechanism.project_speeds(q, u, t) for t, q, u in moments]), accelerations
+    return (
+        assembled,
+        np.array([mechanism.project_speeds(q, u, t) for t, q, u in moments]),
+        accelerations,
+    )

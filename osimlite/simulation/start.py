@@ -31,7 +31,9 @@ def in_units_of(mechanism: Mechanism, name: str, given: float | str) -> float:
         return float(given)
     read = quantity(given)
     if read is None:
-        raise SettingError(f"coordinate '{name}' takes a number such as 0.5 or 30deg, not '{given}'")
+        raise SettingError(
+            f"coordinate '{name}' takes a number such as 0.5 or 30deg, not '{given}'"
+        )
     if read.unit is not None and kind != "coupled" and read.is_angle != (kind == "rotational"):
         wanted = "deg or rad" if kind == "rotational" else "m, cm or mm"
         raise SettingError(f"coordinate '{name}' is {kind}: give '{given}' in {wanted}")
@@ -51,7 +53,11 @@ def suspect_value(info: CoordinateInfo, name: str, given: float | str) -> str:
     """
     if info.motion_type == "translational":
         return ""
-    return doubt(name, quantity(given) if isinstance(given, str) else Quantity(float(given), None), info.range)
+    return doubt(
+        name,
+        quantity(given) if isinstance(given, str) else Quantity(float(given), None),
+        info.range,
+    )
 
 
 def starting(
@@ -59,19 +65,15 @@ def starting(
 ) -> tuple[list[float], list[float], list[list[int]]]:
     """Where the coordinates start.
 
-    Args:
-        mechanism: whose coordinates.
-        initial: values (rad, m) by name or path; a path with ``/value`` or ``/speed`` behind it says where the
-            coordinate starts as far as constraints let it.
-        speeds: generalized speeds by name or path.
+    Args: mechanism: whose coordinates. initial: values (rad, m) by name or path; a path with
+        ``/value`` or ``/speed`` behind it says where the coordinate starts as far as constraints
+        let it. speeds: generalized speeds by name or path.
 
-    Returns:
-        Values and speeds of all coordinates, the places of those whose values stay as they are, and of those whose
-        speeds do.
+    Returns: Values and speeds of all coordinates, the places of those whose values stay as they
+        are, and of those whose speeds do.
 
-    Raises:
-        ModelError: there is no such coordinate.
-        SimulationError: a coordinate is locked or prescribed, or set twice, or a number is not finite.
+    Raises: ModelError: there is no such coordinate. SimulationError: a coordinate is locked or
+        prescribed, or set twice, or a number is not finite.
     """
     infos = mechanism.coordinates
     q, u = [info.default_value for info in infos], [info.default_speed for info in infos]
@@ -87,7 +89,9 @@ def starting(
         for name, value in numbers.items():
             place = mechanism.coordinate_index(name)
             if place in places[-1]:
-                raise SettingError(f"coordinate '{name}' is set twice, by its name and by its path; leave one out")
+                raise SettingError(
+                    f"coordinate '{name}' is set twice, by its name and by its path; leave one out"
+                )
             if infos[place].locked:
                 raise SimulationError(
                     f"coordinate '{name}' is locked at {infos[place].default_value:g}, so that its {what} cannot "
@@ -112,8 +116,8 @@ def _number(value: float, what: str, name: str) -> float:
 def columns_of_states(labels: Sequence[str], paths: Iterable[str]) -> dict[str, int]:
     """Which column has which state, as OpenSim's TableUtilities find it.
 
-    A label is the path of the state, the end of it, or what it was called before OpenSim 4: ``knee``, ``knee_u``,
-    ``soleus.activation``.
+    A label is the path of the state, the end of it, or what it was called before OpenSim 4:
+    ``knee``, ``knee_u``, ``soleus.activation``.
 
     Args:
         labels: of the columns.
@@ -160,12 +164,18 @@ def state_at(
     """A state of a table; see `state_in`."""
     columns = columns_of_states(table.columns, names)
     if not columns or not len(table.times):
-        what = f"column is a state of '{mechanism.name}', such as '{next(iter(names), '')}'" if not columns else "row"
+        what = (
+            f"column is a state of '{mechanism.name}', such as '{next(iter(names), '')}'"
+            if not columns
+            else "row"
+        )
         raise DocumentError(f"no {what}; give a file of its states", file=table.file)
     row = table.rows[-1 if time is None else int(np.argmin(np.abs(table.times - time)))].tolist()
     turning = {info.path for info in mechanism.coordinates if info.motion_type == "rotational"}
     return {
-        path: float(np.radians(row[place])) if table.in_degrees and path.rpartition("/")[0] in turning else row[place]
+        path: float(np.radians(row[place]))
+        if table.in_degrees and path.rpartition("/")[0] in turning
+        else row[place]
         for path, place in columns.items()
     }
 

@@ -1,7 +1,7 @@
 """What the numbers of a state are: y = (q, u, z), in the order of an engine.
 
-First come the values of the coordinates that are free to move, then their generalized speeds, then the auxiliary states
-of the force elements.
+First come the values of the coordinates that are free to move, then their generalized speeds, then
+the auxiliary states of the force elements.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ class StateVariable:
 
     path: str  # as OpenSim has it
     start: Start = 0.0  # where it starts
-    is_simbody: bool = False  # whether Simbody keeps it, in OpenSim: such states stand behind all others
+    # whether Simbody keeps it, in OpenSim: such states stand behind all others
+    is_simbody: bool = False
     is_named: bool = True  # whether OpenSim has a name for it, so that it is in files of states
 
 
@@ -54,7 +55,8 @@ def in_model_order(model: Model, paths: Sequence[str]) -> list[str]:
 class StateLayout:
     """What a state of an engine consists of.
 
-    The order of the auxiliary states is that in which Simbody holds them: the norm of their errors is a sum.
+    The order of the auxiliary states is that in which Simbody holds them: the norm of their errors
+    is a sum.
 
     Args:
         mechanism: whose state.
@@ -67,7 +69,9 @@ class StateLayout:
         size: how many numbers a state has.
     """
 
-    def __init__(self, mechanism: Mechanism, order: Sequence[int], elements: Iterable[Any] = ()) -> None:
+    def __init__(
+        self, mechanism: Mechanism, order: Sequence[int], elements: Iterable[Any] = ()
+    ) -> None:
         self.mechanism = mechanism
         self.order = tuple(order)
         result = [variable for element in elements for variable in element.states]
@@ -102,7 +106,9 @@ class StateLayout:
         """The error for a state of `count` numbers."""
         n, more = len(self.order), len(self.variables)
         parts = f"{n} values, {n} speeds" + (f", {more} auxiliary states" if more else "")
-        return OsimliteError(f"a state of '{self.mechanism.name}' has {self.size} numbers ({parts}), not {count}")
+        return OsimliteError(
+            f"a state of '{self.mechanism.name}' has {self.size} numbers ({parts}), not {count}"
+        )
 
     def table(self, states: ArrayLike) -> Array:
         """States as an array of their own (k, y).
@@ -112,15 +118,21 @@ class StateLayout:
         """
         rows = np.array(states, dtype=np.float64, order="C")
         if rows.ndim != 2 or rows.shape[1] != self.size:
-            raise OsimliteError(f"the states are one row of {self.size} numbers for each run; got {rows.shape}")
+            raise OsimliteError(
+                f"the states are one row of {self.size} numbers for each run; got {rows.shape}"
+            )
         return rows
 
     def default(self) -> list[float]:
         """The state at the default values and speeds."""
         infos = self.mechanism.coordinates
-        return self.pack([info.default_value for info in infos], [info.default_speed for info in infos])
+        return self.pack(
+            [info.default_value for info in infos], [info.default_speed for info in infos]
+        )
 
-    def pack(self, q: Sequence[float], u: Sequence[float], z: Sequence[float] | None = None) -> list[float]:
+    def pack(
+        self, q: Sequence[float], u: Sequence[float], z: Sequence[float] | None = None
+    ) -> list[float]:
         """The state from the values and speeds of all coordinates.
 
         Args:
@@ -150,7 +162,10 @@ class StateLayout:
     def _starts(self, y: Sequence[float]) -> list[float]:
         """Where the auxiliary states start from values and speeds."""
         q, u = self.values(y), self.speeds(y)
-        return [float(item.start(q, u)) if callable(item.start) else item.start for item in self.variables]
+        return [
+            float(item.start(q, u)) if callable(item.start) else item.start
+            for item in self.variables
+        ]
 
     # ------------------------------------------------------------------------------------------------ parts
     def spread(self, values: Sequence[float], still: Sequence[float]) -> list[float]:
@@ -176,7 +191,10 @@ class StateLayout:
     def histories(self, states: Sequence[Sequence[float]]) -> tuple[Array, Array]:
         """Values and speeds (k, n) of all coordinates at k states."""
         rows, count = np.array(states, dtype=float).reshape(len(states), self.size), len(self.order)
-        values, speeds = np.empty((len(states), len(self._still))), np.zeros((len(states), len(self._still)))
+        values, speeds = (
+            np.empty((len(states), len(self._still))),
+            np.zeros((len(states), len(self._still))),
+        )
         values[:] = self._still
         values[:, self.order], speeds[:, self.order] = rows[:, :count], rows[:, count : 2 * count]
         return values, speeds
@@ -185,7 +203,9 @@ class StateLayout:
         """The auxiliary states (k,) by their paths at k states."""
         return dict(zip(self.paths, np.asarray(states)[:, 2 * len(self.order) :].T, strict=True))
 
-    def rows(self, values: Array, speeds: Array, auxiliary: Mapping[str, Array] | None = None) -> Array:
+    def rows(
+        self, values: Array, speeds: Array, auxiliary: Mapping[str, Array] | None = None
+    ) -> Array:
         """States (k, y) from what the histories give; the auxiliary ones by default where they start."""
         places = list(self.order)
         moving = np.column_stack([values[:, places], speeds[:, places]])

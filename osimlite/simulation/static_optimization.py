@@ -1,9 +1,10 @@
 """How muscles and other actuators share the generalized forces of a motion, moment by moment for itself.
 
-As OpenSim's StaticOptimization computes: of all activations x that give the accelerations of the motion, those with the
-least sum of |x|ᵖ. A muscle pulls with x times the force of its fully active fibers, its tendon taken for rigid, and
-without the force of passive fibers; other actuators push with x times their optimal force. Locked, prescribed and
-dependent coordinates move as the constraints let them.
+As OpenSim's StaticOptimization computes: of all activations x that give the accelerations of the
+motion, those with the least sum of |x|ᵖ. A muscle pulls with x times the force of its fully active
+fibers, its tendon taken for rigid, and without the force of passive fibers; other actuators push
+with x times their optimal force. Locked, prescribed and dependent coordinates move as the
+constraints let them.
 """
 
 from __future__ import annotations
@@ -59,7 +60,9 @@ def ideal(actuator: ScalarActuator, optimal_force: float) -> ScalarActuator | No
         result: ScalarActuator = PathActuator(name=actuator.name, geometry_path=path)
     elif isinstance(actuator, ActivationCoordinateActuator):
         result = CoordinateActuator(name=actuator.name, coordinate=actuator.coordinate)
-    elif isinstance(actuator, CoordinateActuator | PointActuator | PointToPointActuator | TorqueActuator):
+    elif isinstance(
+        actuator, CoordinateActuator | PointActuator | PointToPointActuator | TorqueActuator
+    ):
         result = actuator.copy_deep()
     else:
         return None
@@ -76,7 +79,8 @@ class Shared:
     activations: Array  # of all actuators (t, a); NaN at a time at which there is no solution
     strengths: Array  # what each pushes with at an activation of 1 (t, a), N or N m
     coordinates: tuple[str, ...]  # that the actuators are to accelerate (m,)
-    # generalized forces that cannot be given (t, m), N or N m; the least ones, at times without a solution
+    # generalized forces that cannot be given (t, m), N or N m; the least ones, at times without a
+    # solution
     lacking: Array
     solved: NDArray[np.bool_]  # at which times there is a solution (t,)
 
@@ -93,7 +97,9 @@ class Shared:
         """What is missing at a time without a solution, the worst coordinate first."""
         sizes = np.abs(self.lacking[row])
         worst = [place for place in np.argsort(-sizes) if sizes[place] > 0.1 * sizes.max()]
-        return listed([f"{self.lacking[row, k]:.4g} at {self.coordinates[k]}" for k in worst], most=3)
+        return listed(
+            [f"{self.lacking[row, k]:.4g} at {self.coordinates[k]}" for k in worst], most=3
+        )
 
     def unsolved(self) -> str:
         """The times without a solution in words, with the coordinates that lack strength; empty if there are none."""
@@ -120,10 +126,10 @@ class StaticOptimization:
         folder: where the model's file is.
         early_return: whether Simbody's defect in contact of several surfaces is reproduced.
 
-    Raises:
-        SettingError: the exponent is not more than 1, or muscles have no such force.
+    Raises: SettingError: the exponent is not more than 1, or muscles have no such force.
         ModelError: there are no actuators, or fewer than coordinates that they are to accelerate.
-        UnsupportedError: one has no force that is proportional to its control, or cannot be computed.
+        UnsupportedError: one has no force that is proportional to its control, or cannot be
+        computed.
     """
 
     def __init__(
@@ -139,13 +145,18 @@ class StaticOptimization:
         early_return: bool = False,
     ) -> None:
         if not 1.0 < exponent < np.inf:
-            raise SettingError(f"an exponent of {exponent:g} has not one answer; give a number above 1, such as 2")
+            raise SettingError(
+                f"an exponent of {exponent:g} has not one answer; give a number above 1, such as 2"
+            )
         if muscles not in MUSCLES:
-            raise SettingError(f"muscles pull with no '{muscles}' force{or_known(muscles, MUSCLES)}")
+            raise SettingError(
+                f"muscles pull with no '{muscles}' force{or_known(muscles, MUSCLES)}"
+            )
         self.mechanism, self._exponent = mechanism, exponent
         model = model.copy_deep()
         model.controller_set.objects.clear()
-        # No probe is reported here, and those of muscles would miss the muscles that are replaced below.
+        # No probe is reported here, and those of muscles would miss the muscles that are replaced
+        # below.
         model.probe_set.objects.clear()
         self._actuators = _idealised(model, muscles != "isometric")
         tree = model.tree()
@@ -173,12 +184,18 @@ class StaticOptimization:
                 f"'{model.name}' has {len(self.names)} actuators for {len(self.coordinates)} coordinates; append "
                 "reserve actuators, or lock coordinates"
             )
-        self._bounds = np.array([(item.min_control, item.max_control) for item in self._actuators], dtype=float).T
+        self._bounds = np.array(
+            [(item.min_control, item.max_control) for item in self._actuators], dtype=float
+        ).T
         for item, low, high in zip(self._actuators, *self._bounds, strict=True):
             if not low <= high:
-                raise ModelError(f"'{item.name}' has a min_control of {low:g} above its max_control of {high:g}")
+                raise ModelError(
+                    f"'{item.name}' has a min_control of {low:g} above its max_control of {high:g}"
+                )
             if not (low < np.inf and high > -np.inf):
-                raise ModelError(f"'{item.name}' has controls from {low:g} to {high:g} only; give it a finite one")
+                raise ModelError(
+                    f"'{item.name}' has controls from {low:g} to {high:g} only; give it a finite one"
+                )
 
     @cached_property
     def _system(self) -> System:
@@ -200,16 +217,28 @@ class StaticOptimization:
         needed, pushes, strengths = self._asked(times, values, speeds, allowed, ways)
         result, lacking, solved = self._least(pushes, needed)
         result[~solved] = np.nan
-        return Shared(times, self.names, result, strengths * self.optimal_forces, self.coordinates, lacking, solved)
+        return Shared(
+            times,
+            self.names,
+            result,
+            strengths * self.optimal_forces,
+            self.coordinates,
+            lacking,
+            solved,
+        )
 
     def _asked(
         self, times: Array, values: Array, speeds: Array, accelerations: Array, ways: Array
     ) -> tuple[Array, Array, Array]:
-        """What the coordinates of `coordinates` need (t, m), what a control of 1 of each actuator gives them (t, a, m),
-        and the forces of muscles (t, a), 1 of others; `ways` is what moves with each of these coordinates."""
+        """What the coordinates of `coordinates` need (t, m), what a control of 1 of each actuator
+        gives them (t, a, m), and the forces of muscles (t, a), 1 of others; `ways` is what moves
+        with each of these coordinates.
+        """
         system, order = self._system, list(self._system.order)
         moments = np.column_stack([times, system.state.rows(values, speeds)])
-        needed, pushes, strengths = system.pushed(moments, np.ascontiguousarray(accelerations[:, order]), self._paths)
+        needed, pushes, strengths = system.pushed(
+            moments, np.ascontiguousarray(accelerations[:, order]), self._paths
+        )
         turned = ways[:, order]
         return (needed[:, None, :] @ turned)[:, 0], pushes @ turned, strengths
 
@@ -220,7 +249,12 @@ class StaticOptimization:
     def optimal_forces(self) -> Array:
         """What each actuator pushes with by a control of 1 (a,), N or N m; of muscles with fibers 1."""
         fibers = [isinstance(item, Muscle) for item in self._actuators]
-        return np.array([1.0 if own else item.optimal_force for own, item in zip(fibers, self._actuators, strict=True)])
+        return np.array(
+            [
+                1.0 if own else item.optimal_force
+                for own, item in zip(fibers, self._actuators, strict=True)
+            ]
+        )
 
     def strengths(self, times: Array, values: Array, speeds: Array) -> Array:
         """What each actuator pushes with by a control of 1 in one pose (a,), N or N m."""
@@ -237,18 +271,25 @@ class StaticOptimization:
         result: Array = shared[..., 0] * self.optimal_forces
         return result
 
-    def balance(self, times: Array, values: Array, speeds: Array, accelerations: Array) -> tuple[Array, Array, Array]:
+    def balance(
+        self, times: Array, values: Array, speeds: Array, accelerations: Array
+    ) -> tuple[Array, Array, Array]:
         """What a motion takes, whether the constraints allow it or not, of each of the f coordinates that can move.
 
-        Returns:
-            What they need (t, f), what each actuator gives them by 1 N (t, f, a), and the rows of the constraints'
-            equations (t, c, f): multipliers λ push with -Gᵀ λ.
+        Returns: What they need (t, f), what each actuator gives them by 1 N (t, f, a), and the rows
+            of the constraints' equations (t, c, f): multipliers λ push with -Gᵀ λ.
         """
         order = list(self._system.order)
-        ways = np.broadcast_to(np.eye(values.shape[1])[:, order], (len(times), values.shape[1], len(order)))
+        ways = np.broadcast_to(
+            np.eye(values.shape[1])[:, order], (len(times), values.shape[1], len(order))
+        )
         needed, pushes, _ = self._asked(times, values, speeds, accelerations, ways)
         equations, _ = self._equations(times, values, speeds)
-        return needed, (pushes / self.optimal_forces[:, None]).transpose(0, 2, 1), equations[:, :, order]
+        return (
+            needed,
+            (pushes / self.optimal_forces[:, None]).transpose(0, 2, 1),
+            equations[:, :, order],
+        )
 
     @cached_property
     def equation_count(self) -> int:
@@ -275,19 +316,22 @@ class StaticOptimization:
     def responses(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array, Array]:
         """Accelerations of all coordinates in one pose.
 
-        Returns:
-            Without actuators (n,), by each actuator's force of 1 (n, a), and by each generalized force of 1 (n, n).
+        Returns: Without actuators (n,), by each actuator's force of 1 (n, a), and by each
+            generalized force of 1 (n, n).
         """
         system, order = self._system, list(self._system.order)
         udot, ways = self._allowed(times, values, speeds, np.zeros_like(values))
         moments = np.column_stack([times, system.state.rows(values, speeds)])
-        needed, pushes, _ = system.pushed(moments, np.ascontiguousarray(udot[:, order]), self._paths)
+        needed, pushes, _ = system.pushed(
+            moments, np.ascontiguousarray(udot[:, order]), self._paths
+        )
         size = len(order)
         # What accelerations of one coordinate take beyond those of none: the mass matrix.
         tried = np.vstack([np.zeros(size), np.eye(size)])
         taken = system.missing(np.repeat(moments, size + 1, axis=0), tried)
-        # Where constraints close loops, the columns of `ways` are more than the freedoms: an orthonormal basis of what
-        # they span has the same motions, and a mass matrix that can be inverted.
+        # Where constraints close loops, the columns of `ways` are more than the freedoms: an
+        # orthonormal basis of what they span has the same motions, and a mass matrix that can be
+        # inverted.
         turned = span(ways[0])
         mass = turned[order].T @ (taken[1:] - taken[0]).T @ turned[order]
         right = np.column_stack([-needed[0], (pushes[0] / self.optimal_forces[:, None]).T])
@@ -295,10 +339,13 @@ class StaticOptimization:
         count = 1 + len(self.names)
         return udot[0] + found[:, 0], found[:, 1:count], found[:, count:]
 
-    def _allowed(self, times: Array, values: Array, speeds: Array, wanted: Array) -> tuple[Array, Array]:
+    def _allowed(
+        self, times: Array, values: Array, speeds: Array, wanted: Array
+    ) -> tuple[Array, Array]:
         """Accelerations (t, n) that the constraints allow, and what moves with each free coordinate (t, n, m).
 
-        Where the constraints do not allow the accelerations of free coordinates, the nearest ones are taken.
+        Where the constraints do not allow the accelerations of free coordinates, the nearest ones
+        are taken.
         """
         size, free = len(self.mechanism.coordinates), self._free
         ways = np.zeros((len(times), size, len(free)))
@@ -332,7 +379,8 @@ class StaticOptimization:
         if not count:
             return equations, np.zeros((len(times), 0))
         rows, drifts = (
-            int(system.structure[head + place]) for place in (CONSTRAINED.WORK_ROWS, CONSTRAINED.WORK_DRIFTS)
+            int(system.structure[head + place])
+            for place in (CONSTRAINED.WORK_ROWS, CONSTRAINED.WORK_DRIFTS)
         )
         moments = np.column_stack([times, system.state.rows(values, speeds)])
         places = [*range(rows, rows + count * len(order)), *range(drifts, drifts + count)]
@@ -347,8 +395,14 @@ class StaticOptimization:
         directions = turned[rank:].T
         free = directions[self._free]
         if np.linalg.matrix_rank(free) < directions.shape[1]:
-            names = [info.name for index, info in enumerate(self.mechanism.coordinates) if index not in self._free]
-            raise UnsupportedError(f"{listed(names)} can move apart from all coordinates that are to be accelerated")
+            names = [
+                info.name
+                for index, info in enumerate(self.mechanism.coordinates)
+                if index not in self._free
+            ]
+            raise UnsupportedError(
+                f"{listed(names)} can move apart from all coordinates that are to be accelerated"
+            )
         start = np.linalg.pinv(equations) @ targets
         back = np.linalg.pinv(free)
         return start + directions @ (back @ (wanted - start)[self._free]), directions @ back
@@ -407,9 +461,15 @@ def _idealised(model: Model, physiology: bool) -> list[ScalarActuator]:
         if not item.appliesForce:
             continue
         if not isinstance(item, ScalarActuator):
-            raise UnsupportedError(f"'{item.name}' is a {type(item).__name__}, which has no single control")
+            raise UnsupportedError(
+                f"'{item.name}' is a {type(item).__name__}, which has no single control"
+            )
         if not (isinstance(item, Muscle) and physiology):
-            force = item.max_isometric_force if isinstance(item, Muscle) else getattr(item, "optimal_force", 0.0)
+            force = (
+                item.max_isometric_force
+                if isinstance(item, Muscle)
+                else getattr(item, "optimal_force", 0.0)
+            )
             other = ideal(item, force)
             if other is None or id(item) not in places:
                 message = f"'{item.name}' ({type(item).__name__}) does not push in proportion to its control"

@@ -1,8 +1,8 @@
 """What follows a motion in steps: the present state, the step to the next one, and states at times in between.
 
-A state is one list y = (q, u, z): coordinates, generalized speeds, auxiliary states. Its derivative comes from a
-function f(t, y) that returns (qdot, udot, zdot) as a fresh sequence of Python floats and leaves y alone. Lists of
-floats are quicker than arrays here up to some 30 states.
+A state is one list y = (q, u, z): coordinates, generalized speeds, auxiliary states. Its derivative
+comes from a function f(t, y) that returns (qdot, udot, zdot) as a fresh sequence of Python floats
+and leaves y alone. Lists of floats are quicker than arrays here up to some 30 states.
 """
 
 from __future__ import annotations
@@ -42,8 +42,9 @@ class IntegrationError(SimulationError):
 class Stepper(ABC):
     """Common face of the steppers: a present state, steps, and states at times in between.
 
-    When `observe` is called for a step, the last call of f was the one at exactly that time and state; whatever f
-    kept of it (contact forces, say) belongs to the step. It is not called for the initial state.
+    When `observe` is called for a step, the last call of f was the one at exactly that time and
+    state; whatever f kept of it (contact forces, say) belongs to the step. It is not called for the
+    initial state.
 
     Attributes:
         time: s.
@@ -73,7 +74,9 @@ class Stepper(ABC):
         self.evaluations = 1
         self.taken = 0
         if len(self.derivative) != len(self.state):
-            raise ValueError(f"f gives {len(self.derivative)} derivatives of {len(self.state)} states")
+            raise ValueError(
+                f"f gives {len(self.derivative)} derivatives of {len(self.state)} states"
+            )
         self.previous = t, self.state, self.derivative
 
     @property
@@ -134,7 +137,9 @@ class Stepper(ABC):
             return self.state
         start = self.previous[0]
         if not start <= t < self.time:
-            raise ValueError(f"t = {t:.9g} s is outside the last step, {start:.9g} to {self.time:.9g} s")
+            raise ValueError(
+                f"t = {t:.9g} s is outside the last step, {start:.9g} to {self.time:.9g} s"
+            )
         return self.interpolant()(t)
 
     def _advance(self, t: float, y: list[float]) -> None:
@@ -150,14 +155,18 @@ class Stepper(ABC):
 
     def _require_room(self, limit: float) -> None:
         if not limit > self.time:
-            raise ValueError(f"the limit {limit:.9g} s of the step is not after the present {self.time:.9g} s")
+            raise ValueError(
+                f"the limit {limit:.9g} s of the step is not after the present {self.time:.9g} s"
+            )
 
     def _evaluate(self, t: float, y: list[float]) -> Sequence[float]:
         """The derivative at a state that is part of the motion, where it must exist."""
         try:
             derivative = self._f(t, y)
         except (ArithmeticError, ValueError) as failure:
-            raise IntegrationError(f"The derivative cannot be computed at t = {t:.9g} s: {failure}.", t) from failure
+            raise IntegrationError(
+                f"The derivative cannot be computed at t = {t:.9g} s: {failure}.", t
+            ) from failure
         total = sum(derivative)
         if total - total != 0.0:
             self._refuse_non_finite(t, derivative)

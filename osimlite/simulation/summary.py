@@ -14,7 +14,9 @@ Moment = tuple[float, list[float]]
 """Time (s) and state in the engine's order."""
 
 
-def integration_summary(stepper: Stepper, settings: Mapping[str, Any], wall: float) -> dict[str, Any]:
+def integration_summary(
+    stepper: Stepper, settings: Mapping[str, Any], wall: float
+) -> dict[str, Any]:
     """How a motion was followed.
 
     Args:
@@ -34,7 +36,9 @@ def integration_summary(stepper: Stepper, settings: Mapping[str, Any], wall: flo
     }
 
 
-def result_summary(engine: Engine, recorder: Recorder, start: Moment, end: Moment) -> dict[str, Any]:
+def result_summary(
+    engine: Engine, recorder: Recorder, start: Moment, end: Moment
+) -> dict[str, Any]:
     """What became of a motion: its energies at both ends, when contacts began and ended, and how hard they pushed.
 
     Args:
@@ -46,11 +50,16 @@ def result_summary(engine: Engine, recorder: Recorder, start: Moment, end: Momen
     return {
         "energy_J": {"start": energies(engine, *start), "end": energies(engine, *end)},
         "contact_events": [
-            {"time_s": event.time, "contact": event.contact, "event": "begin" if event.begins else "end"}
+            {
+                "time_s": event.time,
+                "contact": event.contact,
+                "event": "begin" if event.begins else "end",
+            }
             for event in recorder.events()
         ],
         "largest_contact_forces": {
-            name: {"force_N": size, "time_s": t} for name, (size, t) in recorder.largest_forces().items()
+            name: {"force_N": size, "time_s": t}
+            for name, (size, t) in recorder.largest_forces().items()
         },
     }
 

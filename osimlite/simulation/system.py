@@ -1,7 +1,8 @@
 """A mechanism with its forces, evaluated stage by stage; every engine has its forces from here.
 
-The stages are those of Simbody: where the links are (position), how they move (velocity), what is applied to them
-(force), how they accelerate. What an evaluation finds stays in the work vector that reports read.
+The stages are those of Simbody: where the links are (position), how they move (velocity), what is
+applied to them (force), how they accelerate. What an evaluation finds stays in the work vector that
+reports read.
 """
 
 from __future__ import annotations
@@ -58,18 +59,13 @@ class System:
         code: what runs the kernels; the best that is installed if left out.
         apart: whether every body is a link of its own, also one that never moves in another.
 
-    Attributes:
-        structure: what is connected to what, integers; equal for models that differ in numbers only.
-        numbers: all numbers in one vector.
-        program: the structure with the addresses of what it calls.
-        order: place in the mechanism of each coordinate of the state.
-        state: what the numbers of a state are.
-        placements: link of each body (-1 for ground), and the body's frame in it.
-        contacts: names of the contacts, by number.
-        columns: labels of the force records.
-        probes: of the model.
-        loads: after an evaluation: the last entry has the bits of the contacts that touch; entry i is the force (N,
-            in ground) of contact i if it does.
+    Attributes: structure: what is connected to what, integers; equal for models that differ in
+        numbers only. numbers: all numbers in one vector. program: the structure with the addresses
+        of what it calls. order: place in the mechanism of each coordinate of the state. state: what
+        the numbers of a state are. placements: link of each body (-1 for ground), and the body's
+        frame in it. contacts: names of the contacts, by number. columns: labels of the force
+        records. probes: of the model. loads: after an evaluation: the last entry has the bits of
+        the contacts that touch; entry i is the force (N, in ground) of contact i if it does.
 
     Raises:
         UnsupportedError: a joint, a function, a constraint or a force that the kernels do not know.
@@ -88,9 +84,15 @@ class System:
         apart: bool = False,
     ) -> None:
         packed = pack(mechanism, forces, chain, apart=apart)
-        self.structure, self.placements, self.order = packed.structure, packed.placements, packed.order
+        self.structure, self.placements, self.order = (
+            packed.structure,
+            packed.placements,
+            packed.order,
+        )
         contacts = [element for element in forces.elements if isinstance(element, PairContact)]
-        self.contacts = tuple(item.pair_name(place) for item in contacts for place in range(len(item.pairs)))
+        self.contacts = tuple(
+            item.pair_name(place) for item in contacts for place in range(len(item.pairs))
+        )
         self.columns = tuple(label for element in forces.elements for label in element.columns)
         self.loads: list[Any] = [None] * len(self.contacts) + [0]
         self.program = Program(packed, best() if code is None else code, self.entries)
@@ -125,7 +127,9 @@ class System:
 
     def _bind(self) -> None:
         self._equilibrate: Callable[[int], int] | None = None
-        self._evaluate = self.program.code.bound("evaluate", self.program.ints, self.numbers, self._w, self._y, self._f)
+        self._evaluate = self.program.code.bound(
+            "evaluate", self.program.ints, self.numbers, self._w, self._y, self._f
+        )
 
     def drive(self, controls: Controls) -> None:
         """Have the actuators driven by other controls of the same names in all evaluations and motions from now on."""
@@ -140,7 +144,9 @@ class System:
             self._controls = controls
             return
         self._driven_by = own, len(numbers), kernel
-        self.structure = np.concatenate((self.structure[: place + ITEM.OWN], np.array(own, dtype=np.int64)))
+        self.structure = np.concatenate(
+            (self.structure[: place + ITEM.OWN], np.array(own, dtype=np.int64))
+        )
         self.numbers = np.concatenate((self.numbers[:first], np.array(numbers, dtype=np.float64)))
         self.program.drive(self.structure, kernel)
         self._bind()
@@ -198,7 +204,8 @@ class System:
     def missing(self, moments: Floats, udot: Floats) -> Floats:
         """Generalized forces (k, n) that states need for accelerations (k, n) beside gravity and all that pushes.
 
-        Both are in the order of the state. Constraints are left aside. Moments and errors are those of :meth:`looked`.
+        Both are in the order of the state. Constraints are left aside. Moments and errors are those
+        of :meth:`looked`.
         """
         first = self.room + len(self.order)
         return self.looked(moments, range(first, first + len(self.order)), udot=udot)
@@ -206,14 +213,17 @@ class System:
     def links_in_motion(self, moments: Floats, udot: Floats) -> Floats:
         """What the kernels find of all links (k, l, n) that accelerate so.
 
-        The wrench of each is what pushes it and all that it carries, gravity too, less what accelerates them: joints
-        and constraints make up for it. Moments and errors are those of :meth:`looked`.
+        The wrench of each is what pushes it and all that it carries, gravity too, less what
+        accelerates them: joints and constraints make up for it. Moments and errors are those of
+        :meth:`looked`.
         """
         first = int(self.structure[MODEL.WORK_LINK])
         result = self.looked(moments, range(first, first + self._links.size), udot=udot)
         return result.reshape(-1, *self._links.shape)
 
-    def equilibrated(self, t: float, y: Sequence[float], numbers: Floats | None = None) -> list[float]:
+    def equilibrated(
+        self, t: float, y: Sequence[float], numbers: Floats | None = None
+    ) -> list[float]:
         """A state (y,) with the auxiliary states that have an equilibrium in it, as Model::equilibrateMuscles gives it.
 
         Args:
@@ -221,13 +231,17 @@ class System:
             y: the state.
             numbers: of a model of the same structure; the system's own by default.
 
-        Raises:
-            SimulationError: a force has no equilibrium, or the rates of coordinates are not defined there.
+        Raises: SimulationError: a force has no equilibrium, or the rates of coordinates are not
+            defined there.
         """
         result, failed = self._equilibrate_all(t, y, numbers)
         if failed is not None:
-            muscle = self._told(self.structure[self._equilibrium_at(failed) + layout.EQUILIBRIUM.ITEM])
-            raise SimulationError(f"no equilibrium was found of {muscle}; start elsewhere, or without an equilibrium")
+            muscle = self._told(
+                self.structure[self._equilibrium_at(failed) + layout.EQUILIBRIUM.ITEM]
+            )
+            raise SimulationError(
+                f"no equilibrium was found of {muscle}; start elsewhere, or without an equilibrium"
+            )
         return result
 
     def equilibrate_each(self, t: float, y: Sequence[float]) -> tuple[list[float], dict[str, str]]:
@@ -237,9 +251,8 @@ class System:
             t: time, s.
             y: the state (y,).
 
-        Returns:
-            The state (y,), in which muscles without equilibrium keep their states, and by the paths of these muscles
-            what is said of each.
+        Returns: The state (y,), in which muscles without equilibrium keep their states, and by the
+            paths of these muscles what is said of each.
 
         Raises:
             SimulationError: the rates of coordinates are not defined there.
@@ -258,7 +271,9 @@ class System:
             ints[MODEL.EQUILIBRIA] = count - (failed + 1)
             ints[MODEL.EQUILIBRIUM_AT] = self._equilibrium_at(failed + 1)
             self._set(t, y)
-            status = self._run(partial(code.entry("equilibrate"), ints, self.numbers, *room), STAGE.VELOCITY)
+            status = self._run(
+                partial(code.entry("equilibrate"), ints, self.numbers, *room), STAGE.VELOCITY
+            )
             failed = failed + 1 + int(self._f[0]) if status == OUTCOME.UNSOLVED else None
         for element in self.forces.elements:
             if element.path in reasons and element.states:
@@ -285,12 +300,18 @@ class System:
             self.program.link_equilibria()
             self._equilibrate = code.bound("equilibrate", ints, self.numbers, *room)
         self._set(t, y)
-        run = self._equilibrate if numbers is None else partial(code.entry("equilibrate"), ints, numbers, *room)
+        run = (
+            self._equilibrate
+            if numbers is None
+            else partial(code.entry("equilibrate"), ints, numbers, *room)
+        )
         try:
             status = self._run(run, STAGE.VELOCITY)
         except (ArithmeticError, ValueError) as failure:
             # Kernels as Python raise what machine code computes as no number.
-            raise SimulationError(f"the equilibrium of the muscles cannot be computed: {failure}") from failure
+            raise SimulationError(
+                f"the equilibrium of the muscles cannot be computed: {failure}"
+            ) from failure
         if status == OUTCOME.UNSOLVED:
             return self._y.tolist(), int(self._f[0])
         if status != OUTCOME.OK:
@@ -314,7 +335,9 @@ class System:
     def refusal(self, status: int, t: float, y: Sequence[float]) -> SimulationError:
         """The error for what the kernels say of a state."""
         if not np.isfinite(np.array(y)).all():
-            return SimulationError("the state of the motion is not finite any more; ask for more accuracy")
+            return SimulationError(
+                "the state of the motion is not finite any more; ask for more accuracy"
+            )
         if status == OUTCOME.UNSOLVED:
             item = self.structure[self.structure[MODEL.ITEM_AT] + int(self._f[0])]
             return NoSolution(f"there is no solution of the equations of {self._told(item)}")
@@ -363,33 +386,53 @@ class System:
         return len(self._w)
 
     def looked(
-        self, moments: Floats, places: Sequence[int], stage: int = STAGE.FORCE, udot: Floats | None = None
+        self,
+        moments: Floats,
+        places: Sequence[int],
+        stage: int = STAGE.FORCE,
+        udot: Floats | None = None,
     ) -> Floats:
         """What is found at some moments, all in one call of the kernels.
 
-        Args:
-            moments: time (s) and state (k, 1 + y).
-            places: of the work vector (m,); from `room` on those of the derivative of the state.
-            stage: up to which the states are evaluated.
-            udot: accelerations (k, n) in the order of the state, whose generalized forces are found instead.
+        Args: moments: time (s) and state (k, 1 + y). places: of the work vector (m,); from `room`
+            on those of the derivative of the state. stage: up to which the states are evaluated.
+            udot: accelerations (k, n) in the order of the state, whose generalized forces are found
+            instead.
 
-        Raises:
-            SimulationError: the rates of coordinates are not defined at one of them, or a force cannot be computed.
+        Raises: SimulationError: the rates of coordinates are not defined at one of them, or a force
+            cannot be computed.
         """
         if moments.shape[1] != 1 + len(self._y):
             raise self.state.wrong_length(moments.shape[1] - 1)
         law, code = "evaluate" if udot is None else "inverse", self.program.code
         code.make_ready(("look", law))
         moving = np.empty((len(moments), 0)) if udot is None else udot
-        given, result = np.ascontiguousarray(np.hstack([moments, moving])), np.empty((len(moments), len(places)))
-        order = np.array([len(given), moving.shape[1], code.address(law), len(places), *places], dtype=np.int64)
-        parts = self.program.ints, self.numbers, self._w, self._y, self._f, stage, given, order, result
+        given, result = (
+            np.ascontiguousarray(np.hstack([moments, moving])),
+            np.empty((len(moments), len(places))),
+        )
+        order = np.array(
+            [len(given), moving.shape[1], code.address(law), len(places), *places], dtype=np.int64
+        )
+        parts = (
+            self.program.ints,
+            self.numbers,
+            self._w,
+            self._y,
+            self._f,
+            stage,
+            given,
+            order,
+            result,
+        )
         status = self._run(code.entry("look"), *parts)
         if status != OUTCOME.OK:
             raise self.refusal(status, float(self._w[WORK.TIME]), self._y.tolist())
         return result
 
-    def pushed(self, moments: Floats, udot: Floats, names: Sequence[str]) -> tuple[Floats, Floats, Floats]:
+    def pushed(
+        self, moments: Floats, udot: Floats, names: Sequence[str]
+    ) -> tuple[Floats, Floats, Floats]:
         """What accelerations need while no actuator pushes, and what each actuator pushes by a control of 1.
 
         What an actuator pushes must be proportional to its control, and the controls of all be 0.
@@ -399,9 +442,9 @@ class System:
             udot: accelerations (k, n) in the order of the state.
             names: paths of a actuators.
 
-        Returns:
-            Generalized forces that are missing (k, n), those of each actuator (k, a, n), and the forces (N) of muscles
-            (k, a), 1 of other actuators. Constraints are left aside. Errors are those of :meth:`looked`.
+        Returns: Generalized forces that are missing (k, n), those of each actuator (k, a, n), and
+            the forces (N) of muscles (k, a), 1 of other actuators. Constraints are left aside.
+            Errors are those of :meth:`looked`.
         """
         code, size = self.program.code, len(self.order)
         code.make_ready(("push_each", "inverse"))
@@ -414,9 +457,14 @@ class System:
                 path = item - int(self.structure[item + ITEM.OWN + self.kind_at(name).text.heads])
                 (strength,) = self.places_of(name, (STRENGTH,))
             order += item, controls[name], path, strength
-        given, result = np.hstack([moments, udot]), np.empty((len(moments), size + len(names) * (size + 1)))
+        given, result = (
+            np.hstack([moments, udot]),
+            np.empty((len(moments), size + len(names) * (size + 1))),
+        )
         parts = self.program.ints, self.numbers, self._w, self._y, self._f, code.address("inverse")
-        status = self._run(code.entry("push_each"), *parts, given, np.array(order, dtype=np.int64), result)
+        status = self._run(
+            code.entry("push_each"), *parts, given, np.array(order, dtype=np.int64), result
+        )
         if status != OUTCOME.OK:
             raise self.refusal(status, float(self._w[WORK.TIME]), self._y.tolist())
         each = result[:, size:].reshape(len(moments), len(names), size + 1)
@@ -435,7 +483,9 @@ class System:
             if probe.kind.measure is not None:
                 result.append(list(probe.kind.measure(probe, self, t, y)))
                 continue
-            self.program.code.entry(probe.kind.name)(self.program.ints, self.numbers, self._w, self._y, self._f, place)
+            self.program.code.entry(probe.kind.name)(
+                self.program.ints, self.numbers, self._w, self._y, self._f, place
+            )
             first = self.structure[place + ITEM.RECORD]
             result.append(self._w[first : first + len(probe.reading.labels)].tolist())
         return result
@@ -459,9 +509,15 @@ class System:
         """One number for each of the columns."""
         self.applied(t, y)
         origins = [self._origin(body) for body in range(len(self.placements))] + [(0.0, 0.0, 0.0)]
-        return [value for element, records in self.read_records() for value in element.report(records, origins)]
+        return [
+            value
+            for element, records in self.read_records()
+            for value in element.report(records, origins)
+        ]
 
-    def force_table(self, times: Sequence[float] | Floats, states: Sequence[Sequence[float]] | Floats) -> Floats:
+    def force_table(
+        self, times: Sequence[float] | Floats, states: Sequence[Sequence[float]] | Floats
+    ) -> Floats:
         """Return one row of the columns for each moment, with all moments evaluated in one call of the kernels.
 
         Args:
@@ -471,10 +527,12 @@ class System:
         Returns:
             Numbers (k, c), those of :meth:`force_records`.
 
-        Raises:
-            SimulationError: the rates of coordinates are not defined at a moment, or a force cannot be computed.
+        Raises: SimulationError: the rates of coordinates are not defined at a moment, or a force
+            cannot be computed.
         """
-        moments = np.column_stack([times, np.asarray(states, dtype=float).reshape(len(times), len(self._y))])
+        moments = np.column_stack(
+            [times, np.asarray(states, dtype=float).reshape(len(times), len(self._y))]
+        )
         result = np.zeros((len(moments), len(self.columns)))
         if not self.columns:
             return result
@@ -489,12 +547,17 @@ class System:
         count = len(places)
         for number in range(len(self._links)):
             first = links + size * number
-            places += [*range(first, first + 9), *range(first + LINK_WORK.POSITION, first + LINK_WORK.POSITION + 3)]
+            places += [
+                *range(first, first + 9),
+                *range(first + LINK_WORK.POSITION, first + LINK_WORK.POSITION + 3),
+            ]
         # The work vectors of long motions are large.
         for start in range(0, len(moments), MOMENTS_AT_ONCE):
             found = self.looked(moments[start : start + MOMENTS_AT_ONCE], places)
             origins = self._origins_of(found[:, count:].reshape(len(found), -1, 12)).tolist()
-            for number, (work, known) in enumerate(zip(found[:, :count].tolist(), origins, strict=True), start):
+            for number, (work, known) in enumerate(
+                zip(found[:, :count].tolist(), origins, strict=True), start
+            ):
                 rows = (
                     element.report([work[part] for part in own], known)
                     for element, own in zip(self.forces.elements, slices, strict=True)
@@ -517,13 +580,25 @@ class System:
         """Kinetic energy, potential energy of gravity, energy stored in forces, J."""
         self.applied(t, y)
         kinetic, gravity = self._mechanical()
-        gravity -= sum(float(mass * self.mechanism.gravity @ center) for mass, center in self.masses_in_ground)
-        return kinetic, gravity, float(sum(element.energy(records) for element, records in self.read_records()))
+        gravity -= sum(
+            float(mass * self.mechanism.gravity @ center) for mass, center in self.masses_in_ground
+        )
+        return (
+            kinetic,
+            gravity,
+            float(sum(element.energy(records) for element, records in self.read_records())),
+        )
 
     def energy_of(self, path: str, t: float, y: Sequence[float]) -> float:
         """Energy stored in one force, J; none in one that does not act."""
         self.applied(t, y)
-        return float(sum(element.energy(records) for element, records in self.read_records() if element.path == path))
+        return float(
+            sum(
+                element.energy(records)
+                for element, records in self.read_records()
+                if element.path == path
+            )
+        )
 
     def _mechanical(self) -> tuple[float, float]:
         """Kinetic energy and potential energy of gravity of all links, after an evaluation."""
@@ -555,7 +630,9 @@ class System:
 
     def links_at(self, moments: Moments) -> Floats:
         """What the kernels find of the motion of all links at some moments (k, l, n)."""
-        return self.links_of(np.array([(t, *y) for t, y in moments]).reshape(len(moments), 1 + len(self._y)))
+        return self.links_of(
+            np.array([(t, *y) for t, y in moments]).reshape(len(moments), 1 + len(self._y))
+        )
 
     def links_of(self, moments: Floats, links: Sequence[int] | None = None) -> Floats:
         """What the kernels find of the motion of l links, or of all (k, l, n), at times (s) with states (k, 1 + y)."""
@@ -576,7 +653,10 @@ class System:
         if link == GROUND:
             return x, y, z
         here = self._links[link]
-        place = here[LINK_WORK.POSITION : LINK_WORK.POSITION + 3] + here[:9].reshape(3, 3) @ frame[:3, 3]
+        place = (
+            here[LINK_WORK.POSITION : LINK_WORK.POSITION + 3]
+            + here[:9].reshape(3, 3) @ frame[:3, 3]
+        )
         x, y, z = place.tolist()
         return x, y, z
 

@@ -29,16 +29,13 @@ class Trajectory(Tabular):
 
     Forces, energies and events are worked out when they are asked for.
 
-    Attributes:
-        mechanism: what moves.
-        times: moments (n,), s.
-        coordinates: names of the k coordinates, in the mechanism's order.
-        values: coordinate values (n, k), rad or m.
-        speeds: generalized speeds (n, k).
-        auxiliary: other states that are integrated (n,), by their paths in OpenSim: the energy, J, that the dampers of
-            a BushingForce have taken up, or of a CoordinateLimitForce that is to compute it.
-        paths: of all states, in the order of OpenSim: ".../value" and ".../speed" of the coordinates, and `auxiliary`.
-        controller: what was recorded at each control step of a controller, None without one.
+    Attributes: mechanism: what moves. times: moments (n,), s. coordinates: names of the k
+        coordinates, in the mechanism's order. values: coordinate values (n, k), rad or m. speeds:
+        generalized speeds (n, k). auxiliary: other states that are integrated (n,), by their paths
+        in OpenSim: the energy, J, that the dampers of a BushingForce have taken up, or of a
+        CoordinateLimitForce that is to compute it. paths: of all states, in the order of OpenSim:
+        ".../value" and ".../speed" of the coordinates, and `auxiliary`. controller: what was
+        recorded at each control step of a controller, None without one.
     """
 
     _repr_html_ = shown_in_notebooks("trajectory")
@@ -61,11 +58,15 @@ class Trajectory(Tabular):
         self.coordinates = mechanism.coordinate_names
         self.values: Array = np.array(values, dtype=float).reshape(len(self.times), count)
         self.speeds: Array = np.array(speeds, dtype=float).reshape(len(self.times), count)
-        own = [f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")]
+        own = [
+            f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")
+        ]
         self.paths = tuple(paths) or (*own, *auxiliary)
         rank = {path: number for number, path in enumerate(self.paths)}
         ordered = sorted(auxiliary, key=lambda path: rank.get(path, len(rank)))
-        self.auxiliary: dict[str, Array] = {path: np.array(auxiliary[path], dtype=float) for path in ordered}
+        self.auxiliary: dict[str, Array] = {
+            path: np.array(auxiliary[path], dtype=float) for path in ordered
+        }
         self._report: Report | None = report
 
     @property
@@ -88,9 +89,10 @@ class Trajectory(Tabular):
     def forces(self) -> Mapping[str, Array]:
         """Columns (n,) of what the forces do, by the labels of OpenSim's ForceReporter, in SI units.
 
-        ``RFootForce.RightShank.force.X`` and its like are forces (N) and, about the body's origin, torques (N·m) on
-        bodies in ground; ``RKneeLimitTorque`` is a generalized force, ``RKneeLimitTorque.PotentialEnergy`` its energy
-        (J). Surfaces of one force on the same body share their columns, which are those of the body.
+        ``RFootForce.RightShank.force.X`` and its like are forces (N) and, about the body's origin,
+        torques (N·m) on bodies in ground; ``RKneeLimitTorque`` is a generalized force,
+        ``RKneeLimitTorque.PotentialEnergy`` its energy (J). Surfaces of one force on the same body
+        share their columns, which are those of the body.
         """
         labels, table = self._force_table
         return {label: table[:, index] for index, label in enumerate(labels)}
@@ -139,7 +141,8 @@ class Trajectory(Tabular):
     def columns(self) -> dict[str, Array]:
         """All values, speeds, states, forces and probes (n,), in SI units and radians.
 
-        They are called ``<coordinate>``, ``<coordinate>/speed``, and as in `auxiliary`, `forces` and `probes`.
+        They are called ``<coordinate>``, ``<coordinate>/speed``, and as in `auxiliary`, `forces`
+        and `probes`.
         """
         columns: dict[str, Array] = {}
         for index, name in enumerate(self.coordinates):
@@ -155,14 +158,20 @@ class Trajectory(Tabular):
     def to_xarray(self) -> Any:
         """An xarray Dataset over ``time`` (s), in SI units and radians.
 
-        ``value`` and ``speed`` are also over ``coordinate``. ``state``, ``force``, ``probe`` and ``energy`` hold
-        `auxiliary`, `forces`, `probes` and `energy`, over ``state_name`` and so on; without any, they are left out.
+        ``value`` and ``speed`` are also over ``coordinate``. ``state``, ``force``, ``probe`` and
+        ``energy`` hold `auxiliary`, `forces`, `probes` and `energy`, over ``state_name`` and so on;
+        without any, they are left out.
 
         Raises:
             MissingDependency: xarray is not installed.
         """
         xarray = require("xarray", extra="frame", purpose="a data set of xarray")
-        groups = {"state": self.auxiliary, "force": self.forces, "probe": self.probes, "energy": self.energy}
+        groups = {
+            "state": self.auxiliary,
+            "force": self.forces,
+            "probe": self.probes,
+            "energy": self.energy,
+        }
         data: dict[str, Any] = {"value": (("time", "coordinate"), self.values)}
         data["speed"] = ("time", "coordinate"), self.speeds
         coords: dict[str, Any] = {"time": self.times, "coordinate": list(self.coordinates)}
@@ -177,8 +186,15 @@ class Trajectory(Tabular):
         """All states, in the order of `paths`."""
         columns: dict[str, Array] = dict(self.auxiliary)
         for index, info in enumerate(self.mechanism.coordinates):
-            columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = self.values[:, index], self.speeds[:, index]
-        rows = np.array([columns[path] for path in self.paths]).reshape(len(self.paths), len(self.times)).T
+            columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = (
+                self.values[:, index],
+                self.speeds[:, index],
+            )
+        rows = (
+            np.array([columns[path] for path in self.paths])
+            .reshape(len(self.paths), len(self.times))
+            .T
+        )
         return StoTable(self.mechanism.name, self.times, self.paths, rows)
 
     def states_text(self) -> str:
@@ -188,12 +204,16 @@ class Trajectory(Tabular):
     def forces_text(self) -> str:
         """The text of forces.sto, with the labels of OpenSim's ForceReporter."""
         labels, table = self._force_table
-        return sto_text("ModelForces", self.times.tolist(), label_as_opensim(labels), table.tolist())
+        return sto_text(
+            "ModelForces", self.times.tolist(), label_as_opensim(labels), table.tolist()
+        )
 
     def probes_text(self) -> str:
         """The text of probes.sto, with the labels of OpenSim's ProbeReporter; empty if there are no probes."""
         labels, table = self._probe_table
-        return sto_text("ModelProbes", self.times.tolist(), labels, table.tolist()) if labels else ""
+        return (
+            sto_text("ModelProbes", self.times.tolist(), labels, table.tolist()) if labels else ""
+        )
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write ``states.sto``, ``forces.sto``, ``summary.json``; ``probes.sto``, ``controller.sto`` if there are any.
@@ -219,7 +239,9 @@ class Trajectory(Tabular):
 
 def text_of(table: StoTable) -> str:
     """The text of a table's file."""
-    return sto_text(table.name, table.times.tolist(), table.columns, table.rows.tolist(), header=table.header)
+    return sto_text(
+        table.name, table.times.tolist(), table.columns, table.rows.tolist(), header=table.header
+    )
 
 
 class Interrupted(KeyboardInterrupt):
@@ -237,8 +259,11 @@ class Interrupted(KeyboardInterrupt):
 class Report(NamedTuple):
     """How a trajectory gets what it works out later."""
 
-    forces: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]  # labels, and one row for each moment
+    forces: Callable[
+        [], tuple[Sequence[str], Sequence[Sequence[float]]]
+    ]  # labels, and one row for each moment
     # kinetic energy, potential energy of gravity and stored energy at each moment, J
     energies: Callable[[], Sequence[Sequence[float]]]
-    probes: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]  # labels, and one row for each moment
+    # labels, and one row for each moment
+    probes: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]
     summary: Callable[[], dict[str, Any]]  # what goes into summary.json

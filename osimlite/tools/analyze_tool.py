@@ -51,10 +51,14 @@ def run(job: Job, outcome: Outcome) -> None:
             given.tell(outcome)
             first, last = given.row(setup.initial_time), given.row(setup.final_time)
             table, record = given.table, lambda: (given.table.times, given.speeds(simulation))
-            rows = ((float(table.times[k]), given.state(simulation, k)) for k in range(first, last + 1))
+            rows = (
+                (float(table.times[k]), given.state(simulation, k)) for k in range(first, last + 1)
+            )
         moments = list(rows)
         if not moments:
-            raise job.error(f"there is nothing from {setup.initial_time:g} s to {setup.final_time:g} s")
+            raise job.error(
+                f"there is nothing from {setup.initial_time:g} s to {setup.final_time:g} s"
+            )
         times, result = np.array([t for t, _ in moments]), np.array([y for _, y in moments])
         unbalanced: dict[str, BoolArray] = {}
         if setup.solve_for_equilibrium_for_auxiliary_states:
@@ -72,11 +76,14 @@ def run(job: Job, outcome: Outcome) -> None:
     tell_rows(job, outcome, motion)
 
 
-def equilibrate_rows(outcome: Outcome, simulation: Simulation, times: Array, states: Array) -> dict[str, BoolArray]:
+def equilibrate_rows(
+    outcome: Outcome, simulation: Simulation, times: Array, states: Array
+) -> dict[str, BoolArray]:
     """Equilibrate the muscles at every time, and report which have no equilibrium and when.
 
-    Like OpenSim's AnalyzeTool, this goes on where a muscle has no equilibrium. OpenSim leaves the fibers of that muscle
-    in any state then, and computes forces and accelerations from it; here its states become NaN.
+    Like OpenSim's AnalyzeTool, this goes on where a muscle has no equilibrium. OpenSim leaves the
+    fibers of that muscle in any state then, and computes forces and accelerations from it; here its
+    states become NaN.
 
     Args:
         outcome: that says so.
@@ -107,7 +114,9 @@ def equilibrate_rows(outcome: Outcome, simulation: Simulation, times: Array, sta
             f"of {reasons[path]}: at {np.count_nonzero(missing)} of {len(times)} moments, {_spans(times, missing)}; "
             "what depends on its fibers or its force is NaN then",
         )
-    outcome.summary["without_equilibrium"] = {path: times[missing].tolist() for path, missing in unbalanced.items()}
+    outcome.summary["without_equilibrium"] = {
+        path: times[missing].tolist() for path, missing in unbalanced.items()
+    }
     if not unbalanced:
         del outcome.summary["without_equilibrium"]
     return unbalanced
@@ -129,7 +138,9 @@ def _followed(
     mechanism = simulation.mechanism
     recorded = RecordedMotion.read(mechanism, job.needed("coordinates_file"))
     infos = enumerate(mechanism.coordinates)
-    if absent := {info.name: k for k, info in infos if info.name in recorded.missing and not info.locked}:
+    if absent := {
+        info.name: k for k, info in infos if info.name in recorded.missing and not info.locked
+    }:
         # Not their default values: so OpenSim's analyses have it, unlike its inverse dynamics.
         recorded.values[:, [*absent.values()]] = 0.0
         outcome.tell("not in the file", f"{listed([*absent])}: 0 is taken, as in OpenSim")
@@ -138,14 +149,17 @@ def _followed(
         recorded = recorded.lowpassed(cutoff, continued=True)
     before = recorded
     recorded = recorded.between(setup.initial_time, setup.final_time)
-    # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints change the values.
+    # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints
+    # change the values.
     given = job.path("speeds_file")
     others: dict[int, Array] = {}
     if given is None:
         speeds = recorded.rates[0]
     else:
         own, speeds, others = _given(job, given, recorded, simulation)
-    rows = zip(recorded.times.tolist(), *constrained(recorded, speeds, simulation, model), strict=True)
+    rows = zip(
+        recorded.times.tolist(), *constrained(recorded, speeds, simulation, model), strict=True
+    )
 
     def states() -> Iterator[tuple[float, list[float]]]:
         for number, (t, q, u) in enumerate(rows):
@@ -177,10 +191,15 @@ def _given(
     rows = np.searchsorted(table.times, recorded.times - SAME_TIME)
     for row, time in zip(rows.tolist(), recorded.times.tolist(), strict=True):
         if row == len(table.times) or abs(table.times[row] - time) > SAME_TIME:
-            raise job.error(f"'{path}' has no row at {time:.15g} s, at which there are coordinates; give it one")
+            raise job.error(
+                f"'{path}' has no row at {time:.15g} s, at which there are coordinates; give it one"
+            )
     for name, place in columns.items():
         speeds[:, paths.index(name)] = table.rows[:, place]
     state = simulation.state
     first, auxiliary = 2 * len(state.order), columns_of_states(table.columns, state.paths)
-    others = {first + state.paths.index(name): table.rows[rows, place] for name, place in auxiliary.items()}
+    others = {
+        first + state.paths.index(name): table.rows[rows, place]
+        for name, place in auxiliary.items()
+    }
     return (table.times, speeds), speeds[rows], others

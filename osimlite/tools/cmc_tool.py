@@ -14,7 +14,9 @@ def run(job: Job, outcome: Outcome) -> None:
     """Follow the motion window by window, and write controls, states and forces."""
     setup: CMCTool = job.setup
     if setup.actuators_to_exclude:
-        raise job.unable("actuators_to_exclude is given, and all actuators are controlled here; leave it empty")
+        raise job.unable(
+            "actuators_to_exclude is given, and all actuators are controlled here; leave it empty"
+        )
     model = told_model(job)
     with simulation_of(job, model) as simulation:
         desired = Desired.of(job, outcome, simulation, model)

@@ -1,8 +1,9 @@
 """Control that is computed window by window, so that a model follows a motion: what RRATool and CMCTool share.
 
-At the start of each window the tasks say which accelerations make up for the errors. Forces of the actuators that give
-these are found in the pose that is expected at its end, within what the actuators can do by then; and the controls that
-bring the actuators there. The model moves by them to the end of the window.
+At the start of each window the tasks say which accelerations make up for the errors. Forces of the
+actuators that give these are found in the pose that is expected at its end, within what the
+actuators can do by then; and the controls that bring the actuators there. The model moves by them
+to the end of the window.
 """
 
 from __future__ import annotations
@@ -61,17 +62,31 @@ class Control:
     @classmethod
     def of(cls, actuator: Any, given: ControlSet | None) -> Control:
         """Of an actuator, and of what a document of bounds says of it."""
-        own = [] if given is None else [item for item in given.objects if isinstance(item, ControlLinear)]
+        own = (
+            []
+            if given is None
+            else [item for item in given.objects if isinstance(item, ControlLinear)]
+        )
         for name in (actuator.name + EXCITATION, actuator.name):
             found = next((item for item in own if item.name == name), None)
             if found is not None:
                 return cls._bounded(found)
-        low = max(actuator.min_control, -WIDEST) if actuator.min_control == -inf else actuator.min_control
-        high = min(actuator.max_control, WIDEST) if actuator.max_control == inf else actuator.max_control
+        low = (
+            max(actuator.min_control, -WIDEST)
+            if actuator.min_control == -inf
+            else actuator.min_control
+        )
+        high = (
+            min(actuator.max_control, WIDEST)
+            if actuator.max_control == inf
+            else actuator.max_control
+        )
         is_muscle = isinstance(actuator, Muscle)
         if is_muscle:
             low, high = max(low, LEAST_MUSCLE), max(high, GREATEST_MUSCLE)
-        return cls(actuator.name + EXCITATION, is_muscle, lambda t: low, lambda t: high, (low, high))
+        return cls(
+            actuator.name + EXCITATION, is_muscle, lambda t: low, lambda t: high, (low, high)
+        )
 
     @classmethod
     def _bounded(cls, found: ControlLinear) -> Control:
@@ -95,10 +110,14 @@ class Control:
         """Of time, through all nodes."""
         if self.is_step:
             # A value holds up to its own time, that included.
-            return PiecewiseConstant((self.times[0], *(nextafter(t, inf) for t in self.times[:-1])), tuple(self.values))
+            return PiecewiseConstant(
+                (self.times[0], *(nextafter(t, inf) for t in self.times[:-1])), tuple(self.values)
+            )
         t, v = np.array(self.times), np.array(self.values)
         slopes = np.append(np.diff(v) / np.diff(t), 0.0)
-        return PiecewisePolynomial(np.append(t[0], t), np.column_stack([np.append(v[0], v), np.append(0.0, slopes)]))
+        return PiecewisePolynomial(
+            np.append(t[0], t), np.column_stack([np.append(v[0], v), np.append(0.0, slopes)])
+        )
 
     def within(self, start: float, end: float, value: float) -> Function:
         """Of time, in a window at whose end it has a value; at its start it has the last one."""
@@ -116,7 +135,10 @@ class Control:
             use_steps=self.is_step,
             default_min=self.default[0],
             default_max=self.default[1],
-            x_nodes=[ControlLinearNode(t=t, value=v) for t, v in zip(self.times, self.values, strict=True)],
+            x_nodes=[
+                ControlLinearNode(t=t, value=v)
+                for t, v in zip(self.times, self.values, strict=True)
+            ],
             min_nodes=list(self.bounds[0]),
             max_nodes=list(self.bounds[1]),
         )
@@ -162,7 +184,12 @@ class ComputedControl:
         controls: Sequence[Control],
         window: float,
     ) -> None:
-        self.simulation, self.desired, self.tasks, self.sharing = simulation, desired, tasks, sharing
+        self.simulation, self.desired, self.tasks, self.sharing = (
+            simulation,
+            desired,
+            tasks,
+            sharing,
+        )
         self.controls, self.window, self._job = list(controls), window, job
         assert isinstance(simulation.engine, System)
         self.engine: Any = simulation.engine
@@ -233,7 +260,9 @@ class ComputedControl:
         errors = self.tasks.errors(now, q, u)
         result.errors[t] = errors[0]
         wanted = self.tasks.accelerations(errors, ahead)
-        low, high = (np.array([getattr(item, name)(t) for item in self.controls]) for name in ("low", "high"))
+        low, high = (
+            np.array([getattr(item, name)(t) for item in self.controls]) for name in ("low", "high")
+        )
         z = np.array(y[self._first :])
         self._poses.clear()
         least, most = self._forces(t, target, z, low), self._forces(t, target, z, high)
@@ -300,7 +329,9 @@ class ComputedControl:
                 y = self.engine.projected(t, y, ASSEMBLED) or y
             self._poses[t] = y[: self._first]
 
-    def _aged(self, t: float, target: float, z: Array, controls: Array, *, held: bool = False) -> Array:
+    def _aged(
+        self, t: float, target: float, z: Array, controls: Array, *, held: bool = False
+    ) -> Array:
         """Auxiliary states at the end of a window, by Merson's method on the poses that are foreseen.
 
         Args:
@@ -341,7 +372,8 @@ class ComputedControl:
     def at_rest(self, start: float, y: list[float], result: Followed) -> tuple[float, list[float]]:
         """When and in which state the motion of a model with muscles begins.
 
-        They come to rest twice at a small control, then at that of the first window; the motion begins at its end.
+        They come to rest twice at a small control, then at that of the first window; the motion
+        begins at its end.
         """
         self._corrections[:] = 0.0
         self._poses.clear()

@@ -42,14 +42,22 @@ class Evidence:
     sensors: Sequence[str] = ()  # names of the k sensors that were fitted
     # how far they are turned from where they were measured (t, k), rad; NaN where one was not
     angles: Array | None = None
-    # of a motion that goes by its own muscles and contacts: the generalized speeds (t, n), other states by their paths,
-    # and the controls, with NaN where there are none
+    # of a motion that goes by its own muscles and contacts: the generalized speeds (t, n), other
+    # states by their paths, and the controls, with NaN where there are none
     speeds: Array | None = None
     states: Mapping[str, Array] = field(default_factory=dict)
     controls: StoTable | None = None
 
     @classmethod
-    def of(cls, model: Model, file: Path, mechanism: Mechanism, times: Array, values: Array, **more: Any) -> Evidence:
+    def of(
+        cls,
+        model: Model,
+        file: Path,
+        mechanism: Mechanism,
+        times: Array,
+        values: Array,
+        **more: Any,
+    ) -> Evidence:
         """Of values in the order of a mechanism's coordinates."""
         infos = mechanism.coordinates
         turning = [info.motion_type == "rotational" for info in infos]
@@ -82,7 +90,10 @@ def steps_of(loads: Path, up: int) -> dict[str, Steps]:
     table = loads_table(document, loads.parent, str(loads))
     result: dict[str, Array] = {}
     for force in document.objects:
-        side, label = side_of(str(force.applied_to_body))[1], f"{(force.force_identifier or '').strip()}{'xyz'[up]}"
+        side, label = (
+            side_of(str(force.applied_to_body))[1],
+            f"{(force.force_identifier or '').strip()}{'xyz'[up]}",
+        )
         if side and label in table.columns:
             result[side] = result.get(side, 0.0) + table[label]
     return {side: _steps(table.times, column > ON_GROUND) for side, column in result.items()}

@@ -34,14 +34,20 @@ def run(job: Job, outcome: Outcome) -> None:
             "give one between 0 and 1, such as 1e-5"
         )
     if not 0.0 <= bounds[0] <= bounds[1] or bounds[1] == 0.0:
-        raise job.error(f"steps from {bounds[0]:g} s to {bounds[1]:g} s are none; give a longest that is longer")
+        raise job.error(
+            f"steps from {bounds[0]:g} s to {bounds[1]:g} s are none; give a longest that is longer"
+        )
     model = told_model(job)
     with simulation_of(job, model) as simulation:
         start, y = _start(job, outcome, simulation)
         if not start < setup.final_time:
-            raise job.error(f"the final_time {setup.final_time:g} s does not come after the start at {start:g} s")
+            raise job.error(
+                f"the final_time {setup.final_time:g} s does not come after the start at {start:g} s"
+            )
         if setup.final_time - start > MOST_STEPS * bounds[1]:
-            raise job.error(f"the final_time {setup.final_time:g} s is too far away for steps of {bounds[1]:g} s")
+            raise job.error(
+                f"the final_time {setup.final_time:g} s is too far away for steps of {bounds[1]:g} s"
+            )
         settings = Settings(setup.integrator_error_tolerance, step_bounds=bounds)
         times, states, failure = simulation.every_step(start, y, setup.final_time, settings)
         outcome.done = failure is None
@@ -75,8 +81,12 @@ def _start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[float, l
 def _write(job: Job, outcome: Outcome, motion: Motion) -> None:
     setup: ForwardTool = job.setup
     simulation, times, precision = motion.simulation, motion.times, setup.output_precision
-    turned = [info.path for info in motion.mechanism.coordinates if info.motion_type == "rotational"]
-    turning = [np.degrees(1.0) if path.rpartition("/")[0] in turned else 1.0 for path in simulation.paths]
+    turned = [
+        info.path for info in motion.mechanism.coordinates if info.motion_type == "rotational"
+    ]
+    turning = [
+        np.degrees(1.0) if path.rpartition("/")[0] in turned else 1.0 for path in simulation.paths
+    ]
     rows: Array = np.column_stack([*motion.histories.values()])
     name = setup.name
 

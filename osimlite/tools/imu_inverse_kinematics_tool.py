@@ -27,16 +27,29 @@ def run(job: Job, outcome: Outcome) -> None:
     """Fit every frame to its minimum; write coordinates, and angles of the sensors from their data where asked for."""
     setup: IMUInverseKinematicsTool = job.setup
     model, file = job.model(), job.needed("orientations_file")
-    data = OrientationData.of(file).between(*both_of(setup.time_range)).turned(setup.sensor_to_opensim_rotations)
+    data = (
+        OrientationData.of(file)
+        .between(*both_of(setup.time_range))
+        .turned(setup.sensor_to_opensim_rotations)
+    )
     frames = {frame.name for frame in model.components(PhysicalFrame)} & {*data.names}
-    weights = {item.name: item.weight for item in reversed(setup.orientation_weights.objects) if item.name in frames}
+    weights = {
+        item.name: item.weight
+        for item in reversed(setup.orientation_weights.objects)
+        if item.name in frames
+    }
     motion = inverse_kinematics(model, orientations=data, weights=weights)
     asked, folder = (
-        "" if name.strip() in NONE else name.strip() for name in (setup.output_motion_file, setup.results_directory)
+        "" if name.strip() in NONE else name.strip()
+        for name in (setup.output_motion_file, setup.results_directory)
     )
     beside, _, name = asked.replace("\\", "/").rpartition("/")
     name = name or f"ik_{file.stem}"
-    tables = {name if "." in name else f"{name}.mot": replace(motion_table(motion), header=DEGREES | {"name": name})}
+    tables = {
+        name if "." in name else f"{name}.mot": replace(
+            motion_table(motion), header=DEGREES | {"name": name}
+        )
+    }
     if setup.report_errors:
         # A sensor that was not measured has no error, which OpenSim writes as 0.
         errors = np.nan_to_num(motion.orientation_errors)
@@ -48,11 +61,19 @@ def run(job: Job, outcome: Outcome) -> None:
         elif asked:
             outcome.new_table(job.result(str(Path(beside) / place)), table)
     if not outcome.tables:
-        outcome.tell("nothing written", "the setup names neither a results_directory nor an output_motion_file")
+        outcome.tell(
+            "nothing written",
+            "the setup names neither a results_directory nor an output_motion_file",
+        )
     outcome.evidence = Evidence.of(
-        model, job.needed("model_file"), motion.mechanism, motion.times, motion.values,
-        sensors=motion.sensors, angles=motion.orientation_errors,
-    )  # fmt: skip
+        model,
+        job.needed("model_file"),
+        motion.mechanism,
+        motion.times,
+        motion.values,
+        sensors=motion.sensors,
+        angles=motion.orientation_errors,
+    )
     outcome.summary |= motion.summary
     for words in told(motion):
         outcome.tell("sensors", words)

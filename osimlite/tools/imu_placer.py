@@ -25,6 +25,10 @@ def run(job: Job, outcome: Outcome) -> None:
     outcome.summary |= placed._asdict()
     outcome.tell("placed", listed(placed.names, most=100))
     if placed.left_out:
-        outcome.tell("left out", f"{listed(placed.left_out)}: the model has no frame of these names")
+        outcome.tell(
+            "left out", f"{listed(placed.left_out)}: the model has no frame of these names"
+        )
     if placed.heading is not None:
-        outcome.tell("heading", f"turned by {math.degrees(placed.heading):.6g} degrees about the vertical")
+        outcome.tell(
+            "heading", f"turned by {math.degrees(placed.heading):.6g} degrees about the vertical"
+        )

@@ -25,8 +25,12 @@ def run(job: Job, outcome: Outcome) -> None:
     setup: InverseDynamicsTool = job.setup
     model = job.model()
     joints = _joints(job, model, outcome)
-    recorded = RecordedMotion.read(build_mechanism(model, opensim_derivatives=True), job.needed("coordinates_file"))
-    by_path = [info.name for info in recorded.mechanism.coordinates if info.name in recorded.named_by_path]
+    recorded = RecordedMotion.read(
+        build_mechanism(model, opensim_derivatives=True), job.needed("coordinates_file")
+    )
+    by_path = [
+        info.name for info in recorded.mechanism.coordinates if info.name in recorded.named_by_path
+    ]
     if by_path:
         outcome.warn(
             "columns",
@@ -45,11 +49,18 @@ def run(job: Job, outcome: Outcome) -> None:
     outcome.table(job.in_results(setup.output_gen_force_file), table)
     if joints:
         result = np.empty_like(table.rows)
-        result[:, [place for body in recorded.mechanism.bodies for place in body.mobilizer.coordinates]] = table.rows
+        result[
+            :, [place for body in recorded.mechanism.bodies for place in body.mobilizer.coordinates]
+        ] = table.rows
         at_joints = loads_at_joints(model, joints, recorded, result)
         outcome.table(job.in_results(setup.output_body_forces_file), at_joints)
     outcome.evidence = Evidence.of(
-        model, job.needed("model_file"), recorded.mechanism, recorded.times, recorded.values, loads=loads
+        model,
+        job.needed("model_file"),
+        recorded.mechanism,
+        recorded.times,
+        recorded.values,
+        loads=loads,
     )
     row, column = np.unravel_index(int(np.abs(table.rows).argmax()), table.rows.shape)
     most = f"{table.columns[column]}, {table.rows[row, column]:.6g} at {table.times[row]:g} s"
@@ -60,18 +71,28 @@ def run(job: Job, outcome: Outcome) -> None:
 def _tell_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -> None:
     """Say what the joint to ground has to push, which nothing does in life: J. Hicks et al., J Biomech Eng 137, 2015.
 
-    Their advice is 5 % of the measured force at most, and moments of 1 % of that times the height of the mass centre.
+    Their advice is 5 % of the measured force at most, and moments of 1 % of that times the height
+    of the mass centre.
     """
     names = [mechanism.coordinates[place].name for place in root_of(mechanism)]
     weight = mechanism.total_mass * float(np.linalg.norm(mechanism.gravity))
     for what, unit in (("force", "N"), ("moment", "N m")):
-        own = [table[label] for label in (f"{name}_{what}" for name in names) if label in table.columns]
+        own = [
+            table[label] for label in (f"{name}_{what}" for name in names) if label in table.columns
+        ]
         if own:
             sizes = np.linalg.norm(own, axis=0)
             rms, most = float(np.sqrt(np.mean(sizes**2))), float(sizes.max())
             outcome.summary |= {f"rms_residual_{what}": rms, f"largest_residual_{what}": most}
-            part = f", {100.0 * most / weight:.3g} % of the weight" if what == "force" and weight else ""
-            outcome.tell(f"residual {what}s", f"{rms:.4g} {unit} (root mean square), at most {most:.4g} {unit}{part}")
+            part = (
+                f", {100.0 * most / weight:.3g} % of the weight"
+                if what == "force" and weight
+                else ""
+            )
+            outcome.tell(
+                f"residual {what}s",
+                f"{rms:.4g} {unit} (root mean square), at most {most:.4g} {unit}{part}",
+            )
 
 
 def _joints(job: Job, model: Model, outcome: Outcome) -> list[Joint]:

@@ -31,7 +31,9 @@ def run(job: Job, outcome: Outcome) -> None:
         # Of the markers that are seen; like OpenSim, the mean is over all markers, seen or not.
         squares = np.nan_to_num(motion.marker_errors**2)
         totals = squares.sum(axis=1)
-        rows = np.column_stack([totals, np.sqrt(totals / squares.shape[1]), np.sqrt(squares.max(axis=1))])
+        rows = np.column_stack(
+            [totals, np.sqrt(totals / squares.shape[1]), np.sqrt(squares.max(axis=1))]
+        )
         labels = ("total_squared_error", "marker_error_RMS", "marker_error_max")
         path = job.in_results(f"{setup.name}_ik_marker_errors.sto")
         outcome.table(path, StoTable("Model Marker Errors from IK", times, labels, rows))
@@ -41,15 +43,25 @@ def run(job: Job, outcome: Outcome) -> None:
         places = motion.places.reshape(len(times), -1)
         outcome.table(path, StoTable("Model Marker Locations from IK", times, columns, places))
     outcome.evidence = Evidence.of(
-        model, job.needed("model_file"), motion.mechanism, times, motion.values,
-        markers=motion.markers, measured=motion.measured, places=motion.places,
-    )  # fmt: skip
+        model,
+        job.needed("model_file"),
+        motion.mechanism,
+        times,
+        motion.values,
+        markers=motion.markers,
+        measured=motion.measured,
+        places=motion.places,
+    )
     if words := describe_unknown(model, IGNORED):
         outcome.warn("unknown classes", words)
     outcome.summary |= motion.summary
     for words in told(motion):
         outcome.tell("markers", words)
-    asked = [task.name for task in setup.ik_task_set.objects if task.apply and isinstance(task, IKMarkerTask)]
+    asked = [
+        task.name
+        for task in setup.ik_task_set.objects
+        if task.apply and isinstance(task, IKMarkerTask)
+    ]
     for what, names in (
         ("not fitted", [name for name in data.names if name not in motion.markers]),
         ("not in the data", [name for name in asked if name not in data.names]),

@@ -30,7 +30,8 @@ class Job:
     setup: Any  # what the document says
     file: Path  # the document
     output: Path | None = None  # folder for all results, in place of those that the setup names
-    refine: float | str | None = None  # to what error meshes of optimal control are refined, if they are
+    # to what error meshes of optimal control are refined, if they are
+    refine: float | str | None = None
     simulates: bool = False  # whether what optimal control finds is simulated, too
 
     def error(self, message: str) -> DocumentError:
@@ -44,8 +45,8 @@ class Job:
     def path(self, tag: str) -> Path | None:
         """The file that a property names; None if it names none.
 
-        It is looked for from the folder of the setup, then from that in which the program runs. OpenSim looks for the
-        models of some tools in the second only, and crashes without.
+        It is looked for from the folder of the setup, then from that in which the program runs.
+        OpenSim looks for the models of some tools in the second only, and crashes without.
         """
         return self.place(str(getattr(self.setup, tag)))
 

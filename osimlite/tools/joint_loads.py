@@ -22,11 +22,13 @@ _SLIGHT = 2.0**-45.5
 """Simbody's SignificantReal: forces of this size are none."""
 
 
-def loads_at_joints(model: Model, joints: Sequence[Joint], recorded: RecordedMotion, forces: Array) -> StoTable:
+def loads_at_joints(
+    model: Model, joints: Sequence[Joint], recorded: RecordedMotion, forces: Array
+) -> StoTable:
     """Force (N) and torque (N m) on the child of each joint at its frame, in ground, that do what its forces do.
 
-    Where either does some of it, that counts which does more with less; the other one does the rest, and each is the
-    shortest that does.
+    Where either does some of it, that counts which does more with less; the other one does the
+    rest, and each is the shortest that does.
 
     Args:
         model: whose joints.
@@ -41,7 +43,8 @@ def loads_at_joints(model: Model, joints: Sequence[Joint], recorded: RecordedMot
     for joint in joints:
         frame = placements.named(joint, "socket_child_frame")
         base, _ = placements.frame(frame)
-        # OpenSim asks what carries the child, and besides what has the joint's coordinates: others if it closes a loop.
+        # OpenSim asks what carries the child, and besides what has the joint's coordinates: others
+        # if it closes a loop.
         asked.append((joint, {carried[base], by_joint[placements.path(joint)]}))
         root = f"{joint.name}_{placements.path(frame).rpartition('/')[2]}"
         labels += [f"{root}_{what}{axis}" for what in "FM" for axis in "XYZ"]
@@ -73,18 +76,26 @@ def _hinges(mechanism: Mechanism, body: int, *, apart: bool) -> tuple[int, Array
     hinges: list[_Hinge] = []
     for motions in groups[::-1] if mobilizer.reversed else groups:
         used = sorted({place for motion in motions for place in motion.coordinates})
-        renumbered: Any = [replace(m, coordinates=tuple(map(used.index, m.coordinates))) for m in motions]
+        renumbered: Any = [
+            replace(m, coordinates=tuple(map(used.index, m.coordinates))) for m in motions
+        ]
         places = [mobilizer.coordinates[place] for place in used]
         still, count = np.eye(4), tuple(range(len(used)))
-        alone = replace(mobilizer, motions=renumbered, coordinates=count, parent_frame=still, child_frame=still)
+        alone = replace(
+            mobilizer, motions=renumbered, coordinates=count, parent_frame=still, child_frame=still
+        )
         carried = replace(mechanism.bodies[body], parent=GROUND, mobilizer=alone)
-        infos = tuple(replace(mechanism.coordinates[place], locked=False, prescribed=None) for place in places)
+        infos = tuple(
+            replace(mechanism.coordinates[place], locked=False, prescribed=None) for place in places
+        )
         hinges.append((places, Mechanism(mobilizer.joint, (carried,), infos)))
     inner = mobilizer.child_frame if mobilizer.reversed else mobilizer.parent_frame
     return mechanism.bodies[body].parent, inner[:3, :3], hinges
 
 
-def _load(state: Kinematics, parent: int, inner: Array, hinges: Sequence[_Hinge], forces: Array) -> Array:
+def _load(
+    state: Kinematics, parent: int, inner: Array, hinges: Sequence[_Hinge], forces: Array
+) -> Array:
     """Force and torque (2, 3) in ground for the generalized forces (n,) at hinges one after another."""
     rotation, load = state.rotations[parent] @ inner, np.zeros((2, 3))
     for places, hinge in hinges:

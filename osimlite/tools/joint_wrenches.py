@@ -28,14 +28,20 @@ class JointWrenches:
 
     def __init__(self, motion: Motion, controls: Controls | None) -> None:
         self.mechanism = motion.mechanism
-        self.carried = {body.mobilizer.joint: index for index, body in enumerate(self.mechanism.bodies)}
+        self.carried = {
+            body.mobilizer.joint: index for index, body in enumerate(self.mechanism.bodies)
+        }
         system = System(self.mechanism, motion.simulation.forces, apart=True)
         if controls is not None:
             system.drive(controls)
         balanced = motion.select(motion.balanced) if motion.unbalanced else motion
-        self.moved = LinkMotion.of(system, balanced.table, balanced.accelerations[:, list(system.order)])
+        self.moved = LinkMotion.of(
+            system, balanced.table, balanced.accelerations[:, list(system.order)]
+        )
         if self.mechanism.constrained:
-            for links, forces in zip(self.moved.links, ConstraintForces.along(balanced), strict=True):
+            for links, forces in zip(
+                self.moved.links, ConstraintForces.along(balanced), strict=True
+            ):
                 self._push(links, forces)
         if motion.unbalanced:
             self.moved = LinkMotion(system, self._spread(motion))
@@ -51,7 +57,9 @@ class JointWrenches:
     def _push(self, links: Array, forces: ConstraintForces) -> None:
         """Let constraints push bodies (l, n), and all that carry them."""
         for constraint, multipliers in forces.multipliers:
-            for body, wrench in zip(constraint.bodies, forces.on_bodies(constraint, multipliers), strict=True):
+            for body, wrench in zip(
+                constraint.bodies, forces.on_bodies(constraint, multipliers), strict=True
+            ):
                 force, here = wrench[3:], forces.state.origins[body]
                 while body != GROUND:
                     arm = here - links[body, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
@@ -64,7 +72,8 @@ class JointWrenches:
         outer = self.carried[joint.path]
         body, link = self.mechanism.bodies[outer], self.moved.links[:, outer]
         mobilizer = body.mobilizer
-        # The body that the joint carries in the tree gets what is missing there, the other one the opposite.
+        # The body that the joint carries in the tree gets what is missing there, the other one the
+        # opposite.
         is_outer = (side == "child") != mobilizer.reversed
         wrench = (-1.0 if is_outer else 1.0) * link[:, LINK_WORK.WRENCH : LINK_WORK.WRENCH + 6]
         frame = mobilizer.child_frame if side == "child" else mobilizer.parent_frame

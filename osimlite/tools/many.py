@@ -45,7 +45,8 @@ class Trial:
     summary: dict[str, Any] = field(default_factory=dict)  # numbers that say how it went
     files: list[str] = field(default_factory=list)  # that were written
     message: str = ""  # why it failed
-    warnings: list[str] = field(default_factory=list)  # what the check found beside errors; what has a suggestion first
+    # what the check found beside errors; what has a suggestion first
+    warnings: list[str] = field(default_factory=list)
     seconds: float = 0.0  # that it took
     digest: str = ""  # of the setup and all files that it names, as they were
     was_done: bool = False  # whether that was before this run
@@ -69,13 +70,16 @@ def found(words: Iterable[str | Path]) -> list[Path]:
     for word in map(str, words):
         if has_magic(word) and not os.path.exists(word):
             matches = find_files(word)
-            setups = [Path(match) for match in matches if not isinstance(top_at(match), Model | Set)]
+            setups = [
+                Path(match) for match in matches if not isinstance(top_at(match), Model | Set)
+            ]
             if not setups:
                 raise OsimliteError(f"no {'setup' if matches else 'file'} matches '{word}'")
             files.update(dict.fromkeys(setups))
         elif os.path.isdir(word):
             raise OsimliteError(
-                f"this is a folder; name the setups in it, as '{os.path.join(word, '*.xml')}'", file=word
+                f"this is a folder; name the setups in it, as '{os.path.join(word, '*.xml')}'",
+                file=word,
             )
         else:
             files[Path(word)] = None
@@ -98,17 +102,16 @@ def run_many(
 
     What they write does not depend on how many work at it.
 
-    Args:
-        setups: the files.
-        output: a folder for all results, with one in it for each setup, named after the setup's place among them; one
-            that names what another makes is given that from there.
-        workers: processes of this machine; by default all is done in this one; None for one for each core.
-        cluster: address of a Dask scheduler whose workers do it instead; they see the same files.
-        resume: leave out what an earlier run has done, if its inputs and its results are still there unchanged.
-        progress: called with how many are done, and of how many.
+    Args: setups: the files. output: a folder for all results, with one in it for each setup, named
+        after the setup's place among them; one that names what another makes is given that from
+        there. workers: processes of this machine; by default all is done in this one; None for one
+        for each core. cluster: address of a Dask scheduler whose workers do it instead; they see
+        the same files. resume: leave out what an earlier run has done, if its inputs and its
+        results are still there unchanged. progress: called with how many are done, and of how many.
         kept: is given what came out of each setup; with one worker, in this process, only.
         overwrite: whether any file may be replaced; without it only results of the same kind are.
-        write_outside: whether setups may name results outside of their project and the current folder.
+        write_outside: whether setups may name results outside of their project and the current
+        folder.
 
     Returns:
         What became of each, in their order.
@@ -161,7 +164,9 @@ def places_of(setups: Sequence[Path], output: Path | None) -> dict[Path, Path | 
     }
 
 
-def find_substitutes(setup: Path, needs: Sequence[Path], places: Mapping[Path, Path | None]) -> dict[str, str]:
+def find_substitutes(
+    setup: Path, needs: Sequence[Path], places: Mapping[Path, Path | None]
+) -> dict[str, str]:
     """Return where files that a setup names are now, if others have made them and put them elsewhere.
 
     Args:
@@ -175,7 +180,9 @@ def find_substitutes(setup: Path, needs: Sequence[Path], places: Mapping[Path, P
         folder = places[maker]
         if folder is None:
             continue
-        for path in named & {os.path.realpath(name) for name in named_files(str(maker), "output-file")}:
+        for path in named & {
+            os.path.realpath(name) for name in named_files(str(maker), "output-file")
+        }:
             new = folder / os.path.basename(path)
             if new.is_file():
                 result[path] = str(new.absolute())
@@ -261,7 +268,8 @@ class _Journal:
     def note(self, trial: Trial) -> None:
         self.noted[trial.setup] = trial
         if time.monotonic() - self._saved > SAVE_SECONDS:
-            # Where nothing can be noted, as beside setups that may only be read, the work goes on all the same.
+            # Where nothing can be noted, as beside setups that may only be read, the work goes on
+            # all the same.
             with suppress(OsimliteError):
                 self.save()
 
@@ -269,7 +277,9 @@ class _Journal:
         """Write it, if there is anything to write."""
         self._saved = time.monotonic()
         if self._is_kept and self.noted and self.path.parent.is_dir():
-            lines = (json.dumps({**vars(trial), "was_done": False}) for trial in self.noted.values())
+            lines = (
+                json.dumps({**vars(trial), "was_done": False}) for trial in self.noted.values()
+            )
             write_into(self.path.parent, self.path.name, "".join(f"{line}\n" for line in lines))
 
     def end(self, trials: Sequence[Trial]) -> None:
@@ -333,7 +343,9 @@ class _Work:
                 moved = True
                 self._given.add(setup)
                 needed = [str(one) for one in self.needs[setup]]
-                broken = [one for one in needed if self.trials[Path(one)].status in (FAILED, WAITED)]
+                broken = [
+                    one for one in needed if self.trials[Path(one)].status in (FAILED, WAITED)
+                ]
                 if broken:
                     message = f"it needs what {listed(broken)} should have made"
                     self.note(Trial(str(setup), WAITED, message=message))
@@ -358,7 +370,10 @@ class _Work:
             try:
                 with processes(do, workers=workers, cluster=cluster) as pool:
                     while len(self.trials) < len(self.setups):
-                        while len(under_way) < 2 * pool.workers and (setup := next(self.ready(), None)) is not None:
+                        while (
+                            len(under_way) < 2 * pool.workers
+                            and (setup := next(self.ready(), None)) is not None
+                        ):
                             under_way.append(setup)
                             pool.submit(setup, setup)
                         if not under_way:
@@ -375,7 +390,11 @@ class _Work:
                         pool.submit(setup, setup)
                         self.note(pool.result()[1])
                 except WorkerLostError:
-                    self.note(Trial(str(setup), FAILED, message="the process that ran it has ended, twice"))
+                    self.note(
+                        Trial(
+                            str(setup), FAILED, message="the process that ran it has ended, twice"
+                        )
+                    )
 
 
 def _needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
@@ -388,11 +407,15 @@ def _needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
     for setup in setups:
         if type(top_at(str(setup))).__name__ not in tools:
             continue
-        makers.update((os.path.realpath(name), setup) for name in named_files(str(setup), "output-file"))
+        makers.update(
+            (os.path.realpath(name), setup) for name in named_files(str(setup), "output-file")
+        )
     needs: dict[Path, list[Path]] = {}
     for setup in setups:
         names = {os.path.realpath(name) for name in named_files(str(setup), "file")}
-        needs[setup] = list({makers[name]: None for name in sorted(names & makers.keys()) if makers[name] != setup})
+        needs[setup] = list(
+            {makers[name]: None for name in sorted(names & makers.keys()) if makers[name] != setup}
+        )
     # What goes round in a circle is run in the order that was given.
     done: set[Path] = set()
     while len(done) < len(setups):

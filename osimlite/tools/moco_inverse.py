@@ -13,8 +13,12 @@ def run(job: Job, outcome: Outcome) -> None:
     from osimlite.optimal.inverse import problem_of_inverse, solved_inverse
 
     if job.setup.output_paths:
-        raise job.unable("output_paths is given, and outputs of the solution are not computed here; leave it empty")
+        raise job.unable(
+            "output_paths is given, and outputs of the solution are not computed here; leave it empty"
+        )
     problem = problem_of_inverse(job.setup, job.file)
     solution = solved_inverse(problem, telling(outcome), job.refine)
-    outcome.new_table(job.result(f"{job.setup.name or 'MocoInverse'}_solution.sto"), solution.trajectory.table())
+    outcome.new_table(
+        job.result(f"{job.setup.name or 'MocoInverse'}_solution.sto"), solution.trajectory.table()
+    )
     report(job, problem, solution, outcome)

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 def run(job: Job, outcome: Outcome) -> None:
     """Solve the problem, and write the solution, whether ``write_solution`` asks for it or not.
 
-    A motion that goes on as a MocoPeriodicityGoal says is written with what follows it, too, as a stride.
+    A motion that goes on as a MocoPeriodicityGoal says is written with what follows it, too, as a
+    stride.
     """
     # CasADi is loaded with it.
     from osimlite.optimal.problem import Problem
@@ -57,7 +58,10 @@ def report(job: Job, problem: Problem, solution: MocoSolution, outcome: Outcome)
         "duration": solution.duration,
         "rounds": [each._asdict() for each in solution.rounds],
     }
-    outcome.tell("status", f"{solution.status} after {solution.iterations} iterations in {solution.duration:.3g} s")
+    outcome.tell(
+        "status",
+        f"{solution.status} after {solution.iterations} iterations in {solution.duration:.3g} s",
+    )
     for each in solution.rounds:
         outcome.tell("mesh", str(each))
     for goal, value in solution.terms.items():
@@ -91,6 +95,10 @@ def _evidence(job: Job, problem: Problem, solution: MocoSolution) -> Evidence:
         trajectory.times,
         values,
         speeds=speeds,
-        states={name: columns[name] for name in trajectory.names["states"] if name.endswith("/activation")},
+        states={
+            name: columns[name]
+            for name in trajectory.names["states"]
+            if name.endswith("/activation")
+        },
         controls=trajectory.table("controls"),
     )

@@ -47,9 +47,13 @@ class Motion:
     simulation: Simulation  # that computes its forces and accelerations
     times: Array  # (t,), s
     states: Array  # (t, y), in the order of the simulation's engine
-    steps: Sequence[Moment] = ()  # the start and the ends of all steps, if the motion was integrated
-    record: Callable[[], Record] | None = None  # gives what was measured, of which the motion is a part
-    # By path of each muscle without an equilibrium at some times: whether it has none (t,). Its states are NaN then.
+    # the start and the ends of all steps, if the motion was integrated
+    steps: Sequence[Moment] = ()
+    record: Callable[[], Record] | None = (
+        None  # gives what was measured, of which the motion is a part
+    )
+    # By path of each muscle without an equilibrium at some times: whether it has none (t,). Its
+    # states are NaN then.
     unbalanced: Mapping[str, BoolArray] = field(default_factory=dict)
     # Makes the simulation of another version of the model; needed if some muscles are unbalanced.
     simulate: Callable[[Model], Simulation] | None = None
@@ -87,8 +91,12 @@ class Motion:
         Args:
             rows: whether each time is among them (t,).
         """
-        unbalanced = {path: missing[rows] for path, missing in self.unbalanced.items() if missing[rows].any()}
-        return replace(self, times=self.times[rows], states=self.states[rows], unbalanced=unbalanced)
+        unbalanced = {
+            path: missing[rows] for path, missing in self.unbalanced.items() if missing[rows].any()
+        }
+        return replace(
+            self, times=self.times[rows], states=self.states[rows], unbalanced=unbalanced
+        )
 
     @cached_property
     def balanced(self) -> BoolArray:
@@ -120,7 +128,9 @@ class Motion:
         # The states of what is off count for nothing, but must be numbers.
         states = np.nan_to_num(part.states)
         simulation = self.simulate(model)
-        return replace(part, model=model, simulation=simulation, states=states, unbalanced={}, left_out=muscles)
+        return replace(
+            part, model=model, simulation=simulation, states=states, unbalanced={}, left_out=muscles
+        )
 
     def compute_balanced(self, compute: Callable[[Motion], Array]) -> Array:
         """Return rows (t, ...) of what needs the forces of all muscles; NaN where one lacks an equilibrium.
@@ -171,12 +181,17 @@ class Motion:
         """All states (t,) by their paths, in OpenSim's order."""
         columns = self.simulation.state.auxiliary_histories(self.states)
         for index, info in enumerate(self.mechanism.coordinates):
-            columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = self.values[:, index], self.speeds[:, index]
+            columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = (
+                self.values[:, index],
+                self.speeds[:, index],
+            )
         return {path: columns[path] for path in self.simulation.paths}
 
     def looked(self, places: Sequence[int], stage: int = STAGE.FORCE) -> Array:
         """What the kernels find at every time (t, m), NaN where a muscle lacks an equilibrium; see `System.looked`."""
-        return self.compute_balanced(lambda motion: motion.system.looked(motion.table, places, stage))
+        return self.compute_balanced(
+            lambda motion: motion.system.looked(motion.table, places, stage)
+        )
 
     def known(self, paths: Sequence[str], *names: str) -> dict[str, Array]:
         """What is known of force elements of some paths at every time (t, m), by the names of their kinds.
@@ -298,7 +313,9 @@ class Tables:
         if self.note and np.isnan(rows).any():
             description = f"\n{self.note}{description}"
         table = StoTable(title, self.times, tuple(columns), rows, in_degrees)
-        self.outcome.table(self._path(f"{of}_{suffix}"), table, description, self.job.setup.output_precision)
+        self.outcome.table(
+            self._path(f"{of}_{suffix}"), table, description, self.job.setup.output_precision
+        )
 
     def add_newer(self, suffix: str, columns: Sequence[str], rows: Array, kind: str) -> None:
         """Have a table written in the newer form of OpenSim's storage files, which is not named after the analysis.

@@ -23,12 +23,27 @@ from osimlite.schema.old_muscles import (
 )
 from osimlite.simulation.elements.muscle import SPRING
 
-KNOWN = ("tension", "fiber_length", "cos_pennation", "active_fiber_force", "passive_fiber_force", "length", "rate",
-         "fiber_velocity")  # fmt: skip
+KNOWN = (
+    "tension",
+    "fiber_length",
+    "cos_pennation",
+    "active_fiber_force",
+    "passive_fiber_force",
+    "length",
+    "rate",
+    "fiber_velocity",
+)
 """What all laws record, and is needed here."""
 
-OF_DYNAMICS = ("FiberVelocity", "NormFiberVelocity", "PennationAngularVelocity", "FiberActivePower",
-               "FiberPassivePower", "TendonPower", "MuscleActuatorPower")  # fmt: skip
+OF_DYNAMICS = (
+    "FiberVelocity",
+    "NormFiberVelocity",
+    "PennationAngularVelocity",
+    "FiberActivePower",
+    "FiberPassivePower",
+    "TendonPower",
+    "MuscleActuatorPower",
+)
 """Tables without numbers for a model without mass, whose dynamics OpenSim does not compute."""
 
 Tables = dict[str, Array]
@@ -43,7 +58,11 @@ def quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> Tables:
         muscles: m of them.
     """
     length, cos, speed = known["fiber_length"], known["cos_pennation"], known["fiber_velocity"]
-    active, passive, tension = known["active_fiber_force"], known["passive_fiber_force"], known["tension"]
+    active, passive, tension = (
+        known["active_fiber_force"],
+        known["passive_fiber_force"],
+        known["tension"],
+    )
     # OpenSim counts the power of damping, which is part of the passive force, to the active power.
     spring = known.get(SPRING, passive)
     optimal = np.array([muscle.optimal_fiber_length for muscle in muscles])
@@ -92,17 +111,26 @@ def _still(found: Tables, is_rigid: Sequence[bool]) -> Tables:
 
 def _accelerated(found: Tables, muscles: Sequence[Any]) -> Tables:
     """What damps the fibers is part of their force, and the power of the mass at their end of the passive one."""
-    damping = [muscle.fiber_damping * muscle.max_isometric_force / muscle.optimal_fiber_length for muscle in muscles]
+    damping = [
+        muscle.fiber_damping * muscle.max_isometric_force / muscle.optimal_fiber_length
+        for muscle in muscles
+    ]
     damped = found["FiberVelocity"] * np.array(damping)
     along = found["MuscleActuatorPower"] - found["TendonPower"]
-    return {"FiberForce": found["FiberForce"] + damped, "FiberPassivePower": along - found["FiberActivePower"]}
+    return {
+        "FiberForce": found["FiberForce"] + damped,
+        "FiberPassivePower": along - found["FiberActivePower"],
+    }
 
 
 def _degroote(found: Tables, muscles: Sequence[Any]) -> Tables:
     """Fibers that point the other way have the angle of those that do not, which turns as if they did."""
     angle = np.minimum(found["PennationAngle"], np.pi - found["PennationAngle"])
     modes = [getattr(muscle, "tendon_compliance_dynamics_mode", "implicit") for muscle in muscles]
-    rigid = [muscle.ignore_tendon_compliance or mode == "implicit" for muscle, mode in zip(muscles, modes, strict=True)]
+    rigid = [
+        muscle.ignore_tendon_compliance or mode == "implicit"
+        for muscle, mode in zip(muscles, modes, strict=True)
+    ]
     return {"PennationAngle": angle} | _still(found, rigid)
 
 
@@ -110,13 +138,23 @@ def _rigid(found: Tables, muscles: Sequence[Any]) -> Tables:
     """The tendon has its slack length, also where the path is shorter."""
     slack = np.array([muscle.tendon_slack_length for muscle in muscles])
     nothing = np.zeros_like(found["Length"])
-    return {"TendonLength": nothing + slack, "TendonPower": nothing, "PennationAngularVelocity": nothing + np.nan}
+    return {
+        "TendonLength": nothing + slack,
+        "TendonPower": nothing,
+        "PennationAngularVelocity": nothing + np.nan,
+    }
 
 
 def _old(found: Tables, muscles: Sequence[Any]) -> Tables:
     """Nobody computes these."""
-    names = ("FiberForce", "PennationAngularVelocity", "FiberActivePower", "FiberPassivePower", "TendonPower",
-             "MuscleActuatorPower")  # fmt: skip
+    names = (
+        "FiberForce",
+        "PennationAngularVelocity",
+        "FiberActivePower",
+        "FiberPassivePower",
+        "TendonPower",
+        "MuscleActuatorPower",
+    )
     return dict.fromkeys(names, np.full_like(found["Length"], np.nan))
 
 

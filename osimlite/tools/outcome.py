@@ -27,7 +27,9 @@ DYNAMICS = "Inverse Dynamics Generalized Forces"
 
 
 def _endless(what: str, time: float) -> SimulationError:
-    return SimulationError(f"{what} at {time:g} s; look for a number in the data that is far too large")
+    return SimulationError(
+        f"{what} at {time:g} s; look for a number in the data that is far too large"
+    )
 
 
 @dataclass(eq=False)
@@ -36,17 +38,23 @@ class Outcome:
 
     tables: dict[str, StoTable] = field(default_factory=dict)  # by the names of their files
     summary: dict[str, Any] = field(default_factory=dict)  # numbers that say how it went
-    told: list[tuple[str, str]] = field(default_factory=list)  # the same in words: a name, and what is said of it
+    # the same in words: a name, and what is said of it
+    told: list[tuple[str, str]] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)  # those that were written
-    # what the check of the setup and of what it names found beside errors; what has a suggestion first
+    # what the check of the setup and of what it names found beside errors; what has a suggestion
+    # first
     warnings: list[Finding] = field(default_factory=list)
     evidence: Evidence | None = None  # what a report shows besides
     title: str = ""  # of a report of this alone, in the place of its folder's name
-    progress: Callable[[str], None] | None = None  # is told, line by line, how far a long search has come
-    done: bool = True  # whether the tool did what it was asked for; what it found is written all the same
+    # is told, line by line, how far a long search has come
+    progress: Callable[[str], None] | None = None
+    # whether the tool did what it was asked for; what it found is written all the same
+    done: bool = True
     _texts: dict[Path, Iterable[str]] = field(default_factory=dict)
 
-    def table(self, path: Path, table: StoTable, description: str = "", precision: int = PRECISION) -> None:
+    def table(
+        self, path: Path, table: StoTable, description: str = "", precision: int = PRECISION
+    ) -> None:
         """Have a table written as OpenSim prints it.
 
         Args:
@@ -59,7 +67,9 @@ class Outcome:
             SettingError: they are more than any number has.
         """
         if precision > MOST_DIGITS:
-            raise SettingError(f"output_precision is {precision}; give the digits behind the point, {PRECISION} or 16")
+            raise SettingError(
+                f"output_precision is {precision}; give the digits behind the point, {PRECISION} or 16"
+            )
         if (missing := self._note_missing(path, table)) and "NaN" not in description:
             description = f"{description}\n{missing}" if description else f"\n{missing}\n"
         self.tables[path.name] = replace(table, file=str(path))
@@ -67,7 +77,9 @@ class Outcome:
 
     def new_table(self, path: Path, table: StoTable) -> None:
         """Have a table written in the newer form of OpenSim's storage files, with its own header."""
-        if (missing := self._note_missing(path, table)) and "NaN" not in "".join(map(str, table.header.values())):
+        if (missing := self._note_missing(path, table)) and "NaN" not in "".join(
+            map(str, table.header.values())
+        ):
             table = replace(table, header={**table.header, "missing": missing})
         self.tables[path.name] = replace(table, file=str(path))
         self._texts[path] = adapter_lines(table)
@@ -104,16 +116,24 @@ class Outcome:
         motion = self.evidence
         if motion is not None and not np.isfinite(motion.values).all():
             row, place = np.argwhere(~np.isfinite(motion.values))[0]
-            raise _endless(f"'{motion.coordinates[place]}' is {motion.values[row, place]}", motion.times[row])
+            raise _endless(
+                f"'{motion.coordinates[place]}' is {motion.values[row, place]}", motion.times[row]
+            )
         for table in self.tables.values():
             odd = ~np.isfinite(table.rows) if table.name == DYNAMICS else np.isinf(table.rows)
             if odd.any():
                 row, place = np.argwhere(odd)[0]
-                raise _endless(f"'{table.columns[place]}' is {table.rows[row, place]}", table.times[row])
+                raise _endless(
+                    f"'{table.columns[place]}' is {table.rows[row, place]}", table.times[row]
+                )
 
     def _require_inputs_kept(self, setup: Path) -> None:
         """Refuse to write over what the results come from. A model may take the place of the one it was made of."""
-        kept = [path for path in self._texts if path.name in self.tables or path.suffix.lower() != ".osim"]
+        kept = [
+            path
+            for path in self._texts
+            if path.name in self.tables or path.suffix.lower() != ".osim"
+        ]
         for path in inputs_among(kept, setup):
             message = f"a result would replace '{path}', which it is computed from; give it another name or place"
             raise DocumentError(message, file=str(setup))
@@ -125,9 +145,8 @@ class Outcome:
             setup: that all comes from.
             writer: decides which files may be written.
 
-        Raises:
-            OsimliteError: a file cannot be written or is one of the setup's own, or results are no numbers any more;
-                then nothing is written.
+        Raises: OsimliteError: a file cannot be written or is one of the setup's own, or results are
+            no numbers any more; then nothing is written.
         """
         self._require_numbers()
         self._require_inputs_kept(setup)
@@ -135,7 +154,8 @@ class Outcome:
             # All names are checked before the first folder is made.
             for path in self._texts:
                 writer.resolve(path)
-            # They are put in their places in the end, the last first: of one place the last one stays.
+            # They are put in their places in the end, the last first: of one place the last one
+            # stays.
             for path, lines in reversed(self._texts.items()):
                 all_or_none.enter_context(writer.written(path, lines))
         self.files += self._texts

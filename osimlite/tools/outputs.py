@@ -1,7 +1,7 @@
 """Outputs of components along a motion, as OpenSim defines them: one function for each, by class and name.
 
-A number, a vector or a spatial vector (angular part first) for each time: (t, 1), (t, 3) or (t, 6), along the axes of
-ground.
+A number, a vector or a spatial vector (angular part first) for each time: (t, 1), (t, 3) or (t, 6),
+along the axes of ground.
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ def reader_of(motion: Motion, component: Component, name: str) -> Reader | None:
         if found is not None:
             return found
     path = motion.model.tree().path_of(component) or ""
-    known = name not in LAWS or (isinstance(component, Muscle) and motion.system.knows(path, LAWS[name]))
+    known = name not in LAWS or (
+        isinstance(component, Muscle) and motion.system.knows(path, LAWS[name])
+    )
     known &= name not in OTHERWISE.get(type(component), ())
     if isinstance(component, Muscle) and type(component) in CHECKED and name in MUSCLES and known:
         return lambda motion, muscle, path: _of_muscle(motion, muscle, path, MUSCLES[name])
@@ -94,7 +96,9 @@ def _momentum(about_origin: bool, part: slice) -> Reader:
         mass = motion.mechanism.bodies[place].mass_properties
         rotation, origin = motion.links.placed(place, np.eye(4))
         center, velocity, _ = motion.links.point(place, mass.center)
-        spin = rotation @ (mass.inertia @ (rotation.transpose(0, 2, 1) @ motion.links.turning(place)[0][..., None]))
+        spin = rotation @ (
+            mass.inertia @ (rotation.transpose(0, 2, 1) @ motion.links.turning(place)[0][..., None])
+        )
         angular, linear = spin[..., 0], mass.mass * velocity
         if about_origin:
             angular = angular + np.cross(center - origin, linear)
@@ -127,7 +131,10 @@ def _com_acceleration(mechanism: Any, q: Array, u: Array, udot: Array) -> Array:
     for index, body in enumerate(mechanism.bodies):
         arm = state.rotations[index] @ body.mass_properties.center
         w, own = state.velocities[index][:3], accelerations[index]
-        rows.append(body.mass_properties.mass * (own[3:] + np.cross(own[:3], arm) + np.cross(w, np.cross(w, arm))))
+        rows.append(
+            body.mass_properties.mass
+            * (own[3:] + np.cross(own[:3], arm) + np.cross(w, np.cross(w, arm)))
+        )
     return np.asarray(np.sum(rows, axis=0) / (mechanism.total_mass or 1.0))
 
 
@@ -145,7 +152,9 @@ SYSTEM: dict[str, Callable[..., Any]] = {
 def _potential_energy(motion: Motion, model: Model, path: str) -> Array:
     """Of gravity and of all forces."""
     return motion.compute_balanced(
-        lambda part: np.array([sum(part.system.energies(t, y)[1:]) for t, y in part.moments]).reshape(-1, 1)
+        lambda part: np.array(
+            [sum(part.system.energies(t, y)[1:]) for t, y in part.moments]
+        ).reshape(-1, 1)
     )
 
 
@@ -203,18 +212,29 @@ def _reaction(side: str) -> Reader:
 def _joint_power(motion: Motion, joint: Joint, path: str) -> Array:
     """That of what prescribes coordinates."""
     tree = motion.model.tree()
-    if any(info.prescribed is not None and info.path.startswith(f"{path}/") for info in motion.mechanism.coordinates):
-        raise UnsupportedError(f"the power of '{tree.path_of(joint)}', which has prescribed coordinates, is not known")
+    if any(
+        info.prescribed is not None and info.path.startswith(f"{path}/")
+        for info in motion.mechanism.coordinates
+    ):
+        raise UnsupportedError(
+            f"the power of '{tree.path_of(joint)}', which has prescribed coordinates, is not known"
+        )
     return np.zeros((len(motion.times), 1))
 
 
-def _of_muscle(motion: Motion, muscle: Any, path: str, of: Callable[[dict[str, Array]], Array]) -> Array:
+def _of_muscle(
+    motion: Motion, muscle: Any, path: str, of: Callable[[dict[str, Array]], Array]
+) -> Array:
     """What is made of the tables of MuscleAnalysis, and of what the law records."""
     extra = [name for name in dict.fromkeys(LAWS.values()) if motion.system.knows(path, name)]
     known = motion.known([path], *KNOWN, *extra)
     with np.errstate(invalid="ignore", divide="ignore"):
         found = known | quantities(known, [muscle])
-        turning = found["FiberLength"] * np.sin(found["PennationAngle"]) * found["PennationAngularVelocity"]
+        turning = (
+            found["FiberLength"]
+            * np.sin(found["PennationAngle"])
+            * found["PennationAngularVelocity"]
+        )
         found["along"] = found["FiberVelocity"] * np.cos(found["PennationAngle"]) - turning
         found["slack"] = np.full_like(found["along"], muscle.tendon_slack_length)
         return of(found)

@@ -17,9 +17,9 @@ MAX_ENTRIES = 1_000_000
 def find_files(pattern: str) -> list[str]:
     """Return the files that match a pattern, sorted, each once.
 
-    ``*``, ``?`` and ``[...]`` match within a name, ``**`` any number of folders. Names that begin with
-    a dot match only where the pattern has the dot. Links to folders are followed, but every folder is
-    visited once: two links to ``.`` would otherwise have 2^40 paths below them.
+    ``*``, ``?`` and ``[...]`` match within a name, ``**`` any number of folders. Names that begin
+    with a dot match only where the pattern has the dot. Links to folders are followed, but every
+    folder is visited once: two links to ``.`` would otherwise have 2^40 paths below them.
 
     Raises:
         OsimliteError: the pattern looks at more than `MAX_ENTRIES` entries.

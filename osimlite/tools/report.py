@@ -76,7 +76,11 @@ class Trial(NamedTuple):
     @property
     def steps(self) -> dict[str, Steps]:
         """By the loads of any of its setups."""
-        result = (quietly_steps(outcome.evidence) for outcome in self.outcomes if outcome.evidence is not None)
+        result = (
+            quietly_steps(outcome.evidence)
+            for outcome in self.outcomes
+            if outcome.evidence is not None
+        )
         return next((steps for steps in result if steps), {})
 
 
@@ -92,9 +96,9 @@ class _Line(NamedTuple):
 def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
     """Write a report of what runs gave, as one page (HTML) that needs nothing else.
 
-    Setups of one folder are one trial, which has its name (a study of Moco alone has its own); several trials, and the
-    left and right side, are drawn over each other. With measured loads curves go over the gait cycle, from each strike
-    of a foot to its next.
+    Setups of one folder are one trial, which has its name (a study of Moco alone has its own);
+    several trials, and the left and right side, are drawn over each other. With measured loads
+    curves go over the gait cycle, from each strike of a foot to its next.
 
     Args:
         outcomes: of the runs by their setups.
@@ -132,7 +136,10 @@ def collect_trials(outcomes: Mapping[str | Path, Outcome]) -> list[Trial]:
 def _parts(trials: Sequence[Trial]) -> Iterator[str]:
     for trial in trials:
         rows = [(name, words) for outcome in trial.outcomes for name, words in outcome.told]
-        facts = "".join(f"<tr><th>{html.escape(name)}</th><td>{html.escape(words)}</td></tr>" for name, words in rows)
+        facts = "".join(
+            f"<tr><th>{html.escape(name)}</th><td>{html.escape(words)}</td></tr>"
+            for name, words in rows
+        )
         heading = f"<h2>{html.escape(trial.name)}</h2>" if len(trials) > 1 else ""
         yield f"{heading}<table>{facts}</table>"
         if trial.evidence is not None:
@@ -190,16 +197,26 @@ def _viewer(evidence: Evidence) -> str:
     return f'<iframe srcdoc="{html.escape(page)}" title="the motion"></iframe><p class="note">{note}</p>'
 
 
-def _motion(evidence: Evidence, mechanism: Mechanism, measured: MeasuredMarkers | None = None) -> Recording:
+def _motion(
+    evidence: Evidence, mechanism: Mechanism, measured: MeasuredMarkers | None = None
+) -> Recording:
     """With the forces of its contacts, if it has speeds."""
     speeds, forces = evidence.speeds, dict[str, Array]()
     if speeds is None:
         speeds = np.zeros_like(evidence.values)
     else:
         folder = evidence.file.parent
-        forces = computed_forces(evidence.model, mechanism, evidence.times, evidence.values, speeds, folder)
+        forces = computed_forces(
+            evidence.model, mechanism, evidence.times, evidence.values, speeds, folder
+        )
     return Recording(
-        evidence.times, evidence.coordinates, evidence.values, speeds, forces, evidence.states, measured=measured
+        evidence.times,
+        evidence.coordinates,
+        evidence.values,
+        speeds,
+        forces,
+        evidence.states,
+        measured=measured,
     )
 
 
@@ -215,7 +232,14 @@ def collect_angles(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
                 continue
             stem, side = side_of(name)
             panels.setdefault(f"{stem} (deg)", []).append(
-                _Line(evidence.times, np.degrees(column), side, STYLES[number % 3], trial.name, trial.steps)
+                _Line(
+                    evidence.times,
+                    np.degrees(column),
+                    side,
+                    STYLES[number % 3],
+                    trial.name,
+                    trial.steps,
+                )
             )
     return panels
 
@@ -233,7 +257,9 @@ def collect_moments(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
                         continue
                     stem, side = side_of(name)
                     unit = "N m" if kind == "moment" else "N"
-                    line = _Line(table.times, table[label], side, STYLES[number % 3], trial.name, trial.steps)
+                    line = _Line(
+                        table.times, table[label], side, STYLES[number % 3], trial.name, trial.steps
+                    )
                     panels.setdefault(f"{stem} ({unit})", []).append(line)
     return panels
 
@@ -269,7 +295,9 @@ def collect_contacts(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
         for axis, name in enumerate("xyz"):
             for side, vectors in sums.items():
                 if np.ptp(vectors[:, axis]) > 0.0:
-                    line = _Line(evidence.times, vectors[:, axis], side, STYLES[number % 3], trial.name, {})
+                    line = _Line(
+                        evidence.times, vectors[:, axis], side, STYLES[number % 3], trial.name, {}
+                    )
                     panels.setdefault(f"along {name} (N)", []).append(line)
     return panels
 
@@ -290,7 +318,11 @@ def _section(title: str, panels: Mapping[str, list[_Line]]) -> Iterator[str]:
     if not panels:
         return
     lines = [line for group in panels.values() for line in group]
-    cyclic = all(line.steps.get(side) and line.steps[side].cycles for line in lines for side in (line.side or "r",))
+    cyclic = all(
+        line.steps.get(side) and line.steps[side].cycles
+        for line in lines
+        for side in (line.side or "r",)
+    )
     columns, rows = 3, -(-len(panels) // 3)
     figure = figure_of("", (11.0, 0.4 + 2.1 * rows))
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
@@ -308,7 +340,11 @@ def _section(title: str, panels: Mapping[str, list[_Line]]) -> Iterator[str]:
             note += " What has no side goes by the right foot."
     else:
         note = "Over time"
-        note += "; vertical lines: strikes (solid) and toe-offs (dotted)." if any(line.steps for line in lines) else "."
+        note += (
+            "; vertical lines: strikes (solid) and toe-offs (dotted)."
+            if any(line.steps for line in lines)
+            else "."
+        )
     yield f'<h2>{title}</h2><p class="note">{note}</p>{_image(figure)}'
 
 
@@ -339,7 +375,11 @@ def _residuals(trial: Trial, name: str) -> Iterator[str]:
         root = _root(outcome.evidence)
         for table in _dynamics(outcome):
             kinds = {
-                unit: [label for label in table.columns if label.endswith(ending) and label[: -len(ending)] in root]
+                unit: [
+                    label
+                    for label in table.columns
+                    if label.endswith(ending) and label[: -len(ending)] in root
+                ]
                 for ending, unit in (("_force", "force (N)"), ("_moment", "moment (N m)"))
             }
             if not any(kinds.values()):
@@ -347,7 +387,13 @@ def _residuals(trial: Trial, name: str) -> Iterator[str]:
             figure = figure_of("", (11.0, 3.0))
             for panel, (unit, labels) in zip(figure.subplots(1, 2), kinds.items(), strict=True):
                 for color, label in zip(COLORS, labels, strict=False):
-                    panel.plot(table.times, table[label], color=color, lw=1.4, label=label.rpartition("_")[0])
+                    panel.plot(
+                        table.times,
+                        table[label],
+                        color=color,
+                        lw=1.4,
+                        label=label.rpartition("_")[0],
+                    )
                 panel.set_ylabel(unit)
                 panel.legend(frameon=False, fontsize=8)
                 _tidy(panel, "time (s)")
@@ -361,11 +407,20 @@ def _errors(trial: Trial, name: str) -> Iterator[str]:
         return
     if evidence.measured is not None and evidence.places is not None and evidence.markers:
         errors = 100.0 * np.linalg.norm(evidence.places - evidence.measured, axis=2)
-        figure = _errors_over(evidence.times, evidence.markers, errors, "marker", "cm", [100.0 * end for end in ADVICE])
+        figure = _errors_over(
+            evidence.times,
+            evidence.markers,
+            errors,
+            "marker",
+            "cm",
+            [100.0 * end for end in ADVICE],
+        )
         note = "Dashed: what OpenSim advises at most, 2 cm for the root mean square and 4 cm for the largest."
         yield f'<h2>Marker errors{html.escape(name)}</h2><p class="note">{note}</p>{_image(figure)}'
     if evidence.angles is not None and evidence.sensors:
-        figure = _errors_over(evidence.times, evidence.sensors, np.degrees(evidence.angles), "sensor", "deg", ())
+        figure = _errors_over(
+            evidence.times, evidence.sensors, np.degrees(evidence.angles), "sensor", "deg", ()
+        )
         note = "Angles from the measured orientations."
         yield f'<h2>Sensor errors{html.escape(name)}</h2><p class="note">{note}</p>{_image(figure)}'
 
@@ -399,13 +454,21 @@ def _errors_over(
 def _legend(figure: Any, lines: Sequence[_Line]) -> None:
     from matplotlib.lines import Line2D
 
-    sides = [Line2D([], [], color=color, label=name) for side, (color, name) in SIDES.items() if name and any(
-        line.side == side for line in lines
-    )]  # fmt: skip
+    sides = [
+        Line2D([], [], color=color, label=name)
+        for side, (color, name) in SIDES.items()
+        if name and any(line.side == side for line in lines)
+    ]
     trials = dict.fromkeys((line.label, line.style) for line in lines)
-    styles = [Line2D([], [], color="#444444", ls=ls, label=label) for label, ls in trials] if len(trials) > 1 else []
+    styles = (
+        [Line2D([], [], color="#444444", ls=ls, label=label) for label, ls in trials]
+        if len(trials) > 1
+        else []
+    )
     if sides or styles:
-        figure.legend(handles=[*sides, *styles], loc="outside upper right", ncols=6, frameon=False, fontsize=9)
+        figure.legend(
+            handles=[*sides, *styles], loc="outside upper right", ncols=6, frameon=False, fontsize=9
+        )
 
 
 def _tidy(panel: Any, label: str) -> None:
@@ -420,4 +483,6 @@ def _tidy(panel: Any, label: str) -> None:
 def _image(figure: Any) -> str:
     out = io.BytesIO()
     figure.savefig(out, format="svg")
-    return f'<img alt="" src="data:image/svg+xml;base64,{base64.b64encode(out.getvalue()).decode()}">'
+    return (
+        f'<img alt="" src="data:image/svg+xml;base64,{base64.b64encode(out.getvalue()).decode()}">'
+    )

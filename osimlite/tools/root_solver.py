@@ -1,8 +1,8 @@
 """OpenSim's RootSolver: zeros of functions that do not depend on one another, all at once.
 
-Each is bracketed, and found by inverse quadratic interpolation or bisection (R. P. Brent, Algorithms for Minimization
-without Derivatives, 1973, chapter 4). What OpenSim calls a zero is as far from one as its tolerance lets it be: so its
-steps are taken here.
+Each is bracketed, and found by inverse quadratic interpolation or bisection (R. P. Brent,
+Algorithms for Minimization without Derivatives, 1973, chapter 4). What OpenSim calls a zero is as
+far from one as its tolerance lets it be: so its steps are taken here.
 """
 
 from __future__ import annotations
@@ -51,7 +51,15 @@ def roots(function: Callable[[Array], Array], low: Array, high: Array, tolerance
 
 
 def _interpolated(
-    a: float, b: float, c: float, fa: float, fb: float, fc: float, before: float, near: float, half: float
+    a: float,
+    b: float,
+    c: float,
+    fa: float,
+    fb: float,
+    fc: float,
+    before: float,
+    near: float,
+    half: float,
 ) -> float:
     """The step to where a line or a parabola through what is known is zero, if it is short enough; else a half."""
     width = c - b
@@ -63,4 +71,6 @@ def _interpolated(
         p = t2 * (width * q * (q - t1) - (b - a) * (t1 - 1.0))
         q = (q - 1.0) * (t1 - 1.0) * (t2 - 1.0)
     p, q = (p, -q) if p > 0.0 else (-p, q)
-    return p / q if p < 0.75 * width * q - 0.5 * abs(near * q) and p < abs(0.5 * before * q) else half
+    return (
+        p / q if p < 0.75 * width * q - 0.5 * abs(near * q) and p < abs(0.5 * before * q) else half
+    )

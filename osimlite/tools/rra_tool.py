@@ -41,11 +41,15 @@ def run(job: Job, outcome: Outcome) -> None:
     outcome.summary["average_residuals"] = dict(zip(RESIDUALS, averages, strict=True))
     if words := residual_words(averages):
         outcome.tell("average residuals", words)
-    lines = "".join(f"{name} average = {value:g}\n" for name, value in zip(RESIDUALS, averages, strict=True))
+    lines = "".join(
+        f"{name} average = {value:g}\n" for name, value in zip(RESIDUALS, averages, strict=True)
+    )
     outcome.text(job.in_results(f"{setup.name}_avgResiduals.txt"), f"Average Residuals:\n\n{lines}")
 
 
-def _move_mass_center(job: Job, outcome: Outcome, model: Model, whole: Model, desired: Desired) -> None:
+def _move_mass_center(
+    job: Job, outcome: Outcome, model: Model, whole: Model, desired: Desired
+) -> None:
     """Move the mass centre of a body in two models so that the moments about the horizontal axes average to nothing.
 
     The masses that would take the vertical force away are only told, as OpenSim does.
@@ -54,7 +58,9 @@ def _move_mass_center(job: Job, outcome: Outcome, model: Model, whole: Model, de
     name = str(setup.adjusted_com_body)
     bodies = {body.name: body for body in model.components(Body)}
     if name not in bodies:
-        raise job.error(f"adjusted_com_body is '{name}', which is no body of the model{did_you_mean(name, bodies)}")
+        raise job.error(
+            f"adjusted_com_body is '{name}', which is no body of the model{did_you_mean(name, bodies)}"
+        )
     body, gravity = bodies[name], model.gravity
     weight = abs(gravity[1]) * body.mass
     if weight < 2.0**-45.5:
@@ -64,7 +70,11 @@ def _move_mass_center(job: Job, outcome: Outcome, model: Model, whole: Model, de
     dx, dz = np.clip([before[5] / weight, -before[3] / weight], -FARTHEST, FARTHEST).tolist()
     x, y, z = body.mass_center
     for each in (model, whole):
-        next(item for item in each.components(Body) if item.name == name).mass_center = (x - dx, y, z - dz)
+        next(item for item in each.components(Body) if item.name == name).mass_center = (
+            x - dx,
+            y,
+            z - dz,
+        )
     total = sum(item.mass for item in bodies.values())
     change = before[1] / gravity[1]
     outcome.summary |= {"mass_center_moved": [-dx, 0.0, -dz], "mass_change": change}
@@ -85,7 +95,10 @@ def _averages(job: Job, model: Model, desired: Desired) -> list[float]:
     given = setup.initial_time_for_com_adjustment, setup.final_time_for_com_adjustment
     own = max(setup.initial_time, desired.start), min(setup.final_time, desired.end)
     first, last = own if given == (-1.0, -1.0) else given
-    rows = [max(0, int(np.searchsorted(desired.times, time, side="right")) - 1) for time in (first, last)]
+    rows = [
+        max(0, int(np.searchsorted(desired.times, time, side="right")) - 1)
+        for time in (first, last)
+    ]
     chosen = slice(rows[0], rows[1] + 1)
     times, values, speeds = desired.times[chosen], desired.values[chosen], desired.speeds[chosen]
     (wanted,) = derivatives_of_samples(desired.times, desired.speeds, times, (1,))

@@ -51,7 +51,9 @@ class FaultySetup(DocumentError):
     def __init__(self, report: Report) -> None:
         first, *others = report.errors
         more = f"; and {counted(len(others), 'error')} more" if others else ""
-        super().__init__(f"{first.message}{more}", file=first.file, line=first.line, column=first.column)
+        super().__init__(
+            f"{first.message}{more}", file=first.file, line=first.line, column=first.column
+        )
         self.report = report
 
 
@@ -72,23 +74,20 @@ def run(
 ) -> Outcome:
     """Run the setup of a tool as OpenSim would, and write the files that it would write.
 
-    Args:
-        setup: the file.
-        output: a folder for all results, in place of where the setup puts them.
-        check: whether the setup and all that it names but the model are checked first.
-        tell: is told, before anything is computed, what is misspelt although the tool runs with it, such as a marker
-            or a sensor that is left out then, or the units of a table.
-        progress: is told, line by line, how far a long search has come.
-        refine: of optimal control, split intervals of the mesh until the error of none is above this; see
-            :func:`osimlite.moco.solve`.
-        simulates: of optimal control, whether the model is also simulated with the controls that were found, and it is
-            told how far that is from what was found.
-        overwrite: whether any file may be replaced; without it only results of the same kind are.
-        write_outside: whether the setup may name results outside of its project and the current folder.
-        substitutes: by absolute path of an input that the setup names, the path of the file that is read instead.
+    Args: setup: the file. output: a folder for all results, in place of where the setup puts them.
+        check: whether the setup and all that it names but the model are checked first. tell: is
+        told, before anything is computed, what is misspelt although the tool runs with it, such as
+        a marker or a sensor that is left out then, or the units of a table. progress: is told, line
+        by line, how far a long search has come. refine: of optimal control, split intervals of the
+        mesh until the error of none is above this; see :func:`osimlite.moco.solve`. simulates: of
+        optimal control, whether the model is also simulated with the controls that were found, and
+        it is told how far that is from what was found. overwrite: whether any file may be replaced;
+        without it only results of the same kind are. write_outside: whether the setup may name
+        results outside of its project and the current folder. substitutes: by absolute path of an
+        input that the setup names, the path of the file that is read instead.
 
-    Returns:
-        The tables that were written, as they were before they were rounded to the digits of the files, and a summary.
+    Returns: The tables that were written, as they were before they were rounded to the digits of
+        the files, and a summary.
 
     Raises:
         FaultySetup: the check found errors.
@@ -101,7 +100,9 @@ def run(
     top = read_any(file)
     tag = type(top).__name__
     if not _is_there(tag):
-        raise NotRunnable(f"setups of {tag} cannot be run; those of {listed(runnable())} can", file=str(file))
+        raise NotRunnable(
+            f"setups of {tag} cannot be run; those of {listed(runnable())} can", file=str(file)
+        )
     if refine is not None and not tag.startswith("Moco"):
         raise SettingError(f"a {tag} has no mesh to refine; leave out --refine")
     outcome = Outcome(progress=progress)
@@ -109,18 +110,24 @@ def run(
     if check:
         away: dict[str, None] = {}
         report = merged(_reports(str(file), away))
-        if errors := [e for e in report.errors if not (_is_run_by_opensim(e) or _is_about_any(e, replaced))]:
+        if errors := [
+            e for e in report.errors if not (_is_run_by_opensim(e) or _is_about_any(e, replaced))
+        ]:
             raise FaultySetup(Report(errors, report.texts))
         if away:
             outcome.tell("taken from here", f"{listed(away)}, not beside the setup")
-        outcome.warnings = sorted(report.errors + report.warnings, key=lambda found: found.suggestion is None)
+        outcome.warnings = sorted(
+            report.errors + report.warnings, key=lambda found: found.suggestion is None
+        )
         misspelt = [found for found in outcome.warnings if found.suggestion is not None]
         if tell is not None and misspelt:
             tell(Report(misspelt, report.texts))
     tool = import_module(f"{__package__}.{module_name(tag)}")
     writer = ResultWriter.for_document(file, output, overwrite=overwrite, outside=write_outside)
     try:
-        tool.run(Job(top, file, None if output is None else Path(output), refine, simulates), outcome)
+        tool.run(
+            Job(top, file, None if output is None else Path(output), refine, simulates), outcome
+        )
         outcome.write(file, writer)
     except OsimliteError as error:
         from osimlite.simulation.elements.gather import SKIP_ADVICE
@@ -187,14 +194,17 @@ def runnable() -> list[str]:
 
 def _is_there(tag: str) -> bool:
     """Whether a class is one of tools, and has a module here."""
-    of_tools = MODULES.get(tag, "").startswith(("osimlite.schema.tools.", "osimlite.schema.moco.studies"))
+    of_tools = MODULES.get(tag, "").startswith(
+        ("osimlite.schema.tools.", "osimlite.schema.moco.studies")
+    )
     return of_tools and find_spec(f"{__package__}.{module_name(tag)}") is not None
 
 
 def _reports(setup: str, away: dict[str, None]) -> Iterator[Report]:
     """Yield what is wrong with a document and with those and the tables that it names, each once, but not models.
 
-    Files that are in the current folder, and not in that of the document that names them, are noted in `away`.
+    Files that are in the current folder, and not in that of the document that names them, are noted
+    in `away`.
     """
     waiting, visited = deque([setup]), {os.path.realpath(setup)}
     while waiting:

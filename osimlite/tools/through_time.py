@@ -50,7 +50,9 @@ def analyses_of(job: Job) -> Analyses:
             tag = type(item).__name__
             name = f"{_ANALYSES}.{module_name(tag)}"
             if find_spec(name) is None:
-                raise job.unable(f"the analysis '{item.name}' is a {tag}, which cannot be computed yet")
+                raise job.unable(
+                    f"the analysis '{item.name}' is a {tag}, which cannot be computed yet"
+                )
             result.append((item, import_module(name)))
     return result
 
@@ -58,8 +60,9 @@ def analyses_of(job: Job) -> Analyses:
 def analyse(job: Job, outcome: Outcome, analyses: Analyses, motion: Motion, first: int = 0) -> None:
     """Compute analyses along the rows of a motion.
 
-    As in OpenSim, the first and the last row are always among those of an analysis, and between them those whose number
-    is a multiple of its `step_interval`; its `start_time` and `end_time` mean nothing.
+    As in OpenSim, the first and the last row are always among those of an analysis, and between
+    them those whose number is a multiple of its `step_interval`; its `start_time` and `end_time`
+    mean nothing.
 
     Args:
         job: what is done.
@@ -99,7 +102,8 @@ def told_model(job: Job) -> Model:
     for controller in setup.controller_set.objects:
         own = _from_here(job, controller.copy_deep())
         actuators = list(model.components(Actuator))
-        # Older setups name all actuators by one word, which they cannot spell out without the model.
+        # Older setups name all actuators by one word, which they cannot spell out without the
+        # model.
         functions = own.ControlFunctions.objects if isinstance(own, PrescribedController) else []
         if functions and not own.socket_actuators and len(functions) == len(actuators):
             own.socket_actuators = tuple(actuators)
@@ -146,7 +150,9 @@ def sharing_of(job: Job, model: Model, mechanism: Mechanism, **choices: Any) -> 
     )
 
 
-def constrained(recorded: RecordedMotion, speeds: Array, simulation: Simulation, model: Model) -> tuple[Array, Array]:
+def constrained(
+    recorded: RecordedMotion, speeds: Array, simulation: Simulation, model: Model
+) -> tuple[Array, Array]:
     """Values and speeds (t, n) of a motion that fulfil the constraints: the speeds those alone that are prescribed."""
     if not simulation.constraints:
         return recorded.values, speeds
@@ -175,9 +181,13 @@ class StateRows(NamedTuple):
         table = read_sto(path)
         columns = columns_of_states(table.columns, simulation.paths)
         if table.in_degrees:
-            raise job.error(f"'{path}' is in degrees, which OpenSim refuses for states; give it in radians")
+            raise job.error(
+                f"'{path}' is in degrees, which OpenSim refuses for states; give it in radians"
+            )
         if not columns or not len(table.times):
-            raise job.error(f"'{path}' has no {'rows' if columns else 'column with a state of the model'}")
+            raise job.error(
+                f"'{path}' has no {'rows' if columns else 'column with a state of the model'}"
+            )
         return cls(table, columns, tuple(path for path in simulation.paths if path not in columns))
 
     def row(self, time: float) -> int:
@@ -216,8 +226,12 @@ def tell_rows(job: Job, outcome: Outcome, motion: Motion) -> None:
     """Say how many rows there are, and keep what a report shows of them."""
     times = motion.times
     outcome.evidence = Evidence.of(
-        motion.model, job.needed("model_file"), motion.mechanism, times, motion.values,
+        motion.model,
+        job.needed("model_file"),
+        motion.mechanism,
+        times,
+        motion.values,
         loads=job.path("external_loads_file"),
-    )  # fmt: skip
+    )
     outcome.tell("rows", f"{len(times)}, from {times[0]:g} s to {times[-1]:g} s")
     outcome.summary["rows"] = len(times)

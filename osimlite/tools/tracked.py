@@ -26,7 +26,9 @@ RESIDUALS = "FX", "FY", "FZ", "MX", "MY", "MZ"
 """What OpenSim's tools take for residual forces and moments of the pelvis."""
 
 
-def track(job: Job, outcome: Outcome, model: Model, desired: Desired, window: float, exact: bool) -> Motion | None:
+def track(
+    job: Job, outcome: Outcome, model: Model, desired: Desired, window: float, exact: bool
+) -> Motion | None:
     """Have a model follow a motion, and write what OpenSim writes of it; None if it does not begin.
 
     Args:
@@ -50,7 +52,9 @@ def track(job: Job, outcome: Outcome, model: Model, desired: Desired, window: fl
     analyses = analyses_of(job)
     start, end = max(setup.initial_time, desired.start), min(setup.final_time, desired.end)
     if not start < end - window:
-        raise job.error(f"there is no window of {window:g} s from {start:g} s to {end:g} s; give a later final_time")
+        raise job.error(
+            f"there is no window of {window:g} s from {start:g} s to {end:g} s; give a later final_time"
+        )
     with simulation_of(job, model) as simulation:
         tasks = Tasks.of(job, simulation.mechanism)
         sharing = Sharing(job, model, simulation.mechanism, tasks, exact)
@@ -72,7 +76,9 @@ def track(job: Job, outcome: Outcome, model: Model, desired: Desired, window: fl
             return None
         tracker.drive_through()
         moments = list(zip(followed.times, followed.states, strict=True))
-        motion = Motion(model, simulation, np.array(followed.times), np.array(followed.states), moments)
+        motion = Motion(
+            model, simulation, np.array(followed.times), np.array(followed.states), moments
+        )
         _write(job, outcome, tracker, motion, followed)
         analyse(job, outcome, analyses, motion)
         _tell(job, outcome, motion, followed)
@@ -89,30 +95,47 @@ def _controls(job: Job, sharing: Sharing, model: Model) -> list[Control]:
 def _first_state(job: Job, simulation: Simulation, desired: Desired, start: float) -> list[float]:
     """Return the state (y,) of the desired motion at a time; fibers are where they were in the default pose.
 
-    Like OpenSim's, it need not fulfil the constraints: only the integration that begins with it projects it. The
-    controls of the first window are computed before, for the desired speeds: without an error of speeds to make up for.
+    Like OpenSim's, it need not fulfil the constraints: only the integration that begins with it
+    projects it. The controls of the first window are computed before, for the desired speeds:
+    without an error of speeds to make up for.
     """
-    in_equilibrium = isinstance(job.setup, RRATool) or job.setup.solve_for_equilibrium_for_auxiliary_states
+    in_equilibrium = (
+        isinstance(job.setup, RRATool) or job.setup.solve_for_equilibrium_for_auxiliary_states
+    )
     default = simulation.initial_state({}, {}, equilibrate=in_equilibrium)
     (wanted,) = desired.at(start)
     q, u = wanted[0], wanted[2]
     return simulation.state.pack(q.tolist(), u.tolist(), default[2 * len(simulation.state.order) :])
 
 
-def _write(job: Job, outcome: Outcome, tracker: ComputedControl, motion: Motion, followed: Followed) -> None:
+def _write(
+    job: Job, outcome: Outcome, tracker: ComputedControl, motion: Motion, followed: Followed
+) -> None:
     name, precision = job.setup.name, job.setup.output_precision
 
     def add(ending: str, table: StoTable) -> None:
         outcome.table(job.in_results(f"{name}_{ending}.sto"), table, precision=precision)
 
     paths = tuple(motion.simulation.paths)
-    add("states", StoTable(name, motion.times, paths, np.column_stack([*motion.histories.values()])))
+    add(
+        "states", StoTable(name, motion.times, paths, np.column_stack([*motion.histories.values()]))
+    )
     labels = tuple(path.rpartition("/")[2] for path in motion.simulation.forces.controls.names)
-    add("controls", StoTable("controls", motion.times, labels, motion.looked(motion.system.places_of_controls)))
+    add(
+        "controls",
+        StoTable("controls", motion.times, labels, motion.looked(motion.system.places_of_controls)),
+    )
     columns = tuple(task.name for task in tracker.tasks.tasks)
-    errors = StoTable("PositionErrors", np.array([*followed.errors]), columns, np.array([*followed.errors.values()]))
+    errors = StoTable(
+        "PositionErrors",
+        np.array([*followed.errors]),
+        columns,
+        np.array([*followed.errors.values()]),
+    )
     add("pErr", errors)
-    controls = ControlSet(name=motion.model.name, objects=[item.document() for item in tracker.controls])
+    controls = ControlSet(
+        name=motion.model.name, objects=[item.document() for item in tracker.controls]
+    )
     outcome.text(job.in_results(f"{name}_controls.xml"), to_text(controls, numbers="opensim"))
 
 
@@ -130,7 +153,9 @@ def _tell(job: Job, outcome: Outcome, motion: Motion, followed: Followed) -> Non
             worst = int(np.argmax(errors[:, chosen].max(axis=0)))
             largest = factor * float(errors[:, chosen].max())
             outcome.summary[f"worst_{what}"] = largest
-            outcome.tell(f"worst {what}", f"{largest:.3g} {unit} off, {table.columns[chosen[worst]]}")
+            outcome.tell(
+                f"worst {what}", f"{largest:.3g} {unit} off, {table.columns[chosen[worst]]}"
+            )
 
 
 def average_residuals(times: Array, columns: tuple[str, ...], rows: Array) -> list[float]:
@@ -143,7 +168,9 @@ def average_residuals(times: Array, columns: tuple[str, ...], rows: Array) -> li
 
 def residual_words(averages: list[float]) -> str:
     """Averages in words."""
-    return ", ".join(f"{name} {value:.4g}" for name, value in zip(RESIDUALS, averages, strict=True) if value)
+    return ", ".join(
+        f"{name} {value:.4g}" for name, value in zip(RESIDUALS, averages, strict=True) if value
+    )
 
 
 def model_file(job: Job, name: str) -> Path:

@@ -69,22 +69,30 @@ class Desired:
         """
         setup: RRATool | CMCTool = job.setup
         if job.path("desired_points_file") is not None:
-            raise job.unable("desired_points_file is given, and points cannot be followed yet; leave it empty")
+            raise job.unable(
+                "desired_points_file is given, and points cannot be followed yet; leave it empty"
+            )
         mechanism = simulation.mechanism
         recorded = RecordedMotion.read(mechanism, job.needed("desired_kinematics_file"))
         if recorded.missing:
-            places = [k for k, info in enumerate(mechanism.coordinates) if info.name in recorded.missing]
+            places = [
+                k for k, info in enumerate(mechanism.coordinates) if info.name in recorded.missing
+            ]
             recorded.values[:, places] = 0.0
-            outcome.tell("not in the file", f"{listed(recorded.missing)}: 0 is taken, as in OpenSim")
+            outcome.tell(
+                "not in the file", f"{listed(recorded.missing)}: 0 is taken, as in OpenSim"
+            )
         start, end = float(recorded.times[0]), float(recorded.times[-1])
         times, values = continued(recorded.times, PADDING), continued(recorded.values, PADDING)
         if setup.lowpass_cutoff_frequency >= 0.0:
             times, values = lowpassed_by_sinc(times, values, setup.lowpass_cutoff_frequency, ORDER)
         _follow_locks(outcome, mechanism, recorded, values)
         padded = replace(recorded, times=times, values=values)
-        # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints change the values.
+        # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints
+        # change the values.
         values, speeds = constrained(padded, padded.rates[0], simulation, model)
-        # OpenSim assembles every row of the desired motion at the time 0: its functions say one value for all rows.
+        # OpenSim assembles every row of the desired motion at the time 0: its functions say one
+        # value for all rows.
         for place, info in enumerate(mechanism.coordinates):
             if info.prescribed is not None:
                 values[:, place] = info.prescribed.evaluate((0.0,))[0]
@@ -116,7 +124,9 @@ class Desired:
         return np.stack([q, rates, *np.split(others, 2, axis=1)], axis=1)
 
 
-def _follow_locks(outcome: Outcome, mechanism: Mechanism, recorded: RecordedMotion, values: Array) -> None:
+def _follow_locks(
+    outcome: Outcome, mechanism: Mechanism, recorded: RecordedMotion, values: Array
+) -> None:
     """Let locks win over a desired motion, as in OpenSim; say where they differ.
 
     Args:
@@ -183,15 +193,21 @@ class Tasks:
                 raise NotRunnable(message, file=str(path))
             for tag in ("active", "weight", "kp", "kv", "ka"):
                 if not getattr(item, tag):
-                    raise job.error(f"the task '{item.name}' of '{path}' has an empty '{tag}'; give it a value")
+                    raise job.error(
+                        f"the task '{item.name}' of '{path}' has an empty '{tag}'; give it a value"
+                    )
             # As in OpenSim, `on` means nothing.
             if not item.active[0]:
                 continue
             for name in (item.name, str(item.coordinate)):
                 if name not in names:
                     near = did_you_mean(name, names)
-                    raise job.error(f"the task '{item.name}' of '{path}' follows no coordinate: '{name}'{near}")
-            weight, kp, kv, ka = (float(getattr(item, tag)[0]) for tag in ("weight", "kp", "kv", "ka"))
+                    raise job.error(
+                        f"the task '{item.name}' of '{path}' follows no coordinate: '{name}'{near}"
+                    )
+            weight, kp, kv, ka = (
+                float(getattr(item, tag)[0]) for tag in ("weight", "kp", "kv", "ka")
+            )
             own, wanted = names.index(str(item.coordinate)), names.index(item.name)
             result.append(Task(item.name, own, wanted, weight, kp, kv, ka, item.limit))
         if not result:
@@ -232,15 +248,14 @@ class Tasks:
 class Sharing:
     """Which forces of the actuators give the accelerations of the tasks.
 
-    Args:
-        job: the setup.
-        model: of it.
-        mechanism: of the model.
-        tasks: what is followed.
-        exact: whether accelerations must be met exactly, so that only the forces count; else both do, squared.
+    Args: job: the setup. model: of it. mechanism: of the model. tasks: what is followed. exact:
+        whether accelerations must be met exactly, so that only the forces count; else both do,
+        squared.
     """
 
-    def __init__(self, job: Job, model: Model, mechanism: Mechanism, tasks: Tasks, exact: bool) -> None:
+    def __init__(
+        self, job: Job, model: Model, mechanism: Mechanism, tasks: Tasks, exact: bool
+    ) -> None:
         self.tasks, self.exact, self.mechanism = tasks, exact, mechanism
         self._unit = sharing_of(job, model, mechanism, muscles="isometric")
         self._strong = sharing_of(job, model, mechanism) if exact else None
@@ -248,16 +263,25 @@ class Sharing:
         self.optimal = self._unit.optimal_forces
         if not self.optimal.all():
             lame = [name for name, force in zip(self.names, self.optimal, strict=True) if not force]
-            raise job.error(f"{listed(lame)} can have no force: the optimal force is 0; give another")
+            raise job.error(
+                f"{listed(lame)} can have no force: the optimal force is 0; give another"
+            )
 
     def accelerations(self, t: float, q: Array, u: Array) -> tuple[Array, Array, Array]:
-        """Of all coordinates: without forces of actuators (n,), by each force (n, a) and by each generalized force
-        (n, n) of 1 N or N m."""
+        """Of all coordinates: without forces of actuators (n,), by each force (n, a) and by each
+        generalized force (n, n) of 1 N or N m.
+        """
         times, values, speeds = np.array([t]), q[None], u[None]
         return self._unit.responses(times, values, speeds)
 
     def forces(
-        self, t: float, q: Array, u: Array, wanted: Array, errors: Array, bounds: tuple[Array, Array]
+        self,
+        t: float,
+        q: Array,
+        u: Array,
+        wanted: Array,
+        errors: Array,
+        bounds: tuple[Array, Array],
     ) -> tuple[Array, str]:
         """Forces (a,) within bounds that give the tasks' wanted accelerations, and what is lacking, if anything."""
         still, each, lightness = self.accelerations(t, q, u)
@@ -267,7 +291,8 @@ class Sharing:
             return self._least(t, q, u, columns, rest, lightness[np.ix_(own, own)], bounds)
         weights = np.sqrt(self.tasks.weights)
         share = math.sqrt(self.tasks.force_weight(errors))
-        # What is left of the accelerations is an unknown too, whose square is to be small as those of the others.
+        # What is left of the accelerations is an unknown too, whose square is to be small as those
+        # of the others.
         size, scale = len(own), self.optimal / max(share, LEAST_SHARE)
         given = np.hstack([weights[:, None] * columns * scale, np.eye(size)])
         free = np.full(size, np.inf)
@@ -287,7 +312,8 @@ class Sharing:
     ) -> tuple[Array, str]:
         assert self._strong is not None
         strengths = self._strong.strengths(np.array([t]), q[None], u[None])
-        # The forces of muscles whose fibers can give none count without end: they are as small as they can be.
+        # The forces of muscles whose fibers can give none count without end: they are as small as
+        # they can be.
         able = np.abs(strengths) > WEAK * np.abs(self.optimal)
         forces = np.clip(0.0, *bounds)
         # A locked coordinate has no acceleration that forces could change.
@@ -296,8 +322,9 @@ class Sharing:
         each, left = columns[counted][:, able], (rest - columns[:, ~able] @ forces[~able])[counted]
         scale = strengths[able]
         scaled = np.sort(np.array(bounds)[:, able] / scale, axis=0)
-        # Accelerations of feet and of the pelvis differ by orders of magnitude, and every force moves all of them: as
-        # equations of the generalized forces that the tasks take, the least of reserves counts, beside full muscles.
+        # Accelerations of feet and of the pelvis differ by orders of magnitude, and every force
+        # moves all of them: as equations of the generalized forces that the tasks take, the least
+        # of reserves counts, beside full muscles.
         mass = np.linalg.pinv(lightness[np.ix_(counted, counted)], RANK, hermitian=True)
         rows = np.ascontiguousarray((mass @ (each * scale)).T)
         result, _, solved = least_effort(rows[None], (mass @ left)[None], 2.0, scaled)
@@ -311,7 +338,9 @@ class Sharing:
             if counts
         ]
         off = np.abs(lacking)
-        worst = [f"{lacking[k]:.4g} at {names[k]}" for k in np.argsort(-off) if off[k] > 0.1 * off.max()]
+        worst = [
+            f"{lacking[k]:.4g} at {names[k]}" for k in np.argsort(-off) if off[k] > 0.1 * off.max()
+        ]
         return forces, listed(worst, most=3)
 
 

@@ -47,7 +47,10 @@ def collect_collisions(
             frame = None
         if frame is None or frame not in mechanism.frames:
             fidelity.add(
-                "contact-geometry", path, "a contact surface in a frame that is not fixed to a body", "left out"
+                "contact-geometry",
+                path,
+                "a contact surface in a frame that is not fixed to a body",
+                "left out",
             )
             continue
         made = _shape(geometry, path, fidelity, mesh_files)
@@ -73,13 +76,18 @@ def _shape(
     match geometry:
         case ContactSphere() if geometry.radius > 0.0:
             told(
-                "the material of a contact surface", "a collision shape without it", f"sphere of {geometry.radius:g} m"
+                "the material of a contact surface",
+                "a collision shape without it",
+                f"sphere of {geometry.radius:g} m",
             )
             return Ball(geometry.radius), here
         case ContactHalfSpace():
             here[0, 3] = SLAB[0] / 2.0
             size = " x ".join(f"{edge:g}" for edge in SLAB)
-            told("a half space, and its material", f"a collision box of {size} m whose face is its surface")
+            told(
+                "a half space, and its material",
+                f"a collision box of {size} m whose face is its surface",
+            )
             return Box(SLAB), here
         case ContactEllipsoid() if min(geometry.radii) > 0.0:
             file = mesh_files.stretched("ellipsoid", ball(), geometry.radii)

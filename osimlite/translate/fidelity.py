@@ -75,15 +75,13 @@ class Group:
 class Fidelity:
     """Everything a translation has to answer for: each component of the model is in `translated` or in a record.
 
-    What stands below a component that has a record shares its fate and may have none of its own; containers (the
-    sets) and the axes that viewers draw at a frame are not counted.
+    What stands below a component that has a record shares its fate and may have none of its own;
+    containers (the sets) and the axes that viewers draw at a frame are not counted.
 
-    Attributes:
-        model: name of the model.
-        target: the format, e.g. ``"urdf"``.
-        translated: what became of a component, by absolute path: ``"link Pelvis"``, ``"joint RHip_rz"``.
-        records: what the target cannot say.
-        renamed: the names of what a component became, by its path and by kind, where they are not its own.
+    Attributes: model: name of the model. target: the format, e.g. ``"urdf"``. translated: what
+        became of a component, by absolute path: ``"link Pelvis"``, ``"joint RHip_rz"``. records:
+        what the target cannot say. renamed: the names of what a component became, by its path and
+        by kind, where they are not its own.
     """
 
     model: str
@@ -157,5 +155,10 @@ class Fidelity:
             }
             for record in self.records
         ]
-        content = {"model": self.model, "target": self.target, "records": records, "translated": self.translated}
+        content = {
+            "model": self.model,
+            "target": self.target,
+            "records": records,
+            "translated": self.translated,
+        }
         return json_lines({**content, "renamed": self.renamed} if self.renamed else content)

@@ -27,7 +27,13 @@ def as_data(function: f.Function) -> dict[str, Any]:
         case f.Polynomial(coefficients):
             return {"type": "polynomial", "coefficients": coefficients[::-1]}
         case f.Sine(amplitude, omega, phase, offset):
-            return {"type": "sine", "amplitude": amplitude, "omega": omega, "phase": phase, "offset": offset}
+            return {
+                "type": "sine",
+                "amplitude": amplitude,
+                "omega": omega,
+                "phase": phase,
+                "offset": offset,
+            }
         case f.Step():
             return {
                 "type": "step",
@@ -35,7 +41,11 @@ def as_data(function: f.Function) -> dict[str, Any]:
                 "y": (function.start_value, function.end_value),
             }
         case f.MultivariatePolynomial(coefficients, powers):
-            return {"type": "multivariate-polynomial", "coefficients": coefficients, "powers": powers}
+            return {
+                "type": "multivariate-polynomial",
+                "coefficients": coefficients,
+                "powers": powers,
+            }
         case f.Scaled(scale, inner):
             return {"type": "scaled", "scale": scale, "function": as_data(inner)}
         case f.PiecewiseLinear(x, y):
@@ -45,7 +55,12 @@ def as_data(function: f.Function) -> dict[str, Any]:
         case EllipsoidPoint(component, radius):
             return {"type": "ellipsoid-point", "component": component, "radius": radius}
         case ArcPoint(component, length, neutral):
-            return {"type": "arc-point", "component": component, "length": length, "neutral": neutral}
+            return {
+                "type": "arc-point",
+                "component": component,
+                "length": length,
+                "neutral": neutral,
+            }
         case f.SimmSpline():
             # The first and the last point go on in straight lines.
             first, *_, last = function.pieces
@@ -63,4 +78,6 @@ def as_data(function: f.Function) -> dict[str, Any]:
                 "x": function.knots[1:].tolist(),
                 "pieces": function.pieces.tolist(),
             }
-    raise UnsupportedError(f"a function of class {type(function).__name__} cannot be written as data")
+    raise UnsupportedError(
+        f"a function of class {type(function).__name__} cannot be written as data"
+    )

@@ -1,7 +1,7 @@
 """What a robot file cannot say about coordinates, as JSON beside it: enough to compute every joint from them.
 
-The value of joint j is ``function(values of its coordinates)``, whatever the function; the frame of a body in ground is
-the frame of its link times ``frame``. docs/urdf.md tells the whole format.
+The value of joint j is ``function(values of its coordinates)``, whatever the function; the frame of
+a body in ground is the frame of its link times ``frame``. docs/urdf.md tells the whole format.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ def coordinates_json(robot: Robot, file: str) -> str:
         "joints": _joints(robot),
         "couplers": _couplers(robot),
         "bodies": [
-            {"path": path, "link": link.name, "frame": frame.tolist()} for path, (link, frame) in robot.link_of.items()
+            {"path": path, "link": link.name, "frame": frame.tolist()}
+            for path, (link, frame) in robot.link_of.items()
         ],
         "shapes": [
             {"path": shape.source, "link": link.name, "as": kind}
@@ -43,7 +44,13 @@ def coordinates_json(robot: Robot, file: str) -> str:
             if shape.source
         ],
     }
-    head = {"format": FORMAT, "version": VERSION, "model": robot.mechanism.name, "robot": robot.name, "file": file}
+    head = {
+        "format": FORMAT,
+        "version": VERSION,
+        "model": robot.mechanism.name,
+        "robot": robot.name,
+        "file": file,
+    }
     lines = [f'  "{name}": {_text(value)}' for name, value in head.items()]
     for name, items in sections.items():
         rows = ",\n".join(f"    {_text(item)}" for item in items)
@@ -88,7 +95,11 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
         if joint.function == IDENTITY:
             said["identity"] = True
         if (mimic := following.get(joint.name)) is not None:
-            said |= {"mimics": mimic.leader, "multiplier": mimic.line.slope, "offset": mimic.line.start}
+            said |= {
+                "mimics": mimic.leader,
+                "multiplier": mimic.line.slope,
+                "offset": mimic.line.start,
+            }
         result.append(said)
     return result
 

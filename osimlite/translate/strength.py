@@ -13,12 +13,17 @@ from osimlite.translate.fidelity import Fidelity
 
 
 def strength(
-    robot: Robot, model: Model, fidelity: Fidelity, *, effort: float | None = None, velocity: float | None = None
+    robot: Robot,
+    model: Model,
+    fidelity: Fidelity,
+    *,
+    effort: float | None = None,
+    velocity: float | None = None,
 ) -> Robot:
     """The same robot with limits of effort and velocity.
 
-    A joint that is a coordinate gets as its effort the sum of the greatest forces of the coordinate's actuators
-    (``optimal_force`` times the greatest control), if all are finite.
+    A joint that is a coordinate gets as its effort the sum of the greatest forces of the
+    coordinate's actuators (``optimal_force`` times the greatest control), if all are finite.
 
     Args:
         robot: made of the model.
@@ -31,10 +36,16 @@ def strength(
     places = {info.path: place for place, info in enumerate(robot.mechanism.coordinates)}
     result: dict[int, list[tuple[str, float]]] = {}
     for actuator in tree.components:
-        if not isinstance(actuator, CoordinateActuator) or not actuator.coordinate or not actuator.appliesForce:
+        if (
+            not isinstance(actuator, CoordinateActuator)
+            or not actuator.coordinate
+            or not actuator.appliesForce
+        ):
             continue
         try:
-            place = places.get(tree.path_of(tree.target(actuator, "coordinate", actuator.coordinate)) or "")
+            place = places.get(
+                tree.path_of(tree.target(actuator, "coordinate", actuator.coordinate)) or ""
+            )
         except ModelError:
             continue
         greatest = max(abs(actuator.min_control), abs(actuator.max_control))
@@ -52,7 +63,11 @@ def strength(
         for path, force in actuators:
             done = "left out, but for its greatest force, which is the joint's effort limit"
             fidelity.add(
-                "actuator", path, "an actuator of a coordinate", done, f"{force:g} {unit} of joint {joint.name}"
+                "actuator",
+                path,
+                "an actuator of a coordinate",
+                done,
+                f"{force:g} {unit} of joint {joint.name}",
             )
 
     def limited(joint: RobotJoint) -> RobotJoint:

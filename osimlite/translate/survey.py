@@ -98,9 +98,20 @@ class _Survey:
     def _gravity(self) -> None:
         units = f"{self.model.length_units} {self.model.force_units}".lower().split()
         if units not in (["meters", "n"], ["m", "n"]):
-            self.note("units", "/", "that the model's units are words for people", "numbers written as m, kg, s, rad")
+            self.note(
+                "units",
+                "/",
+                "that the model's units are words for people",
+                "numbers written as m, kg, s, rad",
+            )
         x, y, z = self.model.gravity
-        self.note("gravity", "/", "gravity", "left out: set it in your program", f"({x:g}, {y:g}, {z:g}) m/s^2")
+        self.note(
+            "gravity",
+            "/",
+            "gravity",
+            "left out: set it in your program",
+            f"({x:g}, {y:g}, {z:g}) m/s^2",
+        )
 
     def _links(self) -> None:
         carriers = {body.path: body.mobilizer.joint for body in self.robot.mechanism.bodies}
@@ -116,11 +127,21 @@ class _Survey:
                 continue
             self.fidelity.translated[path] = f"link {link.name}"
             if carriers.get(path, "/ground") not in (*self.tree.by_path, "/ground"):
-                self.note("loose-body", path, "a body without a joint", "free of ground, as in OpenSim", carriers[path])
+                self.note(
+                    "loose-body",
+                    path,
+                    "a body without a joint",
+                    "free of ground, as in OpenSim",
+                    carriers[path],
+                )
             if len(link.bodies) > 1 and path != "/ground":
-                massless = " without its mass, for it does not move" if "/ground" in link.bodies else ""
+                massless = (
+                    " without its mass, for it does not move" if "/ground" in link.bodies else ""
+                )
                 merged = f"merged into link {link.name}{massless}"
-                self.note("merged-body", path, "bodies welded together as links of their own", merged)
+                self.note(
+                    "merged-body", path, "bodies welded together as links of their own", merged
+                )
             elif path != "/ground" and link.name != path.rsplit("/", 1)[1]:
                 self._renamed(path, f"link {link.name}")
             if link.mass == 0.0 and link.name in self._moving_ends:
@@ -150,7 +171,9 @@ class _Survey:
             path = self.tree.path_of(joint) or ""
             chain = [part for part in self.robot.joints if part.source == path]
             names = " ".join(part.name for part in chain)
-            self.fidelity.translated[path] = f"joint {names}" if names else "merged into the link that carries it"
+            self.fidelity.translated[path] = (
+                f"joint {names}" if names else "merged into the link that carries it"
+            )
             between = [part.child for part in chain if part.child in massless]
             if between:
                 self.note(
@@ -171,7 +194,9 @@ class _Survey:
                 )
 
     def _coordinate(self, index: int, coordinate: Coordinate, path: str) -> None:
-        unit = "m" if self.robot.mechanism.coordinates[index].motion_type == "translational" else "rad"
+        unit = (
+            "m" if self.robot.mechanism.coordinates[index].motion_type == "translational" else "rad"
+        )
         joint = self.robot.joint_of.get(index)
         driven = [part for part in self.robot.moving if index in part.coordinates]
         if not driven:
@@ -179,12 +204,19 @@ class _Survey:
             value = f"{coordinate.default_value:g} {unit}"
             self.note("locked", path, "that a joint is locked", "a fixed joint at its value", value)
             return
-        self.fidelity.translated[path] = f"joint {driven[0].name}" if joint is None else f"joint {joint.name}"
+        self.fidelity.translated[path] = (
+            f"joint {driven[0].name}" if joint is None else f"joint {joint.name}"
+        )
         if joint is not None and joint.name != path.rsplit("/", 1)[1]:
             self._renamed(path, f"joint {joint.name}")
         self._range(coordinate, path, unit, hard=joint is not None and joint.limits is not None)
         if coordinate.locked:
-            self.note("locked", path, "that a joint is locked", "a joint that moves: hold it in your program")
+            self.note(
+                "locked",
+                path,
+                "that a joint is locked",
+                "a joint that moves: hold it in your program",
+            )
         if coordinate.prescribed and coordinate.prescribed_function is not None:
             done = "a joint that moves: drive it in your program"
             self.note("prescribed", path, "that a coordinate follows a function of time", done)
@@ -202,7 +234,9 @@ class _Survey:
             text,
         )
         if coordinate.clamped:
-            self.note("clamped", path, "that a user interface must not leave the range", "left out", text)
+            self.note(
+                "clamped", path, "that a user interface must not leave the range", "left out", text
+            )
 
     def _start(self, coordinate: Coordinate, path: str, unit: str) -> None:
         if coordinate.default_value != 0.0:
@@ -237,8 +271,12 @@ class _Survey:
 
     def _couplers(self) -> None:
         for coupler in couplers(self.robot):
-            driven = [part.name for part in self.robot.moving if coupler.dependent in part.coordinates]
-            leaders = {self._mimics[name].leader if name in self._mimics else None for name in driven}
+            driven = [
+                part.name for part in self.robot.moving if coupler.dependent in part.coordinates
+            ]
+            leaders = {
+                self._mimics[name].leader if name in self._mimics else None for name in driven
+            }
             leader = leaders.pop() if len(leaders) == 1 else None
             name = self.robot.mechanism.coordinates[coupler.dependent].name
             self.note(
@@ -257,7 +295,11 @@ class _Survey:
         mechanism = self.robot.mechanism
         for frame in self.tree.components:
             path = self.tree.path_of(frame) or ""
-            if not isinstance(frame, PhysicalFrame) or path not in mechanism.frames or path in self.fidelity.translated:
+            if (
+                not isinstance(frame, PhysicalFrame)
+                or path not in mechanism.frames
+                or path in self.fidelity.translated
+            ):
                 continue
             if isinstance(self.tree.parent_of(frame), Joint):
                 self.fidelity.translated[path] = "origins of the joint's parts"

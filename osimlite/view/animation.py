@@ -30,8 +30,9 @@ _AXES: Mapping[str, tuple[Array, Array]] = {
     "yz": (np.array((0.0, 0.0, -1.0)), np.array((0.0, 1.0, 0.0))),
     "xz": (np.array((1.0, 0.0, 0.0)), np.array((0.0, 0.0, -1.0))),
 }
-"""To the right and up in each plane. The viewer looks along their cross product, from its positive side:
-along -Z, -X (so that Z points to the left) and -Y (so that Z points down)."""
+"""To the right and up in each plane. The viewer looks along their cross product, from its positive
+side: along -Z, -X (so that Z points to the left) and -Y (so that Z points down).
+"""
 
 LONGEST_ARROW = 0.7
 """Length of the arrow of the largest force, as a part of half the picture's height."""
@@ -58,21 +59,17 @@ def animate(
 ) -> Path:
     """Draw a motion as an animated GIF.
 
-    The film shows the bodies' geometry (a stick figure for bodies without), contact surfaces, paths and markers, half
-    spaces as ground, and the contact forces as arrows; the camera follows what moves.
+    The film shows the bodies' geometry (a stick figure for bodies without), contact surfaces, paths
+    and markers, half spaces as ground, and the contact forces as arrows; the camera follows what
+    moves.
 
-    Args:
-        model: what moves.
-        trajectory: how it moves.
-        path: the file to write.
-        fps: frames per second of the film; a GIF shows at most 50.
-        speed: seconds of motion per second of film.
-        plane: the plane of the picture: ``"xy"`` looks along -Z, ``"yz"`` along -X, ``"xz"`` along -Y.
-        size: width and height in pixels.
-        folders: where the model's mesh files are looked for besides the folder of `file`.
-        file: that the model was read from, if there is one.
-        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
-        progress: called with the number of frames done and of all frames.
+    Args: model: what moves. trajectory: how it moves. path: the file to write. fps: frames per
+        second of the film; a GIF shows at most 50. speed: seconds of motion per second of film.
+        plane: the plane of the picture: ``"xy"`` looks along -Z, ``"yz"`` along -X, ``"xz"`` along
+        -Y. size: width and height in pixels. folders: where the model's mesh files are looked for
+        besides the folder of `file`. file: that the model was read from, if there is one. wrapping:
+        how paths bend around surfaces, see :class:`osimlite.simulation.Options`. progress: called
+        with the number of frames done and of all frames.
 
     Raises:
         MissingDependency: pillow is not installed.
@@ -87,7 +84,10 @@ def animate(
         raise OsimliteError("the motion has no moments; nothing can be drawn")
     image = require("PIL.Image", extra="view", purpose="an animation")
     scene = build_scene(
-        model, build_mechanism(model), MeshFolders(None if file is None else file.parent, folders), wrapping
+        model,
+        build_mechanism(model),
+        MeshFolders(None if file is None else file.parent, folders),
+        wrapping,
     )
     film = Film(scene, trajectory, fps, speed, plane)
     painter = _Painter(film, size)
@@ -114,7 +114,9 @@ def _encoded(frames: list[Any], fps: int, image: Any) -> bytes:
     out = io.BytesIO()
     # A GIF counts time in hundredths of a second.
     duration = max(2, round(100 / fps)) * 10
-    first.save(out, "GIF", save_all=True, append_images=others, duration=duration, loop=0, optimize=False)
+    first.save(
+        out, "GIF", save_all=True, append_images=others, duration=duration, loop=0, optimize=False
+    )
     return out.getvalue()
 
 
@@ -135,7 +137,8 @@ class Film:
         self.moving = moving(self.poses)
         self.pushes = Pushes.of(self.scene, motion, self.times)
         self.activity = {
-            path: np.interp(self.times, recorded, levels) for path, levels in activity(self.scene, motion).items()
+            path: np.interp(self.times, recorded, levels)
+            for path, levels in activity(self.scene, motion).items()
         }
         self.focus = self._focus()
         self.reach = self._reach()
@@ -152,7 +155,9 @@ class Film:
             return np.tile(self.poses[0].origins.mean(axis=0), (len(self.poses), 1))
         centers = np.array([body.mass_properties.center for body in self.mechanism.bodies])
         path = [
-            masses @ (np.einsum("bij,bj->bi", pose.rotations[:-1], centers) + pose.origins[:-1]) / masses.sum()
+            masses
+            @ (np.einsum("bij,bj->bi", pose.rotations[:-1], centers) + pose.origins[:-1])
+            / masses.sum()
             for pose in self.poses
         ]
         return np.array(path)
@@ -160,7 +165,8 @@ class Film:
     def _reach(self) -> Array:
         """How far (2,) from the focus things get, to the side and up or down.
 
-        Everything that moves counts, and of what stands still only what is not much larger: a walker's floor is not.
+        Everything that moves counts, and of what stands still only what is not much larger: a
+        walker's floor is not.
         """
         moving = still = np.full(2, 0.05)
         for number, focus in enumerate(self.flat(self.focus)):
@@ -183,7 +189,9 @@ class Film:
                 placed = pose.matrix(item.body, item.matrix)
                 inward = placed[:3, 0]
                 if abs(inward @ self.up) > STEEPEST * np.linalg.norm(inward):
-                    below = focus + self.up * ((placed[:3, 3] - focus) @ inward) / (inward @ self.up)
+                    below = focus + self.up * ((placed[:3, 3] - focus) @ inward) / (
+                        inward @ self.up
+                    )
                     yield False, self.flat(below[None])
 
 
@@ -195,7 +203,8 @@ class _Painter:
         self.pen = require("PIL.ImageDraw", extra="view", purpose="an animation")
         fonts = require("PIL.ImageFont", extra="view", purpose="an animation")
         self.font, self.small = (fonts.load_default(size[1] / part) for part in (26.0, 32.0))
-        # Half the width and half the height of the picture, in metres, with a margin around what moves.
+        # Half the width and half the height of the picture, in metres, with a margin around what
+        # moves.
         wide, high = (1.12 * film.reach).tolist()
         aspect = size[0] / size[1]
         self.half = max(wide, high * aspect), max(high, wide / aspect)
@@ -209,8 +218,12 @@ class _Painter:
         pushes = film.pushes.at(number, pose)
         arrows = [Arrow(point, force * self.meters_per_newton) for _, point, force in pushes]
         loaded = frozenset(push.surface for push, _, force in pushes if force.any())
-        colors = {path: activity_color(float(levels[number])) for path, levels in film.activity.items()}
-        frame = draw(film.scene, film.q[number], camera, self.size, arrows, Style(None, loaded, colors))
+        colors = {
+            path: activity_color(float(levels[number])) for path, levels in film.activity.items()
+        }
+        frame = draw(
+            film.scene, film.q[number], camera, self.size, arrows, Style(None, loaded, colors)
+        )
         self._words(self.pen.Draw(frame), number)
         return frame
 
@@ -232,7 +245,15 @@ class _Painter:
         y = 0.95 * self.size[1]
         pen.line((x, y, x + length, y), fill=color, width=max(3, round(self.size[1] / 120)))
         middle = x + 0.5 * length, y - 0.015 * self.size[1]
-        pen.text(middle, text, anchor="mb", font=self.small, fill=color, stroke_width=3, stroke_fill=to_hex(SKY))
+        pen.text(
+            middle,
+            text,
+            anchor="mb",
+            font=self.small,
+            fill=color,
+            stroke_width=3,
+            stroke_fill=to_hex(SKY),
+        )
 
 
 def to_hex(color: tuple[float, ...]) -> str:
@@ -243,4 +264,6 @@ def to_hex(color: tuple[float, ...]) -> str:
 def round_down(value: float) -> float:
     """The largest of 1, 2, 5 times a power of ten that is not above a positive value."""
     power = 10.0 ** np.floor(np.log10(value))
-    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1 + 1e-9)))
+    return float(
+        max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1 + 1e-9))
+    )

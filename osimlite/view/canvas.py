@@ -18,8 +18,8 @@ _AT_ONCE = 300_000
 class Canvas:
     """A picture of `width` times `height` pixels in one colour, to draw on.
 
-    Positions are pixels to the right and down from the upper left corner; of two points at one place, that with the
-    greater depth is nearer to the viewer.
+    Positions are pixels to the right and down from the upper left corner; of two points at one
+    place, that with the greater depth is nearer to the viewer.
     """
 
     def __init__(self, width: int, height: int, background: Array) -> None:
@@ -56,18 +56,28 @@ class Canvas:
             depths = spans.values(places[:, :, 2], which, steps)
             seen = np.flatnonzero(depths > self._depths[pixels])
             shades = spans.values(colors, which[seen], steps[seen, None])
-            parts.append((pixels[seen], depths[seen], shades, opacities[spans.triangles[which[seen]]]))
+            parts.append(
+                (pixels[seen], depths[seen], shades, opacities[spans.triangles[which[seen]]])
+            )
         if not parts:
             return
-        pixels, depths, shades, alphas = (np.concatenate(column) for column in zip(*parts, strict=True))
+        pixels, depths, shades, alphas = (
+            np.concatenate(column) for column in zip(*parts, strict=True)
+        )
         order = np.lexsort((depths, pixels))
         pixels, shades, alphas = pixels[order], shades[order], alphas[order]
-        starts = np.flatnonzero(np.append(True, np.diff(pixels) != 0)) if len(pixels) else np.zeros(0, dtype=int)
+        starts = (
+            np.flatnonzero(np.append(True, np.diff(pixels) != 0))
+            if len(pixels)
+            else np.zeros(0, dtype=int)
+        )
         ranks = np.arange(len(pixels)) - np.repeat(starts, np.diff(np.append(starts, len(pixels))))
         for rank in range(int(ranks.max(initial=-1)) + 1):
             now = ranks == rank
             alpha = alphas[now, None]
-            self._colors[pixels[now]] = (1.0 - alpha) * self._colors[pixels[now]] + alpha * shades[now]
+            self._colors[pixels[now]] = (1.0 - alpha) * self._colors[pixels[now]] + alpha * shades[
+                now
+            ]
 
     def pixels(self, fine: int = 1) -> NDArray[np.uint8]:
         """The picture (height, width, 3), every `fine` times `fine` pixels made one."""
@@ -76,7 +86,9 @@ class Canvas:
         colors = np.zeros_like(fields[:, 0, :, 0])
         for row, column in np.ndindex(fine, fine):
             colors += fields[:, row, :, column]
-        result: NDArray[np.uint8] = np.rint(255.0 / fine**2 * colors).clip(0.0, 255.0).astype(np.uint8)
+        result: NDArray[np.uint8] = (
+            np.rint(255.0 / fine**2 * colors).clip(0.0, 255.0).astype(np.uint8)
+        )
         return result
 
     def _spans(self, places: Array) -> Iterator[_Spans]:
@@ -92,7 +104,12 @@ class Canvas:
         triangles = chosen[which]
         starts, ends = self._ends(flat[triangles], _middle(rows))
         some = np.flatnonzero(starts <= ends)
-        triangles, rows, starts, lengths = triangles[some], rows[some], starts[some], (ends - starts + 1)[some]
+        triangles, rows, starts, lengths = (
+            triangles[some],
+            rows[some],
+            starts[some],
+            (ends - starts + 1)[some],
+        )
         total = np.cumsum(lengths)
         cuts = np.searchsorted(total, np.arange(_AT_ONCE, total[-1] if len(total) else 0, _AT_ONCE))
         for part in np.split(np.arange(len(rows)), cuts):
@@ -132,7 +149,9 @@ class _Spans(NamedTuple):
     def values(self, corners: Array, which: Indices, steps: Indices) -> Array:
         """What has these values (t, 3, ...) at the corners, at pixels."""
         own = corners[self.triangles]
-        first, change = (np.einsum("sc,sc...->s...", part, own) for part in (self.weights, self.changes))
+        first, change = (
+            np.einsum("sc,sc...->s...", part, own) for part in (self.weights, self.changes)
+        )
         result: Array = first[which] + change[which] * steps
         return result
 
@@ -160,5 +179,7 @@ def _weights(corners: Array, x: Array, y: Array) -> tuple[Array, Array]:
         result = np.stack((first, second, 1.0 - first - second), axis=1)
         change = np.stack(((by - cy) * size, (cy - ay) * size, (ay - by) * size), axis=1)
     # A triangle seen from its edge covers pixels without a middle.
-    clear = np.isfinite(result).all(axis=1, keepdims=True) & np.isfinite(change).all(axis=1, keepdims=True)
+    clear = np.isfinite(result).all(axis=1, keepdims=True) & np.isfinite(change).all(
+        axis=1, keepdims=True
+    )
     return np.where(clear, result, 1.0 / 3.0), np.where(clear, change, 0.0)

@@ -84,7 +84,9 @@ def build_scene(
 
 
 class _Collector:
-    def __init__(self, model: Model, mechanism: Mechanism, folders: MeshFolders, wrapping: str) -> None:
+    def __init__(
+        self, model: Model, mechanism: Mechanism, folders: MeshFolders, wrapping: str
+    ) -> None:
         self.model, self.mechanism, self.folders = model, mechanism, folders
         self.builder = ElementBuilder(model, mechanism, Path(), wrapping=wrapping)
         self.tree = self.builder.tree
@@ -106,7 +108,9 @@ class _Collector:
                 self._component(component, path)
         bare = [k for k, _ in enumerate(self.mechanism.bodies) if k not in self.drawn]
         for body, ends in sticks(self.mechanism, bare):
-            self.lines.append(Line(self.mechanism.bodies[body].path, "geometry", ends, STICK, 0.008))
+            self.lines.append(
+                Line(self.mechanism.bodies[body].path, "geometry", ends, STICK, 0.008)
+            )
         hints = self.model.model_visual_preferences.model_display_hints
         wanted: dict[Layer, bool] = {
             "geometry": True,
@@ -144,7 +148,14 @@ class _Collector:
             case Marker():
                 body, point = self.mechanism.stations[path]
                 color = self.model.model_visual_preferences.model_display_hints.marker_color
-                self._add(path, "markers", body, unit_shapes.ball(), _stretched((_MARKER_RADIUS,) * 3, point), color)
+                self._add(
+                    path,
+                    "markers",
+                    body,
+                    unit_shapes.ball(),
+                    _stretched((_MARKER_RADIUS,) * 3, point),
+                    color,
+                )
             case AbstractGeometryPath():
                 self._path(component, path)
             case Force():
@@ -164,7 +175,16 @@ class _Collector:
             self._line(path, "geometry", body, placed, ends, look.color, visible)
             return
         own, size = self._shape(shape)
-        self._add(path, "geometry", body, own, placed @ _stretched(scale) @ size, look.color, look.opacity, visible)
+        self._add(
+            path,
+            "geometry",
+            body,
+            own,
+            placed @ _stretched(scale) @ size,
+            look.color,
+            look.opacity,
+            visible,
+        )
 
     def _contact(self, surface: contact.ContactGeometry, path: str) -> None:
         body, placed = self._place(surface, "socket_frame")
@@ -189,7 +209,9 @@ class _Collector:
         own, size = self._shape(surface)
         look = surface.appearance
         visible = look.visible and look.surface_properties.representation != 0 and surface.active
-        self._add(path, "wrap", body, own, here @ size, look.color, WRAP_OPACITY * look.opacity, visible)
+        self._add(
+            path, "wrap", body, own, here @ size, look.color, WRAP_OPACITY * look.opacity, visible
+        )
 
     def _shape(self, shape: Component) -> tuple[Surface, Array]:
         """A unit shape, and what makes the shape of it (4, 4)."""
@@ -203,17 +225,26 @@ class _Collector:
             case wrapping.WrapEllipsoid():
                 return unit_shapes.ball(), _stretched(shape.dimensions)
             case geometry.Cylinder():
-                return unit_shapes.tube(), _TO_Z @ _stretched((shape.radius, shape.radius, 2.0 * shape.half_height))
+                return unit_shapes.tube(), _TO_Z @ _stretched(
+                    (shape.radius, shape.radius, 2.0 * shape.half_height)
+                )
             case contact.ContactCylinder() | wrapping.WrapCylinder():
                 length = getattr(shape, "length", _ENDLESS)
                 return unit_shapes.tube(), _stretched((shape.radius, shape.radius, length))
             case contact.ContactTorus() if shape.torus_radius > 0.0:
-                return unit_shapes.ring(shape.tube_radius / shape.torus_radius), _stretched((shape.torus_radius,) * 3)
+                return unit_shapes.ring(shape.tube_radius / shape.torus_radius), _stretched(
+                    (shape.torus_radius,) * 3
+                )
             case wrapping.WrapTorus() if shape.outer_radius > 0.0:
-                # In spite of their names: the radius of the tube, and that of the circle in its middle.
-                return unit_shapes.ring(shape.inner_radius / shape.outer_radius), _stretched((shape.outer_radius,) * 3)
+                # In spite of their names: the radius of the tube, and that of the circle in its
+                # middle.
+                return unit_shapes.ring(shape.inner_radius / shape.outer_radius), _stretched(
+                    (shape.outer_radius,) * 3
+                )
             case geometry.Mesh() | contact.ContactMesh():
-                return self._mesh(shape.mesh_file if isinstance(shape, geometry.Mesh) else shape.filename), np.eye(4)
+                return self._mesh(
+                    shape.mesh_file if isinstance(shape, geometry.Mesh) else shape.filename
+                ), np.eye(4)
             case contact.ContactHalfSpace():
                 return unit_shapes.sheet(), np.eye(4)
         raise UnsupportedError(f"is a {type(shape).__name__}, which osimlite does not draw")
@@ -222,27 +253,38 @@ class _Collector:
         owner = self.tree.parent_of(path)
         course = PATH.read(self.builder, owner)
         if not isinstance(course, Course):
-            raise UnsupportedError(f"is a {type(path).__name__}, which runs nowhere: osimlite does not draw it")
+            raise UnsupportedError(
+                f"is a {type(path).__name__}, which runs nowhere: osimlite does not draw it"
+            )
         of = (self.tree.path_of(owner) if owner is not None else None) or name
         visible = path.appearance.visible and getattr(owner, "appliesForce", True)
         result: list[Component | None] = []
         if isinstance(path, GeometryPath):
-            result = [self.tree.target(wrap, "wrap_object", wrap.wrap_object) for wrap in path.path_wrap_set.objects]
+            result = [
+                self.tree.target(wrap, "wrap_object", wrap.wrap_object)
+                for wrap in path.path_wrap_set.objects
+            ]
         wraps = tuple(self.tree.path_of(surface) or "" for surface in result if surface is not None)
         belly, tendon = _fibers(owner) if isinstance(owner, Muscle) else (0.0, 0.0)
-        self.lines.append(Line(of, "paths", course, path.appearance.color, 0.0035, visible, wraps, belly, tendon))
+        self.lines.append(
+            Line(of, "paths", course, path.appearance.color, 0.0035, visible, wraps, belly, tendon)
+        )
 
     def _force(self, force: Force, path: str) -> None:
         """The line of a force between two points, and where the force of a contact is shown."""
         match force:
             case springs.PointToPointSpring():
-                self._between(path, force, ("socket_body1", force.point1), ("socket_body2", force.point2))
+                self._between(
+                    path, force, ("socket_body1", force.point1), ("socket_body2", force.point2)
+                )
             case springs.ExpressionBasedPointToPointForce():
                 self._between(path, force, ("body1", force.point1), ("body2", force.point2))
             case actuators.PointToPointActuator():
                 self._between(path, force, ("bodyA", force.pointA), ("bodyB", force.pointB))
             case TwoFrameLinker():
-                self._between(path, force, ("socket_frame1", (0, 0, 0)), ("socket_frame2", (0, 0, 0)))
+                self._between(
+                    path, force, ("socket_frame1", (0, 0, 0)), ("socket_frame2", (0, 0, 0))
+                )
             case HuntCrossleyForce() | contact_forces.ElasticFoundationForce():
                 spec = field_specs(type(force).ContactParameters)["geometry"]
                 for parameters in force.contact_parameters.objects:
@@ -257,18 +299,26 @@ class _Collector:
         points = []
         for name, point in ends:
             body, placed = self._place(force, name)
-            points.append(LinePoint(body, placed[:3, :3] @ np.array(point, dtype=float) + placed[:3, 3]))
-        self.lines.append(Line(path, "springs", tuple(points), SPRING, 0.005, bool(force.appliesForce)))
+            points.append(
+                LinePoint(body, placed[:3, :3] @ np.array(point, dtype=float) + placed[:3, 3])
+            )
+        self.lines.append(
+            Line(path, "springs", tuple(points), SPRING, 0.005, bool(force.appliesForce))
+        )
 
     def _push(self, element: str, path: str, surface: Component | None, label: str | None) -> None:
-        if not isinstance(surface, contact.ContactGeometry) or isinstance(surface, contact.ContactHalfSpace):
+        if not isinstance(surface, contact.ContactGeometry) or isinstance(
+            surface, contact.ContactHalfSpace
+        ):
             return
         frame = self.tree.target(surface, "socket_frame", surface.socket_frame)
         body, placed = self.mechanism.placement(self.tree.path_of(frame) or "")
         base = self.mechanism.bodies[body].name if body >= 0 else "ground"
         labels = (label,) if label else (frame.name, base, surface.name)
         near = (placed @ offset(surface.location, surface.orientation))[:3, 3]
-        self.pushed.append(Pushed(element, path, body, labels, near, self.tree.path_of(surface) or ""))
+        self.pushed.append(
+            Pushed(element, path, body, labels, near, self.tree.path_of(surface) or "")
+        )
 
     # ----------------------------------------------------------------------------------------------- helpers
     @contextmanager
@@ -296,12 +346,21 @@ class _Collector:
             self.places[id(surface)] = len(self.surfaces)
             self.surfaces.append(surface)
         opacity = min(max(float(opacity), 0.0), 1.0)
-        self.items.append(Item(path, layer, body, self.places[id(surface)], matrix, color, opacity, visible))
+        self.items.append(
+            Item(path, layer, body, self.places[id(surface)], matrix, color, opacity, visible)
+        )
         if layer == "geometry" and visible:
             self.drawn.add(body)
 
     def _line(
-        self, path: str, layer: Layer, body: int, placed: Array, ends: Array, color: Color, visible: bool
+        self,
+        path: str,
+        layer: Layer,
+        body: int,
+        placed: Array,
+        ends: Array,
+        color: Color,
+        visible: bool,
     ) -> None:
         points = tuple(LinePoint(body, placed[:3, :3] @ end + placed[:3, 3]) for end in ends)
         self.lines.append(Line(path, layer, points, color, 0.003, visible))
@@ -310,7 +369,9 @@ class _Collector:
         """The mesh in a file; the same for the same file."""
         result = self.folders.find(name)
         if result is None:
-            raise ModelError(f"the mesh file {name} is in none of the folders searched; name its folder {NAMED_SO}")
+            raise ModelError(
+                f"the mesh file {name} is in none of the folders searched; name its folder {NAMED_SO}"
+            )
         if result not in self.meshes:
             self.meshes[result] = read_surface(result)
         return self.meshes[result]
@@ -333,7 +394,8 @@ class _Collector:
             width = max(1.0, WIDTH_OF_HALF_SPACE * float(np.linalg.norm(high - low)))
             for place in self.half_spaces:
                 matrix = self.items[place].matrix
-                # A little inside, so that a floor drawn at the same place is seen, and not spots of both.
+                # A little inside, so that a floor drawn at the same place is seen, and not spots of
+                # both.
                 matrix[:3, 3] += 0.002 * width * matrix[:3, 0]
                 matrix[:3, :3] *= width
         return scene

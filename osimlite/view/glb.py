@@ -1,7 +1,7 @@
 """A model, and how it moves, as one file of glTF 2.0 (.glb): for Blender, slides and pages.
 
-Every body is a node with its shapes below it; a path and the arrow of a contact force are tubes of their own. Lengths
-are in metres, Y is up, and times are those of the motion, from 0.
+Every body is a node with its shapes below it; a path and the arrow of a contact force are tubes of
+their own. Lengths are in metres, Y is up, and times are those of the motion, from 0.
 """
 
 from __future__ import annotations
@@ -45,7 +45,9 @@ def write_glb(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
     if motion is not None:
         recorded = np.asarray(motion.times, dtype=float)
         usual = round((recorded[-1] - recorded[0]) * RATE) + 1
-        times = recorded if len(recorded) <= usual else np.linspace(recorded[0], recorded[-1], usual)
+        times = (
+            recorded if len(recorded) <= usual else np.linspace(recorded[0], recorded[-1], usual)
+        )
         values = values_of(motion, scene.mechanism)
         rows = at_times(motion, values, times)
     poses = [scene.at(row) for row in rows]
@@ -91,7 +93,11 @@ def _segments(
         if line.visible and line.layer in scene.shown:
             corners = [pose.lines[index] for pose in poses]
             most = max(map(len, corners))
-            full = [result[np.minimum(np.arange(most), len(result) - 1)] for result in corners if len(result)]
+            full = [
+                result[np.minimum(np.arange(most), len(result) - 1)]
+                for result in corners
+                if len(result)
+            ]
             if len(full) == len(poses):
                 for k in range(most - 1):
                     yield line.path, line.color, line.radius, np.array(full)[:, k : k + 2]
@@ -145,7 +151,9 @@ class _Writer:
         self._moves = len(times) > 1
         self._times = self._accessor(times[:, None], bounds=True) if self._moves else 0
 
-    def _accessor(self, array: Array, kind: int = _FLOAT, *, bounds: bool = False, target: int | None = None) -> int:
+    def _accessor(
+        self, array: Array, kind: int = _FLOAT, *, bounds: bool = False, target: int | None = None
+    ) -> int:
         data = np.ascontiguousarray(array, dtype="<f4" if kind == _FLOAT else "<u4")
         view = {"buffer": 0, "byteOffset": len(self.buffer), "byteLength": data.nbytes}
         self.views.append(view if target is None else view | {"target": target})
@@ -232,10 +240,14 @@ class _Writer:
             "accessors": self.accessors,
             "bufferViews": self.views,
             "buffers": [{"byteLength": len(self.buffer)}] if self.buffer else [],
-            "animations": [{"channels": self.channels, "samplers": self.samplers}] if self.channels else [],
+            "animations": [{"channels": self.channels, "samplers": self.samplers}]
+            if self.channels
+            else [],
         }
         # glTF allows no empty lists.
-        text = json.dumps({key: part for key, part in parts.items() if part != []}, separators=(",", ":")).encode()
+        text = json.dumps(
+            {key: part for key, part in parts.items() if part != []}, separators=(",", ":")
+        ).encode()
         text += b" " * (-len(text) % 4)
         body = bytes(self.buffer) + bytes(-len(self.buffer) % 4)
         chunks = struct.pack("<I4s", len(text), b"JSON") + text

@@ -30,7 +30,8 @@ class ShowableModel(NamedTuple):
 def build_showable(model: Model) -> ShowableModel:
     """Build the mechanism of a model, or of a copy without the joints and constraints that cannot be built.
 
-    A body that loses its joint this way moves freely, as OpenSim's bodies without a joint do; it is shown at ground.
+    A body that loses its joint this way moves freely, as OpenSim's bodies without a joint do; it is
+    shown at ground.
 
     Raises:
         ModelError: no single part of the model is to blame.
@@ -56,7 +57,8 @@ def _take_out(model: Model, message: str) -> str | None:
     """Remove the first member of a set that a message names; return its path, or None if none is named."""
     tree = model.tree()
     for path in _QUOTED_PATH.findall(message):
-        # '/jointset/hip/hip_offset' is part of the joint '/jointset/hip', which is of no use without it.
+        # '/jointset/hip/hip_offset' is part of the joint '/jointset/hip', which is of no use
+        # without it.
         member = "/".join(path.split("/")[:3])
         component = tree.by_path.get(member)
         if component is not None and member.count("/") == 2 and _remove(model, component):

@@ -28,9 +28,10 @@ LONGEST = 400
 def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[str]]]:
     """The components a file has, each after the one that holds it, and the names of the properties by class.
 
-    A component has `path`, `name`, `kind`, `parent` (a place in the list, -1 for none), `values` of its properties as
-    text, and `given`: which of them are in the file or were assigned, and are no mere defaults. Where a component has
-    other properties than the first of its class, it has `tags` of its own.
+    A component has `path`, `name`, `kind`, `parent` (a place in the list, -1 for none), `values` of
+    its properties as text, and `given`: which of them are in the file or were assigned, and are no
+    mere defaults. Where a component has other properties than the first of its class, it has `tags`
+    of its own.
     """
     tree = model.tree()
     places: dict[int, int] = {}
@@ -49,7 +50,9 @@ def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[s
             "name": path.rsplit("/", 1)[1] or model.name or "model",
             "kind": kind,
             "parent": -1 if above is None else places.get(id(above), -1),
-            "values": [text if len(text) <= LONGEST else text[:LONGEST] + " …" for _, text, _ in rows],
+            "values": [
+                text if len(text) <= LONGEST else text[:LONGEST] + " …" for _, text, _ in rows
+            ],
             "given": [index for index, (_, _, given) in enumerate(rows) if given],
         }
         if tags.setdefault(kind, names) != names:
@@ -70,7 +73,11 @@ def _properties(tree: Tree, item: Object, way: str) -> Iterator[tuple[str, str, 
         if isinstance(spec.kind, Held):
             for held in value if isinstance(value, list) else [value]:
                 if isinstance(held, Object) and not isinstance(held, Component):
-                    name = f"{spec.tag}.{held.name}." if isinstance(value, list) and held.name else f"{spec.tag}."
+                    name = (
+                        f"{spec.tag}.{held.name}."
+                        if isinstance(value, list) and held.name
+                        else f"{spec.tag}."
+                    )
                     yield from _properties(tree, held, way + name)
         elif isinstance(spec.kind, Reference):
             yield way + spec.tag, _named(tree, item, spec.kind, value), given
@@ -127,7 +134,9 @@ def pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[dict[s
     return result
 
 
-def _place(tree: Tree, mechanism: Mechanism, scene: Scene, component: Component | None) -> tuple[int, Any] | None:
+def _place(
+    tree: Tree, mechanism: Mechanism, scene: Scene, component: Component | None
+) -> tuple[int, Any] | None:
     """Body and point (3,) in its frame of a component, or of the nearest above it that is anywhere."""
     while component is not None:
         path = tree.path_of(component) or ""
@@ -156,5 +165,9 @@ def _place(tree: Tree, mechanism: Mechanism, scene: Scene, component: Component 
                 return None
             return body, matrix[:3, :3] @ np.array(component.location) + matrix[:3, 3]
         above = tree.parent_of(component)
-        component = above if isinstance(component, AbstractGeometryPath) or not isinstance(above, Model) else None
+        component = (
+            above
+            if isinstance(component, AbstractGeometryPath) or not isinstance(above, Model)
+            else None
+        )
     return None

@@ -40,7 +40,11 @@ def program_data(paths: Polylines, constraints: Sequence[Constraint]) -> dict[st
     ]
     return {
         # Of each body, and ground as the last, the link, and the frame in that by rows.
-        "bodies": [*zip(program.links.tolist(), program.frames[:, :3].reshape(-1, 12).tolist(), strict=True)],
+        "bodies": [
+            *zip(
+                program.links.tolist(), program.frames[:, :3].reshape(-1, 12).tolist(), strict=True
+            )
+        ],
         "structure": text_of(s.astype("<i4")),
         "numbers": text_of(paths.numbers.astype("<f8")),
         "laws": paths.laws[1:],
@@ -65,7 +69,11 @@ def program_data(paths: Polylines, constraints: Sequence[Constraint]) -> dict[st
 def kernels_text(program: Mapping[str, Any]) -> str:
     """What the page computes with."""
     laws = [law_function(name) for name in program["laws"]]
-    others = [place, *(FOR_ARMS if program["items"] else ()), *(FOR_SPEEDS if program["bound"] else ())]
+    others = [
+        place,
+        *(FOR_ARMS if program["items"] else ()),
+        *(FOR_SPEEDS if program["bound"] else ()),
+    ]
     kernels = write_javascript(laws, others)
     return f"window.osimlite = {{ kernels: {kernels} }};\n"
 

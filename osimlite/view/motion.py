@@ -44,7 +44,8 @@ class Motion(Protocol):
 class ContactForce(NamedTuple):
     """Force (n, 3) in ground of the force element `element` on the frame `frame`, N.
 
-    `torques` (n, 3), N·m, are about the origin of the frame's body, or None if they are not on record.
+    `torques` (n, 3), N·m, are about the origin of the frame's body, or None if they are not on
+    record.
     """
 
     element: str
@@ -60,13 +61,19 @@ def contact_forces(motion: Motion) -> list[ContactForce]:
         if label.endswith(".force.X"):
             place = label.removesuffix(".force.X")
             element, _, frame = place.partition(".")
-            torques = _columns(motion, f"{place}.torque") if f"{place}.torque.X" in motion.forces else None
+            torques = (
+                _columns(motion, f"{place}.torque")
+                if f"{place}.torque.X" in motion.forces
+                else None
+            )
             result.append(ContactForce(element, frame, _columns(motion, f"{place}.force"), torques))
     return result
 
 
 def _columns(motion: Motion, label: str) -> Array:
-    return np.column_stack([np.asarray(motion.forces[f"{label}.{axis}"], dtype=float) for axis in "XYZ"])
+    return np.column_stack(
+        [np.asarray(motion.forces[f"{label}.{axis}"], dtype=float) for axis in "XYZ"]
+    )
 
 
 def activity(scene: Scene, motion: Motion) -> dict[str, Array]:
@@ -89,7 +96,10 @@ def activity_color(activation: float) -> Color:
 
 def moving(poses: Sequence[Bodies]) -> Array:
     """Which bodies (b + 1,) change place from pose to pose; all but ground if none does."""
-    rotations, origins = np.array([p.rotations for p in poses]), np.array([p.origins for p in poses])
+    rotations, origins = (
+        np.array([p.rotations for p in poses]),
+        np.array([p.origins for p in poses]),
+    )
     change = np.ptp(rotations, axis=0).max(axis=(1, 2)) + np.ptp(origins, axis=0).max(axis=1)
     result: Array = change > 1e-9
     if not result.any():

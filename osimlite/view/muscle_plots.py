@@ -26,7 +26,10 @@ _ACROSS = 4
 
 
 def plot_muscles(
-    curves: MuscleCurves, mechanism: Mechanism, folder: str | Path, other: MuscleCurves | None = None
+    curves: MuscleCurves,
+    mechanism: Mechanism,
+    folder: str | Path,
+    other: MuscleCurves | None = None,
 ) -> list[Path]:
     """Draw each quantity over the coordinates that were swept.
 
@@ -52,7 +55,13 @@ def plot_muscles(
             if len(curves.coordinates) == 2:
                 figure = _maps(curves, mechanism, rows, title)
             else:
-                figure = _lines(curves, mechanism, rows, title, None if other is None else other.columns[quantity])
+                figure = _lines(
+                    curves,
+                    mechanism,
+                    rows,
+                    title,
+                    None if other is None else other.columns[quantity],
+                )
             written.append(save(figure, base / f"{quantity}.png"))
     return written
 
@@ -71,7 +80,9 @@ def _axis(curves: MuscleCurves, mechanism: Mechanism, place: int) -> tuple[str, 
     name, values = curves.coordinates[place], curves.poses[:, place]
     info = mechanism.coordinates[mechanism.coordinate_index(name)]
     is_angle = info.motion_type == "rotational"
-    return f"{name} (deg)" if is_angle else f"{name} (m)", np.degrees(values) if is_angle else values
+    return f"{name} (deg)" if is_angle else f"{name} (m)", np.degrees(
+        values
+    ) if is_angle else values
 
 
 def _names(curves: MuscleCurves) -> list[str]:
@@ -101,7 +112,9 @@ def _maps(curves: MuscleCurves, mechanism: Mechanism, rows: Any, title: str) -> 
     for panel in panels.ravel()[len(names) :]:
         panel.set_visible(False)
     for place, (panel, name) in enumerate(zip(panels.ravel(), names, strict=False)):
-        drawn = panel.pcolormesh(xs, ys, rows[:, place].reshape(len(xs), len(ys)).T, shading="nearest", cmap="viridis")
+        drawn = panel.pcolormesh(
+            xs, ys, rows[:, place].reshape(len(xs), len(ys)).T, shading="nearest", cmap="viridis"
+        )
         figure.colorbar(drawn, ax=panel)
         panel.set_title(name, fontsize=9)
     figure.supxlabel(label)

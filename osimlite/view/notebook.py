@@ -1,8 +1,9 @@
 """What Jupyter shows of models, motions, findings, paths and sweeps: HTML, with the page of the viewer inside.
 
-The page stands in an ``<iframe>`` whose text is all there: it asks no network for anything, has no more rights than to
-run its own program, and so works in the sandboxed frames of VS Code and Colab as well. A class says which of these
-functions shows its objects, see :func:`osimlite.base.lazy.shown_in_notebooks`.
+The page stands in an ``<iframe>`` whose text is all there: it asks no network for anything, has no
+more rights than to run its own program, and so works in the sandboxed frames of VS Code and Colab
+as well. A class says which of these functions shows its objects, see
+:func:`osimlite.base.lazy.shown_in_notebooks`.
 """
 
 from __future__ import annotations
@@ -70,7 +71,9 @@ def model(item: Model) -> str:
 
 def trajectory(item: Trajectory) -> str:
     """What it is in a line, and the motion, to be played."""
-    return f"<div>{escape(repr(item))}</div>" + ("" if item.model is None else _space(item.model, item))
+    return f"<div>{escape(repr(item))}</div>" + (
+        "" if item.model is None else _space(item.model, item)
+    )
 
 
 def findings(item: Report) -> str:
@@ -89,7 +92,9 @@ def findings(item: Report) -> str:
         for finding in rows
     )
     words = f"<div>{counts} in {counted(item.checked, 'file')}</div>"
-    return words + (_table(("", "code", "place", "message", "suggestion"), cells, len(rows)) if rows else "")
+    return words + (
+        _table(("", "code", "place", "message", "suggestion"), cells, len(rows)) if rows else ""
+    )
 
 
 def paths(item: Paths) -> str:
@@ -99,11 +104,15 @@ def paths(item: Paths) -> str:
         [
             escape(name),
             f"{lengths[name]:.5g}",
-            ", ".join(f"{escape(path.rpartition('/')[2])} {arm:.4g}" for path, arm in arms[name].items()),
+            ", ".join(
+                f"{escape(path.rpartition('/')[2])} {arm:.4g}" for path, arm in arms[name].items()
+            ),
         ]
         for name in item.names
     )
-    return "<div>in the default pose</div>" + _table(("path", "length (m)", "moment arms (m)"), cells, len(lengths))
+    return "<div>in the default pose</div>" + _table(
+        ("path", "length (m)", "moment arms (m)"), cells, len(lengths)
+    )
 
 
 def muscle_curves(item: MuscleCurves) -> str:
@@ -125,7 +134,9 @@ def runs(item: Outcome) -> str:
     rows = table.slice(0, FIRST_ROWS).to_pylist()
     cells = ([_number(value) for value in row.values()] for row in rows)
     words = f"<div>{counted(table.num_rows, 'run')} in <code>{escape(str(item.path))}</code></div>"
-    return words + _table([escape(name) for name in table.column_names], cells, table.num_rows, FIRST_ROWS)
+    return words + _table(
+        [escape(name) for name in table.column_names], cells, table.num_rows, FIRST_ROWS
+    )
 
 
 def optimum(item: Optimum) -> str:
@@ -159,11 +170,17 @@ def _space(item: Model, motion: Trajectory | None = None) -> str:
     )
 
 
-def _table(headings: Sequence[str], rows: Iterable[Sequence[str]], count: int, most: int = MOST_ROWS) -> str:
+def _table(
+    headings: Sequence[str], rows: Iterable[Sequence[str]], count: int, most: int = MOST_ROWS
+) -> str:
     """A table of cells in HTML, of which the first rows are shown."""
 
     def line(tag: str, cells: Sequence[str]) -> str:
-        return "<tr>" + "".join(f"<{tag} style='text-align:left'>{cell}</{tag}>" for cell in cells) + "</tr>"
+        return (
+            "<tr>"
+            + "".join(f"<{tag} style='text-align:left'>{cell}</{tag}>" for cell in cells)
+            + "</tr>"
+        )
 
     body = "".join(line("td", row) for row in islice(rows, most))
     table = f"<table><thead>{line('th', headings)}</thead><tbody>{body}</tbody></table>"
@@ -175,4 +192,6 @@ def _left(count: int, most: int) -> str:
 
 
 def _number(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else escape("" if value is None else str(value))
+    return (
+        f"{value:.6g}" if isinstance(value, float) else escape("" if value is None else str(value))
+    )

@@ -45,7 +45,8 @@ class Story(NamedTuple):
     words: str  # what there is to see
     command: str  # that makes more of it, for a terminal
     page: str  # name of the file of this page
-    pages: Sequence[tuple[str, str]]  # titles and files of all pages that belong together, in one folder
+    # titles and files of all pages that belong together, in one folder
+    pages: Sequence[tuple[str, str]]
 
 
 def page_text(data: Mapping[str, Any]) -> str:
@@ -56,7 +57,9 @@ def page_text(data: Mapping[str, Any]) -> str:
         return web.joinpath(name).read_text(encoding="utf-8")
 
     # No "</script" may end the data early; in JSON the sign can be written by its number.
-    words = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    words = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace(
+        "<", "\\u003c"
+    )
     parts = {
         "@TITLE@": html.escape(str(data["name"]) or "osimlite"),
         "@STYLE@": read("page.css"),
@@ -64,7 +67,8 @@ def page_text(data: Mapping[str, Any]) -> str:
         "@SCRIPT@": "".join((kernels_text(data["program"]), *map(read, SCRIPTS))),
         "@DATA@": words,
     }
-    # All at once: a model may be called "@DATA@", and a part that is in place already is no template.
+    # All at once: a model may be called "@DATA@", and a part that is in place already is no
+    # template.
     return re.sub("|".join(parts), lambda match: parts[match[0]], read("page.html"))
 
 
@@ -81,14 +85,10 @@ def page_data(
 ) -> dict[str, Any]:
     """Everything the page shows, as data for JSON.
 
-    Args:
-        model: what to show.
-        scene: of that model.
-        motion: how it moves, or None.
-        findings: of the validator.
-        q: coordinate values (n,) at first.
-        server: whether a program answers the page, which then asks it for poses that fulfil the constraints.
-        story: what it tells of the motion.
+    Args: model: what to show. scene: of that model. motion: how it moves, or None. findings: of the
+        validator. q: coordinate values (n,) at first. server: whether a program answers the page,
+        which then asks it for poses that fulfil the constraints. story: what it tells of the
+        motion.
     """
     mechanism = scene.mechanism
     recorded = None if motion is None else _motion(scene, motion)
@@ -97,7 +97,11 @@ def page_data(
     tree, tags = component_tree(model)
     hints = model.model_visual_preferences.model_display_hints
     couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
-    others = [item.name for item in mechanism.constraints if not isinstance(item, Coupler | Lock | Prescribed)]
+    others = [
+        item.name
+        for item in mechanism.constraints
+        if not isinstance(item, Coupler | Lock | Prescribed)
+    ]
     data: dict[str, Any] = finite(
         {
             "name": model.name,
@@ -114,10 +118,16 @@ def page_data(
             "center": (0.5 * (low + high)).tolist(),
             "size": float(np.linalg.norm(high - low)),
             "directions": _directions(scene.up),
-            "coordinates": _coordinates(mechanism, {item.dependent for item in couplers}, q, recorded),
+            "coordinates": _coordinates(
+                mechanism, {item.dependent for item in couplers}, q, recorded
+            ),
             "q": q.tolist(),
             "bodies": [
-                {"path": body.path, "name": body.name, "center": body.mass_properties.center.tolist()}
+                {
+                    "path": body.path,
+                    "name": body.name,
+                    "center": body.mass_properties.center.tolist(),
+                }
                 for body in mechanism.bodies
             ],
             "program": program_data(scene.polylines, mechanism.constraints),
@@ -144,9 +154,18 @@ def _drawn(scene: Scene) -> dict[str, Any]:
         ],
         "lines": [
             {
-                **{name: value for name, value in vars(line).items() if name not in ("course", "wraps")},
+                **{
+                    name: value
+                    for name, value in vars(line).items()
+                    if name not in ("course", "wraps")
+                },
                 **(
-                    {"points": [{"body": point.body, "at": point.location.tolist()} for point in line.course]}
+                    {
+                        "points": [
+                            {"body": point.body, "at": point.location.tolist()}
+                            for point in line.course
+                        ]
+                    }
                     if isinstance(line.course, tuple)
                     else {"route": next(routes), "most": line.course.corners, "wraps": line.wraps}
                 ),
@@ -221,7 +240,8 @@ def _motion(scene: Scene, motion: Motion) -> dict[str, Any]:
         "measured": _measured(getattr(motion, "measured", None)),
         "forces": forces,
         "activations": {
-            path: text_of(np.rint(255.0 * level).astype(np.uint8)) for path, level in activity(scene, motion).items()
+            path: text_of(np.rint(255.0 * level).astype(np.uint8))
+            for path, level in activity(scene, motion).items()
         },
     }
 
@@ -232,7 +252,9 @@ def _measured(markers: MeasuredMarkers | None) -> dict[str, Any] | None:
         return None
     pairs = zip(markers.names, markers.stations, strict=True)
     return {
-        "markers": [{"name": name, "body": body, "at": place.tolist()} for name, (body, place) in pairs],
+        "markers": [
+            {"name": name, "body": body, "at": place.tolist()} for name, (body, place) in pairs
+        ],
         "places": text_of(markers.places.astype("<f4")),
     }
 
@@ -244,7 +266,9 @@ def _view(scene: Scene, values: Array) -> dict[str, Any]:
     moves = moving(poses)[:-1]
     middles = np.array([pose.origins[:-1][moves].mean(axis=0) for pose in poses])
     boxes = np.array([scene.box(row) for row in rows])
-    travels = np.linalg.norm(middles[-1] - middles[0]) > TRAVELS * np.linalg.norm(boxes[0, 1] - boxes[0, 0])
+    travels = np.linalg.norm(middles[-1] - middles[0]) > TRAVELS * np.linalg.norm(
+        boxes[0, 1] - boxes[0, 0]
+    )
     if travels:
         boxes -= (middles - middles[0])[:, None]
     return {
@@ -288,7 +312,12 @@ def _directions(up: Array) -> dict[str, list[float]]:
     # Straight from above, up is no direction in the picture.
     return {
         name: vector.tolist()
-        for name, vector in (("home", home), ("front", front), ("side", side), ("top", up + 1e-3 * front))
+        for name, vector in (
+            ("home", home),
+            ("front", front),
+            ("side", side),
+            ("top", up + 1e-3 * front),
+        )
     }
 
 

@@ -25,8 +25,9 @@ SKY, INK, FLOOR, EARTH, FORCE, TOUCHING = (
     (0.835, 0.369, 0.0),
     (0.969, 0.71, 0.22),
 )
-"""Colours of background, words, floor lines, what is below ground, force arrows (Okabe and Ito's vermilion), and
-loaded contact surfaces."""
+"""Colours of background, words, floor lines, what is below ground, force arrows (Okabe and Ito's
+vermilion), and loaded contact surfaces.
+"""
 
 _KEY, _FILL = (np.array(v) / np.linalg.norm(v) for v in ((-0.45, 0.75, 0.6), (0.7, 0.1, 0.7)))
 """Where light comes from, as seen by the viewer: to the right, up, towards the viewer."""
@@ -61,7 +62,9 @@ class Camera(NamedTuple):
         return np.stack((x, y, away @ self.towards), axis=-1)
 
     @classmethod
-    def around(cls, points: Array, up: Array, direction: Array, aspect: float, margin: float = 1.12) -> Camera:
+    def around(
+        cls, points: Array, up: Array, direction: Array, aspect: float, margin: float = 1.12
+    ) -> Camera:
         """The camera that sees all points (k, 3) from a direction (3,), in a picture `aspect` times as wide as high."""
         back = direction / np.linalg.norm(direction)
         right = np.cross(up, back)
@@ -117,7 +120,9 @@ def draw(
     """
     image = require("PIL.Image", extra="view", purpose="a picture")
     if min(size) < 16 or max(size) > 8000:
-        raise OsimliteError(f"a picture is 16 to 8000 pixels wide and high, not {size[0]} × {size[1]}")
+        raise OsimliteError(
+            f"a picture is 16 to 8000 pixels wide and high, not {size[0]} × {size[1]}"
+        )
     width, height = _FINE * size[0], _FINE * size[1]
     canvas = Canvas(width, height, np.array(SKY))
     heap = _Heap(camera, width, height)
@@ -133,8 +138,12 @@ def _fill(heap: _Heap, scene: Scene, bodies: Bodies, arrows: Iterable[Arrow], st
         if item.path in scene.half_spaces:
             _cut_open(heap, bodies.matrix(item.body, item.matrix))
         loaded = item.path in style.loaded
-        color, opacity = (TOUCHING, max(item.opacity, 0.75)) if loaded else (item.color, item.opacity)
-        heap.put(scene.surfaces[item.surface], bodies.matrix(item.body, item.matrix), color, opacity)
+        color, opacity = (
+            (TOUCHING, max(item.opacity, 0.75)) if loaded else (item.color, item.opacity)
+        )
+        heap.put(
+            scene.surfaces[item.surface], bodies.matrix(item.body, item.matrix), color, opacity
+        )
     for line, corners in zip(scene.lines, bodies.lines, strict=True):
         if line.visible and line.layer in scene.shown:
             color = style.colors.get(line.path, line.color)
@@ -147,13 +156,20 @@ def _fill(heap: _Heap, scene: Scene, bodies: Bodies, arrows: Iterable[Arrow], st
             placed = bodies.matrix(axes.body, axes.matrix)
             for axis in range(3):
                 end = placed[:3, 3] + axes.length * placed[:3, axis]
-                heap.put(unit_shapes.tube(8), _between(placed[:3, 3], end, 0.002), tuple(np.eye(3)[axis].tolist()))
+                heap.put(
+                    unit_shapes.tube(8),
+                    _between(placed[:3, 3], end, 0.002),
+                    tuple(np.eye(3)[axis].tolist()),
+                )
     thick = 0.012 * heap.camera.half[1]
     for arrow in arrows:
         length = float(np.linalg.norm(arrow.vector))
         if length < 2.0 * thick:
             continue
-        tip, end = arrow.point + arrow.vector, arrow.point + arrow.vector * max(0.0, 1.0 - 5.0 * thick / length)
+        tip, end = (
+            arrow.point + arrow.vector,
+            arrow.point + arrow.vector * max(0.0, 1.0 - 5.0 * thick / length),
+        )
         heap.put(unit_shapes.tube(), _between(arrow.point, end, thick), FORCE, front=True)
         head = _between(end, tip, 2.6 * thick)
         head[:3, 3] = end
@@ -188,7 +204,10 @@ def _cut_open(heap: _Heap, placed: Array) -> None:
     far = 4.0 * max(camera.half)
     start = placed[:3, 3] + along * float(along @ (camera.center - placed[:3, 3]))
     heap.put(
-        unit_shapes.tube(4), _between(start - far * along, start + far * along, 0.004 * camera.half[1]), INK, lit=False
+        unit_shapes.tube(4),
+        _between(start - far * along, start + far * along, 0.004 * camera.half[1]),
+        INK,
+        lit=False,
     )
     below = np.eye(4)
     below[:3, :3] = np.column_stack((camera.towards, far * inward, 2.0 * far * along))
@@ -229,10 +248,15 @@ class _Heap:
             lengths = np.linalg.norm(normals, axis=1, keepdims=True)
             normals = normals / np.where(lengths > 0.0, lengths, 1.0)
             normals *= np.where(normals[:, 2:] < 0.0, -1.0, 1.0)
-            light = _AMBIENT + _FROM_KEY * (normals @ _KEY).clip(0.0) + _FROM_FILL * (normals @ _FILL).clip(0.0)
+            light = (
+                _AMBIENT
+                + _FROM_KEY * (normals @ _KEY).clip(0.0)
+                + _FROM_FILL * (normals @ _FILL).clip(0.0)
+            )
             shades *= light[:, None]
         corners, colors = places[surface.triangles], shades[surface.triangles]
-        # The far side is not drawn where it is hidden, nor of what shines through unless it is all there is of a sheet.
+        # The far side is not drawn where it is hidden, nor of what shines through unless it is all
+        # there is of a sheet.
         is_hidden = surface.is_closed and np.linalg.det(matrix[:3, :3]) > 0.0
         if is_hidden or (opacity < 1.0 and len(corners) > 2):
             (ax, ay), (bx, by), (cx, cy) = (corners[:, index, :2].T for index in range(3))

@@ -32,21 +32,26 @@ MOST_ENERGIES = 400
 
 STORED = "stored in contacts, springs, muscles"
 
-_UNITS = {"fiber_length": " (m)", "fiber_velocity": " (m/s)", "stretch": " (m)", "dissipatedEnergy": " (J)"}
+_UNITS = {
+    "fiber_length": " (m)",
+    "fiber_velocity": " (m/s)",
+    "stretch": " (m)",
+    "dissipatedEnergy": " (J)",
+}
 """Of the states of forces that have one."""
 
 _NEVER_MIND = 1e-9
 """A force below this part of the largest counts as none."""
 
 
-def plot_simulation(trajectory: Motion, folder: str | Path, *, mechanism: Mechanism | None = None) -> list[Path]:
+def plot_simulation(
+    trajectory: Motion, folder: str | Path, *, mechanism: Mechanism | None = None
+) -> list[Path]:
     """Draw the coordinates, states of muscles, forces, probes and energy of a motion over time.
 
-    Args:
-        trajectory: the motion.
-        folder: where the pictures go; made if it is not there.
-        mechanism: what moves; the trajectory's own if left out. Without any, coordinates cannot be told into angles
-            and lengths, and there is no picture of the energy.
+    Args: trajectory: the motion. folder: where the pictures go; made if it is not there. mechanism:
+        what moves; the trajectory's own if left out. Without any, coordinates cannot be told into
+        angles and lengths, and there is no picture of the energy.
 
     Returns:
         The PNG files: ``coordinates.png``, and as far as there is something to show ``states.png``,
@@ -79,7 +84,8 @@ def save(figure: Any, path: Path, dpi: float = 150) -> Path:
 def energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[str, Array]]:
     """Moments (m,) and, at them, kinetic energy and potential energy of gravity (J), zero at the origin of the ground.
 
-    A trajectory knows what contacts and springs store besides; of another motion that cannot be told.
+    A trajectory knows what contacts and springs store besides; of another motion that cannot be
+    told.
     """
     times = np.asarray(motion.times, dtype=float)
     known = getattr(motion, "energy", None)
@@ -115,7 +121,10 @@ def draw_figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[
         idle = [label for label in others if label not in acting]
         note = f"never acting: {', '.join(idle)}" if idle else ""
         kinds = {"force (N) or torque (N·m)": acting}
-        yield "other_forces.png", _panels(times, "Forces of muscles, springs and others", kinds, note)
+        yield (
+            "other_forces.png",
+            _panels(times, "Forces of muscles, springs and others", kinds, note),
+        )
     probes = getattr(motion, "probes", {})
     if probes:
         yield "probes.png", _panels(times, "Probes", {"what a probe reports": probes})
@@ -165,7 +174,10 @@ def _one_of_each_pair(forces: Sequence[ContactForce]) -> Iterator[ContactForce]:
 
 
 def _contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
-    sizes = {f"{force.element} on {force.frame}": np.linalg.norm(force.vectors, axis=1) for force in forces}
+    sizes = {
+        f"{force.element} on {force.frame}": np.linalg.norm(force.vectors, axis=1)
+        for force in forces
+    }
     threshold = _NEVER_MIND * max(float(size.max()) for size in sizes.values())
     acting = {label: size for label, size in sizes.items() if size.max() > threshold}
     figure, (above, below) = sheet("Contact forces", [3.4, 0.5 + 0.25 * max(1, len(acting))])
@@ -173,7 +185,10 @@ def _contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
     above.set_ylabel("force (N)")
     above.set_ylim(bottom=0.0)
     for row, size in enumerate(acting.values()):
-        spans = [(times[first], max(times[last] - times[first], 1e-3)) for first, last in _spans(size > threshold)]
+        spans = [
+            (times[first], max(times[last] - times[first], 1e-3))
+            for first, last in _spans(size > threshold)
+        ]
         below.broken_barh(spans, (row - 0.35, 0.7), facecolors=_style(row)["color"])
     below.set_yticks(range(len(acting)), [label.split(" on ")[0] for label in acting])
     below.set_ylim(len(acting) - 0.5, -0.5)
@@ -183,7 +198,9 @@ def _contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
     return figure
 
 
-def _panels(times: Array, title: str, kinds: Mapping[str, Mapping[str, Array]], note: str = "") -> Any:
+def _panels(
+    times: Array, title: str, kinds: Mapping[str, Mapping[str, Array]], note: str = ""
+) -> Any:
     """A figure with as many panels as the lines of each kind, which has one unit, take."""
     panels = [(label, part) for label, lines in kinds.items() for part in shared_out(lines)]
     figure, axes = sheet(title, [3.0] * max(1, len(panels)))
@@ -240,7 +257,9 @@ def lines_in(panel: Any, across: Array, lines: Mapping[str, Array], **style: Any
     for number, (label, column) in enumerate(lines.items()):
         looks = _style(number)
         near = 1e-3 * np.nanmax(np.abs(column), initial=0.0)
-        if below := sum(np.allclose(column, other, rtol=0.0, atol=near, equal_nan=True) for other in drawn):
+        if below := sum(
+            np.allclose(column, other, rtol=0.0, atol=near, equal_nan=True) for other in drawn
+        ):
             # What lies below shows through.
             looks["ls"] = (0.0, (6.0 / (below + 1), 6.0 * below / (below + 1)))
         drawn.append(column)
@@ -248,7 +267,9 @@ def lines_in(panel: Any, across: Array, lines: Mapping[str, Array], **style: Any
         shown = f" {label}" if label.startswith("_") else label
         panel.plot(across, column, label=None if style else shown, **(looks | style))
     # Beside the panel, where it covers no data.
-    panel.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=9)
+    panel.legend(
+        loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=9
+    )
 
 
 def finish(panels: Sequence[Any], across: Array, note: str, label: str = "time (s)") -> None:
@@ -264,7 +285,14 @@ def finish(panels: Sequence[Any], across: Array, note: str, label: str = "time (
     if note:
         style = {"fontsize": 8, "color": "0.35", "va": "top"}
         note = textwrap.fill(note, 110, break_on_hyphens=False)
-        panels[-1].annotate(note, (0.0, 0.0), (0, -32), xycoords="axes fraction", textcoords="offset points", **style)
+        panels[-1].annotate(
+            note,
+            (0.0, 0.0),
+            (0, -32),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            **style,
+        )
 
 
 def _spans(mask: Array) -> list[tuple[int, int]]:

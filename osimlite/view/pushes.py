@@ -21,7 +21,8 @@ class Push:
 
     on: Pushed  # the element, and the body
     forces: Array  # (n, 3) in ground, N
-    torques: Array | None  # (n, 3) in ground about the body's origin, N·m, or None if they are not on record
+    # (n, 3) in ground about the body's origin, N·m, or None if they are not on record
+    torques: Array | None
 
     def point(self, number: int, bodies: Bodies) -> Array:
         """Where the force acts (3,) in ground: the point of its line of action nearest to the contact surface's middle.
@@ -33,7 +34,9 @@ class Push:
         square = float(force @ force)
         if self.torques is None or square == 0.0:
             return near
-        on_line: Array = bodies.origins[self.on.body] + np.cross(force, self.torques[number]) / square
+        on_line: Array = (
+            bodies.origins[self.on.body] + np.cross(force, self.torques[number]) / square
+        )
         result: Array = on_line + force * (float(force @ (near - on_line)) / square)
         return result
 
@@ -53,7 +56,14 @@ class Pushes:
         forces = {(force.element, force.frame): force for force in contact_forces(motion)}
         result: dict[tuple[str, str], Push] = {}
         for pushed in scene.pushed:
-            key = next((key for key in ((pushed.element, label) for label in pushed.labels) if key in forces), None)
+            key = next(
+                (
+                    key
+                    for key in ((pushed.element, label) for label in pushed.labels)
+                    if key in forces
+                ),
+                None,
+            )
             if key is not None and key not in result:
                 force = forces[key]
                 torques = None if force.torques is None else at_times(motion, force.torques, times)
@@ -63,7 +73,9 @@ class Pushes:
     @property
     def largest(self) -> float:
         """The largest component of any force, N."""
-        return max((float(np.abs(push.forces).max(initial=0.0)) for push in self.pushes), default=0.0)
+        return max(
+            (float(np.abs(push.forces).max(initial=0.0)) for push in self.pushes), default=0.0
+        )
 
     def at(self, number: int, bodies: Bodies) -> list[tuple[Pushed, Array, Array]]:
         """At a moment: on what, the point (3,) and the force (3,) of each, in ground."""

@@ -23,7 +23,8 @@ class MeasuredMarkers(NamedTuple):
     """Markers that were measured during a motion, and those of the model that go with them."""
 
     names: Sequence[str]  # of the m markers
-    stations: Sequence[tuple[int, Array]]  # the body of each (-1 for ground), and its place there (3,), m
+    # the body of each (-1 for ground), and its place there (3,), m
+    stations: Sequence[tuple[int, Array]]
     places: Array  # where they were measured (t, m, 3), m; NaN where one was not seen
 
 
@@ -31,7 +32,8 @@ class MeasuredMarkers(NamedTuple):
 class Recording:
     """A motion from a file; the attributes are those of a :class:`osimlite.view.motion.Motion`.
 
-    `remarks` are sentences on what the files do not say, `measured` the markers that it was found from.
+    `remarks` are sentences on what the files do not say, `measured` the markers that it was found
+    from.
     """
 
     times: Array
@@ -55,9 +57,9 @@ def read_recording(
 ) -> Recording:
     """The motion in a .sto or .mot file.
 
-    Coordinates that are not in it keep their default values, or follow others by their couplers. Contact forces are
-    those in the file `forces` (with the labels of OpenSim's ForceReporter); without it they are computed, if the motion
-    has speeds and osimlite knows the model's contacts.
+    Coordinates that are not in it keep their default values, or follow others by their couplers.
+    Contact forces are those in the file `forces` (with the labels of OpenSim's ForceReporter);
+    without it they are computed, if the motion has speeds and osimlite knows the model's contacts.
 
     Args:
         model: what moves.
@@ -88,7 +90,9 @@ def read_recording(
             remarks.append(f"no forces are shown: {error.message}")
     still = np.zeros_like(rows) if speeds is None else speeds
     states = {label: table[label] for label in table.columns if label.endswith("activation")}
-    return Recording(recorded.times, mechanism.coordinate_names, rows, still, columns, states, tuple(remarks))
+    return Recording(
+        recorded.times, mechanism.coordinate_names, rows, still, columns, states, tuple(remarks)
+    )
 
 
 def _follow(mechanism: Mechanism, rows: Array, missing: set[str]) -> None:
@@ -101,7 +105,12 @@ def _follow(mechanism: Mechanism, rows: Array, missing: set[str]) -> None:
 
 
 def computed_forces(
-    model: Model, mechanism: Mechanism, times: Array, values: Array, speeds: Array, folder: Path | None = None
+    model: Model,
+    mechanism: Mechanism,
+    times: Array,
+    values: Array,
+    speeds: Array,
+    folder: Path | None = None,
 ) -> dict[str, Array]:
     """What the forces of a model do at n states, as columns (n,) by the labels of OpenSim's ForceReporter.
 

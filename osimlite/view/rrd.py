@@ -1,8 +1,8 @@
 """A model, and how it moves, as a recording for Rerun (.rrd): bodies, meshes, paths, contact forces, and their curves.
 
-Bodies are entities below ``model``, named by their component paths, with their shapes below them; lines and forces are
-in ground beside them. Everything is over the timeline ``time``, s. Curves are below ``coordinates`` (rad or m),
-``activations`` and ``forces`` (N).
+Bodies are entities below ``model``, named by their component paths, with their shapes below them;
+lines and forces are in ground beside them. Everything is over the timeline ``time``, s. Curves are
+below ``coordinates`` (rad or m), ``activations`` and ``forces`` (N).
 """
 
 from __future__ import annotations
@@ -58,9 +58,15 @@ def write_rrd(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
     axis = int(np.argmax(np.abs(scene.up)))
     upright = f"RIGHT_HAND_{'XYZ'[axis]}_{'UP' if scene.up[axis] > 0.0 else 'DOWN'}"
     still("model", getattr(rr.ViewCoordinates, upright))
-    bodies = [entity("model", path) for path in (*(body.path for body in scene.mechanism.bodies), "ground")]
+    bodies = [
+        entity("model", path)
+        for path in (*(body.path for body in scene.mechanism.bodies), "ground")
+    ]
     for k, name in enumerate(bodies):
-        rotations, origins = [pose.rotations[k] for pose in poses], [pose.origins[k] for pose in poses]
+        rotations, origins = (
+            [pose.rotations[k] for pose in poses],
+            [pose.origins[k] for pose in poses],
+        )
         moving(name, rr.Transform3D.columns(translation=origins, mat3x3=rotations))
     for item in scene.drawn():
         surface = scene.surfaces[item.surface]
@@ -72,7 +78,10 @@ def write_rrd(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
     levels = {} if motion is None else activity(scene, motion)
     for index, line in enumerate(scene.lines):
         if line.visible and line.layer in scene.shown:
-            name, strips = entity("model", line.layer, line.path), [pose.lines[index] for pose in poses]
+            name, strips = (
+                entity("model", line.layer, line.path),
+                [pose.lines[index] for pose in poses],
+            )
             still(name, rr.LineStrips3D.from_fields(radii=line.radius))
             level = levels.get(line.path)
             colors = [line.color] * len(poses) if level is None else map(activity_color, level)
@@ -90,12 +99,19 @@ def write_rrd(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
             name = entity("forces", push.on.path, push.on.labels[0])
             starts = [push.point(number, pose) for number, pose in enumerate(poses)]
             still(f"/model{name}", rr.Arrows3D.from_fields(radii=0.006 * size, colors=_rgba(FORCE)))
-            moving(f"/model{name}", rr.Arrows3D.columns(vectors=scale * push.forces, origins=starts))
+            moving(
+                f"/model{name}", rr.Arrows3D.columns(vectors=scale * push.forces, origins=starts)
+            )
             strength(name, np.linalg.norm(push.forces, axis=1))
     layout = require("rerun.blueprint", extra="rerun", purpose="a recording for Rerun")
-    curves = [layout.TimeSeriesView(origin=kind, name=kind) for kind in ("coordinates", "activations", "forces")]
+    curves = [
+        layout.TimeSeriesView(origin=kind, name=kind)
+        for kind in ("coordinates", "activations", "forces")
+    ]
     space = layout.Spatial3DView(origin="model", name=scene.mechanism.name)
-    recording.send_blueprint(layout.Horizontal(space, layout.Vertical(*curves), column_shares=[2, 1]))
+    recording.send_blueprint(
+        layout.Horizontal(space, layout.Vertical(*curves), column_shares=[2, 1])
+    )
     write_atomically(path, stream.read())
     return Path(path)
 

@@ -1,7 +1,7 @@
 """What there is to see of a model: surfaces, lines and frames, each fixed to bodies; the same for every kind of view.
 
-Nothing here draws. The page in the browser, pictures and films are made of a :class:`Scene` and of coordinate values.
-Bodies are numbered as in the mechanism, -1 is ground.
+Nothing here draws. The page in the browser, pictures and films are made of a :class:`Scene` and of
+coordinate values. Bodies are numbered as in the mechanism, -1 is ground.
 """
 
 from __future__ import annotations
@@ -67,7 +67,8 @@ class Line:
     radius: float = 0.004  # how thick to draw it, m
     visible: bool = True  # whether the model wants it shown
     wraps: tuple[str, ...] = ()  # paths of the wrap objects that it may bend around
-    fibers: float = 0.0  # how thick the fibers of a muscle are in their middle, m; 0 where there are none
+    # how thick the fibers of a muscle are in their middle, m; 0 where there are none
+    fibers: float = 0.0
     tendon: float = 0.0  # slack length of its tendon, m: half of it is at each end
 
     @property
@@ -149,8 +150,10 @@ class Scene:
     lines: Sequence[Line]  # all paths, springs and sticks
     axes: Sequence[Axes]  # all frames
     pushed: Sequence[Pushed] = ()  # where contact forces are shown
-    shown: frozenset[Layer] = frozenset(LAYERS)  # the layers that the model wants to be shown at first
-    half_spaces: frozenset[str] = frozenset()  # paths of the half spaces, whose items show a part of them
+    # the layers that the model wants to be shown at first
+    shown: frozenset[Layer] = frozenset(LAYERS)
+    # paths of the half spaces, whose items show a part of them
+    half_spaces: frozenset[str] = frozenset()
     remarks: Sequence[tuple[str, str]] = ()  # what cannot be shown, as (component's path, sentence)
 
     def at(self, q: Array) -> Bodies:
@@ -161,7 +164,10 @@ class Scene:
     @cached_property
     def polylines(self) -> Polylines:
         """The paths among the lines."""
-        return Polylines(self.mechanism, [line.course for line in self.lines if not isinstance(line.course, tuple)])
+        return Polylines(
+            self.mechanism,
+            [line.course for line in self.lines if not isinstance(line.course, tuple)],
+        )
 
     @cached_property
     def up(self) -> Array:
@@ -177,10 +183,21 @@ class Scene:
     @cached_property
     def large(self) -> frozenset[int]:
         """Places of the items that are scenery: half spaces, and shapes far larger than most."""
-        sizes = np.array([float(np.linalg.norm(np.ptp(corners, axis=0))) for corners in map(self.corners, self.items)])
-        usual = np.array([item.visible and item.layer == "geometry" for item in self.items], dtype=bool)
+        sizes = np.array(
+            [
+                float(np.linalg.norm(np.ptp(corners, axis=0)))
+                for corners in map(self.corners, self.items)
+            ]
+        )
+        usual = np.array(
+            [item.visible and item.layer == "geometry" for item in self.items], dtype=bool
+        )
         limit = SCENERY * float(np.median(sizes[usual])) if usual.any() else np.inf
-        return frozenset(k for k, item in enumerate(self.items) if item.path in self.half_spaces or sizes[k] > limit)
+        return frozenset(
+            k
+            for k, item in enumerate(self.items)
+            if item.path in self.half_spaces or sizes[k] > limit
+        )
 
     def corners(self, item: Item) -> Array:
         """Points (k, 3) around an item, in the body's frame: its own if they are few, else corners of a box."""
@@ -205,24 +222,36 @@ class Scene:
         result: list[Array] = [points for _, points in self.extent(bodies) if len(points)]
         points = np.concatenate(result or [bodies.origins])
         low, high = points.min(axis=0), points.max(axis=0)
-        little = 0.05 * max(1.0, float(np.abs(points).max())) if float((high - low).max()) < 1e-6 else 0.0
+        little = (
+            0.05 * max(1.0, float(np.abs(points).max()))
+            if float((high - low).max()) < 1e-6
+            else 0.0
+        )
         return low - little, high + little
 
     def floor(self, q: Array) -> float:
         """Height of the floor over ground's origin: 0, or under what is drawn if that reaches lower."""
         low, high = self.box(q)
-        lowest, size = float((_box_corners(low, high) @ self.up).min()), float(np.linalg.norm(high - low))
+        lowest, size = (
+            float((_box_corners(low, high) @ self.up).min()),
+            float(np.linalg.norm(high - low)),
+        )
         return 0.0 if lowest >= -0.05 * size else lowest
 
 
 def _box_corners(low: Array, high: Array) -> Array:
-    return np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    return np.array(
+        [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    )
 
 
-def sticks(mechanism: Mechanism, bodies: Iterable[int]) -> Iterator[tuple[int, tuple[LinePoint, LinePoint]]]:
+def sticks(
+    mechanism: Mechanism, bodies: Iterable[int]
+) -> Iterator[tuple[int, tuple[LinePoint, LinePoint]]]:
     """Lines for bodies without shape, each as body and ends.
 
-    They run from the body's own joint to the joints of what it carries, or to its mass centre if it carries nothing.
+    They run from the body's own joint to the joints of what it carries, or to its mass centre if it
+    carries nothing.
     """
     everyone = mechanism.bodies
 

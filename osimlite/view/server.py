@@ -26,9 +26,9 @@ PATIENCE = 30.0
 class PageServer:
     """Serves one page at ``http://127.0.0.1:<port>/`` until it is closed; use it in a ``with`` statement.
 
-    Besides the page it answers ``POST /assemble`` with ``{"values": [...]}``, coordinate values in the mechanism's
-    order, by the nearest values that fulfil the constraints, or by ``{"error": sentence}``; what is no such question,
-    with the status 400.
+    Besides the page it answers ``POST /assemble`` with ``{"values": [...]}``, coordinate values in
+    the mechanism's order, by the nearest values that fulfil the constraints, or by ``{"error":
+    sentence}``; what is no such question, with the status 400.
 
     Args:
         page: text of the page (HTML).
@@ -43,7 +43,9 @@ class PageServer:
         try:
             self.server = _QuietServer((HOST, port), _handler(page.encode(), mechanism, PATIENCE))
         except (OSError, OverflowError) as error:
-            raise OsimliteError(f"cannot listen at port {port}: {error}; choose another one by --port") from None
+            raise OsimliteError(
+                f"cannot listen at port {port}: {error}; choose another one by --port"
+            ) from None
         self._thread = threading.Thread(target=self.server.serve_forever, daemon=True)
         self._thread.start()
 
@@ -114,13 +116,16 @@ def _handler(page: bytes, mechanism: Mechanism, patience: float) -> type[BaseHTT
                 raise _BadQuestion(HTTPStatus.FORBIDDEN, "this server answers its own page only")
             length = self.headers.get("Content-Length", "")
             if not (length.isascii() and length.isdigit() and len(length) < 20):
-                raise _BadQuestion(HTTPStatus.BAD_REQUEST, "the question does not say how long it is")
+                raise _BadQuestion(
+                    HTTPStatus.BAD_REQUEST, "the question does not say how long it is"
+                )
             if int(length) > _LONGEST:
                 raise _BadQuestion(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "the question is too long")
             return self.rfile.read(int(length))
 
         def _is_for_us(self) -> bool:
-            # Pages of other origins may reach this port by a name of their own; they are not to read the model.
+            # Pages of other origins may reach this port by a name of their own; they are not to
+            # read the model.
             return (self.headers.get("Host") or "").partition(":")[0] in (HOST, "localhost")
 
         def _answer(self, status: HTTPStatus, body: bytes, kind: str) -> None:
@@ -152,7 +157,9 @@ def assembled(mechanism: Mechanism, question: bytes) -> dict[str, Any]:
     except (ValueError, OverflowError, RecursionError):
         raise _BadQuestion(HTTPStatus.BAD_REQUEST, "the question is no list of values") from None
     if len(q) != len(mechanism.coordinates):
-        raise _BadQuestion(HTTPStatus.BAD_REQUEST, f"the model has {len(mechanism.coordinates)} coordinates")
+        raise _BadQuestion(
+            HTTPStatus.BAD_REQUEST, f"the model has {len(mechanism.coordinates)} coordinates"
+        )
     if not np.isfinite(q).all():
         return {"error": "a coordinate value is no number"}
     try:
@@ -160,4 +167,6 @@ def assembled(mechanism: Mechanism, question: bytes) -> dict[str, Any]:
             result = mechanism.assemble(q)
     except (OsimliteError, ArithmeticError, np.linalg.LinAlgError) as error:
         return {"error": error.message if isinstance(error, OsimliteError) else "no pose was found"}
-    return {"values": result.tolist()} if np.isfinite(result).all() else {"error": "no pose was found"}
+    return (
+        {"values": result.tolist()} if np.isfinite(result).all() else {"error": "no pose was found"}
+    )

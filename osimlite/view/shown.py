@@ -69,27 +69,27 @@ class Shown:
     ) -> Shown:
         """Make a model ready.
 
-        Args:
-            model: which.
-            mechanism: of the same model, if it is at hand.
-            folders: where its mesh files are looked for besides the folder of `file`, as of `to_urdf`.
-            file: that the model was read from, so that findings know their lines; None: the model itself is checked.
-            motion: how it moves, or the file (.sto, .mot) that says so.
-            forces: a file with contact forces, for a motion from a file.
-            values: of coordinates by name (rad, m); over a motion from a file they stay so.
-            wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
-            left_out: paths of the parts that were taken out of `model` since they cannot be built, with the reasons.
+        Args: model: which. mechanism: of the same model, if it is at hand. folders: where its mesh
+            files are looked for besides the folder of `file`, as of `to_urdf`. file: that the model
+            was read from, so that findings know their lines; None: the model itself is checked.
+            motion: how it moves, or the file (.sto, .mot) that says so. forces: a file with contact
+            forces, for a motion from a file. values: of coordinates by name (rad, m); over a motion
+            from a file they stay so. wrapping: how paths bend around surfaces, see
+            :class:`osimlite.simulation.Options`. left_out: paths of the parts that were taken out
+            of `model` since they cannot be built, with the reasons.
 
-        Raises:
-            OsimliteError: a file is missing or not what it should be; no pose fulfils the constraints.
-            SettingError: there is no such wrapping.
+        Raises: OsimliteError: a file is missing or not what it should be; no pose fulfils the
+            constraints. SettingError: there is no such wrapping.
         """
         if mechanism is None:
             model, mechanism, left_out = build_showable(model)
         places = MeshFolders(None if file is None else file.parent, folders)
         scene = build_scene(model, mechanism, places, wrapping)
         # What is measured of paths and muscles takes longer than a page to open.
-        config = Config(ignore=("OSIM63",), mesh_paths=tuple(str(folder.resolve()) for folder in places.searched))
+        config = Config(
+            ignore=("OSIM63",),
+            mesh_paths=tuple(str(folder.resolve()) for folder in places.searched),
+        )
         findings = validate(model if file is None else file, config=config).findings
         if left_out:
             scene = replace(scene, remarks=[*left_out, *scene.remarks])
@@ -104,7 +104,9 @@ class Shown:
 
     def page_text(self, story: Story | None = None) -> str:
         """One self-contained page (HTML)."""
-        return page_text(page_data(self.model, self.scene, self.motion, self.findings, self.q, story=story))
+        return page_text(
+            page_data(self.model, self.scene, self.motion, self.findings, self.q, story=story)
+        )
 
     def write_page(self, path: str | Path, story: Story | None = None) -> Path:
         """Write one self-contained page (HTML), which may tell something of the motion and play it at once."""
@@ -124,7 +126,9 @@ class Shown:
         data = page_data(self.model, self.scene, self.motion, self.findings, self.q, server=True)
         return PageServer(page_text(data), self.scene.mechanism, port)
 
-    def write_picture(self, path: str | Path, size: tuple[int, int] = (1200, 900), time: float | None = None) -> Path:
+    def write_picture(
+        self, path: str | Path, size: tuple[int, int] = (1200, 900), time: float | None = None
+    ) -> Path:
         """Write a picture (PNG, or any form that pillow knows by its ending).
 
         Args:
@@ -154,7 +158,9 @@ class Shown:
         write_atomically(path, out.getvalue())
         return Path(path)
 
-    def _moment(self, time: float | None) -> tuple[Array, list[Arrow], frozenset[str], dict[str, Color]]:
+    def _moment(
+        self, time: float | None
+    ) -> tuple[Array, list[Arrow], frozenset[str], dict[str, Color]]:
         """Coordinate values (n,), arrows, surfaces under load, and colours of muscles, at a time of the motion."""
         motion = self.motion
         if motion is None:
@@ -163,15 +169,22 @@ class Shown:
             return self.q, [], frozenset(), {}
         first, last = float(motion.times[0]), float(motion.times[-1])
         if time is not None and not first <= time <= last:
-            raise OsimliteError(f"the motion goes from {first:g} to {last:g} s, and has no time {time:g}")
+            raise OsimliteError(
+                f"the motion goes from {first:g} to {last:g} s, and has no time {time:g}"
+            )
         moment = np.array([first if time is None else time])
         values = values_of(motion, self.scene.mechanism)
         q = at_times(motion, values, moment)[0]
         largest = Pushes.of(self.scene, motion, np.asarray(motion.times, dtype=float)).largest
         low, high = self.scene.box(q)
-        scale = LONGEST_ARROW * float(np.linalg.norm(high - low)) / largest if largest > 0.0 else 0.0
+        scale = (
+            LONGEST_ARROW * float(np.linalg.norm(high - low)) / largest if largest > 0.0 else 0.0
+        )
         pushes = Pushes.of(self.scene, motion, moment).at(0, self.scene.at(q))
         loaded = frozenset(push.surface for push, _, force in pushes if force.any())
         levels = activity(self.scene, motion).items()
-        colors = {path: activity_color(float(np.interp(moment[0], motion.times, level))) for path, level in levels}
+        colors = {
+            path: activity_color(float(np.interp(moment[0], motion.times, level)))
+            for path, level in levels
+        }
         return q, [Arrow(point, scale * force) for _, point, force in pushes], loaded, colors

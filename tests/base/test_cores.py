@@ -10,7 +10,9 @@ import pytest
 from osimlite.base.cores import cores
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells which cores a process was given")
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="only Linux tells which cores a process was given"
+)
 def test_only_cores_that_this_process_was_given_count() -> None:
     given = os.sched_getaffinity(0)
     try:
@@ -32,5 +34,7 @@ def test_nobody_else_asks() -> None:
     import osimlite
 
     package = Path(osimlite.__file__).parent
-    asking = [file for file in package.rglob("*.py") if "cpu_count" in file.read_text(encoding="utf-8")]
+    asking = [
+        file for file in package.rglob("*.py") if "cpu_count" in file.read_text(encoding="utf-8")
+    ]
     assert [file.name for file in asking] == ["cores.py"]

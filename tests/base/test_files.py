@@ -18,12 +18,22 @@ from osimlite.io.document.source import Source
 from osimlite.lint.engine import check_source
 from tests.cli.command import Done, run
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pipes and devices among its files")
+pytestmark = pytest.mark.skipif(
+    sys.platform == "win32", reason="Windows has no pipes and devices among its files"
+)
 
 BODIES = """<OpenSimDocument Version="40600"><BodySet name="bodyset"><objects><Body name="b">
 <mass>1</mass><inertia>1 1 1 0 0 0</inertia></Body></objects></BodySet></OpenSimDocument>"""
 INCLUDING = '<OpenSimDocument Version="40600"><Model name="m"><BodySet file="{}" /></Model></OpenSimDocument>'
-KINDS = ("pipe", "socket", "device", "link to a device", "link to a pipe", "endless device", "block device")
+KINDS = (
+    "pipe",
+    "socket",
+    "device",
+    "link to a device",
+    "link to a pipe",
+    "endless device",
+    "block device",
+)
 
 
 @pytest.fixture(params=KINDS)
@@ -55,7 +65,9 @@ def special(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path]:
 
 
 def test_what_is_no_file_is_not_read(special: Path) -> None:
-    with pytest.raises(SpecialFileError, match=r"this is a (pipe|socket|device), and only files are read"):
+    with pytest.raises(
+        SpecialFileError, match=r"this is a (pipe|socket|device), and only files are read"
+    ):
         read_file(special)
 
 
@@ -70,14 +82,19 @@ def test_what_is_no_file_is_not_included(special: Path, tmp_path: Path) -> None:
     (tmp_path / "m.osim").write_text(INCLUDING.format(special))
     done = run("validate", "m.osim", "--format", "concise", "--no-cache", folder=tmp_path)
     assert done.code == 0
-    assert f"warning OSIM702 BodySet should be read from '{special}', which is not read: this is a " in done.out
+    assert (
+        f"warning OSIM702 BodySet should be read from '{special}', which is not read: this is a "
+        in done.out
+    )
 
 
 def test_what_is_no_file_is_not_included_in_an_editor(special: Path, tmp_path: Path) -> None:
     """The text may be that of a file that is not written yet."""
     source = Source.of_characters(INCLUDING.format(special), str(tmp_path / "new.osim"))
     (result,) = (finding for finding in check_source(source) if finding.code == "OSIM702")
-    assert "which is not read: this is a " in result.message and result.message.endswith(": it stays empty")
+    assert "which is not read: this is a " in result.message and result.message.endswith(
+        ": it stays empty"
+    )
 
 
 @pytest.mark.parametrize("command", ["info", "format", "upgrade", "translate", "simulate"])
@@ -91,7 +108,9 @@ def test_every_command_says_so(tmp_path: Path, command: str) -> None:
 def test_the_rest_of_a_folder_is_checked(tmp_path: Path) -> None:
     (tmp_path / "folder.osim").mkdir()
     os.mkfifo(tmp_path / "folder.osim" / "a.osim")
-    (tmp_path / "b.osim").write_text('<OpenSimDocument Version="40600"><Model><gravty/></Model></OpenSimDocument>')
+    (tmp_path / "b.osim").write_text(
+        '<OpenSimDocument Version="40600"><Model><gravty/></Model></OpenSimDocument>'
+    )
     done = run("validate", ".", "--format", "concise", "--no-cache", folder=tmp_path)
     assert done.code == 1 and "OSIM101" in done.out and "OSIM003" in done.out
     assert done.out.endswith("Found 2 errors in 2 files.\n")
@@ -113,7 +132,9 @@ def test_a_pipe_that_takes_the_place_of_a_file_is_not_waited_for(
     (tmp_path / "file").touch()
     os.mkfifo(tmp_path / "pipe")
     ordinary, real = os.stat(tmp_path / "file"), os.stat
-    monkeypatch.setattr(os, "stat", lambda path, **words: ordinary if "pipe" in str(path) else real(path, **words))
+    monkeypatch.setattr(
+        os, "stat", lambda path, **words: ordinary if "pipe" in str(path) else real(path, **words)
+    )
     with pytest.raises(SpecialFileError, match="this is a pipe"):
         read_file(tmp_path / "pipe")
 
@@ -137,11 +158,16 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(f"{module}.LARGEST_FILE", 1_000_000)
 
 
-def test_a_large_file_is_not_read(tmp_path: Path, small: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_large_file_is_not_read(
+    tmp_path: Path, small: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     place = tmp_path / "m.osim"
     with place.open("wb") as stream:
         stream.truncate(2_000_000)
-    with pytest.raises(SpecialFileError, match=r"more than 1 MB in it; allow them by 'largest-file' in osimlite.toml"):
+    with pytest.raises(
+        SpecialFileError,
+        match=r"more than 1 MB in it; allow them by 'largest-file' in osimlite.toml",
+    ):
         read_file(place)
     (tmp_path / "osimlite.toml").write_text("largest-file = 1.5\n")
     with pytest.raises(SpecialFileError, match=r"more than 1.5 MB"):
@@ -163,18 +189,26 @@ def test_a_size_that_makes_no_sense(tmp_path: Path, given: str) -> None:
     from osimlite.lint.settings import settings_for
 
     (tmp_path / "osimlite.toml").write_text(f"largest-file = {given}\n")
-    with pytest.raises(OsimliteError, match="'largest-file' must be a number of MB, 100 or more, not"):
+    with pytest.raises(
+        OsimliteError, match="'largest-file' must be a number of MB, 100 or more, not"
+    ):
         settings_for(tmp_path)
 
 
-def test_an_endless_standard_input_is_not_read_to_the_end(monkeypatch: pytest.MonkeyPatch, small: None) -> None:
+def test_an_endless_standard_input_is_not_read_to_the_end(
+    monkeypatch: pytest.MonkeyPatch, small: None
+) -> None:
     with open("/dev/zero", encoding="latin-1") as endless:
         monkeypatch.setattr(sys, "stdin", endless)
-        with pytest.raises(SpecialFileError, match="<stdin>: cannot read the file: there are more than 1 MB in it"):
+        with pytest.raises(
+            SpecialFileError, match="<stdin>: cannot read the file: there are more than 1 MB in it"
+        ):
             files.read_standard_input()
 
 
-def test_a_few_files_that_name_each_other_are_not_read_without_end(tmp_path: Path, small: None) -> None:
+def test_a_few_files_that_name_each_other_are_not_read_without_end(
+    tmp_path: Path, small: None
+) -> None:
     """Each names the next one twice: thirty files would be read a milliard times."""
     import osimlite
 
@@ -243,7 +277,9 @@ def test_every_name_of_a_file_stays_one_of_it(tmp_path: Path, rewrite: Callable[
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.osim", "b.txt", "c.osim"]
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only the superuser gives files away")
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only the superuser gives files away"
+)
 def test_a_file_keeps_its_owner_and_mode(tmp_path: Path, rewrite: Callable[..., Done]) -> None:
     place = tmp_path / "a.osim"
     place.write_text(MESSY)
@@ -255,7 +291,9 @@ def test_a_file_keeps_its_owner_and_mode(tmp_path: Path, rewrite: Callable[..., 
     assert place.read_text() != MESSY
 
 
-def test_what_cannot_be_given_to_a_new_file_stays_on_the_old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_given_to_a_new_file_stays_on_the_old(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     place = tmp_path / "a.osim"
     place.write_text("before " * 100)
     number = place.stat().st_ino
@@ -267,7 +305,9 @@ def test_what_cannot_be_given_to_a_new_file_stays_on_the_old(tmp_path: Path, mon
     files.write_atomically(place, "after")
     assert place.read_text() == "after" and place.stat().st_ino == number
     monkeypatch.setattr("shutil.copyfileobj", refuse)
-    with pytest.raises(OsimliteError, match=r"not permitted; what was to be written is in (.*)") as caught:
+    with pytest.raises(
+        OsimliteError, match=r"not permitted; what was to be written is in (.*)"
+    ) as caught:
         files.write_atomically(place, "later")
     assert Path(str(caught.value).rpartition(" ")[2]).read_text() == "later"
 

@@ -38,7 +38,11 @@ def write(place: Path, text: str) -> None:
 
 
 def left_in(folder: Path) -> list[str]:
-    return [path.name for path in folder.rglob("*") if path.name == "__pycache__" or path.suffix == ".pyc"]
+    return [
+        path.name
+        for path in folder.rglob("*")
+        if path.name == "__pycache__" or path.suffix == ".pyc"
+    ]
 
 
 def test_a_file_is_run_as_it_is_now(tmp_path: Path) -> None:
@@ -123,7 +127,10 @@ def test_the_model_is_the_one_that_is_written_there(tmp_path: Path) -> None:
 def test_built_twice_within_a_second(tmp_path: Path, source: str) -> None:
     write(tmp_path / "helper.py", "mass = 3.0\n")
     for mass in ("3.0", "4.0"):
-        write(tmp_path / "mine.py", MODEL.replace("from helper import mass", f"import helper; mass = {mass}"))
+        write(
+            tmp_path / "mine.py",
+            MODEL.replace("from helper import mass", f"import helper; mass = {mass}"),
+        )
         done = run("build", source, "-o", "m.osim", folder=tmp_path)
         assert done.code == 0, done.err
         assert f"<mass>{mass[0]}</mass>" in (tmp_path / "m.osim").read_text()

@@ -52,12 +52,21 @@ def fields_of(item: Any) -> list[tuple[str, bool]]:
 
 
 def test_objects_are_made_as_those_of_dataclasses() -> None:
-    assert (Place("a").depth, Place("a", parts=[1]).parts, Slotted("a", 2.0).depth) == (0.5, [1], 2.0)
+    assert (Place("a").depth, Place("a", parts=[1]).parts, Slotted("a", 2.0).depth) == (
+        0.5,
+        [1],
+        2.0,
+    )
     assert Place("a").parts is not Place("a").parts
     assert (Named(more=2).of, Named(more=2).more) == (1, 2)
     assert (Deeper("a").depth, Deeper("a", 1.0, [], "y").last) == (2.0, "y")
     assert Changing(3).seen == set()
-    for wrong in (lambda: Place(), lambda: Named(1, 2), lambda: Slotted("a", deep=1), lambda: Changing(1, set())):  # type: ignore[call-arg]
+    for wrong in (
+        lambda: Place(),  # type: ignore[call-arg]
+        lambda: Named(1, 2),  # type: ignore[call-arg]
+        lambda: Slotted("a", deep=1),  # type: ignore[call-arg]
+        lambda: Changing(1, set()),  # type: ignore[call-arg]
+    ):
         with pytest.raises(TypeError):
             wrong()
     with pytest.raises(ValueError):
@@ -65,10 +74,16 @@ def test_objects_are_made_as_those_of_dataclasses() -> None:
 
 
 def test_objects_compare_and_print_as_those_of_dataclasses() -> None:
-    assert Place("a", parts=[1]) == Place("a") != Place("b") and len({Place("a"), Place("a", 0.5, [2])}) == 1
+    assert (
+        Place("a", parts=[1]) == Place("a") != Place("b")
+        and len({Place("a"), Place("a", 0.5, [2])}) == 1
+    )
     assert Slotted("a") == Slotted("a") != Slotted("b") and len({Slotted("a"), Slotted("a")}) == 1
     assert Deeper("a") == Deeper("a", last="y") != Deeper("b")
-    assert repr(Place("a")) == "Place(name='a', depth=0.5, parts=[])" and repr(Changing(1)) == "Changing(count=1)"
+    assert (
+        repr(Place("a")) == "Place(name='a', depth=0.5, parts=[])"
+        and repr(Changing(1)) == "Changing(count=1)"
+    )
     with pytest.raises(TypeError):
         hash(Changing())
 
@@ -83,7 +98,12 @@ def test_what_is_frozen_cannot_be_changed(item: Any) -> None:
 
 @pytest.mark.parametrize("item", [Place("a", 1.0), Slotted("a", 1.0), Changing(2), Named(more=2)])
 def test_objects_can_be_copied_pickled_and_varied(item: Any) -> None:
-    for made in (copy.copy(item), copy.deepcopy(item), pickle.loads(pickle.dumps(item)), replace(item)):
+    for made in (
+        copy.copy(item),
+        copy.deepcopy(item),
+        pickle.loads(pickle.dumps(item)),
+        replace(item),
+    ):
         assert made == item and type(made) is type(item) and made is not item
     assert dataclasses.replace(item) == item
     assert fields_of(item) == [(name, name != "seen") for name in item.__record_fields__]

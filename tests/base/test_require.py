@@ -29,7 +29,10 @@ def test_names_purpose_package_and_command_of_an_absent_package():
     ("source", "part"),
     [
         ("import no_such_dependency", "without its own dependency no_such_dependency"),
-        ("raise ImportError('libx.so: wrong ELF class')", "cannot be loaded (libx.so: wrong ELF class)"),
+        (
+            "raise ImportError('libx.so: wrong ELF class')",
+            "cannot be loaded (libx.so: wrong ELF class)",
+        ),
     ],
 )
 def test_tells_a_broken_package_from_an_absent_one(tmp_path, monkeypatch, source, part):

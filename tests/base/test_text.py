@@ -13,8 +13,14 @@ from rapidfuzz import fuzz
 from osimlite.base.text import FEW_NAMES, harmless, json_lines, measure_similarity, nearest, visible
 from osimlite.errors import OsimliteError
 
-OBEYED = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
-anything = st.text(st.one_of(st.characters(codec=None), st.sampled_from("\n\r\t\x1b\x9b\x85\u202e\u2028\udce9[]m#:0 ")))
+OBEYED = re.compile(
+    r"[\0-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+)
+anything = st.text(
+    st.one_of(
+        st.characters(codec=None), st.sampled_from("\n\r\t\x1b\x9b\x85\u202e\u2028\udce9[]m#:0 ")
+    )
+)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +90,9 @@ def test_errors_and_findings_are_one_line() -> None:
 
     error = OsimliteError("no body 'a\n::error::b'", file="\x1b[2J.osim", line=3)
     assert str(error) == r"\x1b[2J.osim:3: no body 'a\n::error::b'" and "\n" in error.message
-    finding = Finding("OSIM101", "unknown-tag", Severity.ERROR, "a\nb", "\x9b.osim", suggestion="\u202e")
+    finding = Finding(
+        "OSIM101", "unknown-tag", Severity.ERROR, "a\nb", "\x9b.osim", suggestion="\u202e"
+    )
     assert str(finding) == r"\x9b.osim: error OSIM101 a\nb (did you mean '\u202e'?)"
 
 

@@ -43,14 +43,18 @@ def test_less_than_three_percent_and_a_few_calls_are_nothing() -> None:
 
 def test_modules_are_told_by_name() -> None:
     old, new = (
-        {"walk": Cost({k: names if k == "modules" else {} for k in KINDS})} for names in ({"a": 1}, {"b": 1, "c": 1})
+        {"walk": Cost({k: names if k == "modules" else {} for k in KINDS})}
+        for names in ({"a": 1}, {"b": 1, "c": 1})
     )
     (said,) = compared(old, new, same_versions=True)
     assert said.splitlines()[1:] == ["    loads b, c", "    no longer loads a"]
 
 
 def test_libraries_are_compared_where_they_are_the_same() -> None:
-    old, new = ({"walk": Cost({k: {"rich": n} if k == "library calls" else {} for k in KINDS})} for n in (1000, 2000))
+    old, new = (
+        {"walk": Cost({k: {"rich": n} if k == "library calls" else {} for k in KINDS})}
+        for n in (1000, 2000)
+    )
     assert compared(old, new, same_versions=True)
     assert not compared(old, new, same_versions=False)
 
@@ -73,8 +77,14 @@ def test_the_file_holds_what_was_accepted(tmp_path: Path, monkeypatch: pytest.Mo
     cost.accept(given)
     versions, read = cost.accepted()
     assert versions == cost.versions()
-    assert {name: item.totals for name, item in read.items()} == {name: item.totals for name, item in given.items()}
-    assert read["walk"].parts["calls"] == {"legs.py: step": 1000, "legs.py: others": 12, "others": 4}
+    assert {name: item.totals for name, item in read.items()} == {
+        name: item.totals for name, item in given.items()
+    }
+    assert read["walk"].parts["calls"] == {
+        "legs.py: step": 1000,
+        "legs.py: others": 12,
+        "others": 4,
+    }
     assert read["walk"].parts["modules"] == parts["modules"]
     assert read["run"].parts["modules"] == {"osimlite": 1}
     assert not compared(read, given, same_versions=True)

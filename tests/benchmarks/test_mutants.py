@@ -38,9 +38,13 @@ def test_operators_constants_and_branches_change() -> None:
 def test_tests_are_called_with_the_mutant_in_place(tmp_path: Path, repo: Path) -> None:
     shutil.copy(repo / "pyproject.toml", tmp_path)
     (tmp_path / "clipping.py").write_text("def double(x):\n    return x * 2\n")
-    (tmp_path / "test_it.py").write_text("from clipping import double\n\ndef test_it():\n    assert double(3) == 6\n")
+    (tmp_path / "test_it.py").write_text(
+        "from clipping import double\n\ndef test_it():\n    assert double(3) == 6\n"
+    )
     (mutant, *_) = (
-        each for each in find_mutants("clipping.py", (tmp_path / "clipping.py").read_text()) if each.old == "*"
+        each
+        for each in find_mutants("clipping.py", (tmp_path / "clipping.py").read_text())
+        if each.old == "*"
     )
     assert try_mutant(mutant, ["test_it.py"], tmp_path, full=False, seconds=60) == "killed"
     harmless = Mutant("clipping.py", 2, mutant.start, mutant.end, "*", " * ")

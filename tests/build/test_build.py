@@ -23,7 +23,16 @@ WALK = (
 
 def build(repo, folder, environment):
     """Build a wheel of the source tree with the build's own environment, and return it."""
-    command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", str(folder), str(repo)]
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--no-deps",
+        "--wheel-dir",
+        str(folder),
+        str(repo),
+    ]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     (wheel,) = folder.glob("*.whl")
@@ -39,7 +48,12 @@ def install(wheel, folder):
 
 def walk(environment, folder):
     done = subprocess.run(
-        [sys.executable, "-c", WALK], env=environment, cwd=folder, capture_output=True, text=True, check=False
+        [sys.executable, "-c", WALK],
+        env=environment,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout, done.stderr
@@ -47,7 +61,9 @@ def walk(environment, folder):
 
 def version(environment, folder):
     command = [sys.executable, "-m", "osimlite", "--version", "-v"]
-    return subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=True).stdout
+    return subprocess.run(
+        command, env=environment, cwd=folder, capture_output=True, text=True, check=True
+    ).stdout
 
 
 @pytest.fixture
@@ -63,7 +79,11 @@ def test_a_wheel_without_a_compiler_is_pure_python(repo, tmp_path, without_compi
     assert wheel.name.endswith("-py3-none-any.whl")
     with zipfile.ZipFile(wheel) as archive:
         assert not [name for name in archive.namelist() if "native" in name]
-    environment = {**without_compiler, **install(wheel, tmp_path / "site"), "PATH": without_compiler["PATH"]}
+    environment = {
+        **without_compiler,
+        **install(wheel, tmp_path / "site"),
+        "PATH": without_compiler["PATH"],
+    }
     environment["OSIMLITE_KERNELS"] = ""
     text = version(environment, tmp_path)
     assert "installed without a library of kernels" in text and "no C++ compiler was found" in text

@@ -91,7 +91,9 @@ def test_targets():
     # Only g++ has limits of inlining that are too low.
     assert any(flag.startswith("--param") for flag in GCC.flags(NATIVE))
     assert not any(flag.startswith("--param") for flag in CLANG.flags(NATIVE))
-    assert "-inline-threshold=500" in CLANG.flags(NATIVE) and "-inline-threshold=500" not in GCC.flags(NATIVE)
+    assert "-inline-threshold=500" in CLANG.flags(
+        NATIVE
+    ) and "-inline-threshold=500" not in GCC.flags(NATIVE)
 
 
 def test_an_error_of_the_compiler_is_one_sentence(programs, tmp_path):

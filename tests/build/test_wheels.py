@@ -9,7 +9,9 @@ import zipfile
 
 import pytest
 
-TABLE = json.dumps({"version": "0", "laws": {"evaluate": "1", "merson~16": "2"}}, separators=(",", ":")).encode()
+TABLE = json.dumps(
+    {"version": "0", "laws": {"evaluate": "1", "merson~16": "2"}}, separators=(",", ":")
+).encode()
 NAMES = b"\0evaluate\0merson_along_16\0"
 
 
@@ -30,15 +32,32 @@ def elf(machine=62, rest=b""):
 
 
 def mach(machine=0x0100000C):
-    return b"\xcf\xfa\xed\xfe" + struct.pack("<I", machine) + b"\0_evaluate\0_merson_along_16\0" + TABLE + b"\0"
+    return (
+        b"\xcf\xfa\xed\xfe"
+        + struct.pack("<I", machine)
+        + b"\0_evaluate\0_merson_along_16\0"
+        + TABLE
+        + b"\0"
+    )
 
 
 def windows(machine=0x8664):
-    return b"MZ" + bytes(58) + struct.pack("<I", 64) + b"PE\0\0" + struct.pack("<H", machine) + NAMES + TABLE + b"\0"
+    return (
+        b"MZ"
+        + bytes(58)
+        + struct.pack("<I", 64)
+        + b"PE\0\0"
+        + struct.pack("<H", machine)
+        + NAMES
+        + TABLE
+        + b"\0"
+    )
 
 
 def test_good_libraries(wheels):
-    assert not wheels.check_library(elf(rest=b"\0GLIBC_2.2.5\0GLIBC_2.17\0"), "manylinux_2_17_x86_64")
+    assert not wheels.check_library(
+        elf(rest=b"\0GLIBC_2.2.5\0GLIBC_2.17\0"), "manylinux_2_17_x86_64"
+    )
     assert not wheels.check_library(elf(183), "manylinux_2_17_aarch64")
     assert not wheels.check_library(mach(), "macosx_11_0_arm64")
     assert not wheels.check_library(windows(), "win_amd64")
@@ -47,7 +66,11 @@ def test_good_libraries(wheels):
 @pytest.mark.parametrize(
     ("content", "platform", "problem"),
     [
-        (elf(rest=b"\0GLIBC_2.2.5\0GLIBC_2.29\0"), "manylinux_2_17_x86_64", "needs glibc 2.29, newer than its tag"),
+        (
+            elf(rest=b"\0GLIBC_2.2.5\0GLIBC_2.29\0"),
+            "manylinux_2_17_x86_64",
+            "needs glibc 2.29, newer than its tag",
+        ),
         (elf(), "manylinux_2_17_aarch64", "for the processor x86_64, not aarch64"),
         (mach(0x01000007), "macosx_11_0_arm64", "for the processor x86_64, not aarch64"),
         (windows(), "manylinux_2_17_x86_64", "no library of linux"),

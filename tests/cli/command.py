@@ -58,7 +58,9 @@ def _served(words: list[str], folder: str, text: str, environment: dict[str, str
     order = {"words": words, "folder": folder, "environment": environment}
     server.stdin.write(json.dumps(order) + "\n")
     code = int(server.stdout.readline())
-    out, err = (os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode() for file in files[1:])
+    out, err = (
+        os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode() for file in files[1:]
+    )
     return Done(code, out, err)
 
 

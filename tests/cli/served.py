@@ -2,7 +2,8 @@
 
     python served.py INPUT OUTPUT ERRORS    the numbers of the files that commands read and write
 
-A line of JSON asks for a command: its words, its folder, its environment. The answer is its exit code.
+A line of JSON asks for a command: its words, its folder, its environment. The answer is its exit
+code.
 """
 
 from __future__ import annotations
@@ -21,7 +22,11 @@ import osimlite.cli
 def load() -> None:
     """Import the commands, and all that stands within their functions."""
     for name in osimlite.cli.COMMANDS:
-        source = Path(osimlite.cli.__file__).with_name(f"{name.replace('-', '_')}.py").read_text(encoding="utf-8")
+        source = (
+            Path(osimlite.cli.__file__)
+            .with_name(f"{name.replace('-', '_')}.py")
+            .read_text(encoding="utf-8")
+        )
         osimlite.cli.load_command(name)
         for line in ast.walk(ast.parse(source)):
             # What is not installed is missed by the command that needs it.

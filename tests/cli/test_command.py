@@ -41,12 +41,19 @@ def by_typer(name: str, words: list[str], monkeypatch: pytest.MonkeyPatch) -> di
 
 
 def spellings(name: str) -> list[str]:
-    return [word for each in loaded(name).parameters() for word in each.spellings if each.declared.maker == "Option"]
+    return [
+        word
+        for each in loaded(name).parameters()
+        for word in each.spellings
+        if each.declared.maker == "Option"
+    ]
 
 
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
-@pytest.mark.parametrize("name", ["simulate", "validate", "translate", "view", "find-gait", "gait", "diff", "build"])
+@pytest.mark.parametrize(
+    "name", ["simulate", "validate", "translate", "view", "find-gait", "gait", "diff", "build"]
+)
 def test_what_is_read_is_what_typer_reads(name: str, data: st.DataObject) -> None:
     word = st.sampled_from(WORDS)
     option = st.sampled_from(spellings(name))
@@ -54,7 +61,10 @@ def test_what_is_read_is_what_typer_reads(name: str, data: st.DataObject) -> Non
         st.tuples(word), st.tuples(option), st.tuples(option, word),
         st.builds(lambda left, right: (f"{left}={right}",), option, word),
     )  # fmt: skip
-    words = ["walker.osim", *(each for few in data.draw(st.lists(part, max_size=5)) for each in few)]
+    words = [
+        "walker.osim",
+        *(each for few in data.draw(st.lists(part, max_size=5)) for each in few),
+    ]
     result = loaded(name).read(words)
     if result is not None:
         assert result == by_typer(name, words, pytest.MonkeyPatch()), words
@@ -64,7 +74,12 @@ def test_what_is_read_is_what_typer_reads(name: str, data: st.DataObject) -> Non
 def test_defaults_are_those_of_typer(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     needed = [each for each in loaded(name).parameters() if each.default is ...]
     words = [f for each in needed for f in ("x",) if each.declared.maker == "Argument"]
-    words += [f for each in needed if each.declared.maker == "Option" for f in (next(iter(each.spellings)), "x")]
+    words += [
+        f
+        for each in needed
+        if each.declared.maker == "Option"
+        for f in (next(iter(each.spellings)), "x")
+    ]
     result = loaded(name).read(words)
     assert result is not None and result == by_typer(name, words, monkeypatch)
 
@@ -72,7 +87,15 @@ def test_defaults_are_those_of_typer(name: str, monkeypatch: pytest.MonkeyPatch)
 def test_what_is_wrong_is_left_to_typer() -> None:
     read = loaded("simulate").read
     assert read(["a.osim", "--to", "2", "--plot"]) is not None
-    for wrong in ([], ["a", "b"], ["a", "--two"], ["a", "--to"], ["a", "--to", "x"], ["a", "--plot=1"], ["--help"]):
+    for wrong in (
+        [],
+        ["a", "b"],
+        ["a", "--two"],
+        ["a", "--to"],
+        ["a", "--to", "x"],
+        ["a", "--plot=1"],
+        ["--help"],
+    ):
         assert read(wrong) is None
     assert loaded("find-gait").read(["a", "--digits", "18"]) is None
     assert loaded("find-gait").read(["a", "--digits", "17"]) is not None
@@ -86,7 +109,12 @@ def test_an_option_of_a_simulation_is_declared_once() -> None:
     for name in ("sweep", "optimize", "gait", "muscles"):
         for each in loaded(name).parameters():
             same = taken.get(each.name)
-            if same is not None and each.name in ("wrapping", "skip_unsupported", "integrator", "equilibrate"):
+            if same is not None and each.name in (
+                "wrapping",
+                "skip_unsupported",
+                "integrator",
+                "equilibrate",
+            ):
                 assert each.declared.told == same.declared.told and each.default == same.default
 
 
@@ -94,5 +122,7 @@ def test_python_does_not_look_through_all_objects_at_the_end() -> None:
     # What is registered first is called last.
     told = "import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count() > 1000))"
     script = f"{told}; from osimlite.cli import main; main(['--version'])"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60
+    )
     assert done.stdout.split()[-1] == "True"

@@ -35,7 +35,10 @@ def test_the_whole_tour(tmp_path: Path) -> None:
     difference = re.search(r"farther than (\S+) rad", said)
     assert difference is not None and float(difference[1]) < 1e-4
     if by_bullet:
-        apart = re.search(r"farther than (\S+) rad or m from the motion of the compiled engine; (\d+) and (\d+)", said)
+        apart = re.search(
+            r"farther than (\S+) rad or m from the motion of the compiled engine; (\d+) and (\d+)",
+            said,
+        )
         assert apart is not None and 0.0 < float(apart[1]) < 1e-6 and apart[2] == apart[3]
     else:
         assert "pip install 'osimlite[bullet]'" in said
@@ -45,7 +48,9 @@ def test_the_whole_tour(tmp_path: Path) -> None:
     walked = re.search(r"walks for 10 s at (\S+) m/s, in (\d+) steps, by reflexes alone", said)
     assert walked is not None and 1.1 < float(walked[1]) < 1.4 and 18 <= int(walked[2]) <= 26
     for page in pages:
-        (text,) = re.findall(r'id="data">(.*?)</script>', (folder / page).read_text(encoding="utf-8"))
+        (text,) = re.findall(
+            r'id="data">(.*?)</script>', (folder / page).read_text(encoding="utf-8")
+        )
         story = json.loads(text)["story"]
         assert [file for _, file in story["pages"]] == pages and story["page"] == page
         assert story["words"][:60] in said

@@ -33,20 +33,33 @@ def run(*arguments: str) -> tuple[int, str]:
 
 
 def test_every_extra_has_a_purpose() -> None:
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
+        "optional-dependencies"
+    ]
     assert {*extras, ""} - {*EXTRAS} == {"all", "dev", "fast"}
     result = purposes(requirements())
     assert all(result[extra] for extra in EXTRAS)
     assert sorted(use for uses in result.values() for use in uses) == sorted(NEEDS)
     assert (
-        "translate" in result["sim"] and "view --screenshot" in result["view"] and "simulate --gui" in result["bullet"]
+        "translate" in result["sim"]
+        and "view --screenshot" in result["view"]
+        and "simulate --gui" in result["bullet"]
     )
 
 
 def test_a_use_belongs_to_the_first_extra_that_brings_all_it_needs() -> None:
-    wanted = {"": ["lxml"], "sim": ["numpy"], "view": ["numpy", "pillow"], "more": ["numpy", "pillow"]}
+    wanted = {
+        "": ["lxml"],
+        "sim": ["numpy"],
+        "view": ["numpy", "pillow"],
+        "more": ["numpy", "pillow"],
+    }
     result = purposes(wanted)
-    assert "validate" in result[""] and "kinematics" in result["sim"] and "view --screenshot" in result["view"]
+    assert (
+        "validate" in result[""]
+        and "kinematics" in result["sim"]
+        and "view --screenshot" in result["view"]
+    )
     assert not any("optimize" in uses for uses in result.values())
 
 
@@ -103,7 +116,9 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "<coordinates_file>m.mot</coordinates_file></InverseDynamicsTool></OpenSimDocument>"
     )
     rows = "".join(f"0.{k} 0\n" for k in range(9))
-    (place / "m.mot").write_text(f"m\nversion=1\nnRows=9\nnColumns=2\nendheader\ntime Pelvis_tx\n{rows}")
+    (place / "m.mot").write_text(
+        f"m\nversion=1\nnRows=9\nnColumns=2\nendheader\ntime Pelvis_tx\n{rows}"
+    )
     return place
 
 
@@ -116,9 +131,14 @@ def call(words: str, absent: set[str], folder: Path) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize("use", [pytest.param(use, marks=pytest.mark.full) if use in SLOW else use for use in EXAMPLES])
+@pytest.mark.parametrize(
+    "use", [pytest.param(use, marks=pytest.mark.full) if use in SLOW else use for use in EXAMPLES]
+)
 def test_what_is_needed_is_enough_and_is_needed(work: Path, use: str) -> None:
-    every = {MODULES.get(name, name) for names in NEEDS.values() for name in names} | {"scipy", "distributed"}
+    every = {MODULES.get(name, name) for names in NEEDS.values() for name in names} | {
+        "scipy",
+        "distributed",
+    }
     needed = {MODULES.get(name, name) for name in NEEDS[use]}
     # Drawing libraries need packages of their own.
     brought = {"PIL", "numpy"} if "matplotlib" in needed else set()
@@ -141,7 +161,9 @@ def test_what_is_examined() -> None:
     assert examine("no-such-package-of-ours") == Package("no-such-package-of-ours", "", "")
 
 
-def test_what_lies_in_the_current_folder_is_not_executed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_lies_in_the_current_folder_is_not_executed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "lxml.py").write_text("raise SystemExit('executed')")
     monkeypatch.chdir(tmp_path)
     assert examine("lxml") == Package("lxml", metadata.version("lxml"), "")
@@ -156,7 +178,9 @@ def test_a_package_that_cannot_be_loaded(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     assert examine("torn") == Package("torn", "1.0", "OSError: libtorn.so: wrong ELF class")
-    monkeypatch.setattr("osimlite.cli.doctor.requirements", lambda: {"": ["torn"], "sim": ["no-such-package"]})
+    monkeypatch.setattr(
+        "osimlite.cli.doctor.requirements", lambda: {"": ["torn"], "sim": ["no-such-package"]}
+    )
     code, text = run(str(tmp_path))
     assert code == 1
     assert "torn 1.0 cannot be loaded: OSError: libtorn.so: wrong ELF class" in text

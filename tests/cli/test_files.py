@@ -20,8 +20,14 @@ def test_build_lists_models_and_takes_parameters(tmp_path: Path) -> None:
     code, out, _ = run("build", "--list")
     assert code == 0 and out.split()[0] == "dynamic-walker" and "()" not in out
     code, _, error = run("build", "dynamic-walker", "-o", "w.omoco", folder=tmp_path)
-    assert code == 2 and "name the model's file, w.osim" in error and not (tmp_path / "w.omoco").exists()
-    code, _, _ = run("build", "dynamic-walker", "-p", "thigh_length=0.42", "-o", "w.osim", folder=tmp_path)
+    assert (
+        code == 2
+        and "name the model's file, w.osim" in error
+        and not (tmp_path / "w.omoco").exists()
+    )
+    code, _, _ = run(
+        "build", "dynamic-walker", "-p", "thigh_length=0.42", "-o", "w.osim", folder=tmp_path
+    )
     assert code == 0
     contact = osimlite.read(tmp_path / "w.osim")["/contactgeometryset/RKneeContact"]
     assert contact.location == (0.0, 0.21, 0.0)
@@ -40,7 +46,9 @@ def test_build_takes_a_file_of_the_user(tmp_path: Path) -> None:
     code, _, error = run("build", "mine.py", "-p", "mass=3", "-o", "p.osim", folder=tmp_path)
     assert code == 0, error
     assert osimlite.read(tmp_path / "p.osim")["/bodyset/bob"].mass == 3.0
-    code, _, error = run("build", "mine.py:pendulum", "-p", "mas=3", "-o", "q.osim", folder=tmp_path)
+    code, _, error = run(
+        "build", "mine.py:pendulum", "-p", "mas=3", "-o", "q.osim", folder=tmp_path
+    )
     assert code == 2 and "did you mean 'mass'" in error
     code, _, error = run("build", "mine.py", "-p", "mass=heavy", "-o", "q.osim", folder=tmp_path)
     assert code == 2 and "must be a number" in error
@@ -62,7 +70,11 @@ def test_build_writes_nothing_if_the_model_has_an_error(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("source", "words"),
-    [("dynamic-wlker", "did you mean 'dynamic-walker'"), ("no.py", "no such file"), ("no.such:thing", "cannot import")],
+    [
+        ("dynamic-wlker", "did you mean 'dynamic-walker'"),
+        ("no.py", "no such file"),
+        ("no.such:thing", "cannot import"),
+    ],
 )
 def test_build_names_what_is_missing(source: str, words: str) -> None:
     code, _, error = run("build", source)
@@ -92,9 +104,15 @@ def test_a_file_of_an_older_format_stays_one(tmp_path: Path) -> None:
     file.write_text(
         '<OpenSimDocument Version="20302"><Model name="m"><gravity> 0 -9.810 0\n</gravity></Model></OpenSimDocument>'
     )
-    assert run("format", "--check", "old.osim", folder=tmp_path)[:2] == (1, "would reformat old.osim\n")
+    assert run("format", "--check", "old.osim", folder=tmp_path)[:2] == (
+        1,
+        "would reformat old.osim\n",
+    )
     assert run("format", "old.osim", folder=tmp_path)[:2] == (0, "reformatted old.osim\n")
-    assert 'Version="20302"' in file.read_text() and "\t\t<gravity>0 -9.810 0</gravity>\n" in file.read_text()
+    assert (
+        'Version="20302"' in file.read_text()
+        and "\t\t<gravity>0 -9.810 0</gravity>\n" in file.read_text()
+    )
     assert run("format", "--check", "old.osim", folder=tmp_path)[:2] == (0, "")
 
 
@@ -122,16 +140,20 @@ def test_info(fixtures: Path) -> None:
 def test_errors_are_one_sentence(tmp_path: Path) -> None:
     code, out, error = run("info", "nowhere.osim", folder=tmp_path)
     assert (code, out) == (2, "")
-    assert error == "osimlite: nowhere.osim: cannot read the file: no such file (see docs/errors.md#files)\n"
+    assert (
+        error
+        == "osimlite: nowhere.osim: cannot read the file: no such file (see docs/errors.md#files)\n"
+    )
     for command in ("info", "validate", "format"):
         code, out, error = run(command, "steady-walker", folder=tmp_path)
-        assert (code, out) == (2, "") and "'osimlite build steady-walker -o steady-walker.osim'" in error
+        assert (code, out) == (
+            2,
+            "",
+        ) and "'osimlite build steady-walker -o steady-walker.osim'" in error
         assert error.count("\n") == 1
     code, _, error = run("info", ".", folder=tmp_path)
     assert code == 2 and "this is a folder; name a model file in it" in error
-    said = (
-        "osimlite: .: there is no file of OpenSim in this folder: no .osim, .xml or .omoco (see docs/lint-in-ci.md)\n"
-    )
+    said = "osimlite: .: there is no file of OpenSim in this folder: no .osim, .xml or .omoco (see docs/lint-in-ci.md)\n"
     assert run("format", ".", folder=tmp_path) == (2, "", said)
     (tmp_path / "empty.osim").touch()
     assert run("format", "empty.osim", folder=tmp_path)[0] == 2
@@ -174,7 +196,11 @@ def test_build_writes_to_standard_output_and_through_links(tmp_path: Path) -> No
 def test_folders_that_cannot_be_made_are_named(fixtures: Path, tmp_path: Path) -> None:
     (tmp_path / "afile").write_text("")
     model = str(fixtures / "walker" / "DynamicWalkerModel.osim")
-    for words in (("simulate", model, "--to", "0.01"), ("demo", "--no-pictures"), ("translate", model)):
+    for words in (
+        ("simulate", model, "--to", "0.01"),
+        ("demo", "--no-pictures"),
+        ("translate", model),
+    ):
         for place in ("afile", "afile/sub"):
             code, _, error = run(*words, "-o", place, folder=tmp_path)
             assert code == 2 and "afile: cannot make" in error, (words, error)

@@ -39,7 +39,10 @@ def test_without_words_the_help_is_printed(tmp_path: Path) -> None:
         (("scone", "humanwalks"), "did you mean 'human-walks', the built-in scenario?"),
         (("simulate", "dynamic-walkr"), "did you mean the built-in model 'dynamic-walker'?"),
         (("view", "jumpr.osim"), "'osimlite build jumper -o jumper.osim' writes it"),
-        (("scale", "box.osim"), "there is nothing to scale; add --distance, --factor, --mass or --place"),
+        (
+            ("scale", "box.osim"),
+            "there is nothing to scale; add --distance, --factor, --mass or --place",
+        ),
         (("scale", "box.osim", "--preserve-masses"), "there is nothing to scale"),
         (("modify", "box.osim"), "there is nothing to replace; add --replace NAME=WORD"),
         (("simulate", "box.osim", "--to"), "'osimlite simulate --help' lists what there is"),

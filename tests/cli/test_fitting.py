@@ -14,7 +14,12 @@ from osimlite.io.tables.storage import read_sto
 from osimlite.io.tables.trc import write_trc
 from tests.cli.command import run
 
-POINTS = {"one": (0.1, 0.0, 0.0), "two": (0.0, 0.2, 0.0), "three": (0.0, 0.0, 0.3), "four": (0.1, 0.1, 0.1)}
+POINTS = {
+    "one": (0.1, 0.0, 0.0),
+    "two": (0.0, 0.2, 0.0),
+    "three": (0.0, 0.0, 0.3),
+    "four": (0.1, 0.1, 0.1),
+}
 
 
 @pytest.fixture
@@ -23,24 +28,33 @@ def lab(tmp_path: Path) -> Path:
     model = osimlite.Model(name="box")
     body = osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
     model.add(body)
-    model.add(osimlite.FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body))
+    model.add(
+        osimlite.FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body)
+    )
     for name, point in POINTS.items():
         model.add(osimlite.Marker(name=name, socket_parent_frame=body, location=point))
     osimlite.write(model, tmp_path / "box.osim")
     mechanism: Any = osimlite.mechanism(model)
     poses = [0.2 * k * np.array((0.3, -0.2, 0.1, 0.5, 0.6, 0.7)) for k in range(5)]
-    rows = [[x for p in POINTS.values() for x in mechanism.at(q).point(0, np.array(p)).tolist()] for q in poses]
+    rows = [
+        [x for p in POINTS.values() for x in mechanism.at(q).point(0, np.array(p)).tolist()]
+        for q in poses
+    ]
     write_trc(tmp_path / "walk.trc", [0.1 * k for k in range(5)], list(POINTS), rows)
     return tmp_path
 
 
 def test_a_trial_is_fitted(lab: Path) -> None:
-    done = run("ik", "box.osim", "walk.trc", "--weight", "one=10", "--from", "0.1", "-o", "out", folder=lab)
+    done = run(
+        "ik", "box.osim", "walk.trc", "--weight", "one=10", "--from", "0.1", "-o", "out", folder=lab
+    )
     assert (done.code, done.err) == (0, "")
     assert "4 frames, 4 markers: errors of 0.00 cm" in done.out
     table = read_sto(lab / "out" / "ik.mot")
     assert table.in_degrees and table.times == pytest.approx([0.1, 0.2, 0.3, 0.4])
-    assert table.rows[-1] == pytest.approx([*np.rad2deg((0.24, -0.16, 0.08)), 0.4, 0.48, 0.56], abs=1e-6)
+    assert table.rows[-1] == pytest.approx(
+        [*np.rad2deg((0.24, -0.16, 0.08)), 0.4, 0.48, 0.56], abs=1e-6
+    )
     assert read_sto(lab / "out" / "marker_errors.sto").columns == tuple(POINTS)
 
 
@@ -54,13 +68,25 @@ def test_a_trial_is_fitted(lab: Path) -> None:
         (("ik", "box.osim", "none.trc"), "none.trc: cannot read the file"),
         (("ik", "box.osim", "box.osim"), "it is no marker file"),
         (("scale", "box.osim", "--distance", "b=one:two"), "there are no markers of it"),
-        (("scale", "box.osim", "walk.trc", "--distance", "b=one"), "'one' names no pair of markers for 'b'"),
+        (
+            ("scale", "box.osim", "walk.trc", "--distance", "b=one"),
+            "'one' names no pair of markers for 'b'",
+        ),
         (("scale", "box.osim", "--factor", "b=1,2"), "'1,2' are no factors for 'b'"),
         (("scale", "box.osim", "--factor", "c=2"), "'box' has no body 'c'"),
         (("scale", "box.osim", "walk.trc", "--distance", "c.X=one:two"), "'box' has no body 'c'"),
-        (("scale", "box.osim", "--factor", "b=0"), "factors of 'b' are positive numbers, not 0, 0, 0"),
-        (("scale", "box.osim", "--factor", "b=1,-2,1"), "factors of 'b' are positive numbers, not 1, -2, 1"),
-        (("scale", "box.osim", "walk.trc", "--distance", "b.XQ=one:two"), "'XQ' of 'b' are no axes"),
+        (
+            ("scale", "box.osim", "--factor", "b=0"),
+            "factors of 'b' are positive numbers, not 0, 0, 0",
+        ),
+        (
+            ("scale", "box.osim", "--factor", "b=1,-2,1"),
+            "factors of 'b' are positive numbers, not 1, -2, 1",
+        ),
+        (
+            ("scale", "box.osim", "walk.trc", "--distance", "b.XQ=one:two"),
+            "'XQ' of 'b' are no axes",
+        ),
     ],
 )
 def test_what_is_wrong_is_told(lab: Path, words: tuple[str, ...], said: str) -> None:
@@ -73,25 +99,67 @@ def test_markers_that_do_not_count_and_units_that_cannot_be_right_are_told(lab: 
     trial = lab / "walk.trc"
     trial.write_text(trial.read_text().replace("three", "threee"))
     out = run("ik", "box.osim", "walk.trc", "-o", "out", folder=lab).out
-    assert "of the model, not in the data: three\n" in out and "in the data, not of the model: threee\n" in out
+    assert (
+        "of the model, not in the data: three\n" in out
+        and "in the data, not of the model: threee\n" in out
+    )
     assert "units" not in out
     data = MarkerData.of(trial)
-    write_trc(trial, data.times.tolist(), data.names, (1000.0 * data.positions).reshape(len(data.times), -1).tolist())
-    assert "check the units of the data" in run("ik", "box.osim", "walk.trc", "-o", "out", folder=lab).out
+    write_trc(
+        trial,
+        data.times.tolist(),
+        data.names,
+        (1000.0 * data.positions).reshape(len(data.times), -1).tolist(),
+    )
+    assert (
+        "check the units of the data"
+        in run("ik", "box.osim", "walk.trc", "-o", "out", folder=lab).out
+    )
 
 
 def test_a_model_is_scaled(lab: Path) -> None:
-    done = run("scale", "box.osim", "walk.trc", "--distance", "b.XY=one:two", "--mass", "3", "--place", folder=lab)
-    assert (done.code, done.err) == (0, "") and "b.XY: 1" in done.out and "wrote scaled.osim" in done.out
+    done = run(
+        "scale",
+        "box.osim",
+        "walk.trc",
+        "--distance",
+        "b.XY=one:two",
+        "--mass",
+        "3",
+        "--place",
+        folder=lab,
+    )
+    assert (
+        (done.code, done.err) == (0, "")
+        and "b.XY: 1" in done.out
+        and "wrote scaled.osim" in done.out
+    )
     model = osimlite.read(lab / "scaled.osim")
     assert model["/bodyset/b"].mass == pytest.approx(3.0)
     done = run("scale", "box.osim", "--factor", "b=2,1,1", "-o", "long.osim", folder=lab)
-    assert done.code == 0 and osimlite.read(lab / "long.osim")["/markerset/one"].location == (0.2, 0.0, 0.0)
+    assert done.code == 0 and osimlite.read(lab / "long.osim")["/markerset/one"].location == (
+        0.2,
+        0.0,
+        0.0,
+    )
 
 
 def test_a_model_is_fitted_to_a_person(lab: Path) -> None:
     """Markers stay where they are held; the setup leads to the same model."""
-    done = run("fit", "box.osim", "walk.trc", "--hold", "one", "--hold", "two", "--mass", "3", "-o", "out", folder=lab)
+    done = run(
+        "fit",
+        "box.osim",
+        "walk.trc",
+        "--hold",
+        "one",
+        "--hold",
+        "two",
+        "--mass",
+        "3",
+        "-o",
+        "out",
+        folder=lab,
+    )
     assert (done.code, done.err) == (0, "")
     assert "b: 1.0000 ±" in done.out and "walk.trc: errors of 0.00 cm" in done.out
     model = osimlite.read(lab / "out" / "box_fitted.osim")
@@ -107,7 +175,11 @@ def test_trials_of_two_folders_may_have_one_name(lab: Path) -> None:
     (lab / "second").mkdir()
     (lab / "second" / "walk.trc").write_bytes((lab / "walk.trc").read_bytes())
     done = run("fit", "box.osim", "walk.trc", "second/walk.trc", "-o", "out", folder=lab)
-    assert done.code == 0 and "\nwalk.trc: errors" in done.out and "walk.trc: errors" in done.out.partition("second")[2]
+    assert (
+        done.code == 0
+        and "\nwalk.trc: errors" in done.out
+        and "walk.trc: errors" in done.out.partition("second")[2]
+    )
 
 
 def test_a_marker_that_is_not_there_cannot_be_held(lab: Path) -> None:

@@ -60,7 +60,10 @@ def test_options_are_checked_before_the_walk(
 def test_without_a_cycle_the_steps_are_counted_and_the_answer_is_no(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run("dynamic-walker", "-p", "slope=8", "--to", "1", "--basin", "-o", str(tmp_path / "gait")) == 1
+    assert (
+        run("dynamic-walker", "-p", "slope=8", "--to", "1", "--basin", "-o", str(tmp_path / "gait"))
+        == 1
+    )
     assert "makes no step" in " ".join(capsys.readouterr().out.split())
     facts = json.loads((tmp_path / "gait" / "gait.json").read_text())
     assert facts["walk"]["steps"] == [] and facts["walk"]["ending"] == "fell"
@@ -86,7 +89,9 @@ def test_without_contacts(file: str, capsys: pytest.CaptureFixture[str]) -> None
     assert "'pendulum' has no contact forces" in capsys.readouterr().err
 
 
-def test_what_cannot_be_computed_can_be_left_out(file: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_cannot_be_computed_can_be_left_out(
+    file: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     model = pendulum()
     for number in range(6):
         model.add(osimlite.ElasticFoundationForce(name=f"foundation{number}", appliesForce=True))
@@ -99,11 +104,17 @@ def test_what_cannot_be_computed_can_be_left_out(file: str, capsys: pytest.Captu
     assert "has no contact forces" in capsys.readouterr().err
 
 
-def test_constraints_are_beyond_the_search_for_gaits(file: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_constraints_are_beyond_the_search_for_gaits(
+    file: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     model = pendulum()
     body = next(iter(model.components(osimlite.Body)))
-    model.add(osimlite.PointConstraint(name="held", socket_body_1="/ground", socket_body_2=body.path))
+    model.add(
+        osimlite.PointConstraint(name="held", socket_body_1="/ground", socket_body_2=body.path)
+    )
     osimlite.write(model, file)
     assert run(file) == 1
     error = capsys.readouterr().err
-    assert "some of which /constraintset/held takes away" in error and "take the engine" not in error
+    assert (
+        "some of which /constraintset/held takes away" in error and "take the engine" not in error
+    )

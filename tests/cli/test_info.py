@@ -30,7 +30,11 @@ def test_info_says_of_a_changed_model_anew_whether_it_can_be_simulated(tmp_path,
     file, text = tmp_path / "walker.osim", WALKER.read_text()
 
     def said() -> str:
-        return next(line.split(None, 1)[1] for line in run("info", file).out.splitlines() if "simulation" in line)
+        return next(
+            line.split(None, 1)[1]
+            for line in run("info", file).out.splitlines()
+            if "simulation" in line
+        )
 
     def answers() -> list[Path]:
         return list(own_cache.rglob("answers/*.json"))
@@ -52,14 +56,19 @@ def test_info_says_of_a_changed_model_anew_whether_it_can_be_simulated(tmp_path,
     file.write_text(f'{text[:start]}<ForceSet file="forces.xml"/>{text[end:]}')
     (tmp_path / "forces.xml").write_text(forces)
     assert said() == "possible, nothing is left out"
-    (tmp_path / "forces.xml").write_text(forces.replace("CoordinateLimitForce", "CoordinateLimitForse"))
+    (tmp_path / "forces.xml").write_text(
+        forces.replace("CoordinateLimitForce", "CoordinateLimitForse")
+    )
     assert said().startswith("not without leaving out")
     file.write_text(text.replace("<mass>", "<mass>nan "))
     assert said().startswith("not possible") and len(answers()) == 1 and "left out" not in said()
 
 
 def test_info_of_a_setup_file_names_its_files(fixtures):
-    rows = [line.split(None, 1) for line in run("info", fixtures / "documents" / "analyze.xml").out.splitlines()]
+    rows = [
+        line.split(None, 1)
+        for line in run("info", fixtures / "documents" / "analyze.xml").out.splitlines()
+    ]
     assert ["AnalyzeTool", "walk"] in [[word.strip() for word in row] for row in rows]
     files = [row[1].strip() for row in rows if row and row[0] == "force_set_files"]
     assert files == ["residuals.xml (not there)", "reserves.xml (not there)"]
@@ -82,11 +91,15 @@ def test_info_of_tables(fixtures):
 
 def test_diff_of_tables(fixtures, tmp_path):
     old, new = fixtures / "setups" / "coords.mot", tmp_path / "new.mot"
-    head, _, rows = old.read_text().replace("inDegrees=yes", "inDegrees=no").partition("pelvis_tilt")
+    head, _, rows = (
+        old.read_text().replace("inDegrees=yes", "inDegrees=no").partition("pelvis_tilt")
+    )
     first, *others = rows.splitlines(keepends=True)
     words = others[6].split("\t")
     words[2] = "1.5"
-    new.write_text(f"{head}tilt{first}{''.join(others[:6])}" + "\t".join(words) + "".join(others[7:-1]))
+    new.write_text(
+        f"{head}tilt{first}{''.join(others[:6])}" + "\t".join(words) + "".join(others[7:-1])
+    )
     done = run("diff", old, new)
     assert done.code == 1 and done.out.splitlines()[:4] == [
         "- pelvis_tilt", "+ tilt", "  inDegrees: yes -> no", "  rows: 61 -> 60",
@@ -97,7 +110,10 @@ def test_diff_of_tables(fixtures, tmp_path):
     assert (run("diff", old, old).code, run("diff", old, old).out) == (0, "")
     said = run("format", old).err
     assert "no element in it; of tables, 'validate', 'info' and 'diff' know more" in said
-    assert run("diff", "--git", "a.mot", "/dev/null", "0", "0", old, "0", "0").out.splitlines()[2] == "+ pelvis_tilt"
+    assert (
+        run("diff", "--git", "a.mot", "/dev/null", "0", "0", old, "0", "0").out.splitlines()[2]
+        == "+ pelvis_tilt"
+    )
 
 
 def test_format_and_diff_of_setup_files(fixtures, tmp_path):
@@ -107,7 +123,10 @@ def test_format_and_diff_of_setup_files(fixtures, tmp_path):
     new = tmp_path / "new.xml"
     new.write_text(Path(old).read_text().replace("<weight>10<", "<weight>20<"))
     result = run("diff", old, new)
-    assert (result.code, result.out.splitlines()) == (1, ["  trial3", "    IKTaskSet.objects[r.knee].weight: 10 -> 20"])
+    assert (result.code, result.out.splitlines()) == (
+        1,
+        ["  trial3", "    IKTaskSet.objects[r.knee].weight: 10 -> 20"],
+    )
 
 
 def test_info_lists_muscles_and_says_what_can_be_simulated(tmp_path):
@@ -119,7 +138,9 @@ def test_info_lists_muscles_and_says_what_can_be_simulated(tmp_path):
         muscle = model.add(kind(name=f"m{wraps}", max_isometric_force=546.0))
         path = muscle.geometry_path
         path.path_point_set.objects += [
-            osimlite.PathPoint(name="o", socket_parent_frame=model.ground, location=(0.5, 0.0, 0.0)),
+            osimlite.PathPoint(
+                name="o", socket_parent_frame=model.ground, location=(0.5, 0.0, 0.0)
+            ),
             osimlite.PathPoint(name="i", socket_parent_frame=body, location=(0.0, 0.2, 0.0)),
         ]
         path.path_wrap_set.objects += [osimlite.PathWrap(name="w", wrap_object="ball")] * wraps
@@ -154,7 +175,8 @@ def test_format_says_when_there_is_nothing_to_do(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new"), [("</Body>", "</Boddy>"), ("<mass>1</mass>", "<mass>1</mass"), ("<mass>", "<mass")]
+    ("old", "new"),
+    [("</Body>", "</Boddy>"), ("<mass>1</mass>", "<mass>1</mass"), ("<mass>", "<mass")],
 )
 def test_every_command_names_the_same_place_of_a_syntax_error(old, new, tmp_path):
     path = tmp_path / "broken.osim"
@@ -171,5 +193,16 @@ def test_components_are_counted_as_on_the_page():
     from osimlite.view.inspect import component_tree
 
     nodes, _ = component_tree(read(WALKER))
-    said = next(line for line in run("info", WALKER).out.splitlines() if line.startswith("components "))
-    assert said.split()[1:] == [str(len(nodes)), "in", "the", "file,", "98", "as", "OpenSim", "counts"]
+    said = next(
+        line for line in run("info", WALKER).out.splitlines() if line.startswith("components ")
+    )
+    assert said.split()[1:] == [
+        str(len(nodes)),
+        "in",
+        "the",
+        "file,",
+        "98",
+        "as",
+        "OpenSim",
+        "counts",
+    ]

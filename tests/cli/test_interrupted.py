@@ -23,10 +23,16 @@ main(["info", sys.argv[1]])
 
 @pytest.mark.parametrize(
     "how",
-    ["raise", "raise RuntimeError('Error calling __set_name__') from error", "raise ImportError('half loaded')"],
+    [
+        "raise",
+        "raise RuntimeError('Error calling __set_name__') from error",
+        "raise ImportError('half loaded')",
+    ],
 )
 def test_also_where_it_comes_as_another_error(how: str, repo) -> None:
     model = repo / "fixtures" / "walker" / "DynamicWalkerModel.osim"
     command = [sys.executable, "-c", WRAPPED.format(how=how), str(model)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100, cwd=repo)
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, timeout=100, cwd=repo
+    )
     assert (done.returncode, done.stderr) == (130, "osimlite: interrupted\n")

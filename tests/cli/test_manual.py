@@ -27,7 +27,11 @@ def missing(place: str) -> bool:
     return not (ROOT / page).is_file() or (heading != "" and heading not in headings(page))
 
 
-KINDS = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, errors.OsimliteError)]
+KINDS = [
+    kind
+    for kind in vars(errors).values()
+    if isinstance(kind, type) and issubclass(kind, errors.OsimliteError)
+]
 
 
 def test_the_pages_and_their_headings_are_there():
@@ -45,7 +49,11 @@ def test_whatever_raises_errors_has_a_page():
     assert {f"osimlite.cli.{command.replace('-', '_')}" for command in COMMANDS} <= {*PAGES}
     folder = Path(errors.__file__).parent
     raises = re.compile(rf"raise ({'|'.join(kind.__name__ for kind in KINDS)})\(")
-    parts = {path.relative_to(folder).parts[0] for path in folder.glob("*/**/*.py") if raises.search(path.read_text())}
+    parts = {
+        path.relative_to(folder).parts[0]
+        for path in folder.glob("*/**/*.py")
+        if raises.search(path.read_text())
+    }
     assert "studies" in parts and not parts - {name.split(".")[1] for name in PAGES}
 
 
@@ -64,7 +72,10 @@ def test_whatever_raises_errors_has_a_page():
         ("simulate walker.osim --controls hip=1", "docs/controls.md#yours"),
         ("simulate walker.osim --integrator euler", "docs/integrators.md"),
         ("sweep walker.osim --vary RHip=0:1", "docs/sweeps.md#what-can-be-varied"),
-        ("sweep walker.osim --vary RHip_rz=0:1 --samples 2 --measure max(", "docs/sweeps.md#what-is-kept"),
+        (
+            "sweep walker.osim --vary RHip_rz=0:1 --samples 2 --measure max(",
+            "docs/sweeps.md#what-is-kept",
+        ),
         ("view walker.osim --screenshot x.png --at 1", "docs/viewer.md"),
         ("translate walker.osim --to mjcf --fit all -o x", "docs/mujoco.md"),
     ],

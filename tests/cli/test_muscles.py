@@ -49,7 +49,16 @@ def test_a_coordinate_is_swept_over_its_range_and_written(file):
 
 
 def test_two_models_side_by_side(file):
-    told = run("muscles", "arm.osim", "--coordinate", "x=0.31:0.34", "--compare", "strong.osim", "-o", "both.csv")
+    told = run(
+        "muscles",
+        "arm.osim",
+        "--coordinate",
+        "x=0.31:0.34",
+        "--compare",
+        "strong.osim",
+        "-o",
+        "both.csv",
+    )
     assert told.code == 0
     assert "Largest differences of strong.osim from arm.osim" in told.out
     with open("both.csv") as text:
@@ -69,7 +78,9 @@ def test_pictures(file):
     assert told.code == 0
     pictures = {path.name for path in (file.parent / "arm-muscles").iterdir()}
     assert {"moment_arm_x.png", "tendon_force.png", "length.png"} <= pictures
-    assert all((file.parent / "arm-muscles" / name).read_bytes()[:4] == b"\x89PNG" for name in pictures)
+    assert all(
+        (file.parent / "arm-muscles" / name).read_bytes()[:4] == b"\x89PNG" for name in pictures
+    )
 
 
 @pytest.mark.parametrize(
@@ -101,7 +112,11 @@ def test_degrees_that_are_taken_for_radians_are_refused(file):
 def test_a_model_without_muscles_is_told(file):
     osimlite.write(dynamic_walker(), file.parent / "walker.osim")
     told = run("muscles", "walker.osim", "--coordinate", "RHip_rz")
-    assert told.code == 1 and not told.out and "'walker.osim' has no muscle that moves with RHip_rz" in told.err
+    assert (
+        told.code == 1
+        and not told.out
+        and "'walker.osim' has no muscle that moves with RHip_rz" in told.err
+    )
     assert "'walker.osim' has no muscles" in run("muscles", "walker.osim").err
 
 

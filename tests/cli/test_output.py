@@ -31,12 +31,16 @@ def folder(fixtures: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         text = re.sub(rf"\b{name}\b", name + written, text)
     (place / FILE).write_text(text, encoding="utf-8")
     (place / "other.osim").write_text(text.replace("Pelvis&", "Qelvis&"), encoding="utf-8")
-    (place / "wrong.osim").write_text(text.replace("<gravity>", "<gravty>&#27; :::error::\u202e", 1), encoding="utf-8")
+    (place / "wrong.osim").write_text(
+        text.replace("<gravity>", "<gravty>&#27; :::error::\u202e", 1), encoding="utf-8"
+    )
     return place
 
 
 def call(folder: Path, *words: str, encoding: str = "utf-8") -> tuple[int, bytes, bytes]:
-    streams = [io.TextIOWrapper(io.BytesIO(), encoding=encoding, write_through=True) for _ in range(2)]
+    streams = [
+        io.TextIOWrapper(io.BytesIO(), encoding=encoding, write_through=True) for _ in range(2)
+    ]
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.setenv("COLUMNS", "60")
@@ -88,14 +92,18 @@ def test_nothing_that_people_read_is_obeyed(folder: Path, words: list[str]) -> N
 def test_formats_for_programs_are_whole_wherever_they_go(folder: Path, encoding: str) -> None:
     texts = {}
     for form in ("json", "sarif", "junit", "github"):
-        code, out, err = call(folder, "validate", "--no-cache", FILE, "--format", form, encoding=encoding)
+        code, out, err = call(
+            folder, "validate", "--no-cache", FILE, "--format", form, encoding=encoding
+        )
         assert (code, err) == (1, b"")
         texts[form] = out.decode("utf-8")
     findings = json.loads(texts["json"])
     assert {finding["file"] for finding in findings} == {FILE.replace("\udce9", r"\xe9")}
     assert any(HOSTILE in finding["message"] for finding in findings)
     results = json.loads(texts["sarif"])["runs"][0]["results"]
-    uris = {result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] for result in results}
+    uris = {
+        result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] for result in results
+    }
     assert uris == {"%3A%3Aerror%3A%3A%1B%5B2J%07%0A%3A%3Aerror%3A%3Acaf%E9%E2%80%AE.osim"}
     assert ElementTree.fromstring(texts["junit"]).get("failures") == "1"
     check(texts["junit"])
@@ -107,17 +115,29 @@ def test_formats_for_programs_are_whole_wherever_they_go(folder: Path, encoding:
 
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii", "utf-16"])
 def test_output_of_any_encoding(folder: Path, encoding: str) -> None:
-    for words, code in ((["info", FILE], 0), (["validate", "--no-cache", FILE], 1), (["info", "世.osim"], 2)):
+    for words, code in (
+        (["info", FILE], 0),
+        (["validate", "--no-cache", FILE], 1),
+        (["info", "世.osim"], 2),
+    ):
         done, out, err = call(folder, *words, encoding=encoding)
         assert done == code, err.decode(encoding)
         check(out.decode(encoding) + err.decode(encoding))
-        assert "世" in out.decode(encoding) + err.decode(encoding) or r"\u4e16" in (out + err).decode(encoding)
+        assert "世" in out.decode(encoding) + err.decode(encoding) or r"\u4e16" in (
+            out + err
+        ).decode(encoding)
     # A model is no text of the terminal: it says itself that it is UTF-8.
     code, out, _ = call(folder, "build", "dynamic-walker", "-o", "-", encoding=encoding)
-    assert code == 0 and out.decode("utf-8").startswith("<?xml") and out.endswith(b"</OpenSimDocument>\n")
+    assert (
+        code == 0
+        and out.decode("utf-8").startswith("<?xml")
+        and out.endswith(b"</OpenSimDocument>\n")
+    )
 
 
-def test_no_path_of_a_file_is_broken_into_lines(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
+def test_no_path_of_a_file_is_broken_into_lines(
+    capsys: pytest.CaptureFixture[str], monkeypatch
+) -> None:
     monkeypatch.setenv("COLUMNS", "60")
     path = "/tmp/" + "pytest-of-somebody/" * 4 + "best.par"
     Facts("search", [("runs", "40"), ("files", f"/tmp/best.osim, {path}")]).show()

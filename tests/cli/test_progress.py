@@ -19,7 +19,8 @@ class Terminal(io.StringIO):
 
 
 @pytest.mark.parametrize(
-    ("stream", "second", "shows"), [(Terminal, 1.5, True), (Terminal, 0.5, False), (io.StringIO, 1.5, False)]
+    ("stream", "second", "shows"),
+    [(Terminal, 1.5, True), (Terminal, 0.5, False), (io.StringIO, 1.5, False)],
 )
 def test_bar(monkeypatch, stream, second, shows):
     clock = iter((0.0, second, second + 0.05, second + 0.2))

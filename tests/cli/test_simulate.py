@@ -31,13 +31,21 @@ def test_files_and_table(walker, tmp_path):
     start = "--set", "RHip_rz=40deg", "--set-speed", "LKnee_rz=-1.5"
     code, out, err = run("simulate", walker, "--to", "0.5", *start, "-o", "r", folder=tmp_path)
     assert (code, err) == (0, "")
-    assert sorted(path.name for path in (tmp_path / "r").iterdir()) == ["forces.sto", "states.sto", "summary.json"]
+    assert sorted(path.name for path in (tmp_path / "r").iterdir()) == [
+        "forces.sto",
+        "states.sto",
+        "summary.json",
+    ]
     states = read_sto(tmp_path / "r" / "states.sto")
-    assert states["/jointset/RightThighToPelvis/RHip_rz/value"][0] == pytest.approx(0.6981317007977318)
+    assert states["/jointset/RightThighToPelvis/RHip_rz/value"][0] == pytest.approx(
+        0.6981317007977318
+    )
     assert states["/jointset/LeftShankToThigh/LKnee_rz/speed"][0] == -1.5
     assert states.times[-1] == 0.5 and len(states.times) == 51
     assert max(map(len, out.splitlines())) <= 80 and "RFootForce" in out
-    assert json.loads((tmp_path / "r" / "summary.json").read_text())["settings"]["initial_speeds"] == {"LKnee_rz": -1.5}
+    assert json.loads((tmp_path / "r" / "summary.json").read_text())["settings"][
+        "initial_speeds"
+    ] == {"LKnee_rz": -1.5}
 
 
 @pytest.fixture
@@ -45,10 +53,19 @@ def stiff(tmp_path: Path) -> Path:
     """A bob between stops, which swings some ten thousand times in a second."""
     model = osimlite.Model(name="stiff")
     bob = model.add(osimlite.Body(name="bob", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-    slide = osimlite.SliderJoint(name="rail", coordinates=[osimlite.Coordinate(name="x", default_value=1.0)])
+    slide = osimlite.SliderJoint(
+        name="rail", coordinates=[osimlite.Coordinate(name="x", default_value=1.0)]
+    )
     model.add(slide.between(model.ground, bob))
-    stops = {"lower_limit": -0.01, "upper_limit": 0.0, "lower_stiffness": 1e10, "upper_stiffness": 1e10}
-    limit = osimlite.CoordinateLimitForce(name="stop", coordinate="x", damping=0.0, transition=1e-3, **stops)
+    stops = {
+        "lower_limit": -0.01,
+        "upper_limit": 0.0,
+        "lower_stiffness": 1e10,
+        "upper_stiffness": 1e10,
+    }
+    limit = osimlite.CoordinateLimitForce(
+        name="stop", coordinate="x", damping=0.0, transition=1e-3, **stops
+    )
     model.add(limit)
     osimlite.write(model, tmp_path / "stiff.osim")
     return tmp_path / "stiff.osim"
@@ -59,7 +76,18 @@ def stiff(tmp_path: Path) -> Path:
 def test_a_long_run_tells_how_far_it_is_and_keeps_what_it_has_after_ctrl_c(stiff, engine, choice):
     pty = pytest.importorskip("pty", reason="needs terminals as POSIX has them")
     ours, theirs = pty.openpty()
-    words = ["simulate", stiff.name, "--engine", engine, *choice, "--to", "9", "--report-interval", "9", "--plot"]
+    words = [
+        "simulate",
+        stiff.name,
+        "--engine",
+        engine,
+        *choice,
+        "--to",
+        "9",
+        "--report-interval",
+        "9",
+        "--plot",
+    ]
     command = [sys.executable, "-m", "osimlite", *words]
     environment = {**os.environ, "TERM": "xterm", "COLUMNS": "160"}
     with subprocess.Popen(
@@ -74,10 +102,19 @@ def test_a_long_run_tells_how_far_it_is_and_keeps_what_it_has_after_ctrl_c(stiff
                 is_sent = True
         out = process.stdout.read()
     assert process.returncode == 130, said
-    assert "simulating" in said and "s, steps of " in said and "interrupted at" in said and "Traceback" not in said
+    assert (
+        "simulating" in said
+        and "s, steps of " in said
+        and "interrupted at" in said
+        and "Traceback" not in said
+    )
     assert "steps" in out
     folder = stiff.parent / "stiff"
-    assert sorted(path.name for path in folder.iterdir()) == ["forces.sto", "states.sto", "summary.json"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "forces.sto",
+        "states.sto",
+        "summary.json",
+    ]
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["interrupted"] is True and 0.0 < summary["time_reached_s"] < 9.0
     for name in ("states.sto", "forces.sto"):
@@ -86,7 +123,15 @@ def test_a_long_run_tells_how_far_it_is_and_keeps_what_it_has_after_ctrl_c(stiff
 
 def test_fixed_step(walker, tmp_path):
     code, out, _ = run(
-        "simulate", walker, "--to", "0.1", "--fixed-step", "1e-3", "--report-interval", "0.05", folder=tmp_path
+        "simulate",
+        walker,
+        "--to",
+        "0.1",
+        "--fixed-step",
+        "1e-3",
+        "--report-interval",
+        "0.05",
+        folder=tmp_path,
     )
     assert code == 0 and "100 of 100" in out
     # Without a folder to write into, one that is named after the model's file.
@@ -122,7 +167,12 @@ def test_failure_says_one_sentence_and_leaves_nothing(walker, tmp_path, argument
 def test_failure_on_the_way_keeps_what_was_recorded(walker, tmp_path):
     code, out, err = run("simulate", walker, "--fixed-step", "0.1", "-o", "r", folder=tmp_path)
     kept, said = err.splitlines()
-    assert code == 1 and "stopped at" in kept and "recorded goes into 'r'" in kept and "shorter fixed step" in said
+    assert (
+        code == 1
+        and "stopped at" in kept
+        and "recorded goes into 'r'" in kept
+        and "shorter fixed step" in said
+    )
     summary = json.loads((tmp_path / "r" / "summary.json").read_text())
     assert read_sto(tmp_path / "r" / "states.sto").times[-1] == summary["time_reached_s"] > 0.0
     assert "steps" in out
@@ -182,7 +232,15 @@ def test_a_motion_goes_on_from_a_file_of_states(tmp_path):
         done = run(*words, "--set", f"{name}={value}", folder=tmp_path)
         assert done.code == 2 and told in done.err
     run(*words, "-o", str(tmp_path / "one"))
-    run(*words, "--states", str(tmp_path / "one" / "states.sto"), "--set", "q1=0.25", "-o", str(tmp_path / "two"))
+    run(
+        *words,
+        "--states",
+        str(tmp_path / "one" / "states.sto"),
+        "--set",
+        "q1=0.25",
+        "-o",
+        str(tmp_path / "two"),
+    )
     one, two = (read_sto(tmp_path / folder / "states.sto") for folder in ("one", "two"))
     changed = one.columns.index("/jointset/j1/q1/value")
     assert two.rows[0, changed] == 0.25 and one.columns == two.columns
@@ -225,7 +283,9 @@ def test_results_do_not_depend_on_pybullet(without_pybullet, walker, tmp_path, w
     assert done.returncode == code, done.stderr
     assert said in done.stdout + done.stderr
     if code == 0:
-        assert json.loads((tmp_path / "without" / "summary.json").read_text())["engine"] == "compiled"
+        assert (
+            json.loads((tmp_path / "without" / "summary.json").read_text())["engine"] == "compiled"
+        )
         assert run(*arguments, "-o", "here", folder=tmp_path).code == 0
         states = [(tmp_path / folder / "states.sto").read_bytes() for folder in ("without", "here")]
         assert states[0] == states[1]
@@ -243,7 +303,10 @@ def driven(tmp_path: Path) -> Path:
     model = osimlite.Model(name="driven")
     bob = model.add(osimlite.Body(name="bob", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
     rail = osimlite.SliderJoint(name="rail", coordinates=[osimlite.Coordinate(name="x")])
-    model.add(rail.between(model.ground, bob), *(CoordinateActuator(name=name, coordinate="x") for name in "ab"))
+    model.add(
+        rail.between(model.ground, bob),
+        *(CoordinateActuator(name=name, coordinate="x") for name in "ab"),
+    )
     osimlite.write(model, tmp_path / "driven.osim")
     write_sto(tmp_path / "controls.sto", "controls", [0.0, 0.2], ["/forceset/a"], [[1.0], [3.0]])
     return tmp_path / "driven.osim"
@@ -261,7 +324,9 @@ def test_controls_of_a_table_and_of_a_number(driven):
 
 
 def test_what_is_doubtful_is_told_and_done(driven):
-    code, _, err = run("simulate", driven.name, "--to", "0.5", "--controls", "controls.sto", folder=driven.parent)
+    code, _, err = run(
+        "simulate", driven.name, "--to", "0.5", "--controls", "controls.sto", folder=driven.parent
+    )
     told = "osimlite: the controls are given from 0 to 0.2 s of a motion from 0 to 0.5 s; "
     assert (code, err) == (0, told + "their first and last values hold before and after\n")
     assert read_sto(driven.parent / "driven" / "forces.sto")["a"][-1] == 3.0
@@ -274,7 +339,10 @@ def test_what_is_doubtful_is_told_and_done(driven):
         (("b",), "--controls takes a file, or NAME=VALUE with a number; got 'b'"),
         (("b=fast",), "--controls takes a file, or NAME=VALUE with a number; got 'b=fast'"),
         (("b=1", "b=2"), "'b' is controlled twice; leave one out"),
-        (("controls.sto", "a=2"), "'/forceset/a' is controlled twice, by its name and by its path; leave one out"),
+        (
+            ("controls.sto", "a=2"),
+            "'/forceset/a' is controlled twice, by its name and by its path; leave one out",
+        ),
         (("gone.sto",), "gone.sto: cannot read the file: no such file"),
         (("bad.sto",), "bad.sto:6:7: 'a' is nan; give a number"),
     ],

@@ -47,11 +47,22 @@ def test_translate_writes_the_urdf_and_tells_what_is_lost(walker: Path) -> None:
 def test_translate_takes_options(walker: Path) -> None:
     code, out, _ = run("translate", "walker.osim", "--limits", "range", "--merge", folder=walker)
     assert code == 0 and "8 links, 7 joints of which 7 move" in out
-    assert '<joint name="RKnee_rz" type="revolute">' in (walker / "walker" / "walker.urdf").read_text()
+    assert (
+        '<joint name="RKnee_rz" type="revolute">' in (walker / "walker" / "walker.urdf").read_text()
+    )
 
 
 def test_translate_writes_collision_shapes_and_limits(walker: Path) -> None:
-    code, _, _ = run("translate", "walker.osim", "--collision", "--effort", "50", "--velocity", "7", folder=walker)
+    code, _, _ = run(
+        "translate",
+        "walker.osim",
+        "--collision",
+        "--effort",
+        "50",
+        "--velocity",
+        "7",
+        folder=walker,
+    )
     text = (walker / "walker" / "walker.urdf").read_text()
     assert code == 0 and "collision box of 1 x 200 x 200 m" in urdf_records(walker / "walker")
     assert "<collision " in text and 'effort="50" velocity="7"' in text
@@ -70,7 +81,9 @@ def test_folders_of_meshes_are_named_by_options_settings_and_the_environment(
     osimlite.write(model, tmp_path / "bones.osim")
     monkeypatch.setenv("OSIMLITE_GEOMETRY", "nowhere:strips")
     (tmp_path / "osimlite.toml").write_text('mesh-paths = ["binary"]\n')
-    code, out, _ = run("translate", "bones.osim", "--geometry", "ascii", "-o", "robot", folder=tmp_path)
+    code, out, _ = run(
+        "translate", "bones.osim", "--geometry", "ascii", "-o", "robot", folder=tmp_path
+    )
     assert code == 0 and "VTK's format" in out
     assert sorted(path.name for path in (tmp_path / "robot/meshes").iterdir()) == [
         "ascii.obj",
@@ -85,8 +98,13 @@ def test_translate_writes_mjcf_and_its_account(walker: Path) -> None:
     account = json.loads((walker / "native/fidelity.json").read_text())
     limits = [record for record in account["records"] if record["kind"] == "limit-force"]
     assert account["target"] == "mjcf 4" and {record["how"] for record in limits} == {"approximate"}
-    assert set(limits[0]["errors"]) == {"force", "damping"} and limits[0]["errors"]["force"]["unit"] == "N m"
-    code, _, _ = run("translate", "walker.osim", "--to", "mjcf", "--driver", "-o", "driven", folder=walker)
+    assert (
+        set(limits[0]["errors"]) == {"force", "damping"}
+        and limits[0]["errors"]["force"]["unit"] == "N m"
+    )
+    code, _, _ = run(
+        "translate", "walker.osim", "--to", "mjcf", "--driver", "-o", "driven", folder=walker
+    )
     assert code == 0
     assert sorted(path.name for path in (walker / "driven").iterdir() if path.is_file()) == [
         "fidelity.json",
@@ -100,10 +118,16 @@ def test_a_file_of_mujocos_is_checked_against_its_model(tmp_path: Path) -> None:
     model["/jointset/slide/x"].range = (0.25, 0.4)
     (tmp_path / "one.osim").write_text(osimlite.to_text(model))
     assert run("translate", "one.osim", "--to", "mjcf", "-o", "native", folder=tmp_path)[0] == 0
-    code, out, _ = run("translate", "one.osim", "--check", "native/one.xml", "-o", "checked", folder=tmp_path)
+    code, out, _ = run(
+        "translate", "one.osim", "--check", "native/one.xml", "-o", "checked", folder=tmp_path
+    )
     assert code == 0 and "one.xml: root mean square errors" in out and "mu " in out
     (result,) = json.loads((tmp_path / "checked/check.json").read_text())["muscles"]
-    assert result["length"]["max"] < 1e-12 and result["fiber"] == pytest.approx(1.0) and result["force"]["rms"] < 0.2
+    assert (
+        result["length"]["max"] < 1e-12
+        and result["fiber"] == pytest.approx(1.0)
+        and result["force"]["rms"] < 0.2
+    )
     code, _, error = run("translate", "one.osim", "--check", "gone.xml", folder=tmp_path)
     assert code == 2 and "gone.xml: MuJoCo does not load it" in error
 
@@ -125,11 +149,16 @@ def test_paths_are_called_by_the_names_of_their_muscles() -> None:
         (("walker.osim", "--limits", "all"), "--limits is 'none' or 'range'"),
         (("walker.osim", "--effort", "0"), "a limit of effort is a positive number, not 0"),
         (("gone.osim",), "gone.osim"),
-        (("walker.osim", "--geometry", "gone"), "gone: --geometry names a folder that is not there"),
+        (
+            ("walker.osim", "--geometry", "gone"),
+            "gone: --geometry names a folder that is not there",
+        ),
         (("walker.osim", "-o", "walker.osim"), "cannot make a folder here"),
     ],
 )
-def test_what_cannot_be_done_is_said_in_one_line(walker: Path, arguments: tuple[str, ...], said: str) -> None:
+def test_what_cannot_be_done_is_said_in_one_line(
+    walker: Path, arguments: tuple[str, ...], said: str
+) -> None:
     code, out, error = run("translate", *arguments, folder=walker)
     assert code == 2 and out == ""
     assert said in error and len(error.splitlines()) == 1

@@ -20,7 +20,9 @@ from osimlite.schema.model import CURRENT_VERSION
 def run(*arguments: object) -> Result:
     application = Typer()
     application.command()(upgrade)
-    result = CliRunner().invoke(application, [str(argument) for argument in arguments], env={"COLUMNS": "80"})
+    result = CliRunner().invoke(
+        application, [str(argument) for argument in arguments], env={"COLUMNS": "80"}
+    )
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result
@@ -36,7 +38,9 @@ def test_the_file_is_written_beside_the_old_one(old: Path, fixtures: Path) -> No
     result = run(old)
     target = old.with_name(f"leg_{CURRENT_VERSION}.osim")
     assert result.exit_code == 0
-    assert target.read_text() == (fixtures / "versions" / "upgraded" / "meaningless.osim").read_text()
+    assert (
+        target.read_text() == (fixtures / "versions" / "upgraded" / "meaningless.osim").read_text()
+    )
     assert old.read_bytes() == before
     assert f"version 20303 to {CURRENT_VERSION}" in result.output
 
@@ -77,7 +81,9 @@ def test_a_current_file_needs_nothing(fixtures: Path, tmp_path: Path) -> None:
 
 
 def test_text_that_is_no_xml_is_told(old: Path) -> None:
-    old.write_text(old.read_text().replace('<Model name="old">', '<Model name="old"><credits>A & B</credits>'))
+    old.write_text(
+        old.read_text().replace('<Model name="old">', '<Model name="old"><credits>A & B</credits>')
+    )
     assert "line 3: '&' is no XML and was read as it stands" in run(old).output
 
 

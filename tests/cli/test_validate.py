@@ -16,7 +16,9 @@ WALKER = Path(__file__).resolve().parents[2] / "fixtures" / "walker" / "DynamicW
 @pytest.fixture
 def faulty(tmp_path):
     path = tmp_path / "faulty.osim"
-    path.write_text(WALKER.read_text().replace("RFootContact PlatformContact", "RFootContct PlatformContact"))
+    path.write_text(
+        WALKER.read_text().replace("RFootContact PlatformContact", "RFootContct PlatformContact")
+    )
     return path
 
 
@@ -53,8 +55,13 @@ def test_standard_input_may_be_a_setup_or_a_table_of_a_project(fixtures, tmp_pat
         (tmp_path / file.name).write_bytes(file.read_bytes())
     ik, motion = (tmp_path / "ik.xml").read_text(), (tmp_path / "coords.mot").read_text()
     text = ik.replace("walk.trc", "wolk.trc")
-    assert "'wolk.trc'" in run("validate", "-", "--stdin-filename", tmp_path / "ik.xml", text=text).out
-    assert "'walk.trc'" not in run("validate", "-", "--stdin-filename", tmp_path / "ik.xml", text=ik).out
+    assert (
+        "'wolk.trc'" in run("validate", "-", "--stdin-filename", tmp_path / "ik.xml", text=text).out
+    )
+    assert (
+        "'walk.trc'"
+        not in run("validate", "-", "--stdin-filename", tmp_path / "ik.xml", text=ik).out
+    )
     wrong = motion.replace("=yes", "=true")
     done = run("validate", "-", "--stdin-filename", "a.mot", text=wrong, folder=tmp_path)
     assert done.out.startswith("a.mot:5:11: error OSIM803")
@@ -70,7 +77,10 @@ def test_xml_of_others_is_passed_over_where_that_is_asked_for(tmp_path):
     assert run("validate", tmp_path / "pom.xml", "--skip-other-xml").code == 0
     for command in ("validate", "format"):
         done = run(command, tmp_path)
-        assert done.code == 2 and "there is no file of OpenSim in this folder: no .osim, .xml" in done.err
+        assert (
+            done.code == 2
+            and "there is no file of OpenSim in this folder: no .osim, .xml" in done.err
+        )
 
 
 def test_a_folder_is_every_model_below(faulty):
@@ -86,9 +96,15 @@ def test_a_folder_is_every_model_below(faulty):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["validate", "no_such_file.osim"], "no_such_file.osim: cannot read the file: no such file"),
+        (
+            ["validate", "no_such_file.osim"],
+            "no_such_file.osim: cannot read the file: no such file",
+        ),
         (["validate", WALKER, "--format", "yaml"], "--format is one of"),
-        (["validate", WALKER, "--fail-on", "bad"], "--fail-on is one of error, warning and info, not 'bad'"),
+        (
+            ["validate", WALKER, "--fail-on", "bad"],
+            "--fail-on is one of error, warning and info, not 'bad'",
+        ),
         (["validate", WALKER, "--select", "OSIM999"], "no rule has the code or name 'OSIM999'"),
         (["rule", "unresolved-refrence"], "did you mean 'unresolved-reference'?"),
     ],
@@ -118,7 +134,9 @@ def test_the_table_of_rules_fits_a_terminal():
 
 def test_what_is_no_certain_mend_is_named(tmp_path):
     path = tmp_path / "walker.osim"
-    path.write_text(WALKER.read_text().replace("RFootContact PlatformContact", "RFotContact PlatformContact"))
+    path.write_text(
+        WALKER.read_text().replace("RFootContact PlatformContact", "RFotContact PlatformContact")
+    )
     shown = run("validate", path, "--fix", "--diff")
     assert shown.code == 0 and not shown.out
     assert shown.err == "Would mend 0 places; --unsafe-fixes would mend 1 place more.\n"
@@ -131,7 +149,9 @@ def test_what_is_no_certain_mend_is_named(tmp_path):
 
 def test_fix_mends_in_place_and_diff_shows_it_first(tmp_path):
     path = tmp_path / "walker.osim"
-    path.write_text(WALKER.read_text().replace("RFootContact PlatformContact", "rfootcontact PlatformContact"))
+    path.write_text(
+        WALKER.read_text().replace("RFootContact PlatformContact", "rfootcontact PlatformContact")
+    )
     before = path.read_text()
     shown = run("validate", path, "--diff")
     assert shown.code == 1 and path.read_text() == before
@@ -157,14 +177,18 @@ def test_a_baseline_lets_an_old_repository_begin(faulty):
 
 
 def test_settings_of_the_project_hold(faulty):
-    (faulty.parent / "pyproject.toml").write_text('[tool.osimlite]\nignore = ["OSIM3", "OSIM5"]\nfail-on = "info"\n')
+    (faulty.parent / "pyproject.toml").write_text(
+        '[tool.osimlite]\nignore = ["OSIM3", "OSIM5"]\nfail-on = "info"\n'
+    )
     assert run("validate", faulty).code == 0
     (faulty.parent / "pyproject.toml").write_text("[tool.osimlite]\nignores = []\n")
     done = run("validate", faulty)
     assert done.code == 2 and "did you mean 'ignore'?" in done.err
 
 
-@pytest.mark.parametrize(("name", "text"), [("no.osim", "hello"), ("torn.osim", "<a><b></a>"), ("t.sto", "x\n")])
+@pytest.mark.parametrize(
+    ("name", "text"), [("no.osim", "hello"), ("torn.osim", "<a><b></a>"), ("t.sto", "x\n")]
+)
 def test_diff_of_what_cannot_be_read_is_exit_2_with_the_place(name, text, tmp_path):
     (tmp_path / name).write_text(text)
     done = run("validate", tmp_path / name, "--diff")

@@ -36,11 +36,20 @@ def test_a_page_and_a_picture_are_written(walker: Path, capsys: pytest.CaptureFi
     pytest.importorskip("PIL", reason="needs pillow (extra 'view')")
     motion = stroll()
     write_sto(walker / "walk.sto", "walk", motion.times, motion.coordinates, motion.values.tolist())
-    code = run("walker.osim", "walk.sto", "--html", "out/page.html", "--screenshot", "a.png", "--at", "0.2")
+    code = run(
+        "walker.osim", "walk.sto", "--html", "out/page.html", "--screenshot", "a.png", "--at", "0.2"
+    )
     assert code == 2 and "out" in capsys.readouterr().err
-    assert run("walker.osim", "walk.sto", "--html", "page.html", "--screenshot", "a.png", "--at", "0.2") == 0
+    assert (
+        run(
+            "walker.osim", "walk.sto", "--html", "page.html", "--screenshot", "a.png", "--at", "0.2"
+        )
+        == 0
+    )
     assert re.search(r"wrote page\.html \(0\.\d MB\)\nwrote a\.png", capsys.readouterr().out)
-    assert (walker / "page.html").stat().st_size > 500_000 and (walker / "a.png").read_bytes()[1:4] == b"PNG"
+    assert (walker / "page.html").stat().st_size > 500_000 and (walker / "a.png").read_bytes()[
+        1:4
+    ] == b"PNG"
 
 
 def test_coordinates_can_be_set(walker: Path) -> None:
@@ -70,7 +79,9 @@ def test_what_cannot_be_shown_is_said(
 @pytest.mark.skipif(os.name == "nt", reason="sends signals")
 def test_the_page_is_served_until_interrupted(walker: Path) -> None:
     command = [sys.executable, "-u", "-m", "osimlite", "view", "walker.osim", "--no-browser"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as served:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as served:
         try:
             assert served.stdout is not None and served.stderr is not None
             line = served.stdout.readline()

@@ -22,7 +22,9 @@ from osimlite.simulation.engines.compiled import CompiledEngine
 
 
 def largest_difference(ours, expected):
-    return np.abs(np.subtract(ours, expected)).max(initial=0.0) / max(1.0, np.abs(expected).max(initial=0.0))
+    return np.abs(np.subtract(ours, expected)).max(initial=0.0) / max(
+        1.0, np.abs(expected).max(initial=0.0)
+    )
 
 
 def state_near(mechanism, seed):
@@ -53,12 +55,16 @@ def test_same_accelerations(corpus_model):
                 mechanism.acceleration(q, u)
             return
         assert largest_difference(result, mechanism.acceleration(q, u)) < 1e-9 * scale
-    forces = force_elements(model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent)
+    forces = force_elements(
+        model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent
+    )
     ours, theirs = CompiledEngine(mechanism, forces), make(mechanism, forces, Settings())
     with theirs:
         for seed in range(2):
             q, u = (values.tolist() for values in state_near(mechanism, seed))
-            difference = largest_difference(ours.acceleration(0.1, q, u), theirs.acceleration(0.1, q, u))
+            difference = largest_difference(
+                ours.acceleration(0.1, q, u), theirs.acceleration(0.1, q, u)
+            )
             assert difference < 1e-9 * scale
             assert ours.force_records(0.1, ours.state.pack(q, u)) == pytest.approx(
                 theirs.force_records(0.1, theirs.state.pack(q, u)), rel=1e-7, abs=1e-7
@@ -72,7 +78,9 @@ def test_same_accelerations_under_constraints(corpus_model):
     mechanism = build_mechanism(model)
     if all(isinstance(item, Lock) for item in mechanism.constraints):
         pytest.skip("the model has no constraints")
-    forces = force_elements(model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent)
+    forces = force_elements(
+        model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent
+    )
     ours, theirs = CompiledEngine(mechanism, forces), make(mechanism, forces, Settings())
     y = ours.state.pack(*state_near(mechanism, 3))
     result = ours.projected(0.1, y, 1e-10)
@@ -86,7 +94,9 @@ def test_same_accelerations_under_constraints(corpus_model):
                 ours.acceleration(0.1, q, u)
             assert "no mass" in str(error)
             return
-        assert largest_difference(ours.acceleration(0.1, q, u), expected) < 1e-9 * conditioning(mechanism)
+        assert largest_difference(ours.acceleration(0.1, q, u), expected) < 1e-9 * conditioning(
+            mechanism
+        )
         assert ours.force_records(0.1, ours.state.pack(q, u)) == pytest.approx(
             theirs.force_records(0.1, theirs.state.pack(q, u)), rel=1e-7, abs=1e-7
         )
@@ -96,7 +106,11 @@ def conditioning(mechanism):
     """How many times more than usual rounding counts: a thousandth of the condition of the mass matrix, or 1."""
     q, _ = state_near(mechanism, 0)
     matrix = mechanism.mass_matrix(q)
-    free = [index for index, info in enumerate(mechanism.coordinates) if not info.locked and matrix[index, index] > 0]
+    free = [
+        index
+        for index, info in enumerate(mechanism.coordinates)
+        if not info.locked and matrix[index, index] > 0
+    ]
     if not free:
         return 1.0
     own = matrix[np.ix_(free, free)]

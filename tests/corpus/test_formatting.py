@@ -29,7 +29,9 @@ def layout(corpus_model: CorpusModel) -> str:
 def words(source: Source) -> tuple[int, str]:
     """The version of a document and what it says, white space aside, which classes of plug-ins keep."""
     document = read_document(source, of=Object)
-    return document.version, re.sub(r"\s+", " ", re.sub(r"\s*([<>])\s*", r"\1", to_text(document.top)))
+    return document.version, re.sub(
+        r"\s+", " ", re.sub(r"\s*([<>])\s*", r"\1", to_text(document.top))
+    )
 
 
 def test_the_same_is_said_and_nothing_changes_twice(corpus_model: CorpusModel) -> None:

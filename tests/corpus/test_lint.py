@@ -11,15 +11,18 @@ from osimlite.lint import validate
 from tests.conftest import CorpusModel
 
 PROVED = {
-    # Massless fingers at the end of their chains: the mass matrix is singular, accelerations are NaN.
+    # Massless fingers at the end of their chains: the mass matrix is singular, accelerations are
+    # NaN.
     "m0109": {"OSIM407"},
     # derivative_smoothing is no property of the class: OpenSim's own print of the file has lost it.
     "m0115": {"OSIM101"},
     # The muscle starts where it ends, on two bodies: OpenSim's acceleration is NaN.
     "m0123": {"OSIM541"},
-    # Curves under tags that the muscle does not have any more: OpenSim prints its own defaults in their place.
+    # Curves under tags that the muscle does not have any more: OpenSim prints its own defaults in
+    # their place.
     "m0117": {"OSIM101"},
-    # enable_controller, false in the file, is no property: OpenSim prints the controller without <enabled>: it is on.
+    # enable_controller, false in the file, is no property: OpenSim prints the controller without
+    # <enabled>: it is on.
     "m0189": {"OSIM101"},
     # <publications> three times: OpenSim prints the first alone.
     "m0225": {"OSIM104"},
@@ -47,7 +50,11 @@ REASONS = {
     "m0459": ("OSIM303", "<ActivationCoordinateActuator", "must name a Coordinate"),
     "m0460": ("OSIM303", "<PointToPointActuator", "must name a Body"),
     "m0702": ("OSIM102", "<WISCO_Ligament", "no class 'WISCO_Ligament'"),
-    "m0713": ("OSIM102", "<WISCO_ElasticFoundationForce", "no class 'WISCO_ElasticFoundationForce'"),
+    "m0713": (
+        "OSIM102",
+        "<WISCO_ElasticFoundationForce",
+        "no class 'WISCO_ElasticFoundationForce'",
+    ),
     "m0719": ("OSIM303", "<PinJoint", "socket_child_frame"),
     "m0923": ("OSIM102", "<FixationController", "no class 'FixationController'"),
     "m1004": ("OSIM102", "<OrientationSensor", "no class 'OrientationSensor'"),
@@ -58,9 +65,12 @@ REASONS = {
 def test_no_error_without_proof(corpus_model: CorpusModel) -> None:
     if corpus_model.converted is None:
         pytest.skip("OpenSim cannot load this file")
-    # The errors among the rules about what is measured are proved in tests/oracle/test_lint_measures.py.
+    # The errors among the rules about what is measured are proved in
+    # tests/oracle/test_lint_measures.py.
     report = validate(corpus_model.path, ignore="OSIM63")
-    assert {finding.code for finding in report.errors} == PROVED.get(corpus_model.id, set()), str(report)
+    assert {finding.code for finding in report.errors} == PROVED.get(corpus_model.id, set()), str(
+        report
+    )
 
 
 def test_what_opensim_refuses_is_explained_in_its_line(corpus_model: CorpusModel) -> None:
@@ -70,7 +80,8 @@ def test_what_opensim_refuses_is_explained_in_its_line(corpus_model: CorpusModel
     lines = corpus_model.path.read_text("utf-8", "replace").splitlines() or [""]
     errors = validate(corpus_model.path, select=code).errors
     assert any(
-        words in finding.message and finding.line is not None and text in lines[finding.line - 1] for finding in errors
+        words in finding.message and finding.line is not None and text in lines[finding.line - 1]
+        for finding in errors
     ), "\n".join(map(str, errors))
 
 
@@ -80,7 +91,9 @@ def test_the_lists_are_of_files_that_exist(corpus: list[CorpusModel]) -> None:
 
 
 @pytest.mark.parametrize(("name", "gone"), [("m0115", "derivative_smoothing"), ("m0189", "enable")])
-def test_opensim_drops_what_is_called_an_unknown_tag(corpus: list[CorpusModel], name: str, gone: str) -> None:
+def test_opensim_drops_what_is_called_an_unknown_tag(
+    corpus: list[CorpusModel], name: str, gone: str
+) -> None:
     model = next(model for model in corpus if model.id == name)
     assert model.converted is not None
     text = gzip.decompress(model.converted.read_bytes()).decode()
@@ -92,5 +105,7 @@ def test_opensim_drops_what_is_called_an_unknown_tag(corpus: list[CorpusModel], 
 
 def test_opensim_renames_the_second_joint_of_a_name(corpus: list[CorpusModel]) -> None:
     model = next(model for model in corpus if model.id == "m0239")
-    paths = {path for path, _ in json.loads(gzip.decompress(model.truth.read_bytes()))["components"]}
+    paths = {
+        path for path, _ in json.loads(gzip.decompress(model.truth.read_bytes()))["components"]
+    }
     assert "/jointset/back_0" in paths

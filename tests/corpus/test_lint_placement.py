@@ -23,9 +23,13 @@ def test_default_poses_are_opensims(corpus_model: CorpusModel) -> None:
     subject = Subject(survey(Source(gzip.decompress(corpus_model.converted.read_bytes()))))
     if next(subject.each(Constraint), None) is not None:
         pytest.skip("OpenSim assembles this model, which moves it")
-    truth = json.loads(gzip.decompress(corpus_model.truth.read_bytes()))["default_pose"]["body_xform"]
+    truth = json.loads(gzip.decompress(corpus_model.truth.read_bytes()))["default_pose"][
+        "body_xform"
+    ]
     poses = default_poses(subject)
-    placed = [body for body in subject.each(Body) if id(body) in poses and subject.path(body) in truth]
+    placed = [
+        body for body in subject.each(Body) if id(body) in poses and subject.path(body) in truth
+    ]
     if not placed:
         pytest.skip("no body is placed by joints that can be followed without arrays")
     near = ROUNDED.get(corpus_model.id, 1e-10)

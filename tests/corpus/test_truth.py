@@ -62,7 +62,9 @@ def test_masses(file: tuple[Model, dict[str, Any], float]) -> None:
 def test_muscles(file: tuple[Model, dict[str, Any], float]) -> None:
     model, truth, digits = file
     muscles: list[Any] = [force for force in model.force_set.objects if is_a(force, "Muscle")]
-    assert [(m.name, type(m).__name__) for m in muscles] == [(m["name"], m["cls"]) for m in truth["muscles"]]
+    assert [(m.name, type(m).__name__) for m in muscles] == [
+        (m["name"], m["cls"]) for m in truth["muscles"]
+    ]
     for muscle, theirs in zip(muscles, truth["muscles"], strict=True):
         ours = (
             muscle.max_isometric_force,

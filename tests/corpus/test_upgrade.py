@@ -1,6 +1,7 @@
 """Real files of old versions, upgraded, equal OpenSim's own conversion: every component, every property.
 
-Where the two differ OpenSim loses something or adds what it only computes; `comparison.excepted` has every such case.
+Where the two differ OpenSim loses something or adds what it only computes; `comparison.excepted`
+has every such case.
 """
 
 from __future__ import annotations
@@ -62,7 +63,9 @@ def test_references_lead_where_opensim_finds_them(corpus_model: CorpusModel) -> 
     document = old(corpus_model)
     truth = json.loads(gzip.decompress(corpus_model.truth.read_bytes()))
     tree = document.model.tree()
-    broken = [use for use in tree.uses() if tree.resolve(use).failure and use.spec.name != "members"]
+    broken = [
+        use for use in tree.uses() if tree.resolve(use).failure and use.spec.name != "members"
+    ]
     if document.version >= 40000 and not str(truth["load"]["stage"]).startswith("ok"):
         pytest.skip("OpenSim cannot connect this file either")
     assert [(use.holder.name, use.spec.name, use.value) for use in broken] == []

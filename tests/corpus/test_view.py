@@ -26,6 +26,10 @@ def test_a_page_can_be_made(corpus_model) -> None:
     data = page_data(model, scene, None, (), q)
     assert json.loads(json.dumps(data, allow_nan=False))["tree"]
     assert data["size"] > 0.0 and np.isfinite(data["center"]).all()
-    # What is not drawn is a mesh that is not here, or one of the shapes and frames that are not known.
+    # What is not drawn is a mesh that is not here, or one of the shapes and frames that are not
+    # known.
     for path, said in scene.remarks:
-        assert path and any(word in said for word in ("mesh file", "does not draw", "polygons", "names no", "no such"))
+        assert path and any(
+            word in said
+            for word in ("mesh file", "does not draw", "polygons", "names no", "no such")
+        )

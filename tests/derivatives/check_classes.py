@@ -55,12 +55,19 @@ LEFT = {"ElasticFoundationForce", "ExternalForce"}
 """The former is refused (meshes), the latter is no more than functions of time, as a PrescribedForce."""
 EXACT = 1e-11
 CASES = FORCES | {
-    "activation": lambda: ActivationCoordinateActuator(name="a", coordinate="q1_0", optimal_force=7.0),
+    "activation": lambda: ActivationCoordinateActuator(
+        name="a", coordinate="q1_0", optimal_force=7.0
+    ),
     "clutch": lambda: ClutchedPathSpring(
         name="a", stiffness=50.0, dissipation=0.3, initial_stretch=0.1, geometry_path=straight()
     ),
     "stop": lambda: CoordinateLinearStopForce(
-        name="a", socket_coordinate="/jointset/j2/q2_0", stiffness=9.0, damping=0.2, upper_limit=-0.2, lower_limit=-0.3
+        name="a",
+        socket_coordinate="/jointset/j2/q2_0",
+        stiffness=9.0,
+        damping=0.2,
+        upper_limit=-0.2,
+        lower_limit=-0.3,
     ),
     "exponential limit": lambda: ExponentialCoordinateLimitForce(
         name="a",
@@ -99,7 +106,9 @@ def test_muscles(case, monkeypatch):
 
 
 def test_no_class_of_forces_is_left_out():
-    models = [with_force(make) for make in CASES.values()] + [hung(muscle(case)) for case in CONFIGURATIONS]
+    models = [with_force(make) for make in CASES.values()] + [
+        hung(muscle(case)) for case in CONFIGURATIONS
+    ]
     seen = {type(component) for model in models for component in model.force_set.objects}
     rest = {kind.component.__name__ for kind in kinds()} - {kind.__name__ for kind in seen}
     assert rest == LEFT
@@ -127,14 +136,30 @@ def test_probes():
     model = hung(muscle("millard_damped"), (0.4, 0.6))
     model["/jointset/slide/x"].default_value = 0.322
     model.add(CoordinateActuator(name="motor", coordinate="x", optimal_force=3.0))
-    model.add(*(kind(name=kind.__name__, actuator_names=("all",)) for kind in (ActuatorForceProbe, ActuatorPowerProbe)))
+    model.add(
+        *(
+            kind(name=kind.__name__, actuator_names=("all",))
+            for kind in (ActuatorForceProbe, ActuatorPowerProbe)
+        )
+    )
     model.add(SystemEnergyProbe(name="of more than kernels know"))
     of_muscles = (
-        (Umberger2010MuscleMetabolicsProbe, Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter),
-        (Bhargava2004MuscleMetabolicsProbe, Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter),
+        (
+            Umberger2010MuscleMetabolicsProbe,
+            Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter,
+        ),
+        (
+            Bhargava2004MuscleMetabolicsProbe,
+            Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter,
+        ),
     )
     for kind, parameter in of_muscles:
-        probe = kind(name=kind.__name__, report_total_metabolics_only=False, probe_operation="integrate", gain=2.0)
+        probe = kind(
+            name=kind.__name__,
+            report_total_metabolics_only=False,
+            probe_operation="integrate",
+            gain=2.0,
+        )
         probe.metabolic_muscle_parameter_set.objects.append(parameter(name="mu"))
         model.add(probe)
     functions = osimlite.casadi(model)
@@ -156,10 +181,20 @@ def test_probes():
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("held", ["none", *KINDS])
 def test_trees_of_joints(held, seed):
-    rng, bodies, infos = np.random.default_rng([seed, KINDS.index(held) if held in KINDS else 99]), [], []
+    rng, bodies, infos = (
+        np.random.default_rng([seed, KINDS.index(held) if held in KINDS else 99]),
+        [],
+        [],
+    )
     for index in range(3):
-        kind = JOINT_TYPES[rng.integers(len(JOINT_TYPES))] if index else JOINT_TYPES[seed % len(JOINT_TYPES)]
-        body, own = _body(index, int(rng.integers(-1, index)), kind, bool(rng.integers(2)), len(infos), rng)
+        kind = (
+            JOINT_TYPES[rng.integers(len(JOINT_TYPES))]
+            if index
+            else JOINT_TYPES[seed % len(JOINT_TYPES)]
+        )
+        body, own = _body(
+            index, int(rng.integers(-1, index)), kind, bool(rng.integers(2)), len(infos), rng
+        )
         bodies.append(body)
         infos += own
     mechanism = Mechanism("random", tuple(bodies), tuple(infos), np.array((0.3, -9.5, 0.7)))
@@ -183,14 +218,20 @@ def test_trees_of_joints(held, seed):
     way = rng.normal(size=len(y))
     value, jacobian, bends = carried(packed, 0.3, y, [], way)
     x, d = casadi.SX.sym("x", len(y)), casadi.SX.sym("d", len(y))
-    traced = Traced(packed, forces, packed.numbers.tolist(), 0.3, casadi.vertsplit(x), (), equations)
+    traced = Traced(
+        packed, forces, packed.numbers.tolist(), 0.3, casadi.vertsplit(x), (), equations
+    )
     found = traced.evaluated(STAGE.ACCELERATION)
     xdot = found.sure(found.f.cells)
     slopes = casadi.jacobian(xdot, x)
     turned = casadi.jtimes(slopes @ d, x, d)
-    got = [np.array(part.full()) for part in casadi.Function("f", [x, d], [xdot, slopes, turned])(y, way)]
+    got = [
+        np.array(part.full())
+        for part in casadi.Function("f", [x, d], [xdot, slopes, turned])(y, way)
+    ]
     scale = 1.0 + np.abs(value).max()
     assert off(got[0][:, 0], value, scale) < 1e-9
     assert off(got[1], jacobian, scale) < 1e-9
-    # Where equations follow from others, only where they hold: there is no one second derivative across that.
+    # Where equations follow from others, only where they hold: there is no one second derivative
+    # across that.
     assert len(equations) < count or off(got[2][:, 0], bends @ way, scale) < 1e-8

@@ -19,7 +19,12 @@ from tests.conftest import ROOT, SHARED
 from tests.derivatives.machine import Beside, off, slope
 
 OWN = "furthest-walker", "tree"
-CORPUS = {"m0115": "2-D walking", "m0036": "path actuators", "m0093": "ligaments", "m0097": "constraints"}
+CORPUS = {
+    "m0115": "2-D walking",
+    "m0036": "path actuators",
+    "m0093": "ligaments",
+    "m0097": "constraints",
+}
 
 
 def corpus_file(number):
@@ -109,23 +114,31 @@ def test_outputs_are_those_of_the_simulation(name):
     x = both.state(3)
     y = np.zeros(len(x))
     y[both.places] = x
-    found = dict(zip(f.outputs.name_out(), f.outputs(both.t, x, both.controls(x), f.p), strict=True))
+    found = dict(
+        zip(f.outputs.name_out(), f.outputs(both.t, x, both.controls(x), f.p), strict=True)
+    )
     q, u = both.engine.state.values(y), both.engine.state.speeds(y)
     places = mechanism.station_positions(q)
     assert off(matrix(found["stations"]).ravel(), np.array([*places.values()]).ravel()) < 1e-12
-    assert f.output_names["stations"] == tuple(f"{path}|{axis}" for path in places for axis in "xyz")
+    assert f.output_names["stations"] == tuple(
+        f"{path}|{axis}" for path in places for axis in "xyz"
+    )
     for k, (body, point) in enumerate(mechanism.stations.values()):
         wanted = mechanism.at(q, u).point_velocity(body, point)
         assert off(matrix(found["station_velocities"])[3 * k : 3 * k + 3, 0], wanted) < 1e-11
     bodies = mechanism.at(q, u)
     masses = np.array([body.mass_properties.mass for body in mechanism.bodies])
-    centers = np.array([bodies.point(k, body.mass_properties.center) for k, body in enumerate(mechanism.bodies)])
+    centers = np.array(
+        [bodies.point(k, body.mass_properties.center) for k, body in enumerate(mechanism.bodies)]
+    )
     assert off(matrix(found["mass_center"]).ravel(), masses @ centers / masses.sum()) < 1e-12
     both.engine.applied(both.t, y.tolist())
     for label, value in zip(f.output_names["forces"], matrix(found["forces"]).ravel(), strict=True):
         path, _, what = label.partition("|")
         assert value == pytest.approx(
-            both.engine.recorded(path, both.engine.kind_at(path).recorded[what]), rel=1e-11, abs=1e-11
+            both.engine.recorded(path, both.engine.kind_at(path).recorded[what]),
+            rel=1e-11,
+            abs=1e-11,
         )
 
 
@@ -138,11 +151,20 @@ def test_contact_forces_are_those_of_the_simulation():
         x[height] -= 0.005
         y[both.places] = x
         both.engine.applied(both.t, y.tolist())
-    force = matrix(f.outputs(both.t, x, [], f.p)[f.outputs.index_out("contact_forces")]).reshape(-1, 2, 3)
-    wanted = [load if touches else np.zeros(3) for load, touches in zip(both.engine.loads, _bits(both), strict=False)]
+    force = matrix(f.outputs(both.t, x, [], f.p)[f.outputs.index_out("contact_forces")]).reshape(
+        -1, 2, 3
+    )
+    wanted = [
+        load if touches else np.zeros(3)
+        for load, touches in zip(both.engine.loads, _bits(both), strict=False)
+    ]
     assert off(force[:, 0], np.array(wanted)) < 1e-10
     labels = f.output_names["contact_forces"]
-    assert len(labels) == force.size and labels[0].endswith("|force_x") and labels[5].endswith("|point_z")
+    assert (
+        len(labels) == force.size
+        and labels[0].endswith("|force_x")
+        and labels[5].endswith("|point_z")
+    )
 
 
 def _bits(both):
@@ -217,7 +239,9 @@ def test_constraints_of_welded_bodies_do_not_depend_on_what_is_a_parameter():
     )
     plain, apart = osimlite.casadi(model), osimlite.casadi(model, ["/bodyset/arm/mass"])
     x = plain.x
-    for one, other in zip(plain.constraints(0, x, x, []), apart.constraints(0, x, x, apart.p), strict=True):
+    for one, other in zip(
+        plain.constraints(0, x, x, []), apart.constraints(0, x, x, apart.p), strict=True
+    ):
         np.testing.assert_allclose(matrix(one), matrix(other), rtol=0, atol=1e-14)
     assert matrix(apart.constraints(0, x, x, apart.p)[3])[0, 0] == pytest.approx(-(0.5**0.5))
 
@@ -226,7 +250,9 @@ def test_a_number_that_is_no_parameter_is_refused():
     model = model_named("furthest-walker")
     with pytest.raises(osimlite.OsimliteError, match="no number '/bodyset/nobody/mass'"):
         osimlite.casadi(model, ["/bodyset/nobody/mass"])
-    with pytest.raises(osimlite.OsimliteError, match=r"stiffness' cannot stay a symbol: .* no linear function"):
+    with pytest.raises(
+        osimlite.OsimliteError, match=r"stiffness' cannot stay a symbol: .* no linear function"
+    ):
         osimlite.casadi(model, ["/forceset/RHipForce/contact_parameters/stiffness"])
 
 
@@ -236,27 +262,41 @@ def test_what_has_no_formula_is_refused_by_name():
     egg = osimlite.ContactEllipsoid(name=foot.name, radii=(0.04, 0.05, 0.06))
     egg.socket_frame, egg.location = foot.socket_frame, foot.location
     model.contact_geometry_set.objects[model.contact_geometry_set.objects.index(foot)] = egg
-    with pytest.raises(osimlite.OsimliteError, match=r"'/forceset/RFootForce' has no formula .* take spheres"):
+    with pytest.raises(
+        osimlite.OsimliteError, match=r"'/forceset/RFootForce' has no formula .* take spheres"
+    ):
         osimlite.casadi(model)
 
 
 def test_functions_are_written(tmp_path):
     f = beside("furthest-walker").functions
     files = f.save(tmp_path / "walker", ["dynamics", "outputs"])
-    assert [file.name for file in files] == ["dynamics.casadi", "outputs.casadi", "model.c", "model.h", "model.json"]
+    assert [file.name for file in files] == [
+        "dynamics.casadi",
+        "outputs.casadi",
+        "model.c",
+        "model.h",
+        "model.json",
+    ]
     again = casadi.Function.load(str(files[0]))
     assert np.array_equal(matrix(again(0.0, f.x, f.u, f.p)), matrix(f.dynamics(0.0, f.x, f.u, f.p)))
     assert "int dynamics(const casadi_real** arg" in files[2].read_text()
     facts = json.loads(files[-1].read_text())
-    assert facts["states"] == list(f.states) and facts["functions"]["dynamics"].startswith("dynamics:(t,x[")
-    with pytest.raises(osimlite.OsimliteError, match="no function 'motion'; there are dynamics, residual"):
+    assert facts["states"] == list(f.states) and facts["functions"]["dynamics"].startswith(
+        "dynamics:(t,x["
+    )
+    with pytest.raises(
+        osimlite.OsimliteError, match="no function 'motion'; there are dynamics, residual"
+    ):
         f.save(tmp_path, ["motion"])
 
 
 def test_the_pages_examples_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     scope: dict = {}
-    for block in re.findall(r"```python\n(.*?)```", (ROOT / "docs/casadi.md").read_text(), re.DOTALL):
+    for block in re.findall(
+        r"```python\n(.*?)```", (ROOT / "docs/casadi.md").read_text(), re.DOTALL
+    ):
         if "import jax" in block and find_spec("jax") is None:
             continue
         exec(compile(block, "casadi.md", "exec"), scope)
@@ -306,7 +346,9 @@ def test_outputs_are_linearized_by_their_names():
 
             assert np.abs(slope(along, 1e-3) - column).max() < 1e-8 * max(1.0, np.abs(wanted).max())
     assert near.C.any() and near.D[0].any() and not near.D[1:].any()
-    with pytest.raises(osimlite.OsimliteError, match="no output 'mass_centre'; did you mean 'mass_center'"):
+    with pytest.raises(
+        osimlite.OsimliteError, match="no output 'mass_centre'; did you mean 'mass_center'"
+    ):
         osimlite.linearize(f, outputs=["mass_centre"])
     none = osimlite.linearize(f)
     assert none.C.shape == (0, len(x)) and none.D.shape == (0, len(u)) and none.outputs == ()

@@ -27,7 +27,10 @@ def kernel_of(model, functions):
         y = [0.0] * len(x)
         for place, value in zip(functions.state_indices, x.tolist(), strict=True):
             y[place] = value
-        driven = {name: Constant(value) for name, value in zip(functions.controls, u.tolist(), strict=True)}
+        driven = {
+            name: Constant(value)
+            for name, value in zip(functions.controls, u.tolist(), strict=True)
+        }
         simulation.engine.drive(simulation.forces.controls.driven(driven))
         return np.array(simulation.engine.derivative(0.0, y))[functions.state_indices]
 
@@ -71,9 +74,13 @@ def test_wrapped_paths_are_those_of_the_kernels():
         one, two = (derivative(x + s * e, u) - derivative(x - s * e, u) for s in (1.0, 2.0))
         slopes[:, k] = (8.0 * one - two) / (12.0 * h)
     assert np.abs(near.A - slopes).max() <= 1e-6 * np.abs(slopes).max()
-    moves = osimlite.linearize(functions, x, u, outputs=["mass_center", "mass_center_velocity", "forces"])
+    moves = osimlite.linearize(
+        functions, x, u, outputs=["mass_center", "mass_center_velocity", "forces"]
+    )
     n = len(functions.coordinates)
-    assert moves.C[:3, :n] == pytest.approx(moves.C[3:6, n : 2 * n], abs=1e-12) and moves.C[6:].any()
+    assert (
+        moves.C[:3, :n] == pytest.approx(moves.C[3:6, n : 2 * n], abs=1e-12) and moves.C[6:].any()
+    )
     lengths, _, arms = functions.paths(0.0, x, functions.p)
     known = osimlite.paths(model)
     q = {path: float(value) for path, value in zip(functions.coordinates, x, strict=False)}
@@ -101,10 +108,15 @@ def test_curves_are_met_to_rounding():
     function = casadi.Function("curve", [x], [y, slope, casadi.gradient(y, x)])
     for at in np.linspace(-0.2, 1.8, 401):
         mine, wanted = [float(part) for part in function(at)], curve_value(numbers, at)
-        assert mine[:2] == pytest.approx(wanted, abs=1e-11) and mine[2] == pytest.approx(wanted[1], abs=1e-8)
+        assert mine[:2] == pytest.approx(wanted, abs=1e-11) and mine[2] == pytest.approx(
+            wanted[1], abs=1e-8
+        )
 
 
-@pytest.mark.skipif(not GAIT.is_dir(), reason="needs the shared reference folder, which is not beside this repository")
+@pytest.mark.skipif(
+    not GAIT.is_dir(),
+    reason="needs the shared reference folder, which is not beside this repository",
+)
 def test_damped_muscles_of_millard():
     (path,) = GAIT.glob("*.osim")
     model = osimlite.read(path)

@@ -1,6 +1,7 @@
 """Exact derivatives of the kernels as they are, run as Python on numbers that carry theirs (R. E. Wengert, 1964).
 
-Nothing of how CasADi is given the kernels takes part: branches are taken as machine code takes them.
+Nothing of how CasADi is given the kernels takes part: branches are taken as machine code takes
+them.
 """
 
 from __future__ import annotations
@@ -67,7 +68,9 @@ class Jet:
         if isinstance(b, Jet):
             return MATHEMATICS["exp"](MATHEMATICS["log"](self) * b)
         slope = b * self.v ** (b - 1) if b else 0.0
-        return self.through(self.v**b, slope, b * (b - 1) * self.v ** (b - 2) if b and b != 1 else 0.0)
+        return self.through(
+            self.v**b, slope, b * (b - 1) * self.v ** (b - 2) if b and b != 1 else 0.0
+        )
 
     def __rpow__(self, b: float) -> Jet:
         rate, value = math.log(b), b**self.v
@@ -159,7 +162,8 @@ def _copy_sign(x: Any, y: float) -> Any:
     if not isinstance(x, Jet):
         return math.copysign(x, y)
     value = math.copysign(x.v, y)
-    # |x| has no derivative at 0: a number that is not negative keeps its derivatives unless the sign is changed.
+    # |x| has no derivative at 0: a number that is not negative keeps its derivatives unless the
+    # sign is changed.
     same_sign = (x.v < 0.0) == (value < 0.0)
     return x.through(value, 1.0 if same_sign else -1.0, 0.0)
 
@@ -211,7 +215,9 @@ def _carried(functions: list[Any]) -> Iterator[None]:
             elif value is settled or value is is_nothing:
                 changed.append((scope, name, value))
                 scope[name] = SAID[value]
-            elif getattr(value, "__module__", "").startswith(OURS) and hasattr(value, "__globals__"):
+            elif getattr(value, "__module__", "").startswith(OURS) and hasattr(
+                value, "__globals__"
+            ):
                 functions.append(value)
         changed.append((scope, "float", float))
         scope["float"] = lambda x: x if isinstance(x, Jet) else float(x)
@@ -225,7 +231,9 @@ def _carried(functions: list[Any]) -> Iterator[None]:
                 scope[name] = value
 
 
-def carried(packed: Any, t: float, y: list[float], controls: list[float], along: Any) -> tuple[Any, Any, Any]:
+def carried(
+    packed: Any, t: float, y: list[float], controls: list[float], along: Any
+) -> tuple[Any, Any, Any]:
     """The derivative (n,) of a state y (n,), its own by the state (n, n), and the derivative of that along a direction.
 
     Args:
@@ -243,7 +251,9 @@ def carried(packed: Any, t: float, y: list[float], controls: list[float], along:
     first = s[MODEL.WORK_CONTROL]
     w[first : first + len(controls)] = controls
     one, none = np.eye(len(y)), np.zeros(len(y))
-    state = np.array([Jet(v, one[k], float(along[k]), none) for k, v in enumerate(y)] + [None], dtype=object)[:-1]
+    state = np.array(
+        [Jet(v, one[k], float(along[k]), none) for k, v in enumerate(y)] + [None], dtype=object
+    )[:-1]
     f = np.zeros(len(y)).astype(object)
     kernels = [*packed.laws, *(k for k in packed.kernels.values() if isinstance(k, str))]
     with _carried([evaluate, *map(law_function, kernels)]):

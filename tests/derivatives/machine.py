@@ -23,7 +23,9 @@ class Beside:
         engine: Any = Simulation(model, "compiled").engine
         self.engine = engine
         infos, order = engine.mechanism.coordinates, engine.order
-        own = [f"{infos[place].path}/{what}" for what in ("value", "speed") for place in order] + engine.state.paths
+        own = [
+            f"{infos[place].path}/{what}" for what in ("value", "speed") for place in order
+        ] + engine.state.paths
         self.places = [own.index(name) for name in self.functions.states]
         self.size = len(self.functions.coordinates)
         # What drives the machine code is what the functions are given.
@@ -44,7 +46,9 @@ class Beside:
     def kept(self, x: np.ndarray) -> np.ndarray:
         """A state near x in which the constraints hold."""
         infos, order = self.engine.mechanism.coordinates, self.engine.order
-        values, speeds = (np.array([getattr(i, f"default_{what}") for i in infos]) for what in ("value", "speed"))
+        values, speeds = (
+            np.array([getattr(i, f"default_{what}") for i in infos]) for what in ("value", "speed")
+        )
         y = np.zeros(len(x))
         y[self.places] = x
         values[[*order]], speeds[[*order]] = y[: self.size], y[self.size : 2 * self.size]
@@ -72,11 +76,15 @@ class Beside:
     def errors(self, x: np.ndarray, seed: int = 0) -> dict[str, float]:
         """How far value, Jacobian and Hessian by the state are from the kernels' own, with random controls.
 
-        Each is relative to the numbers that it is made of, or to one. The Hessian is that of a random combination,
-        along a random direction; functions that are no expressions have none.
+        Each is relative to the numbers that it is made of, or to one. The Hessian is that of a
+        random combination, along a random direction; functions that are no expressions have none.
         """
         f, rng, n = self.functions, np.random.default_rng(seed), len(x)
-        u, push, along = rng.uniform(0.05, 0.95, len(f.controls)), rng.normal(size=n), rng.normal(size=n)
+        u, push, along = (
+            rng.uniform(0.05, 0.95, len(f.controls)),
+            rng.normal(size=n),
+            rng.normal(size=n),
+        )
         y, way = np.zeros(n), np.zeros(n)
         y[self.places], way[self.places] = x, along
         packed = pack(self.engine.mechanism, self.engine.forces)
@@ -97,14 +105,18 @@ class Beside:
 
             n, made = len(self.functions.states), self.functions.dynamics
             x, u, push, along = (
-                casadi.MX.sym(name, size) for name, size in zip("xupd", (n, len(given[1]), n, n), strict=True)
+                casadi.MX.sym(name, size)
+                for name, size in zip("xupd", (n, len(given[1]), n, n), strict=True)
             )
             xdot = made(self.t, x, u, self.functions.p)
             found = [xdot, casadi.jacobian(xdot, x)]
             if made.is_a("SXFunction"):
                 found.append(casadi.jtimes(casadi.jtimes(xdot, x, push, True), x, along))
             self._made = casadi.Function("all", [x, u, push, along], found)
-        return [np.array(part.full()).squeeze(-1 if k != 1 else ()) for k, part in enumerate(self._made(*given))]
+        return [
+            np.array(part.full()).squeeze(-1 if k != 1 else ())
+            for k, part in enumerate(self._made(*given))
+        ]
 
 
 def slope(function: Callable[[float], np.ndarray], h: float) -> np.ndarray:
@@ -116,4 +128,6 @@ def slope(function: Callable[[float], np.ndarray], h: float) -> np.ndarray:
 
 def off(a: np.ndarray, b: np.ndarray, sizes: np.ndarray | None = None) -> float:
     """The largest difference, each relative to the size of the number, or to one."""
-    return float(np.max(np.abs(a - b) / np.maximum(1.0, np.abs(b) if sizes is None else sizes), initial=0.0))
+    return float(
+        np.max(np.abs(a - b) / np.maximum(1.0, np.abs(b) if sizes is None else sizes), initial=0.0)
+    )

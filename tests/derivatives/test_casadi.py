@@ -15,12 +15,16 @@ def test_what_is_missing_is_said(monkeypatch):
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.delitem(sys.modules, "opensim", raising=False)
     monkeypatch.setitem(sys.modules, "casadi", None)
-    with pytest.raises(osimlite.OsimliteError, match=r"a model as functions of CasADi needs casadi"):
+    with pytest.raises(
+        osimlite.OsimliteError, match=r"a model as functions of CasADi needs casadi"
+    ):
         osimlite.casadi(furthest_walker())
 
 
 def test_beside_opensim_another_process_is_advised(monkeypatch):
-    for name in [name for name in sys.modules if name.startswith(("osimlite.derivatives.sym", "casadi"))]:
+    for name in [
+        name for name in sys.modules if name.startswith(("osimlite.derivatives.sym", "casadi"))
+    ]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "opensim", sys)
     with pytest.raises(osimlite.OsimliteError, match="take another process"):

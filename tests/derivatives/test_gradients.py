@@ -18,7 +18,11 @@ from tests.derivatives.test_sensitivity import human, pendulum
 
 def swing(run):
     """The angle that is reached, and what it cost."""
-    return (run.end["angle"] - 2.0) ** 2 + 1e-3 * float(np.sum(run.history("angle/speed") ** 2)) + run.values["angle"]
+    return (
+        (run.end["angle"] - 2.0) ** 2
+        + 1e-3 * float(np.sum(run.history("angle/speed") ** 2))
+        + run.values["angle"]
+    )
 
 
 def steps(run):
@@ -35,13 +39,20 @@ def both(made, values):
         return runner.run(row[None]).measures[name][0]
 
     def slope(place, h):
-        return (8.0 * (moved(place, h) - moved(place, -h)) - moved(place, 2 * h) + moved(place, -2 * h)) / (12.0 * h)
+        return (
+            8.0 * (moved(place, h) - moved(place, -h)) - moved(place, 2 * h) + moved(place, -2 * h)
+        ) / (12.0 * h)
 
-    wanted = [slope(place, 1e-3 * (made.variables[place].high - made.variables[place].low)) for place in free]
+    wanted = [
+        slope(place, 1e-3 * (made.variables[place].high - made.variables[place].low))
+        for place in free
+    ]
     return registry.gradients(made).at(values, free), np.array(wanted)
 
 
-@pytest.mark.parametrize("measure", [swing, "mean(motor) + end(angle)^2 - sin(max(angle))", "energy", "angle/speed"])
+@pytest.mark.parametrize(
+    "measure", [swing, "mean(motor) + end(angle)^2 - sin(max(angle))", "energy", "angle/speed"]
+)
 def test_a_pendulum(measure):
     vary = {
         "angle": (0.1, 1.0),
@@ -58,7 +69,10 @@ def test_a_pendulum(measure):
 
 
 def test_muscles_with_tendons_that_start_in_equilibrium():
-    vary = {"soleus_?/control": (0.1, 0.9), "/forceset/soleus_r/max_isometric_force": (2000.0, 6000.0)}
+    vary = {
+        "soleus_?/control": (0.1, 0.9),
+        "/forceset/soleus_r/max_isometric_force": (2000.0, 6000.0),
+    }
     made = plan(
         human(), vary, measures=("end(center_of_mass_Y) + 0.1*mean(soleus_r/activation)",), to=0.05, accuracy=1e-9,
         equilibrate=True,
@@ -79,8 +93,14 @@ def test_a_search_arrives(tmp_path):
     assert np.abs(slopes.at([*found.values.values()], [0, 1, 2])).max() < 1e-3
     again = optimize(made, Objective(cost), tmp_path / "part", method="gradient", budget=4)
     assert again.evaluations == 4
-    rest = optimize(made, Objective(cost), tmp_path / "part", method="gradient", budget=60, resume=True)
-    assert (rest.value, rest.values, rest.evaluations) == (found.value, found.values, found.evaluations)
+    rest = optimize(
+        made, Objective(cost), tmp_path / "part", method="gradient", budget=60, resume=True
+    )
+    assert (rest.value, rest.values, rest.evaluations) == (
+        found.value,
+        found.values,
+        found.evaluations,
+    )
 
 
 @pytest.mark.parametrize(
@@ -92,7 +112,9 @@ def test_a_search_arrives(tmp_path):
     ],
 )
 def test_what_has_no_derivatives_is_refused(choices, message):
-    made = plan(furthest_walker(), {"RHip_rz": (0.3, 0.7)}, to=0.1, **{"measures": ("distance",), **choices})
+    made = plan(
+        furthest_walker(), {"RHip_rz": (0.3, 0.7)}, to=0.1, **{"measures": ("distance",), **choices}
+    )
     with pytest.raises((SettingError, UnsupportedError), match=message):
         registry.gradients(made)
 

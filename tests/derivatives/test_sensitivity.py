@@ -26,7 +26,11 @@ def human():
 
 def pendulum(gravity=9.81):
     model = osimlite.Model(name="pendulum", gravity=(0.0, -gravity, 0.0))
-    rod = model.add(osimlite.Body(name="rod", mass=2.0, mass_center=(0.1, -0.5, 0.0), inertia=(0.2, 0.1, 0.2, 0, 0, 0)))
+    rod = model.add(
+        osimlite.Body(
+            name="rod", mass=2.0, mass_center=(0.1, -0.5, 0.0), inertia=(0.2, 0.1, 0.2, 0, 0, 0)
+        )
+    )
     angle = osimlite.Coordinate(name="angle", default_value=0.7)
     model.add(osimlite.PinJoint(name="hinge", coordinates=[angle]).between(model.ground, rod))
     model.add(osimlite.CoordinateActuator(name="motor", coordinate="angle", optimal_force=3.0))
@@ -36,7 +40,10 @@ def pendulum(gravity=9.81):
 def states_of(trajectory, names):
     columns = dict(trajectory.auxiliary)
     for k, info in enumerate(trajectory.mechanism.coordinates):
-        columns |= {f"{info.path}/value": trajectory.values[:, k], f"{info.path}/speed": trajectory.speeds[:, k]}
+        columns |= {
+            f"{info.path}/value": trajectory.values[:, k],
+            f"{info.path}/speed": trajectory.speeds[:, k],
+        }
     return np.column_stack([columns[name] for name in names])
 
 
@@ -51,7 +58,9 @@ def difference(model, found, number, by, to, **choices):
             for place in places(changed, number):
                 setter = place.setter(changed)
                 setter.put(setter.get() + h)
-        run = osimlite.simulate(changed, to, "compiled", **{**choices, "initial": initial, "accuracy": ACCURACY})
+        run = osimlite.simulate(
+            changed, to, "compiled", **{**choices, "initial": initial, "accuracy": ACCURACY}
+        )
         return states_of(run, found.states)
 
     rows = [(moved(h) - moved(-h)) / (2.0 * h) for h in (by, by / 2.0, by / 4.0)]
@@ -73,21 +82,37 @@ def off(model, parameters, states, by, to, accuracy=1e-10, **choices):
 def test_a_pendulum_with_a_motor():
     parameters = "/bodyset/rod/mass", "/bodyset/rod/mass_center/1", "/forceset/motor/optimal_force"
     drive = {"motor": lambda t: np.sin(9.0 * t)}
-    found = off(pendulum(), parameters, [ANGLE, SPEED], [1e-2] * 5, 1.0, controls=drive, report_interval=0.0123)
+    found = off(
+        pendulum(),
+        parameters,
+        [ANGLE, SPEED],
+        [1e-2] * 5,
+        1.0,
+        controls=drive,
+        report_interval=0.0123,
+    )
     assert len(found) == 5 and max(found.values()) < 1e-7
 
 
 def test_a_walker_in_contact():
     model = furthest_walker()
     assert osimlite.simulate(model, 0.3, "compiled").summary["contact_events"]
-    found = off(model, ["/bodyset/Pelvis/mass"], ["/jointset/PelvisToPlatform/Pelvis_tx/speed"], [1e-3] * 2, 0.3)
+    found = off(
+        model,
+        ["/bodyset/Pelvis/mass"],
+        ["/jointset/PelvisToPlatform/Pelvis_tx/speed"],
+        [1e-3] * 2,
+        0.3,
+    )
     assert max(found.values()) < 1e-6
 
 
 def test_muscles_with_tendons():
     muscle = "/forceset/vasti_r"
     parameters = f"{muscle}/max_isometric_force", f"{muscle}/tendon_slack_length"
-    found = off(human(), parameters, [f"{muscle}/activation"], [10.0, 1e-4, 1e-3], 0.03, accuracy=1e-9)
+    found = off(
+        human(), parameters, [f"{muscle}/activation"], [10.0, 1e-4, 1e-3], 0.03, accuracy=1e-9
+    )
     assert max(found.values()) < 1e-6
 
 
@@ -100,7 +125,9 @@ def test_muscles_around_surfaces():
 def test_bends_are_narrowed_down(monkeypatch):
     """Where a spring begins to push, the motion is accurate and its derivative would not be."""
     model, mass = pendulum(), "/bodyset/rod/mass"
-    stop = osimlite.CoordinateLimitForce(name="stop", coordinate="angle", upper_limit=180.0, upper_stiffness=5.0)
+    stop = osimlite.CoordinateLimitForce(
+        name="stop", coordinate="angle", upper_limit=180.0, upper_stiffness=5.0
+    )
     stop.lower_limit, stop.lower_stiffness, stop.transition, stop.damping = -20.0, 50.0, 0.001, 0.0
     model.add(stop)
     assert max(off(model, [mass], [ANGLE], [1e-3] * 2, 0.8).values()) < 2e-6
@@ -113,7 +140,9 @@ def test_bends_are_narrowed_down(monkeypatch):
 
 
 def test_numbers_are_named_and_found():
-    found = osimlite.sensitivity(pendulum(), ["/bodyset/rod/mass"], 0.1, states=[SPEED], report_interval=0.05)
+    found = osimlite.sensitivity(
+        pendulum(), ["/bodyset/rod/mass"], 0.1, states=[SPEED], report_interval=0.05
+    )
     assert found.numbers == ("/bodyset/rod/mass", SPEED) and found.states == (ANGLE, SPEED)
     assert np.array_equal(found.of(ANGLE, SPEED), found.derivatives[:, 0, 1])
     assert found.derivatives[0].tolist() == [[0.0, 0.0], [0.0, 1.0]]
@@ -135,9 +164,13 @@ def test_tangents_are_taken_for_many_motions():
     model = pendulum()
     tangents = osimlite.tangents(model, ["/bodyset/rod/mass"])
     model.body_set.objects[0].mass = 3.0
-    found, wanted = (osimlite.sensitivity(model, given, 0.3) for given in (tangents, ["/bodyset/rod/mass"]))
+    found, wanted = (
+        osimlite.sensitivity(model, given, 0.3) for given in (tangents, ["/bodyset/rod/mass"])
+    )
     assert np.abs(found.derivatives - wanted.derivatives).max() < 1e-12
-    with pytest.raises(SettingError, match=r"another derivative of '.*/angle/speed' .* of this very model"):
+    with pytest.raises(
+        SettingError, match=r"another derivative of '.*/angle/speed' .* of this very model"
+    ):
         osimlite.sensitivity(pendulum(gravity=3.0), tangents, 0.3)
     with pytest.raises(SettingError, match="of another model"):
         osimlite.sensitivity(furthest_walker(), osimlite.tangents(model), 0.3)
@@ -146,7 +179,9 @@ def test_tangents_are_taken_for_many_motions():
 def test_what_is_not_there_is_refused():
     with pytest.raises(SettingError, match="'fixed_step' does not go with sensitivities"):
         osimlite.sensitivity(pendulum(), fixed_step=0.001)
-    with pytest.raises(SettingError, match=f"is where a state starts, which is held; take '{ANGLE}'"):
+    with pytest.raises(
+        SettingError, match=f"is where a state starts, which is held; take '{ANGLE}'"
+    ):
         osimlite.sensitivity(pendulum(), ["/jointset/hinge/angle/default_value"])
 
 
@@ -170,7 +205,11 @@ def test_constraints_go_with_a_motion(name):
 @pytest.mark.parametrize("held", [False, True])
 def test_a_start_that_is_bound_goes_with_a_number(held):
     """How long a rod is tells where the motion starts, but for what was given."""
-    model, number, angle = MODELS["rod"](), "/constraintset/rod/constant_distance", "/jointset/j0/p0/value"
+    model, number, angle = (
+        MODELS["rod"](),
+        "/constraintset/rod/constant_distance",
+        "/jointset/j0/p0/value",
+    )
     first = osimlite.sensitivity(model, to=0.01)
     start = dict(zip(first.states, first.motion[0].tolist(), strict=True))
     if held:
@@ -183,6 +222,10 @@ def test_a_start_that_is_bound_goes_with_a_number(held):
 
 
 def test_derivatives_that_are_no_numbers_are_told(monkeypatch):
-    monkeypatch.setattr("osimlite.derivatives.tangents.Steps.step", lambda self, t0, t1, y: (y + np.nan, 0.0 * y))
-    with pytest.raises(SimulationError, match=r"the derivatives of '/jointset/hinge/angle/value' are no finite"):
+    monkeypatch.setattr(
+        "osimlite.derivatives.tangents.Steps.step", lambda self, t0, t1, y: (y + np.nan, 0.0 * y)
+    )
+    with pytest.raises(
+        SimulationError, match=r"the derivatives of '/jointset/hinge/angle/value' are no finite"
+    ):
         osimlite.sensitivity(pendulum(), ["/bodyset/rod/mass"], 0.1)

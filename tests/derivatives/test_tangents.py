@@ -147,14 +147,19 @@ def test_every_rule_is_that_of_python(a, b, along):
     x = np.column_stack(([1.5, -0.5], np.full((2, WAYS), 0.25)))
     steps, found = machine_code(rules)(0, x, y)
     none = np.zeros(WAYS)
-    jets = [np.array([Jet(row[0], row[1:], 0.0, none) for row in rows] + [None], dtype=object)[:-1] for rows in (x, y)]
+    jets = [
+        np.array([Jet(row[0], row[1:], 0.0, none) for row in rows] + [None], dtype=object)[:-1]
+        for rows in (x, y)
+    ]
     wanted = np.zeros(40, dtype=object)
     with _carried([rules]):
         assert rules(np.zeros(1), jets[0], wanted, jets[1], wanted, 0) == steps
     for row, jet in zip(found, wanted, strict=True):
         value, change = (jet.v, jet.g) if isinstance(jet, Jet) else (float(jet), none)
         size = 1.0 + np.abs(change).max() + abs(value)
-        assert abs(row[0] - value) <= 1e-14 * size and np.abs(row[1:] - change).max() <= 1e-13 * size
+        assert (
+            abs(row[0] - value) <= 1e-14 * size and np.abs(row[1:] - change).max() <= 1e-13 * size
+        )
 
 
 def test_a_root_has_the_derivatives_of_its_equation():
@@ -170,7 +175,10 @@ def test_a_root_has_the_derivatives_of_its_equation():
 
 OF_RATES = [name for name in LAW_MODULES if name not in WITHOUT_DERIVATIVES]
 OF_RATES += [
-    kind.name + form for kind in kinds() if isinstance(kind, Kind) for form in ("", RIGID)[: 1 + bool(kind.rigid)]
+    kind.name + form
+    for kind in kinds()
+    if isinstance(kind, Kind)
+    for form in ("", RIGID)[: 1 + bool(kind.rigid)]
 ]
 
 
@@ -196,19 +204,27 @@ def test_whole_models(name):
     rng, size, moving = np.random.default_rng(1), len(made.states), 2 * len(made.coordinates)
     x, u = made.x.copy(), rng.uniform(0.05, 0.95, len(made.controls))
     x[:moving] += 0.1 * rng.normal(size=moving)
-    x[moving:] = np.where(x[moving:] == 0.0, 0.1, x[moving:]) * rng.uniform(0.95, 1.05, size - moving)
+    x[moving:] = np.where(x[moving:] == 0.0, 0.1, x[moving:]) * rng.uniform(
+        0.95, 1.05, size - moving
+    )
     rates, a, b = made.linear(0.3, x, u)
     y = np.zeros(size)
     y[made.state_indices] = x
-    value, wanted, _ = carried(pack(made.mechanism, made.forces), 0.3, y.tolist(), u.tolist(), np.zeros(size))
+    value, wanted, _ = carried(
+        pack(made.mechanism, made.forces), 0.3, y.tolist(), u.tolist(), np.zeros(size)
+    )
     places = np.ix_(made.state_indices, made.state_indices)
     sizes = np.maximum(1.0, np.abs(a).max(axis=1, keepdims=True))
-    assert off(rates, value[made.state_indices]) < 1e-12 and (np.abs(a - wanted[places]) / sizes).max() < 1e-12
+    assert (
+        off(rates, value[made.state_indices]) < 1e-12
+        and (np.abs(a - wanted[places]) / sizes).max() < 1e-12
+    )
     # Not all at once: whichever others are beside it, a direction has the same derivatives.
     along = rng.normal(size=(size + len(u), 1))
     _, change = made.along(0.3, x, u, along[:size], along[size:])
     assert (
-        np.abs(change - np.hstack((a, b)) @ along).max() < 1e-12 * np.abs(np.hstack((a, b))).max() * np.abs(along).sum()
+        np.abs(change - np.hstack((a, b)) @ along).max()
+        < 1e-12 * np.abs(np.hstack((a, b))).max() * np.abs(along).sum()
     )
     # What jets cannot know: that searches have derivatives of their roots, not of their steps.
     none = np.zeros((size, 0))
@@ -216,16 +232,24 @@ def test_whole_models(name):
     def moved(h):
         return made.along(0.3, x + h * along[:size, 0], u + h * along[size:, 0], none)[0]
 
-    assert (np.abs(slope(moved, 1e-5) - change[:, 0]) / (sizes[:, 0] * np.abs(along).sum())).max() < 1e-7
+    assert (
+        np.abs(slope(moved, 1e-5) - change[:, 0]) / (sizes[:, 0] * np.abs(along).sum())
+    ).max() < 1e-7
 
 
 def test_what_is_nothing_now_may_be_something_next():
     """Constraints that a motionless mechanism keeps without a force: derivatives of what is 0 count."""
     model = osimlite.Model(name="gears", gravity=(0.0, 0.0, 0.0))
     for name in ("one", "two"):
-        body = model.add(osimlite.Body(name=name, mass=1.0, mass_center=(0.0, 0.3, 0.0), inertia=(1, 1, 1, 0, 0, 0)))
+        body = model.add(
+            osimlite.Body(
+                name=name, mass=1.0, mass_center=(0.0, 0.3, 0.0), inertia=(1, 1, 1, 0, 0, 0)
+            )
+        )
         turn = osimlite.Coordinate(name=f"turn_{name}")
-        model.add(osimlite.PinJoint(name=f"axle_{name}", coordinates=[turn]).between(model.ground, body))
+        model.add(
+            osimlite.PinJoint(name=f"axle_{name}", coordinates=[turn]).between(model.ground, body)
+        )
     model.add(osimlite.CoordinateActuator(name="motor", coordinate="turn_one", optimal_force=1.0))
     model.add(osimlite.CoordinateCouplerConstraint(
         name="gear", independent_coordinate_names=("turn_one",), dependent_coordinate_name="turn_two",
@@ -278,14 +302,21 @@ def test_outputs_have_derivatives(name):
     rng, size, moving = np.random.default_rng(2), len(made.states), 2 * len(made.coordinates)
     x, u = made.x.copy(), rng.uniform(0.1, 0.9, len(made.controls))
     x[:moving] += 0.02 * rng.normal(size=moving)
-    x[moving:] = np.where(x[moving:] == 0.0, 0.1, x[moving:]) * rng.uniform(0.97, 1.03, size - moving)
+    x[moving:] = np.where(x[moving:] == 0.0, 0.1, x[moving:]) * rng.uniform(
+        0.97, 1.03, size - moving
+    )
     groups = [group for group, labels in made.output_names.items() if labels]
-    assert {"stations", "mass_center", "contact_forces", "forces", "probes"} & {*groups} == {*groups} - {
+    assert {"stations", "mass_center", "contact_forces", "forces", "probes"} & {*groups} == {
+        *groups
+    } - {
         "station_velocities",
         "mass_center_velocity",
     }
     near = osimlite.linearize(made, x, u, outputs=groups)
-    assert len(near.outputs) == len(near.y) == sum(map(len, made.output_names.values())) and near.C.shape[1] == size
+    assert (
+        len(near.outputs) == len(near.y) == sum(map(len, made.output_names.values()))
+        and near.C.shape[1] == size
+    )
     chosen = [(group, k) for group in groups for k in range(len(made.output_names[group]))]
     along = rng.normal(size=size + len(u))
 

@@ -33,8 +33,13 @@ def test_patches_are_sound_and_say_what_opensim_reads(kit):
     for patch in sorted(kit.glob("*.patch")):
         told, _, _ = patch.read_text(encoding="utf-8").partition("\ndiff --git ")
         assert "\n\nOpenSim 4.6 reads: " in told and f"({patch.name})" in page
-        done = subprocess.run([git, "apply", "--numstat", patch], capture_output=True, text=True, check=True)
-        added, removed = (sum(int(line.split("\t")[place]) for line in done.stdout.splitlines()) for place in (0, 1))
+        done = subprocess.run(
+            [git, "apply", "--numstat", patch], capture_output=True, text=True, check=True
+        )
+        added, removed = (
+            sum(int(line.split("\t")[place]) for line in done.stdout.splitlines())
+            for place in (0, 1)
+        )
         assert 0 < added + removed < 100
 
 
@@ -44,15 +49,32 @@ def test_clients_call_what_there_is(patch):
     git = shutil.which("git")
     if git is None:
         pytest.skip("needs git")
-    assert "(client/kinematics.patch)" in (patch.parents[1] / "README.md").read_text(encoding="utf-8")
+    assert "(client/kinematics.patch)" in (patch.parents[1] / "README.md").read_text(
+        encoding="utf-8"
+    )
     subprocess.run([git, "apply", "--numstat", patch], capture_output=True, check=True)
-    added = [line[1:] for line in patch.read_text(encoding="utf-8").splitlines() if re.match(r"\+(?!\+\+)", line)]
+    added = [
+        line[1:]
+        for line in patch.read_text(encoding="utf-8").splitlines()
+        if re.match(r"\+(?!\+\+)", line)
+    ]
     names = set(re.findall(r"osimlite\.(\w+)", "\n".join(added)))
     assert {"read", "read_document", "write", "run"} <= names <= set(dir(osimlite))
     # What the setups are given is theirs.
-    given = set(re.findall(r"(?:IKTool|scaleTool|modelScaler|markerPlacer)\.(\w+)(?:\.\w+)* = ", "\n".join(added)))
-    classes = osimlite.ScaleTool, osimlite.ModelScaler, osimlite.MarkerPlacer, osimlite.InverseKinematicsTool
-    assert given <= {name for cls in classes for name in cls.model_fields} and (not given or "time_range" in given)
+    given = set(
+        re.findall(
+            r"(?:IKTool|scaleTool|modelScaler|markerPlacer)\.(\w+)(?:\.\w+)* = ", "\n".join(added)
+        )
+    )
+    classes = (
+        osimlite.ScaleTool,
+        osimlite.ModelScaler,
+        osimlite.MarkerPlacer,
+        osimlite.InverseKinematicsTool,
+    )
+    assert given <= {name for cls in classes for name in cls.model_fields} and (
+        not given or "time_range" in given
+    )
 
 
 @each_kit
@@ -63,7 +85,10 @@ def test_the_workflow_gives_the_action_what_it_takes(kit, repo):
     assert len(text.splitlines()) == 11 and step["uses"].startswith("OWNER/osimlite@")
     if not (repo / "action.yml").exists():
         pytest.skip("action.yml is in the repository only")
-    assert step["with"].keys() <= yaml.safe_load((repo / "action.yml").read_text(encoding="utf-8"))["inputs"].keys()
+    assert (
+        step["with"].keys()
+        <= yaml.safe_load((repo / "action.yml").read_text(encoding="utf-8"))["inputs"].keys()
+    )
 
 
 @each_kit

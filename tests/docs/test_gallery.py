@@ -23,6 +23,10 @@ def test_every_part_has_a_picture_what_makes_it_and_a_page() -> None:
 
 def test_a_part_makes_its_picture() -> None:
     pytest.importorskip("PIL", reason="needs pillow (extra 'view')")
-    (elbow,) = (part for part in gallery.sections(gallery.PAGE.read_text(encoding="utf-8")) if "elbow.png" in part)
+    (elbow,) = (
+        part
+        for part in gallery.sections(gallery.PAGE.read_text(encoding="utf-8"))
+        if "elbow.png" in part
+    )
     name, picture = gallery.made(elbow)
     assert name == "elbow.png" and picture.startswith(PNG)

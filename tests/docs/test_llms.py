@@ -27,10 +27,19 @@ def test_every_page_is_listed_with_its_first_sentence() -> None:
     head, *parts = re.split(r"^## ", text, flags=re.M)
     assert re.fullmatch(r"# osimlite\n\n> .+\n\n", head)
     entry = re.compile(r"- \[([^]]+)\]\(([\w/-]+\.md)\): (\S.+)")
-    result = [match for part in parts for match in map(entry.fullmatch, part.splitlines()[2:]) if match]
-    assert len(result) == sum(line.startswith("- ") for line in text.splitlines()) == len(nav.pages) > 30
+    result = [
+        match for part in parts for match in map(entry.fullmatch, part.splitlines()[2:]) if match
+    ]
+    assert (
+        len(result)
+        == sum(line.startswith("- ") for line in text.splitlines())
+        == len(nav.pages)
+        > 30
+    )
     assert {match[2] for match in result} == {page.file.src_uri for page in nav.pages}
     assert "- [Rules](rules.md): What `osimlite validate` looks for.\n" in text
     assert not [match[0] for match in result if len(match[3]) > 400 or "](" in match[3]]
     # A page begins with a sentence about itself, and not with what follows an example or a table.
-    assert not [match[0] for match in result if not re.fullmatch(r"([A-Z`]|osimlite ).*[.?]", match[3])]
+    assert not [
+        match[0] for match in result if not re.fullmatch(r"([A-Z`]|osimlite ).*[.?]", match[3])
+    ]

@@ -1,9 +1,9 @@
 """Every block of code in the manual is run, page by page, in a folder of its own, in the order of the page.
 
-Python blocks of a page share their names; `sh` blocks are run by bash; TOML, YAML, JSON and XML are read. A comment
-``<!-- prepared: commands -->`` makes what a page takes for granted, ``<!-- not run: reason -->`` before a block says
-why it cannot be run here. After ``<!-- tried: what -->`` comes a table: the commands and the Python in all but its
-first column are run.
+Python blocks of a page share their names; `sh` blocks are run by bash; TOML, YAML, JSON and XML are
+read. A comment ``<!-- prepared: commands -->`` makes what a page takes for granted, ``<!-- not run:
+reason -->`` before a block says why it cannot be run here. After ``<!-- tried: what -->`` comes a
+table: the commands and the Python in all but its first column are run.
 """
 
 from __future__ import annotations
@@ -26,7 +26,10 @@ from osimlite.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 # What makes the pictures of the gallery is run when the site is built.
-PAGES = sorted({path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md")} - {"docs/gallery.md"})
+PAGES = sorted(
+    {path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md")}
+    - {"docs/gallery.md"}
+)
 QUICK = (
     "adoption", "compiled", "constraints", "errors", "format-and-diff", "from-mujoco", "from-urdf", "integrators",
     "lint-in-ci", "modifying", "plugin-classes", "rules", "urdf", "yaml",
@@ -58,29 +61,46 @@ def blocks(text: str) -> list[Block]:
     for match in _BLOCK.finditer(text):
         part = "code" if match["fence"] else "table"
         line = text.count("\n", 0, match.start(part)) + 1
-        result.append(Block(match["language"] if match["fence"] else part, match[part], line, match["why"]))
+        result.append(
+            Block(match["language"] if match["fence"] else part, match[part], line, match["why"])
+        )
     return result
 
 
 @pytest.fixture
 def shell(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """An environment in which `osimlite` and `python` are those under test."""
-    # Where it is not known, Matplotlib lists the fonts of the machine anew in each folder, which takes seconds.
+    # Where it is not known, Matplotlib lists the fonts of the machine anew in each folder, which
+    # takes seconds.
     fonts = os.environ.get("MPLCONFIGDIR") or str(tmp_path_factory.getbasetemp() / "matplotlib")
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
-    home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(tmp_path / "cache"))}
-    return {**os.environ, "PATH": path, "MPLBACKEND": "Agg", "MPLCONFIGDIR": fonts, "COLUMNS": "100", **home}
+    home = {
+        "HOME": str(tmp_path / "home"),
+        "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(tmp_path / "cache")),
+    }
+    return {
+        **os.environ,
+        "PATH": path,
+        "MPLBACKEND": "Agg",
+        "MPLCONFIGDIR": fonts,
+        "COLUMNS": "100",
+        **home,
+    }
 
 
 @pytest.mark.skipif(os.name == "nt", reason="blocks of commands are for bash")
 @pytest.mark.parametrize(
     "page",
     [
-        page if page.startswith(tuple(f"docs/{name}" for name in QUICK)) else pytest.param(page, marks=pytest.mark.full)
+        page
+        if page.startswith(tuple(f"docs/{name}" for name in QUICK))
+        else pytest.param(page, marks=pytest.mark.full)
         for page in PAGES
     ],
 )
-def test_every_block_runs(page: str, tmp_path: Path, shell: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_block_runs(
+    page: str, tmp_path: Path, shell: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     for package in ("matplotlib",):
         pytest.importorskip(package, reason=f"needs {package} (extra 'all')")
     folder = tmp_path / "work"
@@ -150,7 +170,11 @@ def read(block: Block, place: str) -> None:
 def test_the_code_of_a_table_is_found_and_fails() -> None:
     text = "<!-- tried: the second column -->\n| a | b |\n|---|---|\n| `no()` | `x = 1`, `x.y` or `--z`; `x = 1` |\n"
     (block,) = blocks(text)
-    assert (block.language, block.line) == ("table", 2) and tried(block.code) == ["x = 1", "x.y", "--z"]
+    assert (block.language, block.line) == ("table", 2) and tried(block.code) == [
+        "x = 1",
+        "x.y",
+        "--z",
+    ]
     names: dict[str, object] = {}
     try_("x = 1", names)
     try_("--z", names)
@@ -159,8 +183,13 @@ def test_the_code_of_a_table_is_found_and_fails() -> None:
 
 
 def test_a_block_that_is_not_run_is_found() -> None:
-    result = blocks("a\n\n<!-- not run: it takes an hour -->\n```sh\nsleep 3600\n```\n\n```python\nx = 1\n```\n")
-    assert result == [Block("sh", "sleep 3600\n", 5, "it takes an hour"), Block("python", "x = 1\n", 9, None)]
+    result = blocks(
+        "a\n\n<!-- not run: it takes an hour -->\n```sh\nsleep 3600\n```\n\n```python\nx = 1\n```\n"
+    )
+    assert result == [
+        Block("sh", "sleep 3600\n", 5, "it takes an hour"),
+        Block("python", "x = 1\n", 9, None),
+    ]
 
 
 def test_the_reference_tells_of_all_that_the_package_exports() -> None:

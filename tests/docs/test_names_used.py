@@ -1,6 +1,7 @@
 """All that the manual calls exists: functions, their keywords, commands and their options, also in what is not run.
 
-The full suite executes the manual. These tests read it: they are quick, and cover blocks that are never executed.
+The full suite executes the manual. These tests read it: they are quick, and cover blocks that are
+never executed.
 """
 
 from __future__ import annotations
@@ -24,9 +25,15 @@ from osimlite.errors import MissingDependency
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
-    for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "docs").rglob("*.ipynb")]
+    for path in [
+        ROOT / "README.md",
+        *(ROOT / "docs").rglob("*.md"),
+        *(ROOT / "docs").rglob("*.ipynb"),
+    ]
 )
-_FENCE = re.compile(r"^(?P<fence>`{3,})(?P<language>\w*)[^\n]*\n(?P<code>.*?)^(?P=fence)", re.M | re.S)
+_FENCE = re.compile(
+    r"^(?P<fence>`{3,})(?P<language>\w*)[^\n]*\n(?P<code>.*?)^(?P=fence)", re.M | re.S
+)
 
 
 def read_programs(path: Path) -> Iterator[tuple[str, str]]:
@@ -37,7 +44,10 @@ def read_programs(path: Path) -> Iterator[tuple[str, str]]:
             source = "".join(cell["source"])
             if cell["cell_type"] == "code":
                 lines = source.splitlines()
-                yield "python", "\n".join("" if line.startswith(("!", "%")) else line for line in lines)
+                yield (
+                    "python",
+                    "\n".join("" if line.startswith(("!", "%")) else line for line in lines),
+                )
                 yield "sh", "\n".join(line[1:] for line in lines if line.startswith("!"))
     else:
         for match in _FENCE.finditer(text):
@@ -61,7 +71,9 @@ def resolve(node: ast.expr, names: dict[str, Any]) -> Any:
             except AttributeError:
                 return import_module(f"{owner.__name__}.{node.attr}")
         if isinstance(owner, type):
-            assert hasattr(owner, node.attr) or node.attr in getattr(owner, "model_fields", {}), ast.unparse(node)
+            assert hasattr(owner, node.attr) or node.attr in getattr(owner, "model_fields", {}), (
+                ast.unparse(node)
+            )
     return None
 
 
@@ -73,15 +85,24 @@ def check_python(code: str, names: dict[str, Any]) -> None:
             for alias in node.names:
                 if alias.name.partition(".")[0] == "osimlite":
                     module = import_module(alias.name)
-                    names[alias.asname or "osimlite"] = module if alias.asname else import_module("osimlite")
-        elif isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "osimlite":
+                    names[alias.asname or "osimlite"] = (
+                        module if alias.asname else import_module("osimlite")
+                    )
+        elif (
+            isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "osimlite"
+        ):
             module = import_module(str(node.module))
             for alias in node.names:
                 names[alias.asname or alias.name] = resolve(
                     ast.Attribute(ast.Name("module"), alias.name), {"module": module}
                 )
     # Within `try` a page shows which error a mistake raises.
-    shown_mistakes = {call for attempt in ast.walk(tree) if isinstance(attempt, ast.Try) for call in ast.walk(attempt)}
+    shown_mistakes = {
+        call
+        for attempt in ast.walk(tree)
+        if isinstance(attempt, ast.Try)
+        for call in ast.walk(attempt)
+    }
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute):
             resolve(node, names)
@@ -100,7 +121,9 @@ def check_keywords(call: ast.Call, function: Any) -> None:
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values()):
         return
     for keyword in call.keywords:
-        assert keyword.arg is None or keyword.arg in parameters, f"{ast.unparse(call)}: {keyword.arg}"
+        assert keyword.arg is None or keyword.arg in parameters, (
+            f"{ast.unparse(call)}: {keyword.arg}"
+        )
 
 
 def split_commands(code: str) -> Iterator[list[str]]:
@@ -168,7 +191,9 @@ def test_a_name_that_does_not_exist_fails(code: str) -> None:
         check_python(code, {})
 
 
-@pytest.mark.parametrize("line", ["osimlite simulat x", "cd a && osimlite validate x --formt json | head"])
+@pytest.mark.parametrize(
+    "line", ["osimlite simulat x", "cd a && osimlite validate x --formt json | head"]
+)
 def test_a_command_that_does_not_exist_fails(line: str) -> None:
     with pytest.raises(AssertionError):
         for words in split_commands(line):

@@ -32,17 +32,22 @@ def test_all_are_listed() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["lint", *(pytest.param(name, marks=pytest.mark.full) for name in SHOWN if name != "lint")]
+    "name",
+    ["lint", *(pytest.param(name, marks=pytest.mark.full) for name in SHOWN if name != "lint")],
 )
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::RuntimeWarning")
 def test_it_runs(name: str) -> None:
     nbformat, notebooks = import_module("nbformat"), import_module("docs._notebooks")
     path = FOLDER / f"{name}.ipynb"
     kept = nbformat.read(path, as_version=4)
-    assert not any(cell.get("outputs") or cell.get("execution_count") for cell in kept.cells), "strip its outputs"
+    assert not any(cell.get("outputs") or cell.get("execution_count") for cell in kept.cells), (
+        "strip its outputs"
+    )
     notebook = notebooks.executed(path)
     if not any(cell.get("outputs") for cell in notebook.cells):
-        pytest.skip(f"needs {notebook.metadata['needs']}, beside the notebook or in the shared folder")
+        pytest.skip(
+            f"needs {notebook.metadata['needs']}, beside the notebook or in the shared folder"
+        )
     text = "\n\n".join(notebooks.parts(path, notebook))
     shown = notebooks.on_page_content(re.sub(r"^output .*$", r"<p>\g<0></p>", text, flags=re.M))
     assert all(words in shown for words in SHOWN[name]) and "<p>output" not in shown

@@ -19,6 +19,11 @@ def test_the_extension(repo: Path) -> None:
     pytest.importorskip("pygls", reason="needs pygls (extra 'lsp')")
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
     done = subprocess.run(
-        [npm, "test"], cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False
+        [npm, "test"],
+        cwd=folder,
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0 and "# skipped 0" in done.stdout, done.stdout + done.stderr

@@ -25,7 +25,9 @@ def free_body() -> osimlite.Model:
     model = osimlite.Model(name="one")
     body = osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
     model.add(body)
-    model.add(osimlite.FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body))
+    model.add(
+        osimlite.FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body)
+    )
     for name, point in zip(MARKERS, POINTS.tolist(), strict=True):
         model.add(osimlite.Marker(name=name, socket_parent_frame=body, location=tuple(point)))
     return model
@@ -59,7 +61,12 @@ def unpacked(folder: Path, name: str, to: Path) -> Path:
     ("case", "model", "trial", "setup"),
     [
         ("ik_gait10", "gait10_subject01", "subject01_walk.trc", "walk_Setup_IK.xml"),
-        ("ik_id_gait2354", "gait2354_subject01_simbody", "subject01_walk1.trc", "subject01_Setup_IK.xml"),
+        (
+            "ik_id_gait2354",
+            "gait2354_subject01_simbody",
+            "subject01_walk1.trc",
+            "subject01_Setup_IK.xml",
+        ),
     ],
 )
 def test_walks_are_the_converged_ones(
@@ -69,11 +76,27 @@ def test_walks_are_the_converged_ones(
     reference = shared / "oracle" / "tools" / "reference"
     human = osimlite.read(unpacked(reference / "models", f"{model}.osim", tmp_path))
     tasks: Any = osimlite.read_document(reference / case / setup).ik_task_set.objects
-    weights = {task.name: task.weight for task in tasks if type(task).__name__ == "IKMarkerTask" and task.apply}
-    goals = {task.name: task.weight for task in tasks if type(task).__name__ == "IKCoordinateTask" and task.apply}
+    weights = {
+        task.name: task.weight
+        for task in tasks
+        if type(task).__name__ == "IKMarkerTask" and task.apply
+    }
+    goals = {
+        task.name: task.weight
+        for task in tasks
+        if type(task).__name__ == "IKCoordinateTask" and task.apply
+    }
     data = read_trc(unpacked(reference / case, trial, tmp_path))
-    known = {name: weight for name, weight in weights.items() if any(m.name == name for m in human.components())}
-    rest = {name: 0.0 for name in data.names if name not in known and any(m.name == name for m in human.components())}
+    known = {
+        name: weight
+        for name, weight in weights.items()
+        if any(m.name == name for m in human.components())
+    }
+    rest = {
+        name: 0.0
+        for name in data.names
+        if name not in known and any(m.name == name for m in human.components())
+    }
     converged = np.load(reference / case / "converged.npz")
     times = converged["t"]
     result = osimlite.inverse_kinematics(
@@ -93,7 +116,9 @@ def test_files_and_arrays_are_the_same(tmp_path: Path) -> None:
     results = [osimlite.inverse_kinematics(model, as_arrays(places), times=times)]
     for unit, factor in (("m", 1.0), ("mm", 1000.0)):
         path = tmp_path / f"{unit}.trc"
-        write_trc(path, times, MARKERS, (factor * places).reshape(len(values), -1).tolist(), units=unit)
+        write_trc(
+            path, times, MARKERS, (factor * places).reshape(len(values), -1).tolist(), units=unit
+        )
         results.append(osimlite.inverse_kinematics(model, path))
     for result in results:
         assert result.values == pytest.approx(values, abs=1e-8)
@@ -110,7 +135,9 @@ def test_the_frame_solver_finds_the_same_poses() -> None:
     model = free_body()
     whole = osimlite.inverse_kinematics(model, as_arrays(places))
     solver = osimlite.FrameSolver(model, markers=list(MARKERS))
-    assert np.array([solver.step(frame) for frame in places]) == pytest.approx(whole.values, abs=1e-12)
+    assert np.array([solver.step(frame) for frame in places]) == pytest.approx(
+        whole.values, abs=1e-12
+    )
     assert solver.places == pytest.approx(whole.places[-1], abs=1e-12)
     solver.reset()
     assert solver.step(places[0]) == pytest.approx(whole.values[0], abs=1e-9)
@@ -149,12 +176,21 @@ def test_weights_count() -> None:
     ("change", "sentence"),
     [
         (lambda t: t.replace("PathFileType", "Path"), "it is no marker file"),
-        (lambda t: t.replace("\tm\t", "\tfeet\t"), r":3: the markers are in 'feet'; Units is one of m, mm"),
+        (
+            lambda t: t.replace("\tm\t", "\tfeet\t"),
+            r":3: the markers are in 'feet'; Units is one of m, mm",
+        ),
         (lambda t: t.replace("one\t", "two\t"), "two markers are called two"),
         (lambda t: "".join(t.splitlines(keepends=True)[:6]), "markers but no frames"),
         (lambda t: t.replace("\n2\t0.5", "\n2\t-0.5"), "frame 2 does not come after"),
-        (lambda t: t.replace("\n2\t0.5\t", "\n2\t0.5\tgap"), r":8: 'gap.*' in column 3 is no number"),
-        (lambda t: t.replace("\n2\t0.5\t", "\n2\t0.5\t1\t1\t"), r":8: the row has more than the 14 cells"),
+        (
+            lambda t: t.replace("\n2\t0.5\t", "\n2\t0.5\tgap"),
+            r":8: 'gap.*' in column 3 is no number",
+        ),
+        (
+            lambda t: t.replace("\n2\t0.5\t", "\n2\t0.5\t1\t1\t"),
+            r":8: the row has more than the 14 cells",
+        ),
     ],
 )
 def test_damaged_files_are_told(change: Any, sentence: str, tmp_path: Path) -> None:
@@ -203,10 +239,14 @@ def test_markers_of_a_table(tmp_path: Path) -> None:
     columns = [f"{name}{end}" for name in MARKERS for end in ("_tx", "_ty", "_tz")]
     write_sto(path, "markers", [0.0, 0.1, 0.2, 0.3], columns, places.reshape(4, -1).tolist())
     assert MarkerData.of(path).names == MARKERS
-    assert osimlite.inverse_kinematics(free_body(), path).values == pytest.approx(motion(4), abs=1e-8)
+    assert osimlite.inverse_kinematics(free_body(), path).values == pytest.approx(
+        motion(4), abs=1e-8
+    )
 
 
-def test_c3d_files_need_a_package_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_c3d_files_need_a_package_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """And say which."""
     monkeypatch.setitem(sys.modules, "ezc3d", None)
     (tmp_path / "walk.c3d").write_bytes(b"")

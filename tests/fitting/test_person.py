@@ -23,7 +23,13 @@ from osimlite.schema.tools.scale import ScaleTool
 from tests.fitting.test_scaling import assert_same
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
-SIZES = {"Pelvis": 1.06, "RightThigh": 1.12, "LeftThigh": 1.12, "RightShank": 0.93, "LeftShank": 0.93}
+SIZES = {
+    "Pelvis": 1.06,
+    "RightThigh": 1.12,
+    "LeftThigh": 1.12,
+    "RightShank": 0.93,
+    "LeftShank": 0.93,
+}
 BONES = {"lateral": (0.0, -0.15, 0.05), "medial": (0.0, -0.15, -0.05)}
 CLUSTER = {"upper": (0.05, 0.02, 0.02), "front": (0.08, -0.1, 0.0), "back": (-0.07, -0.05, 0.03)}
 HELD = tuple(f"{body}_{name}" for body in SIZES for name in BONES)
@@ -35,11 +41,17 @@ def marked() -> osimlite.Model:
     for body in list(model.components(osimlite.Body)):
         if body.name in SIZES:
             for name, place in (BONES | CLUSTER).items():
-                model.add(osimlite.Marker(name=f"{body.name}_{name}", socket_parent_frame=body, location=place))
+                model.add(
+                    osimlite.Marker(
+                        name=f"{body.name}_{name}", socket_parent_frame=body, location=place
+                    )
+                )
     return model
 
 
-def person(seed: int, noise: float = 0.0, frames: int = 60) -> tuple[dict[str, Any], dict[str, Any]]:
+def person(
+    seed: int, noise: float = 0.0, frames: int = 60
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """Markers (t, 3) of somebody who moves, and by how much those of the clusters are elsewhere."""
     rng, model = np.random.default_rng(seed), marked()
     scale_model(model, {body: (size,) * 3 for body, size in SIZES.items()})
@@ -76,7 +88,10 @@ def test_somebody_is_found_again(seed: int) -> None:
     for name, by in offsets.items():
         assert np.linalg.norm(result.offsets[name] - by) < 0.003, name
     error = result.errors(result.after)["moving"]
-    assert 0.007 < error < 0.005 * np.sqrt(3.0) and result.errors(result.before)["moving"] > 2.0 * error
+    assert (
+        0.007 < error < 0.005 * np.sqrt(3.0)
+        and result.errors(result.before)["moving"] > 2.0 * error
+    )
     motion = osimlite.inverse_kinematics(result.model, data)
     assert motion.summary["rms_marker_error"] == pytest.approx(error, rel=1e-3)
 
@@ -110,7 +125,11 @@ def test_factors_move_markers_as_the_difference_of_two_models_says() -> None:
     model = osimlite.read(FIXTURES / "kinematics" / "mixed_joint_tree.osim")
     bodies = [body for body in model.components(osimlite.Body)]
     for body in bodies:
-        model.add(osimlite.Marker(name=f"on {body.name}", socket_parent_frame=body, location=(0.1, -0.2, 0.3)))
+        model.add(
+            osimlite.Marker(
+                name=f"on {body.name}", socket_parent_frame=body, location=(0.1, -0.2, 0.3)
+            )
+        )
     names = [f"on {body.name}" for body in bodies]
     carriers = {body.name: "" for body in bodies}
     segments = Segments.of(carriers, carriers, by_axis=True, symmetric=False)
@@ -129,18 +148,38 @@ def test_factors_move_markers_as_the_difference_of_two_models_says() -> None:
 
 def test_bodies_without_markers_go_with_others() -> None:
     """The talus with the foot, the patella with the thigh."""
-    carriers = {"pelvis": "ground", "femur_r": "pelvis", "patella_r": "femur_r", "tibia_r": "femur_r"}
-    carriers |= {"talus_r": "tibia_r", "calcn_r": "talus_r", "toes_r": "calcn_r", "femur_l": "pelvis"}
+    carriers = {
+        "pelvis": "ground",
+        "femur_r": "pelvis",
+        "patella_r": "femur_r",
+        "tibia_r": "femur_r",
+    }
+    carriers |= {
+        "talus_r": "tibia_r",
+        "calcn_r": "talus_r",
+        "toes_r": "calcn_r",
+        "femur_l": "pelvis",
+    }
     marked = {"pelvis", "femur_r", "tibia_r", "calcn_r", "femur_l"}
     parts = Segments.of(carriers, marked, by_axis=False, symmetric=True).parts
-    groups = [{"pelvis"}, {"femur_r", "femur_l", "patella_r"}, {"tibia_r"}, {"talus_r", "calcn_r", "toes_r"}]
+    groups = [
+        {"pelvis"},
+        {"femur_r", "femur_l", "patella_r"},
+        {"tibia_r"},
+        {"talus_r", "calcn_r", "toes_r"},
+    ]
     assert [set(part.bodies) for part in parts] == groups
     assert len(Segments.of(carriers, marked, by_axis=True, symmetric=False).parts) == 15
 
 
 @pytest.mark.parametrize(
     ("one", "other"),
-    [("femur_r", "femur_l"), ("LeftShank", "RightShank"), ("r_foot", "l_foot"), ("R_HUMERUS", "L_HUMERUS")],
+    [
+        ("femur_r", "femur_l"),
+        ("LeftShank", "RightShank"),
+        ("r_foot", "l_foot"),
+        ("R_HUMERUS", "L_HUMERUS"),
+    ],
 )
 def test_names_of_sides(one: str, other: str) -> None:
     """As models have them."""
@@ -162,7 +201,10 @@ def test_the_setup_makes_the_same_model(tmp_path: Path) -> None:
     setup = read_any(tmp_path / "subject" / SETUP)
     assert isinstance(setup, ScaleTool)
     made = run_scale(setup, tmp_path / "subject").model
-    assert_same(osimlite.read_text(osimlite.to_text(made)), osimlite.read(tmp_path / "subject" / "generic_fitted.osim"))
+    assert_same(
+        osimlite.read_text(osimlite.to_text(made)),
+        osimlite.read(tmp_path / "subject" / "generic_fitted.osim"),
+    )
     assert sum(body.mass for body in made.components(osimlite.Body)) == pytest.approx(70.0)
 
 
@@ -202,7 +244,9 @@ def test_bodies_that_are_fixed_to_ground_and_poses_that_are_given() -> None:
     post = osimlite.Body(name="post", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
     arm = osimlite.Body(name="arm", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
     model.add(post, arm)
-    model.add(osimlite.WeldJoint(name="weld", socket_parent_frame=model.ground, socket_child_frame=post))
+    model.add(
+        osimlite.WeldJoint(name="weld", socket_parent_frame=model.ground, socket_child_frame=post)
+    )
     top = osimlite.PhysicalOffsetFrame(name="top", socket_parent=post, translation=(0.0, 1.0, 0.0))
     post.components.append(top)
     model.add(osimlite.PinJoint(name="pin", socket_parent_frame=top, socket_child_frame=arm))
@@ -210,7 +254,10 @@ def test_bodies_that_are_fixed_to_ground_and_poses_that_are_given() -> None:
         for number, place in enumerate(np.eye(3)):
             model.add(
                 osimlite.Marker(
-                    name=f"{body.name}{number}", socket_parent_frame=body, location=tuple(place.tolist()), fixed=True
+                    name=f"{body.name}{number}",
+                    socket_parent_frame=body,
+                    location=tuple(place.tolist()),
+                    fixed=True,
                 )
             )
     mechanism = osimlite.mechanism(model)
@@ -222,4 +269,7 @@ def test_bodies_that_are_fixed_to_ground_and_poses_that_are_given() -> None:
     assert result.factors["arm"] == pytest.approx([1.2] * 3, rel=1e-3)
     (coordinate,) = model.components(osimlite.Coordinate)
     coordinate.locked = True
-    assert fit(model, {"still": {name: rows[:1] for name, rows in data.items()}}).factors["arm"][0] > 1.19
+    assert (
+        fit(model, {"still": {name: rows[:1] for name, rows in data.items()}}).factors["arm"][0]
+        > 1.19
+    )

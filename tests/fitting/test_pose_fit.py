@@ -70,7 +70,8 @@ def derivatives(fit: PoseFit, frame: Any, q: Any) -> tuple[float, Any, Any]:
     y[:size] = q[fit.order]
     value = pose_cost.cost(m, y)
     stiffness, bend = (
-        m.v[m.p[part] :][: size * size].reshape(size, size) for part in (pose_record.STIFFNESS, pose_record.BEND)
+        m.v[m.p[part] :][: size * size].reshape(size, size)
+        for part in (pose_record.STIFFNESS, pose_record.BEND)
     )
     return value, m.v[m.p[pose_record.SLOPE] :][:size].copy(), stiffness + bend
 
@@ -103,7 +104,10 @@ def test_the_derivatives_are_those_of_the_cost(case: Case, seed: int) -> None:
 def sensors_of(mechanism: Mechanism, rng: np.random.Generator) -> list[Sensor]:
     """A sensor on every body and one in ground."""
     return [
-        Sensor(FramePlacement(body, transform(rotation_xyz(rng.uniform(-3.0, 3.0, 3)))), float(rng.uniform(0.2, 5.0)))
+        Sensor(
+            FramePlacement(body, transform(rotation_xyz(rng.uniform(-3.0, 3.0, 3)))),
+            float(rng.uniform(0.2, 5.0)),
+        )
         for body in (-1, *range(len(mechanism.bodies)))
     ]
 
@@ -111,7 +115,12 @@ def sensors_of(mechanism: Mechanism, rng: np.random.Generator) -> list[Sensor]:
 def orientations_at(mechanism: Mechanism, sensors: list[Sensor], q: Any) -> Any:
     """How the sensors are turned (k, 3, 3)."""
     state = mechanism.at(q)
-    return np.array([(state.transform(sensor.frame.body) @ sensor.frame.transform)[:3, :3] for sensor in sensors])
+    return np.array(
+        [
+            (state.transform(sensor.frame.body) @ sensor.frame.transform)[:3, :3]
+            for sensor in sensors
+        ]
+    )
 
 
 def turns_between(wanted: Any, found: Any) -> Any:
@@ -142,10 +151,16 @@ def test_the_derivatives_of_angles_are_those_of_the_cost(case: Case, seed: int, 
         ahead, behind = (derivatives(fit, frame, case.q + sign * step) for sign in (1.0, -1.0))
         assert slope[number] == pytest.approx((ahead[0] - behind[0]) / 2e-5, abs=1e-8)
         if not any(body.mobilizer.joint_type == ROUND for body in mechanism.bodies):
-            assert second[number] == pytest.approx((ahead[1] - behind[1]) / 2e-5, abs=1e-7, rel=1e-6)
+            assert second[number] == pytest.approx(
+                (ahead[1] - behind[1]) / 2e-5, abs=1e-7, rel=1e-6
+            )
 
 
-@given(cases(max_bodies=4), st.integers(0, 99), st.sampled_from(["", "coupler", "point", "distance", "line", "weld"]))
+@given(
+    cases(max_bodies=4),
+    st.integers(0, 99),
+    st.sampled_from(["", "coupler", "point", "distance", "line", "weld"]),
+)
 @settings(max_examples=40)
 def test_a_pose_is_a_minimum_where_the_constraints_hold(case: Case, seed: int, kind: str) -> None:
     """No direction that the constraints leave free leads down."""
@@ -168,7 +183,9 @@ def test_a_pose_is_a_minimum_where_the_constraints_hold(case: Case, seed: int, k
         return
     assert not poses.unsettled
     q = poses.values[0]
-    assert poses.costs[0] == pytest.approx(cost_of(mechanism, markers, measured, q), rel=1e-9, abs=1e-18)
+    assert poses.costs[0] == pytest.approx(
+        cost_of(mechanism, markers, measured, q), rel=1e-9, abs=1e-18
+    )
     assert poses.costs[0] <= cost_of(mechanism, markers, measured, start) * (1.0 + 1e-12)
     assert poses.places[0] == pytest.approx(places_at(mechanism, markers, q), abs=1e-12)
     state = mechanism.at(q)
@@ -176,10 +193,19 @@ def test_a_pose_is_a_minimum_where_the_constraints_hold(case: Case, seed: int, k
     for item in mechanism.constraints:
         assert np.abs(item.position_errors(state)).max(initial=0.0) < 1e-9
         count = len(item.position_errors(state))
-        rows = np.vstack([rows, item.velocity_equations(state)[0][:count] @ np.linalg.inv(mechanism.rate_matrix(q))])
+        rows = np.vstack(
+            [
+                rows,
+                item.velocity_equations(state)[0][:count] @ np.linalg.inv(mechanism.rate_matrix(q)),
+            ]
+        )
     slope = np.array(
         [
-            (cost_of(mechanism, markers, measured, q + e) - cost_of(mechanism, markers, measured, q - e)) / 2e-6
+            (
+                cost_of(mechanism, markers, measured, q + e)
+                - cost_of(mechanism, markers, measured, q - e)
+            )
+            / 2e-6
             for e in 1e-6 * np.eye(len(q))
         ]
     )
@@ -194,7 +220,10 @@ def test_python_and_machine_code_find_the_same_poses() -> None:
     rng = np.random.default_rng(2)
     motion = [places_at(case, markers, 0.3 * np.sin(0.1 * t + np.arange(6))) for t in range(4)]
     frames = np.array(motion).reshape(4, -1) + rng.normal(0.0, 0.01, (4, 3 * len(markers)))
-    result = [PoseFit(case, markers, code=code).fit(frames, q=np.zeros(6)).values for code in (COMPILED, PYTHON)]
+    result = [
+        PoseFit(case, markers, code=code).fit(frames, q=np.zeros(6)).values
+        for code in (COMPILED, PYTHON)
+    ]
     assert result[0] == pytest.approx(result[1], abs=1e-10)
 
 
@@ -216,7 +245,11 @@ def _pendulum(**changes: Any) -> Mechanism:
         model.add(body)
         model.add(PinJoint(name=f"j{number}", socket_parent_frame=last, socket_child_frame=body))
         last = model.add(
-            PhysicalOffsetFrame(name=f"end{number}", socket_parent=f"/bodyset/b{number}", translation=(1.0, 0.0, 0.0))
+            PhysicalOffsetFrame(
+                name=f"end{number}",
+                socket_parent=f"/bodyset/b{number}",
+                translation=(1.0, 0.0, 0.0),
+            )
         )
     mechanism = osimlite.mechanism(model)
     infos = (mechanism.coordinates[0], replace(mechanism.coordinates[1], **changes))
@@ -235,7 +268,8 @@ def test_a_clamped_coordinate_stays_in_its_range() -> None:
     poses = PoseFit(clamped, markers).fit(measured)
     assert poses.values[0, 1] == 0.25 and 0.3 < poses.values[0, 0] < 0.9
     ahead, here, behind = (
-        cost_of(free, markers, measured.reshape(-1, 3), poses.values[0] + (step, 0.0)) for step in (1e-4, 0.0, -1e-4)
+        cost_of(free, markers, measured.reshape(-1, 3), poses.values[0] + (step, 0.0))
+        for step in (1e-4, 0.0, -1e-4)
     )
     assert here < min(ahead, behind)
 
@@ -253,7 +287,9 @@ def test_locked_and_prescribed_coordinates_are_held() -> None:
     measured = places_at(_pendulum(), ARM, np.array((0.3, 0.9))).reshape(1, -1)
     locked = PoseFit(_pendulum(locked=True, default_value=0.7), ARM).fit(measured)
     assert locked.values[0, 1] == 0.7
-    driven = PoseFit(_pendulum(prescribed=f.Linear(1.0, 0.2)), ARM).fit(np.repeat(measured, 2, 0), [0.0, 0.5])
+    driven = PoseFit(_pendulum(prescribed=f.Linear(1.0, 0.2)), ARM).fit(
+        np.repeat(measured, 2, 0), [0.0, 0.5]
+    )
     assert driven.values[:, 1] == pytest.approx((0.2, 0.7), abs=1e-12)
 
 
@@ -263,7 +299,9 @@ def test_goals_pull_coordinates() -> None:
     measured = places_at(mechanism, ARM, np.array((0.3, 0.9))).reshape(-1)
     fit = PoseFit(mechanism, ARM, goals=[Goal(1, 1e6)])
     values = fit.fit(np.array([[*measured, 0.1], [*measured, np.nan]])).values
-    assert values[0, 1] == pytest.approx(0.1, abs=1e-5) and values[1] == pytest.approx((0.3, 0.9), abs=1e-9)
+    assert values[0, 1] == pytest.approx(0.1, abs=1e-5) and values[1] == pytest.approx(
+        (0.3, 0.9), abs=1e-9
+    )
     held = PoseFit(_pendulum(locked=True, default_value=0.7), ARM, goals=[Goal(1, 1e6)])
     assert held.fit(np.array([[*measured, 0.1]])).values[0, 1] == 0.7
 
@@ -303,63 +341,96 @@ def test_sensors_turn_bodies(far: float) -> None:
     fit = PoseFit(mechanism, [], [Sensor(FramePlacement(0, frame))])
     poses = fit.fit(wanted.reshape(1, -1), q=np.zeros(6))
     assert poses.costs[0] == pytest.approx(0.0, abs=1e-16)
-    assert mechanism.at(poses.values[0]).rotations[0] @ frame[:3, :3] == pytest.approx(wanted, abs=1e-8)
+    assert mechanism.at(poses.values[0]).rotations[0] @ frame[:3, :3] == pytest.approx(
+        wanted, abs=1e-8
+    )
 
 
 @pytest.mark.parametrize(
     "axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.6, -0.8, 0.0), (-0.6, 0.0, 0.8)]
 )
 @pytest.mark.parametrize("short", [0.0, 1e-13, 1e-7, 1e-3])
-def test_a_sensor_that_is_half_a_turn_off_is_found(axis: tuple[float, float, float], short: float) -> None:
+def test_a_sensor_that_is_half_a_turn_off_is_found(
+    axis: tuple[float, float, float], short: float
+) -> None:
     """A cost without a slope is none: whichever way round, the whole half turn counts."""
     mechanism = _free_body()
     sensor = Sensor(FramePlacement(0, np.eye(4)))
     wanted = Rotation.from_rotvec((np.pi - short) * np.array(axis)).as_matrix()
-    value, _, _ = derivatives(PoseFit(mechanism, [], [sensor], code=PYTHON), wanted.ravel(), np.zeros(6))
+    value, _, _ = derivatives(
+        PoseFit(mechanism, [], [sensor], code=PYTHON), wanted.ravel(), np.zeros(6)
+    )
     assert value == pytest.approx(0.5 * (np.pi - short) ** 2, rel=1e-12)
     poses = PoseFit(mechanism, [], [sensor]).fit(wanted.reshape(1, -1), q=np.zeros(6))
-    assert orientations_at(mechanism, [sensor], poses.values[0])[0] == pytest.approx(wanted, abs=1e-8)
+    assert orientations_at(mechanism, [sensor], poses.values[0])[0] == pytest.approx(
+        wanted, abs=1e-8
+    )
 
 
 def test_markers_and_sensors_count_as_shares() -> None:
     """The cost is the mean of the markers and the mean of the sensors; the turns that are left are told."""
     mechanism, rng = _free_body(), np.random.default_rng(5)
-    markers, sensors = markers_of(mechanism, rng), [Sensor(FramePlacement(0, np.eye(4)), 3.0) for _ in range(3)]
+    markers, sensors = (
+        markers_of(mechanism, rng),
+        [Sensor(FramePlacement(0, np.eye(4)), 3.0) for _ in range(3)],
+    )
     q = np.array((0.3, 0.2, -0.1, 0.4, 0.5, 0.6))
     measured = places_at(mechanism, markers, q) + rng.normal(0.0, 0.02, (3, 3))
     noise = Rotation.from_rotvec(rng.normal(0.0, 0.1, (3, 3))).as_matrix()
     rotations = noise @ orientations_at(mechanism, sensors, q)
     rotations[1] = np.nan
-    poses = PoseFit(mechanism, markers, sensors).fit(np.concatenate([measured.ravel(), rotations.ravel()])[None], q=q)
+    poses = PoseFit(mechanism, markers, sensors).fit(
+        np.concatenate([measured.ravel(), rotations.ravel()])[None], q=q
+    )
     result = poses.values[0]
     turns = turns_between(rotations[[0, 2]], orientations_at(mechanism, sensors, result)[[0, 2]])
     angles = np.sum(turns**2, axis=1)
-    assert poses.costs[0] == pytest.approx(cost_of(mechanism, markers, measured, result) + 0.25 * angles.sum())
-    assert poses.turns[0, [0, 2]] == pytest.approx(turns, abs=1e-12) and np.isnan(poses.turns[0, 1]).all()
+    assert poses.costs[0] == pytest.approx(
+        cost_of(mechanism, markers, measured, result) + 0.25 * angles.sum()
+    )
+    assert (
+        poses.turns[0, [0, 2]] == pytest.approx(turns, abs=1e-12)
+        and np.isnan(poses.turns[0, 1]).all()
+    )
 
 
 def test_a_jump_is_followed() -> None:
     """Positions that leap from one frame to the next are fitted in each of them."""
     mechanism = _free_body()
     markers = markers_of(mechanism, np.random.default_rng(3))
-    poses = np.array([(0.1, 0.0, 0.0, 0.0, 0.0, 0.0), (0.9, 0.5, -0.4, 2.0, 3.0, -4.0), (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)])
+    poses = np.array(
+        [
+            (0.1, 0.0, 0.0, 0.0, 0.0, 0.0),
+            (0.9, 0.5, -0.4, 2.0, 3.0, -4.0),
+            (0.1, 0.0, 0.0, 0.0, 0.0, 0.0),
+        ]
+    )
     frames = np.array([places_at(mechanism, markers, q) for q in poses]).reshape(3, -1)
-    assert PoseFit(mechanism, markers).fit(frames, q=np.zeros(6)).values == pytest.approx(poses, abs=1e-8)
+    assert PoseFit(mechanism, markers).fit(frames, q=np.zeros(6)).values == pytest.approx(
+        poses, abs=1e-8
+    )
 
 
 @pytest.mark.parametrize("goal", [False, True])
 def test_the_first_pose_has_no_whole_turns(goal: bool) -> None:
     """Wherever a body is turned to, its angles are those within half a turn of where the fit began."""
-    model, body = Model(name="arm"), Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    model, body = (
+        Model(name="arm"),
+        Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),
+    )
     model.add(body)
-    model.add(osimlite.GimbalJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body))
+    model.add(
+        osimlite.GimbalJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body)
+    )
     mechanism, rng = osimlite.mechanism(model), np.random.default_rng(0)
     markers = markers_of(mechanism, rng)
     fit = PoseFit(mechanism, markers, goals=[Goal(0, 1e-4)] if goal else [])
     for _ in range(60):
         q = rng.uniform(-3.0, 3.0, 3)
         poses = fit.fit(np.array([[*places_at(mechanism, markers, q).ravel(), 0.0]]), q=np.zeros(3))
-        assert np.abs(poses.values).max() <= np.pi + (0.05 if goal else 1e-8) and not poses.unsettled
+        assert (
+            np.abs(poses.values).max() <= np.pi + (0.05 if goal else 1e-8) and not poses.unsettled
+        )
         assert poses.costs[0] <= (0.5e-4 * np.pi**2 if goal else 1e-20)
 
 

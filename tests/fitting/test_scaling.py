@@ -40,13 +40,20 @@ def numbers_of(item: Object, path: str = "") -> dict[str, Any]:
 def assert_same(ours: Object, theirs: Object, but: str = "/socket_frame") -> None:
     """Objects mean the same; numbers agree to 1e-9."""
     left_out = "/socket_frame", but
-    one, other = ({k: v for k, v in numbers_of(item).items() if not k.endswith(left_out)} for item in (ours, theirs))
+    one, other = (
+        {k: v for k, v in numbers_of(item).items() if not k.endswith(left_out)}
+        for item in (ours, theirs)
+    )
     assert one.keys() == other.keys()
     for place, value in other.items():
-        if isinstance(value, float) or (isinstance(value, tuple) and value and isinstance(value[0], float)):
+        if isinstance(value, float) or (
+            isinstance(value, tuple) and value and isinstance(value[0], float)
+        ):
             # Of the points of a spline OpenSim prints six digits.
             rel = 1e-5 if place.endswith(("/x", "/y")) else 1e-9
-            assert np.asarray(one[place]) == pytest.approx(np.asarray(value), rel=rel, abs=1e-12, nan_ok=True), place
+            assert np.asarray(one[place]) == pytest.approx(
+                np.asarray(value), rel=rel, abs=1e-12, nan_ok=True
+            ), place
         else:
             assert one[place] == value, place
 
@@ -70,7 +77,9 @@ def setup(shared: Path, tmp_path: Path) -> Path:
     for source in (shared / CASE).iterdir():
         data = source.read_bytes()
         name = source.name.removesuffix(".gz")
-        (tmp_path / f"their_{name}").write_bytes(gzip.decompress(data) if source.suffix == ".gz" else data)
+        (tmp_path / f"their_{name}").write_bytes(
+            gzip.decompress(data) if source.suffix == ".gz" else data
+        )
     tool: Any = osimlite.read_document(tmp_path / "their_scale.xml")
     names = {
         "gait2354.osim": tool.generic_model_maker.model_file,
@@ -99,11 +108,19 @@ def test_a_gait_model_is_scaled_as_opensim_scales_it(setup: Path) -> None:
     text = result.texts[tool.marker_placer.output_motion_file]
     their_text = (setup / "their_subject01_static_output.mot").read_text()
     assert text.split("\n")[:7] == their_text.split("\n")[:7]
-    assert result.placed.pose.costs[0] == pytest.approx(2.0127e-4, rel=3e-3) and not result.placed.pose.unsettled
+    assert (
+        result.placed.pose.costs[0] == pytest.approx(2.0127e-4, rel=3e-3)
+        and not result.placed.pose.unsettled
+    )
     (setup / "pose.mot").write_text(text)
-    pose, known = read_sto(setup / "pose.mot"), read_sto(setup / "their_subject01_static_output.mot")
+    pose, known = (
+        read_sto(setup / "pose.mot"),
+        read_sto(setup / "their_subject01_static_output.mot"),
+    )
     assert pose.columns == known.columns and pose.rows == pytest.approx(known.rows, abs=0.02)
-    assert next(iter(result.placed.told())).endswith("OpenSim advises less than 1 and 2 cm of markers on bones")
+    assert next(iter(result.placed.told())).endswith(
+        "OpenSim advises less than 1 and 2 cm of markers on bones"
+    )
     assert len(result.placed.moved) > 30 and max(result.placed.moved.values()) < 0.2
 
 
@@ -111,16 +128,24 @@ def body_model() -> osimlite.Model:
     """A thigh with two markers on its ends and a shank below."""
     model = osimlite.Model(name="leg")
     thigh = osimlite.Body(
-        name="thigh", mass=8.0, mass_center=(0.0, -0.2, 0.0), inertia=(0.1, 0.02, 0.1, 0.01, 0.0, 0.0)
+        name="thigh",
+        mass=8.0,
+        mass_center=(0.0, -0.2, 0.0),
+        inertia=(0.1, 0.02, 0.1, 0.01, 0.0, 0.0),
     )
     model.add(thigh)
-    model.add(osimlite.FreeJoint(name="hip", socket_parent_frame=model.ground, socket_child_frame=thigh))
+    model.add(
+        osimlite.FreeJoint(name="hip", socket_parent_frame=model.ground, socket_child_frame=thigh)
+    )
     for name, y in (("top", 0.0), ("bottom", -0.4)):
         model.add(osimlite.Marker(name=name, socket_parent_frame=thigh, location=(0.0, y, 0.0)))
     return model
 
 
-STATIC = {"top": [[0.0, 1.0, 0.0]] * 3, "bottom": [[0.0, 0.5, 0.0], [0.0, 0.52, 0.0], [0.0, 0.54, 0.0]]}
+STATIC = {
+    "top": [[0.0, 1.0, 0.0]] * 3,
+    "bottom": [[0.0, 0.5, 0.0], [0.0, 0.52, 0.0], [0.0, 0.54, 0.0]],
+}
 LENGTH = {"length": ([("top", "bottom")], {"thigh": "Y"})}
 
 
@@ -128,11 +153,17 @@ def test_distances_of_markers_scale_bodies() -> None:
     """The mean over the frames, along the axes that are named; the model given stays as it is."""
     model = body_model()
     result = osimlite.scale(model, STATIC, measurements=LENGTH)
-    assert result.measured is not None and result.measured.ratios == {"length": pytest.approx(0.48 / 0.4)}
+    assert result.measured is not None and result.measured.ratios == {
+        "length": pytest.approx(0.48 / 0.4)
+    }
     thigh: Any = result.model["/bodyset/thigh"]
-    assert thigh.mass_center == pytest.approx((0.0, -0.24, 0.0)) and thigh.mass == pytest.approx(8.0 * 1.2)
+    assert thigh.mass_center == pytest.approx((0.0, -0.24, 0.0)) and thigh.mass == pytest.approx(
+        8.0 * 1.2
+    )
     assert model["/bodyset/thigh"].mass == 8.0
-    both = osimlite.scale(model, STATIC, measurements=LENGTH, factors={"thigh": (2.0, 1.0, 1.0)}, mass=5.0)
+    both = osimlite.scale(
+        model, STATIC, measurements=LENGTH, factors={"thigh": (2.0, 1.0, 1.0)}, mass=5.0
+    )
     assert both.model["/bodyset/thigh"].mass == pytest.approx(5.0)
     assert both.model["/markerset/bottom"].location == pytest.approx((0.0, -0.4, 0.0))
 
@@ -153,10 +184,14 @@ def test_inertia_of_equal_factors_is_exact() -> None:
     """It goes by the square of the factor, and by the mass."""
     model = body_model()
     scale_model(model, {"thigh": (1.1, 1.1, 1.1)})
-    assert model["/bodyset/thigh"].inertia == pytest.approx(np.array((0.1, 0.02, 0.1, 0.01, 0.0, 0.0)) * 1.1**5)
+    assert model["/bodyset/thigh"].inertia == pytest.approx(
+        np.array((0.1, 0.02, 0.1, 0.01, 0.0, 0.0)) * 1.1**5
+    )
     model = body_model()
     scale_model(model, {"thigh": (1.1, 1.1, 1.1)}, preserve_mass_distribution=True)
-    assert model["/bodyset/thigh"].inertia == pytest.approx(np.array((0.1, 0.02, 0.1, 0.01, 0.0, 0.0)) * 1.1**2)
+    assert model["/bodyset/thigh"].inertia == pytest.approx(
+        np.array((0.1, 0.02, 0.1, 0.01, 0.0, 0.0)) * 1.1**2
+    )
 
 
 def test_what_cannot_be_scaled_is_told() -> None:
@@ -164,12 +199,16 @@ def test_what_cannot_be_scaled_is_told() -> None:
     model = body_model()
     with pytest.raises(SettingError, match="no body 'tigh'; did you mean 'thigh'"):
         osimlite.scale(model, factors={"tigh": 1.2})
-    with pytest.raises(SettingError, match="measurement 'thigh' is pairs of markers, and by body the axes"):
+    with pytest.raises(
+        SettingError, match="measurement 'thigh' is pairs of markers, and by body the axes"
+    ):
         osimlite.scale(model, {}, measurements={"thigh": ([("one", "two")], ["thigh"])})  # type: ignore[arg-type]
     with pytest.raises(SettingError, match="there are no markers of it"):
         osimlite.scale(model, measurements=LENGTH)
     notes = osimlite.scale(model, {"top": STATIC["top"]}, measurements=LENGTH).measured
-    assert notes is not None and notes.notes == ["measurement 'length' is left out: the data have no marker 'bottom'"]
+    assert notes is not None and notes.notes == [
+        "measurement 'length' is left out: the data have no marker 'bottom'"
+    ]
     gap = {**STATIC, "bottom": [[0.0, np.nan, 0.0], *STATIC["bottom"][1:]]}
     notes = osimlite.scale(model, gap, measurements=LENGTH).measured
     assert notes is not None and "were not seen in every frame" in notes.notes[0]
@@ -178,7 +217,9 @@ def test_what_cannot_be_scaled_is_told() -> None:
     slider = osimlite.Model(name="slider")
     body = osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
     slider.add(body)
-    slider.add(osimlite.PlanarJoint(name="j", socket_parent_frame=slider.ground, socket_child_frame=body))
+    slider.add(
+        osimlite.PlanarJoint(name="j", socket_parent_frame=slider.ground, socket_child_frame=body)
+    )
     names = [item.name for item in slider.components(osimlite.Coordinate)]
     slider.add(
         osimlite.CoordinateCouplerConstraint(
@@ -193,9 +234,12 @@ def test_what_cannot_be_scaled_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("first", "last", "frames"), [(-1.0, 9.0, (0, 4)), (0.5, 1.5, (0, 3)), (1.0, 2.0, (1, 3)), (7.0, 8.0, (3, 4))]
+    ("first", "last", "frames"),
+    [(-1.0, 9.0, (0, 4)), (0.5, 1.5, (0, 3)), (1.0, 2.0, (1, 3)), (7.0, 8.0, (3, 4))],
 )
-def test_frames_of_a_range_are_those_of_opensim(first: float, last: float, frames: tuple[int, int]) -> None:
+def test_frames_of_a_range_are_those_of_opensim(
+    first: float, last: float, frames: tuple[int, int]
+) -> None:
     """The last one not after the beginning to the first one not before the end."""
     result = frames_between(np.arange(4.0), first, last)
     assert (result.start, result.stop) == frames

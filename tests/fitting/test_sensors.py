@@ -40,7 +40,12 @@ def leg() -> osimlite.Model:
     model = osimlite.Model(name="leg")
     carrier: Any = model.ground
     for name, joint in (("thigh", osimlite.FreeJoint), ("shank", osimlite.PinJoint)):
-        body = osimlite.Body(name=name, mass=1.0, mass_center=(0.0, -0.2, 0.0), inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+        body = osimlite.Body(
+            name=name,
+            mass=1.0,
+            mass_center=(0.0, -0.2, 0.0),
+            inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0),
+        )
         model.add(body)
         at = model.add(osimlite.PhysicalOffsetFrame(name=f"{name}_at", socket_parent=carrier))
         model.add(joint(name=f"{name}_joint", socket_parent_frame=at, socket_child_frame=body))
@@ -69,7 +74,9 @@ def test_quaternions_and_matrices_are_the_same_rotations() -> None:
     matrices = rotation_of(given)
     assert np.linalg.det(matrices) == pytest.approx(np.ones(30))
     unit = given / np.linalg.norm(given, axis=1)[:, None]
-    assert np.abs(np.sum(quaternion(matrices) * unit, axis=1)) == pytest.approx(np.ones(30), abs=1e-14)
+    assert np.abs(np.sum(quaternion(matrices) * unit, axis=1)) == pytest.approx(
+        np.ones(30), abs=1e-14
+    )
     for length in (1e-300, 1e-5, 1e300):
         assert rotation_of(length * unit) == pytest.approx(matrices, abs=1e-12)
     assert rotation_about_space((0.3, 0.4, 0.5)) == pytest.approx(
@@ -84,23 +91,37 @@ def test_quaternions_and_matrices_are_the_same_rotations() -> None:
 
 def test_sensors_are_worn_in_the_centres_of_mass(lab: Path) -> None:
     done = run("run", "placer.xml", "-o", "out", folder=lab)
-    assert (done.code, done.err) == (0, "") and "thigh_imu and shank_imu" in done.out and "heading" in done.out
+    assert (
+        (done.code, done.err) == (0, "")
+        and "thigh_imu and shank_imu" in done.out
+        and "heading" in done.out
+    )
     model: Any = osimlite.read(lab / "out" / "worn.osim")
     for name in ("thigh", "shank"):
         frame, sensor = model[f"/bodyset/{name}/{name}_imu"], model[f"/componentset/{name}_imu"]
         assert frame.translation == (0.0, -0.2, 0.0) and sensor.socket_frame == frame.path
-    one, other = (turned(*model[f"/bodyset/{name}/{name}_imu"].orientation) for name in ("thigh", "shank"))
+    one, other = (
+        turned(*model[f"/bodyset/{name}/{name}_imu"].orientation) for name in ("thigh", "shank")
+    )
     assert one.T @ other == pytest.approx(turned(0.1, 0.5, 0.2).T @ turned(0.0, 0.5, 0.0))
 
 
 def test_a_sensor_that_is_there_is_turned() -> None:
     model: Any = leg()
-    place_sensors(model, OrientationData.of({"shank_imu": turned(0.1, 0.2, 0.3), "shank": np.eye(3)}))
+    place_sensors(
+        model, OrientationData.of({"shank_imu": turned(0.1, 0.2, 0.3), "shank": np.eye(3)})
+    )
     frame = model["/bodyset/shank/shank_imu"]
     frame.translation = (1.0, 2.0, 3.0)
-    placed = place_sensors(model, OrientationData.of({"shank_imu": turned(0.3, 0.2, 0.1), "shank": np.eye(3)}))
+    placed = place_sensors(
+        model, OrientationData.of({"shank_imu": turned(0.3, 0.2, 0.1), "shank": np.eye(3)})
+    )
     assert placed == (("shank_imu",), ("shank",), None)
-    assert frame.orientation == pytest.approx((0.3, 0.2, 0.1)) and frame.translation == (1.0, 2.0, 3.0)
+    assert frame.orientation == pytest.approx((0.3, 0.2, 0.1)) and frame.translation == (
+        1.0,
+        2.0,
+        3.0,
+    )
     assert len(list(model.components(osimlite.IMU))) == 1
 
 
@@ -116,8 +137,16 @@ def test_what_is_wrong_with_sensors_is_told(lab: Path) -> None:
     for data, words, said in (
         ({"thigh_imu": eye}, ("shank_imu", "x"), "there is no sensor 'shank_imu' in the data"),
         ({"thigh_imu": eye}, ("thigh_imu", "w"), "the axis 'w' is none"),
-        ({"foot_imu": eye, "thigh": eye}, (), r"no sensor of the data \(foot_imu and thigh\) is called as a frame"),
-        ({"thigh_imu": np.full((3, 3), np.nan)}, (), "does not say in its first frame how the sensor 'thigh_imu'"),
+        (
+            {"foot_imu": eye, "thigh": eye},
+            (),
+            r"no sensor of the data \(foot_imu and thigh\) is called as a frame",
+        ),
+        (
+            {"thigh_imu": np.full((3, 3), np.nan)},
+            (),
+            "does not say in its first frame how the sensor 'thigh_imu'",
+        ),
     ):
         with pytest.raises(SettingError, match=said):
             place_sensors(leg(), OrientationData.of(data), *words)
@@ -131,7 +160,9 @@ def test_what_is_wrong_with_sensors_is_told(lab: Path) -> None:
     with pytest.raises(DocumentError, match="must say DataType=Quaternion"):
         OrientationData.of(lab / "motion.sto")
     twins: Any = leg()
-    twins["/bodyset/thigh"].components.append(osimlite.PhysicalOffsetFrame(name="shank", socket_parent=".."))
+    twins["/bodyset/thigh"].components.append(
+        osimlite.PhysicalOffsetFrame(name="shank", socket_parent="..")
+    )
     with pytest.raises(SettingError, match="several frames 'shank'"):
         place_sensors(twins, OrientationData.of({"shank_imu": eye}))
 
@@ -139,10 +170,19 @@ def test_what_is_wrong_with_sensors_is_told(lab: Path) -> None:
 def worn() -> osimlite.Model:
     """The leg with sensors and markers."""
     model = leg()
-    place_sensors(model, OrientationData.of({"thigh_imu": turned(0.1, 0.5, 0.2), "shank_imu": turned(0.0, 0.5, 0.0)}))
+    place_sensors(
+        model,
+        OrientationData.of(
+            {"thigh_imu": turned(0.1, 0.5, 0.2), "shank_imu": turned(0.0, 0.5, 0.0)}
+        ),
+    )
     for body in list(model.components(osimlite.Body)):
         for number, place in enumerate(((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.3))):
-            model.add(osimlite.Marker(name=f"{body.name}{number}", socket_parent_frame=body, location=place))
+            model.add(
+                osimlite.Marker(
+                    name=f"{body.name}{number}", socket_parent_frame=body, location=place
+                )
+            )
     return model
 
 
@@ -152,13 +192,17 @@ def measured(model: osimlite.Model, count: int = 8) -> tuple[Any, dict[str, Any]
     poses = 0.4 * np.sin(3.0 * t + np.arange(7.0))
     sensors = {
         f"{name}_imu": np.array(
-            [quaternion(mechanism.frame_transform(f"/bodyset/{name}/{name}_imu", q)[:3, :3]) for q in poses]
+            [
+                quaternion(mechanism.frame_transform(f"/bodyset/{name}/{name}_imu", q)[:3, :3])
+                for q in poses
+            ]
         )
         for name in ("thigh", "shank")
     }
     markers: Any = list(model.components(osimlite.Marker))
     places = {
-        item.name: np.array([mechanism.at(q).point(*mechanism.stations[item.path]) for q in poses]) for item in markers
+        item.name: np.array([mechanism.at(q).point(*mechanism.stations[item.path]) for q in poses])
+        for item in markers
     }
     return poses, sensors, places
 
@@ -174,13 +218,26 @@ def test_orientations_are_fitted_and_translations_stay(lab: Path) -> None:
     assert result.values[:, 3:6] == pytest.approx(np.tile((0.0, 0.9, 0.0), (8, 1)))
     assert result.values[:, :3] == pytest.approx(poses[:, :3], abs=1e-8)
     assert np.delete(result.values[:, 6], 3) == pytest.approx(np.delete(poses[:, 6], 3), abs=1e-8)
-    assert np.isnan(result.orientation_errors[3, 1]) and result.summary["partly_unseen"] == {"shank_imu": 0.125}
-    assert result.summary["rms_orientation_error"] < 1e-8 and result.summary["worst_sensor"] in result.sensors
+    assert np.isnan(result.orientation_errors[3, 1]) and result.summary["partly_unseen"] == {
+        "shank_imu": 0.125
+    }
+    assert (
+        result.summary["rms_orientation_error"] < 1e-8
+        and result.summary["worst_sensor"] in result.sensors
+    )
     assert result.to_xarray()["orientation_error"].dims == ("time", "sensor")
     assert list(result.to_frame().columns) == list(result.coordinates)
     path = lab / "trial.sto"
     rows = np.stack([*sensors.values()], axis=1).reshape(8, -1).tolist()
-    write_sto(path, "trial", (np.arange(8) / 10).tolist(), list(sensors), rows, kind="Quaternion", has_missing=True)
+    write_sto(
+        path,
+        "trial",
+        (np.arange(8) / 10).tolist(),
+        list(sensors),
+        rows,
+        kind="Quaternion",
+        has_missing=True,
+    )
     again = osimlite.inverse_kinematics(model, orientations=path, start=0.2, end=0.4)
     assert again.times == pytest.approx([0.2, 0.3, 0.4])
     assert again.values == pytest.approx(result.values[2:5], abs=1e-7)
@@ -191,14 +248,18 @@ def test_markers_and_orientations_are_fitted_together() -> None:
     model = worn()
     poses, sensors, places = measured(model)
     sensors["thigh_imu"] = quaternion(turned(0.5, 0.0, 0.0) @ rotation_of(sensors["thigh_imu"]))
-    result = osimlite.inverse_kinematics(model, places, orientations=sensors, weights={"thigh_imu": 0.0})
+    result = osimlite.inverse_kinematics(
+        model, places, orientations=sensors, weights={"thigh_imu": 0.0}
+    )
     assert result.values == pytest.approx(poses, abs=1e-8)
     assert result.orientation_errors == pytest.approx(np.tile((0.5, 0.0), (8, 1)), abs=1e-8)
     assert result.turns[:, 0] == pytest.approx(np.tile((-0.5, 0.0, 0.0), (8, 1)), abs=1e-8)
     solver = osimlite.FrameSolver(model, [*places], {"thigh_imu": 0.0}, sensors=[*sensors])
     for number, q in enumerate(poses):
         seen = [values[number] for values in places.values()]
-        assert solver.step(seen, orientations=[one[number] for one in sensors.values()]) == pytest.approx(q, abs=1e-8)
+        assert solver.step(
+            seen, orientations=[one[number] for one in sensors.values()]
+        ) == pytest.approx(q, abs=1e-8)
     assert solver.turns == pytest.approx(result.turns[-1], abs=1e-8)
     assert solver.places == pytest.approx(result.places[-1], abs=1e-8)
 
@@ -210,12 +271,19 @@ def test_the_frame_solver_takes_sensors_alone() -> None:
     solver = osimlite.FrameSolver(model, sensors=["shank_imu", "thigh_imu"])
     for number, q in enumerate(whole.values):
         given = np.array([sensors["shank_imu"][number], sensors["thigh_imu"][number]])
-        assert solver.step(orientations=given if number % 2 else rotation_of(given)) == pytest.approx(q, abs=1e-9)
-    with pytest.raises(SettingError, match="the orientations of 2 sensors are as many quaternions or matrices; got 1"):
+        assert solver.step(
+            orientations=given if number % 2 else rotation_of(given)
+        ) == pytest.approx(q, abs=1e-9)
+    with pytest.raises(
+        SettingError,
+        match="the orientations of 2 sensors are as many quaternions or matrices; got 1",
+    ):
         solver.step(orientations=[[1.0, 0.0, 0.0, 0.0]])
     with pytest.raises(SettingError, match="the positions of 0 markers"):
         solver.step([[0.0, 0.0, 0.0]], orientations=np.eye(4)[:2])
-    with pytest.raises(SettingError, match=r"no frame that is called as a sensor \(shin_imu\); did you"):
+    with pytest.raises(
+        SettingError, match=r"no frame that is called as a sensor \(shin_imu\); did you"
+    ):
         osimlite.FrameSolver(model, sensors=["shin_imu"])
 
 
@@ -224,21 +292,35 @@ def test_what_cannot_be_fitted_is_told() -> None:
     _, sensors, places = measured(model)
     for said, given in (
         ("there is nothing to fit", {}),
-        (r"no frame that is called as a sensor \(foot_imu\)", {"orientations": {"foot_imu": np.eye(3)}}),
-        ("no sensor 'tigh_imu'; did you mean 'thigh_imu'", {"orientations": sensors, "weights": {"tigh_imu": 1.0}}),
+        (
+            r"no frame that is called as a sensor \(foot_imu\)",
+            {"orientations": {"foot_imu": np.eye(3)}},
+        ),
+        (
+            "no sensor 'tigh_imu'; did you mean 'thigh_imu'",
+            {"orientations": sensors, "weights": {"tigh_imu": 1.0}},
+        ),
         ("is no weight", {"orientations": sensors, "weights": {"thigh_imu": -1.0}}),
-        ("8 frames of the markers and the 1 of the", {"markers": places, "orientations": {"thigh_imu": np.eye(3)}}),
+        (
+            "8 frames of the markers and the 1 of the",
+            {"markers": places, "orientations": {"thigh_imu": np.eye(3)}},
+        ),
     ):
         with pytest.raises(SettingError, match=said):
             osimlite.inverse_kinematics(model, **given)
 
 
-def test_frames_with_many_sensors_missing_reach_their_best_pose(corpus: Any, tmp_path: Path) -> None:
+def test_frames_with_many_sensors_missing_reach_their_best_pose(
+    corpus: Any, tmp_path: Path
+) -> None:
     """Where poses look nearly alike and coordinates are at ends of their ranges, some hundred steps were not enough."""
     path = next(result.converted for result in corpus if result.id == "m0954")
     (tmp_path / "model.osim").write_bytes(gzip.decompress(path.read_bytes()))
     model = osimlite.read(tmp_path / "model.osim")
-    place_sensors(model, OrientationData.of({f"{body.name}_imu": np.eye(3) for body in model.body_set.objects}))
+    place_sensors(
+        model,
+        OrientationData.of({f"{body.name}_imu": np.eye(3) for body in model.body_set.objects}),
+    )
     mechanism, rng, frames = osimlite.mechanism(model), np.random.default_rng(1), 400
     names = [f"{body.name}_imu" for body in model.body_set.objects]
     placed = {path.rpartition("/")[2]: frame for path, frame in mechanism.frames.items()}
@@ -249,13 +331,16 @@ def test_frames_with_many_sensors_missing_reach_their_best_pose(corpus: Any, tmp
         state = mechanism.at(q)
         rows.append(
             [
-                rotation_xyz(angles) @ (state.transform(placed[name].body) @ placed[name].transform)[:3, :3]
+                rotation_xyz(angles)
+                @ (state.transform(placed[name].body) @ placed[name].transform)[:3, :3]
                 for name, angles in zip(names, rng.normal(0.0, 0.09, (len(names), 3)), strict=True)
             ]
         )
     values = np.array(rows)
     values[(rng.random(frames) < 0.3)[:, None] & (rng.random(values.shape[:2]) < 0.2)] = np.nan
-    result = osimlite.inverse_kinematics(model, orientations=dict(zip(names, np.swapaxes(values, 0, 1), strict=True)))
+    result = osimlite.inverse_kinematics(
+        model, orientations=dict(zip(names, np.swapaxes(values, 0, 1), strict=True))
+    )
     assert not result.unsettled and result.steps.max() < 120
 
 
@@ -283,7 +368,9 @@ def test_a_misspelt_weight_is_told_with_its_line_before_the_run(lab: Path) -> No
     assert sorted(path.name for path in (lab / "out").iterdir()) == [
         "ik_standing.mot", "ik_standing_orientationErrors.sto",
     ]  # fmt: skip
-    (lab / "tracker.xml").write_text(TRACKER.replace("tigh_imu", "thigh_imu").replace("standing.sto", "standin.sto"))
+    (lab / "tracker.xml").write_text(
+        TRACKER.replace("tigh_imu", "thigh_imu").replace("standing.sto", "standin.sto")
+    )
     done = run("run", "tracker.xml", folder=lab)
     assert done.code == 2 and "tracker.xml:4:" in done.err
 
@@ -294,9 +381,15 @@ def test_a_misspelt_marker_is_told_with_its_line_before_the_run(lab: Path) -> No
     rows = np.stack([*places.values()], axis=1).reshape(8, -1).tolist()
     write_trc(lab / "trial.trc", [0.1 * k for k in range(8)], [*places], rows)
     tool = osimlite.InverseKinematicsTool(
-        name="ik", model_file="worn.osim", marker_file="trial.trc", output_motion_file="ik.mot", time_range=(0.0, 0.5)
+        name="ik",
+        model_file="worn.osim",
+        marker_file="trial.trc",
+        output_motion_file="ik.mot",
+        time_range=(0.0, 0.5),
     )
-    tool.ik_task_set.objects = [osimlite.IKMarkerTask(name=name, weight=1.0) for name in [*places, "thihg0"]]
+    tool.ik_task_set.objects = [
+        osimlite.IKMarkerTask(name=name, weight=1.0) for name in [*places, "thihg0"]
+    ]
     osimlite.write(tool, lab / "ik.xml")
     line = (lab / "ik.xml").read_text().split("thihg0")[0].count("\n") + 1
     done = run("run", "ik.xml", folder=lab)
@@ -305,10 +398,14 @@ def test_a_misspelt_marker_is_told_with_its_line_before_the_run(lab: Path) -> No
 
 def test_the_command_takes_orientations(lab: Path) -> None:
     osimlite.write(worn(), lab / "worn.osim")
-    done = run("ik", "worn.osim", "standing.sto", "--weight", "thigh_imu=2", "-o", "out", folder=lab)
+    done = run(
+        "ik", "worn.osim", "standing.sto", "--weight", "thigh_imu=2", "-o", "out", folder=lab
+    )
     assert (done.code, done.err) == (0, "") and "2 sensors: errors of 0.00 degrees" in done.out
     errors = read_sto(lab / "out" / "orientation_errors.sto")
-    assert errors.columns == ("thigh_imu", "shank_imu") and errors.rows == pytest.approx(np.zeros((1, 2)), abs=1e-8)
+    assert errors.columns == ("thigh_imu", "shank_imu") and errors.rows == pytest.approx(
+        np.zeros((1, 2)), abs=1e-8
+    )
     assert read_sto(lab / "out" / "ik.mot").in_degrees
 
 

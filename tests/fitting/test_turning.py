@@ -20,19 +20,33 @@ FACING = 2
 def turner(low: float, high: float) -> osimlite.Model:
     """A pelvis, jointed as gait models are, whose rotation is clamped (degrees), and a thigh."""
     model = osimlite.Model(name="turner")
-    bodies = [osimlite.Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)) for name in ("pelvis", "leg")]
+    bodies = [
+        osimlite.Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+        for name in ("pelvis", "leg")
+    ]
     for body in bodies:
         model.add(body)
         for number, place in enumerate(PLACES):
-            model.add(osimlite.Marker(name=f"{body.name}{number}", socket_parent_frame=body, location=place))
+            model.add(
+                osimlite.Marker(
+                    name=f"{body.name}{number}", socket_parent_frame=body, location=place
+                )
+            )
     coordinates = [osimlite.Coordinate(name=name) for name in NAMES]
-    coordinates[FACING].clamped, coordinates[FACING].range = True, (float(np.radians(low)), float(np.radians(high)))
+    coordinates[FACING].clamped, coordinates[FACING].range = (
+        True,
+        (float(np.radians(low)), float(np.radians(high))),
+    )
     moves = osimlite.SpatialTransform()
     for number, name in enumerate(NAMES):
         kind = f"{'translation' if number > 2 else 'rotation'}{number % 3 + 1}"
         line = osimlite.LinearFunction(coefficients=(1.0, 0.0))
         axis = np.eye(3)[number % 3].tolist() if number > 2 else AXES[number]
-        setattr(moves, kind, osimlite.TransformAxis(name=kind, coordinates=(name,), axis=tuple(axis), function=line))
+        setattr(
+            moves,
+            kind,
+            osimlite.TransformAxis(name=kind, coordinates=(name,), axis=tuple(axis), function=line),
+        )
     joint = osimlite.CustomJoint(
         name="root", socket_parent_frame=model.ground, socket_child_frame=bodies[0], coordinates=coordinates,
         spatial_transform=moves,
@@ -70,7 +84,9 @@ def fitted(model: osimlite.Model, places: Any) -> Any:
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
-@pytest.mark.parametrize(("low", "high"), [(-180.0, 180.0), (-200.0, 200.0), (0.0, 360.0), (-180.0, 540.0)])
+@pytest.mark.parametrize(
+    ("low", "high"), [(-180.0, 180.0), (-200.0, 200.0), (0.0, 360.0), (-180.0, 540.0)]
+)
 def test_who_turns_around_goes_on_at_the_other_end(low: float, high: float, way: float) -> None:
     """Twice around and back; nothing is lost on the way, and no coordinate leaps without need."""
     angles = way * np.concatenate([np.arange(100.0, 760.0, 8.0), np.arange(760.0, 100.0, -30.0)])
@@ -122,7 +138,9 @@ def test_every_frame_is_at_the_least_of_all_minima(low: float, high: float) -> N
 
         def residuals(q: Any, wanted: Any = wanted) -> Any:
             state = mechanism.at(q)
-            return (np.array([state.point(*station) for station in stations]) - wanted).ravel() / np.sqrt(len(stations))
+            return (
+                np.array([state.point(*station) for station in stations]) - wanted
+            ).ravel() / np.sqrt(len(stations))
 
         least = np.inf
         for start in np.linspace(ends[0] + 0.1, ends[1] - 0.1, 3):

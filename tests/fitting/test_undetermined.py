@@ -19,7 +19,9 @@ MARKERS = ("ASI", "PSI", "SAC", "THI", "KNE", "TIB", "ANK", "TOE")
 def fit(model: Path, markers: tuple[str, ...], **options: Any):
     """Fit the walk of a lab to some of its markers."""
     data = MarkerData.of(LABS / "unseen" / "walk.trc")
-    arrays = {name: data.positions[:, place] for place, name in enumerate(data.names) if name in markers}
+    arrays = {
+        name: data.positions[:, place] for place, name in enumerate(data.names) if name in markers
+    }
     return osimlite.inverse_kinematics(osimlite.read(model), arrays, times=data.times, **options)
 
 
@@ -43,7 +45,8 @@ def test_a_goal_or_a_lock_determines(tmp_path: Path) -> None:
     assert fit(model, MARKERS[:5], coordinates={"knee_angle": (0.1, -0.3)}).undetermined == ()
     folder = copy_lab("unseen", tmp_path)
     change(
-        folder / "leg.osim", ('<Coordinate name="knee_angle">', '<Coordinate name="knee_angle"><locked>true</locked>')
+        folder / "leg.osim",
+        ('<Coordinate name="knee_angle">', '<Coordinate name="knee_angle"><locked>true</locked>'),
     )
     assert fit(folder / "leg.osim", MARKERS[:5]).undetermined == ()
 
@@ -61,7 +64,13 @@ def test_a_coupled_joint_is_determined_by_the_other(tmp_path: Path) -> None:
 
 def test_a_motion_of_one_frame() -> None:
     data = MarkerData.of(LABS / "unseen" / "walk.trc")
-    arrays = {name: data.positions[:1, place] for place, name in enumerate(data.names) if name in MARKERS[:5]}
-    motion = osimlite.inverse_kinematics(osimlite.read(LABS / "unseen" / "leg.osim"), arrays, times=data.times[:1])
+    arrays = {
+        name: data.positions[:1, place]
+        for place, name in enumerate(data.names)
+        if name in MARKERS[:5]
+    }
+    motion = osimlite.inverse_kinematics(
+        osimlite.read(LABS / "unseen" / "leg.osim"), arrays, times=data.times[:1]
+    )
     assert motion.undetermined == ("knee_angle",)
     assert np.isfinite(motion.values).all()

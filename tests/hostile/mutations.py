@@ -1,7 +1,8 @@
 """Damage files at random, run a command on each, and look for crashes, hangs and changed files.
 
-One process serves all commands of a kind and is started anew when it dies or hangs, so that thousands of
-commands take minutes. `python -m tests.hostile.mutations 500` prints the table of all kinds.
+One process serves all commands of a kind and is started anew when it dies or hangs, so that
+thousands of commands take minutes. `python -m tests.hostile.mutations 500` prints the table of all
+kinds.
 """
 
 from __future__ import annotations
@@ -101,7 +102,12 @@ KINDS = {
         (*_PENDULUM, *_IMU, "@motion.sto"),
         (("validate", "@", "--no-cache"), ("run", "@", *_OUT)),
     ),
-    ".omoco": Kind(".omoco", ("setups/slide.omoco",), _SLIDE, (("validate", "@", "--no-cache"), ("run", "@", *_OUT))),
+    ".omoco": Kind(
+        ".omoco",
+        ("setups/slide.omoco",),
+        _SLIDE,
+        (("validate", "@", "--no-cache"), ("run", "@", *_OUT)),
+    ),
     ".scone": Kind(
         ".scone",
         ("@scone",),
@@ -117,8 +123,9 @@ KINDS = {
     ),
 }
 
-ANGLES = "motion\nversion=1\nnRows=12\nnColumns=3\ninDegrees=no\nendheader\ntime\tq0\tq1\n" + "".join(
-    f"{0.1 * k:.1f}\t{0.01 * k * k:.4f}\t0.1\n" for k in range(12)
+ANGLES = (
+    "motion\nversion=1\nnRows=12\nnColumns=3\ninDegrees=no\nendheader\ntime\tq0\tq1\n"
+    + "".join(f"{0.1 * k:.1f}\t{0.01 * k * k:.4f}\t0.1\n" for k in range(12))
 )
 SETUP = """<OpenSimDocument Version="40600"><InverseDynamicsTool name="swing">
 <results_directory>out</results_directory><model_file>model.osim</model_file>
@@ -130,7 +137,9 @@ MARKERS = (
     "PathFileType\t4\t(X/Y/Z)\tit.trc\n"
     "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n"
     "100\t100\t5\t2\tm\t100\t1\t5\nFrame#\tTime\tm0\t\t\tm1\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n"
-) + "".join(f"{k + 1}\t{0.01 * k:.2f}\t0.1\t-0.5\t0\t0.2\t-{1.0 + 0.01 * k:.2f}\t0\n" for k in range(5))
+) + "".join(
+    f"{k + 1}\t{0.01 * k:.2f}\t0.1\t-0.5\t0\t0.2\t-{1.0 + 0.01 * k:.2f}\t0\n" for k in range(5)
+)
 MESH_MODEL = """<OpenSimDocument Version="40600"><Model name="m"><Ground name="ground"><attached_geometry>
 <Mesh name="g"><mesh_file>it.vtp</mesh_file></Mesh></attached_geometry></Ground></Model></OpenSimDocument>
 """
@@ -147,7 +156,9 @@ VALUES = (
 )  # fmt: skip
 """What is put in the place of numbers and names."""
 
-_WORD = re.compile(rb"(?<=>)[^<>\s][^<>]*(?=<)|(?<=[\s=:{\[,~\"])[-+]?[0-9][0-9.e+-]*|(?<== )[\w./*]+")
+_WORD = re.compile(
+    rb"(?<=>)[^<>\s][^<>]*(?=<)|(?<=[\s=:{\[,~\"])[-+]?[0-9][0-9.e+-]*|(?<== )[\w./*]+"
+)
 
 
 def damage(data: bytes, rng: random.Random) -> bytes:
@@ -238,11 +249,15 @@ def run_kind(name: str, count: int, seed: int = 1) -> tuple[Counter[str], list[s
         count: of mutations.
         seed: the same seed, the same mutations.
 
-    Returns:
-        How often commands ended in each way, and a line for each fault: a traceback, a crash, a hang or a file
-        that was changed.
+    Returns: How often commands ended in each way, and a line for each fault: a traceback, a crash,
+        a hang or a file that was changed.
     """
-    kind, rng, faults, counts = KINDS[name], random.Random(f"{name} {seed}"), list[str](), Counter[str]()
+    kind, rng, faults, counts = (
+        KINDS[name],
+        random.Random(f"{name} {seed}"),
+        list[str](),
+        Counter[str](),
+    )
     with tempfile.TemporaryDirectory() as top:
         folder, outside = Path(top, "work", "in"), Path(top, "outside")
         folder.mkdir(parents=True)
@@ -262,22 +277,33 @@ def run_kind(name: str, count: int, seed: int = 1) -> tuple[Counter[str], list[s
                 file.write_bytes(data)
                 before = _digests(Path(top))
                 for command in kind.commands:
-                    code, used, text = server.run([file.name if word == "@" else word for word in command])
+                    code, used, text = server.run(
+                        [file.name if word == "@" else word for word in command]
+                    )
                     if code == TERMINATED:
-                        # Nothing here sends that signal: somebody else has ended the process. It is asked again.
-                        code, used, text = server.run([file.name if word == "@" else word for word in command])
+                        # Nothing here sends that signal: somebody else has ended the process. It is
+                        # asked again.
+                        code, used, text = server.run(
+                            [file.name if word == "@" else word for word in command]
+                        )
                     # A study is searched as long as it says, which no damage to it makes endless.
-                    limit = SEARCH_SECONDS if name == ".omoco" and command[0] == "run" else HANG_SECONDS
+                    limit = (
+                        SEARCH_SECONDS if name == ".omoco" and command[0] == "run" else HANG_SECONDS
+                    )
                     is_good = code in ("0", "1", "2") and used <= limit
                     counts[code if is_good else "fault"] += 1
                     if not is_good:
                         faults.append(f"{name} {number} {command[0]}: {code} {used:.1f} s {text}")
                         _keep(file, number)
                 after = _digests(Path(top))
-                if changed := [path for path, digest in before.items() if after.get(path) != digest]:
+                if changed := [
+                    path for path, digest in before.items() if after.get(path) != digest
+                ]:
                     faults.append(f"{name} {number}: changed {changed}")
                 for path in set(after) - set(before):
-                    if not path.startswith(("work/in/out", "work/in/built.osim", "work/in/page.html", "cache")):
+                    if not path.startswith(
+                        ("work/in/out", "work/in/built.osim", "work/in/page.html", "cache")
+                    ):
                         faults.append(f"{name} {number}: wrote {path}")
                     if not path.startswith("cache"):
                         Path(top, path).unlink()
@@ -290,7 +316,9 @@ def _sources(kind: Kind) -> list[bytes]:
         if source.startswith("@"):
             result.append(_made(source[1:]))
         elif (FIXTURES / source).is_dir():
-            result += [path.read_bytes() for path in sorted((FIXTURES / source).rglob(f"*{kind.ending}"))]
+            result += [
+                path.read_bytes() for path in sorted((FIXTURES / source).rglob(f"*{kind.ending}"))
+            ]
         else:
             result.append((FIXTURES / source).read_bytes())
     return result
@@ -322,8 +350,15 @@ def _made(name: str) -> bytes:
 
 
 def _digests(top: Path) -> dict[str, str]:
-    files = (path for path in top.rglob("*") if path.is_file() and "cache" not in path.relative_to(top).parts)
-    return {path.relative_to(top).as_posix(): hashlib.md5(path.read_bytes()).hexdigest() for path in files}
+    files = (
+        path
+        for path in top.rglob("*")
+        if path.is_file() and "cache" not in path.relative_to(top).parts
+    )
+    return {
+        path.relative_to(top).as_posix(): hashlib.md5(path.read_bytes()).hexdigest()
+        for path in files
+    }
 
 
 def _keep(file: Path, number: int) -> None:

@@ -15,14 +15,27 @@ import osimlite
 from osimlite.base.require import SAFE_PATH, leave_current_folder, protect_processes, require
 
 ROOT = Path(osimlite.__file__).parents[1]
-MODULES = ("ctypes", "numpy", "json", "textwrap", "subprocess", "yaml", "lxml", "casadi", "random", "signal")
+MODULES = (
+    "ctypes",
+    "numpy",
+    "json",
+    "textwrap",
+    "subprocess",
+    "yaml",
+    "lxml",
+    "casadi",
+    "random",
+    "signal",
+)
 
 
 @pytest.fixture
 def trap(tmp_path: Path) -> Path:
     """A folder of a stranger, with modules of many names and settings of packages."""
     for name in MODULES:
-        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'EXECUTED')!r}, 'a').write('{name} ')\n")
+        (tmp_path / f"{name}.py").write_text(
+            f"open({str(tmp_path / 'EXECUTED')!r}, 'a').write('{name} ')\n"
+        )
     (tmp_path / ".numba_config.yaml").write_text("- no settings\n")
     (tmp_path / "matplotlibrc").write_text("text.usetex: True\n")
     return tmp_path
@@ -50,7 +63,9 @@ def test_doctor_executes_nothing_of_the_folder(trap: Path) -> None:
 
 
 @pytest.mark.parametrize("words", [("--to", "mjcf", "--check")], ids=" ".join)
-def test_translate_executes_nothing_of_the_folder(trap: Path, repo: Path, words: tuple[str, ...]) -> None:
+def test_translate_executes_nothing_of_the_folder(
+    trap: Path, repo: Path, words: tuple[str, ...]
+) -> None:
     pytest.importorskip("mujoco", reason="needs mujoco (extra 'mujoco')")
     shutil.copy(repo / "fixtures" / "pipelines" / "pendulum" / "model.osim", trap / "m.osim")
     done = call(trap, "translate", "m.osim", *words, "-o", "out")
@@ -65,13 +80,17 @@ def test_ipopt_reads_no_options_of_the_folder(trap: Path, repo: Path) -> None:
         pytest.skip("needs casadi (extra 'casadi')")
     for name in ("slide.omoco", "slide.osim", "slide_guess.sto", "slide_states.sto"):
         shutil.copy(repo / "fixtures" / "setups" / name, trap / name)
-    (trap / "ipopt.opt").write_text("output_file written.txt\nfile_print_level 5\nhsllib ./library.so\n")
+    (trap / "ipopt.opt").write_text(
+        "output_file written.txt\nfile_print_level 5\nhsllib ./library.so\n"
+    )
     done = call(trap, "run", "slide.omoco", "-o", "out")
     assert (done.returncode, done.stderr.count("Traceback")) == (0, 0)
     assert not (trap / "written.txt").exists() and not (trap / "EXECUTED").exists()
 
 
-def test_packages_are_imported_from_another_folder(trap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_packages_are_imported_from_another_folder(
+    trap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(trap)
     monkeypatch.syspath_prepend("")
     monkeypatch.delenv(SAFE_PATH, raising=False)
@@ -86,7 +105,9 @@ def test_packages_are_imported_from_another_folder(trap: Path, monkeypatch: pyte
     assert require("json", extra="x", purpose="x") is sys.modules["json"]
 
 
-def test_processes_do_not_look_into_their_folder(trap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_processes_do_not_look_into_their_folder(
+    trap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv(SAFE_PATH, raising=False)
     protect_processes()
     subprocess.run([sys.executable, "-c", "import textwrap, random"], cwd=trap, check=True)

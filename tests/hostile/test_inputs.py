@@ -38,7 +38,9 @@ def write_includes(folder: Path, count: int, times: int) -> Path:
     return folder / "e0.scone"
 
 
-@pytest.mark.parametrize(("count", "times", "words"), [(19, 2, "include more than"), (30, 1, "without end")])
+@pytest.mark.parametrize(
+    ("count", "times", "words"), [(19, 2, "include more than"), (30, 1, "without end")]
+)
 def test_includes_have_a_budget(tmp_path: Path, count: int, times: int, words: str) -> None:
     with pytest.raises(DocumentError, match=words):
         read_settings(write_includes(tmp_path, count, times))
@@ -49,7 +51,13 @@ def test_an_included_file_may_stand_several_times(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["a { " * 5000, "a { " * 5000 + "} " * 5000, "a: &a\n  b: *a\n", "a: " + "[{b: " * 60 + "1" + "}]" * 60]
+    "text",
+    [
+        "a { " * 5000,
+        "a { " * 5000 + "} " * 5000,
+        "a: &a\n  b: *a\n",
+        "a: " + "[{b: " * 60 + "1" + "}]" * 60,
+    ],
 )
 def test_nesting_has_an_end(tmp_path: Path, text: str) -> None:
     is_yaml = ":" in text
@@ -64,7 +72,9 @@ def test_nesting_has_an_end(tmp_path: Path, text: str) -> None:
         read_settings(path)
 
 
-@pytest.mark.parametrize("text", ["include: [a, b]", "include: {a: b}", "? [a, b]\n: 1", "? {a: 1}\n: 2"])
+@pytest.mark.parametrize(
+    "text", ["include: [a, b]", "include: {a: b}", "? [a, b]\n: 1", "? {a: 1}\n: 2"]
+)
 def test_includes_of_yaml_are_names(tmp_path: Path, text: str) -> None:
     pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
     (tmp_path / "it.yaml").write_text(text)
@@ -72,8 +82,12 @@ def test_includes_of_yaml_are_names(tmp_path: Path, text: str) -> None:
         read_settings(tmp_path / "it.yaml")
 
 
-@pytest.mark.parametrize("name", ["secret.txt", "../secret.yaml", ".hidden/a.scone", "/etc/passwd", "link.scone"])
-def test_includes_show_no_other_files(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "name", ["secret.txt", "../secret.yaml", ".hidden/a.scone", "/etc/passwd", "link.scone"]
+)
+def test_includes_show_no_other_files(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = tmp_path / "scenario"
     (folder / ".hidden").mkdir(parents=True)
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -98,7 +112,9 @@ def test_scenarios_are_regular_files(tmp_path: Path, name: str) -> None:
         read_settings(tmp_path / "including.scone")
 
 
-@pytest.mark.parametrize("content", [b"a\xff 1 2 3\n", b"a nan 1 2\n", b"a inf 1 2\n", b"a 1 2\n", b"\0\0\0\0"])
+@pytest.mark.parametrize(
+    "content", [b"a\xff 1 2 3\n", b"a nan 1 2\n", b"a inf 1 2\n", b"a 1 2\n", b"\0\0\0\0"]
+)
 def test_damaged_parameters(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "it.par").write_bytes(content)
     with pytest.raises(DocumentError):
@@ -160,7 +176,9 @@ def compressed_mesh(kind: str, size: int, blocks: int, promised: int) -> bytes:
 
 
 @pytest.mark.parametrize("kind", ["ZLib", "LZMA"])
-@pytest.mark.parametrize(("promised", "words"), [(1_000_000, "more than 400 MB"), (2**62, "more than"), (8, "damaged")])
+@pytest.mark.parametrize(
+    ("promised", "words"), [(1_000_000, "more than 400 MB"), (2**62, "more than"), (8, "damaged")]
+)
 def test_meshes_do_not_grow(kind: str, promised: int, words: str) -> None:
     blocks = 1 if promised == 8 else 500
     with pytest.raises(OsimliteError, match=words):
@@ -179,7 +197,19 @@ def test_polygons_of_many_corners(count: int) -> None:
 
 # --------------------------------------------------------------------------------------------------- texts
 
-OPEN = ["<!--", "<a ", "<", "<?x ", "<![CDATA[", '<x a="<" ', "<\n", "<<<<<<<\n", "<?", "</a", "<!-- osimlite: ignore "]
+OPEN = [
+    "<!--",
+    "<a ",
+    "<",
+    "<?x ",
+    "<![CDATA[",
+    '<x a="<" ',
+    "<\n",
+    "<<<<<<<\n",
+    "<?",
+    "</a",
+    "<!-- osimlite: ignore ",
+]
 
 
 @pytest.mark.parametrize("word", OPEN)
@@ -219,7 +249,10 @@ def test_remarks_are_blanked(text: str, blank: str) -> None:
 @pytest.mark.parametrize("number", ["9" * 400, "-" + "9" * 400, "9" * 5000])
 def test_whole_numbers_of_any_length(tmp_path: Path, number: str) -> None:
     pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
-    for name, text in (("m.yaml", f"gravity: [0, {number}, 0]\n"), ("m.json", f'{{"gravity": [0, {number}, 0]}}')):
+    for name, text in (
+        ("m.yaml", f"gravity: [0, {number}, 0]\n"),
+        ("m.json", f'{{"gravity": [0, {number}, 0]}}'),
+    ):
         (tmp_path / name).write_text(text)
         with pytest.raises(OsimliteError):
             osimlite.io.document.data.read_data(tmp_path / name)
@@ -238,9 +271,15 @@ BROKEN_SETTINGS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "text", "is_ignored"), BROKEN_SETTINGS, ids=range(len(BROKEN_SETTINGS)))
-def test_settings_that_make_no_sense(tmp_path: Path, fixtures: Path, name: str, text: str, is_ignored: bool) -> None:
-    (tmp_path / "m.osim").write_text('<OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>')
+@pytest.mark.parametrize(
+    ("name", "text", "is_ignored"), BROKEN_SETTINGS, ids=range(len(BROKEN_SETTINGS))
+)
+def test_settings_that_make_no_sense(
+    tmp_path: Path, fixtures: Path, name: str, text: str, is_ignored: bool
+) -> None:
+    (tmp_path / "m.osim").write_text(
+        '<OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>'
+    )
     (tmp_path / name).write_text(text)
     done = run("validate", "m.osim", "--no-cache", folder=tmp_path)
     assert (done.code == 2) == (not is_ignored)
@@ -257,7 +296,13 @@ CLASSES = [
     CLASS % '"default":{"a":[]}',
     '{"classes":{},"references":[{"cls":"A","property":"a","resolution":["body-name"]}]}',
     '{"classes":{"My":{"bases":["Force"],"outputs":[5]}}}',
-    json.dumps({"classes": {f"C{i}": {"bases": [f"C{i + 1}" if i < 1500 else "Force"]} for i in range(1501)}}),
+    json.dumps(
+        {
+            "classes": {
+                f"C{i}": {"bases": [f"C{i + 1}" if i < 1500 else "Force"]} for i in range(1501)
+            }
+        }
+    ),
 ]
 
 
@@ -307,7 +352,9 @@ def test_tables_of_tools_say_where_they_have_nan(tmp_path: Path) -> None:
     outcome.table(tmp_path / "old.sto", table, "about it\n")
     outcome.new_table(tmp_path / "new.sto", table)
     setup = tmp_path / "setup.xml"
-    setup.write_text('<OpenSimDocument Version="40600"><InverseDynamicsTool name="a"/></OpenSimDocument>')
+    setup.write_text(
+        '<OpenSimDocument Version="40600"><InverseDynamicsTool name="a"/></OpenSimDocument>'
+    )
     outcome.write(setup, ResultWriter.for_document(setup))
     assert outcome.told == [("not a number", "old.sto has NaN where there is no value: 'a'")]
     for name in ("old.sto", "new.sto"):
@@ -326,7 +373,9 @@ def test_linearize_gives_no_nan(fixtures: Path) -> None:
         osimlite.linearize(model)
 
 
-@pytest.mark.parametrize("name", ["@DATA@", "@SCRIPT@", "@LIBRARY@", "@TITLE@ @STYLE@", "\\1 \\g<0>"])
+@pytest.mark.parametrize(
+    "name", ["@DATA@", "@SCRIPT@", "@LIBRARY@", "@TITLE@ @STYLE@", "\\1 \\g<0>"]
+)
 def test_names_are_no_placeholders_of_the_page(fixtures: Path, tmp_path: Path, name: str) -> None:
     import html
 

@@ -9,7 +9,9 @@ import pytest
 
 from tests.hostile.mutations import KINDS, run_kind
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits of processes are those of POSIX")
+pytestmark = pytest.mark.skipif(
+    sys.platform == "win32", reason="limits of processes are those of POSIX"
+)
 NEEDS = {".c3d": "ezc3d", ".scone": "numpy", ".yaml": "yaml", ".omoco": "casadi"}
 
 

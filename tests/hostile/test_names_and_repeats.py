@@ -21,7 +21,9 @@ NAMED = {"force": 'name="f"', "joint": 'name="j"'}
 
 @pytest.mark.parametrize("separator", SEPARATORS)
 @pytest.mark.parametrize("named", NAMED)
-def test_no_table_is_written_with_a_name_that_breaks_it(named: str, separator: str, tmp_path: Path) -> None:
+def test_no_table_is_written_with_a_name_that_breaks_it(
+    named: str, separator: str, tmp_path: Path
+) -> None:
     old = NAMED[named]
     text = small_model(forces=SPRING).replace(old, f'{old[:-1]}{SEPARATORS[separator]}x"')
     (tmp_path / "m.osim").write_text(text, encoding="utf-8")
@@ -31,9 +33,13 @@ def test_no_table_is_written_with_a_name_that_breaks_it(named: str, separator: s
 
 
 @pytest.mark.parametrize("name", ["BodySet", "JointSet", "ForceSet", "ContactGeometrySet"])
-def test_elements_that_stand_many_times_are_checked_in_linear_time(name: str, fixtures: Path) -> None:
+def test_elements_that_stand_many_times_are_checked_in_linear_time(
+    name: str, fixtures: Path
+) -> None:
     text = (fixtures / "walker" / "DynamicWalkerModel.osim").read_text(encoding="utf-8")
-    pattern = re.compile(rf"(<{name}\b[^>]*>\s*<objects>)(.*?)(</objects>\s*(?:<groups />\s*)?</{name}>)", re.DOTALL)
+    pattern = re.compile(
+        rf"(<{name}\b[^>]*>\s*<objects>)(.*?)(</objects>\s*(?:<groups />\s*)?</{name}>)", re.DOTALL
+    )
     times = []
     for count in (20, 40):
         match = pattern.search(text)

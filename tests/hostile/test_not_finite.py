@@ -15,7 +15,8 @@ def test_forces_that_are_no_numbers_are_no_result(fixtures: Path) -> None:
     """The library refuses them as the command does."""
     model = osimlite.read(fixtures / "pipelines" / "pendulum" / "model.osim")
     motion = {
-        coordinate.name: [0.01 * k * k for k in range(12)] for coordinate in model.components(osimlite.Coordinate)
+        coordinate.name: [0.01 * k * k for k in range(12)]
+        for coordinate in model.components(osimlite.Coordinate)
     }
     times = [0.1 * k for k in range(12)]
     osimlite.inverse_dynamics(model, motion, times=times)

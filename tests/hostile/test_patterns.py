@@ -15,7 +15,15 @@ from osimlite.tools import patterns as file_patterns
 from osimlite.tools.named_files import named_files
 from osimlite.tools.patterns import find_files
 
-SLOW = ["(.*)*(.*)*(.*)*(.*)*(.*)*!", "(a+)+$b", "(a|a)*b", "(a|aa)+b", "((a*)*)*b", "(.*a){20}b", "(x+x+)+y"]
+SLOW = [
+    "(.*)*(.*)*(.*)*(.*)*(.*)*!",
+    "(a+)+$b",
+    "(a|a)*b",
+    "(a|aa)+b",
+    "((a*)*)*b",
+    "(.*a){20}b",
+    "(x+x+)+y",
+]
 ASSERTIONS = ["^", "$", r"\b", "(?=a)", "(?!b)", "(?=a*b)", "(?!(?=b).*/)", "(?=.*(?!a)b)"]
 ATOMS = [
     "a",
@@ -77,7 +85,9 @@ def test_assertions_within_assertions_take_no_time() -> None:
     assert time.process_time() - begin < 5.0
 
 
-@pytest.mark.parametrize("text", ["(?<=a).*", "(?<!a).*", "(?i)a", "(?P<x>a)", "(?#a)", "(?", ".*(?=", "(?!a"])
+@pytest.mark.parametrize(
+    "text", ["(?<=a).*", "(?<!a).*", "(?i)a", "(?P<x>a)", "(?#a)", "(?", ".*(?=", "(?!a"]
+)
 def test_what_opensim_refuses_is_no_pattern(text: str) -> None:
     with pytest.raises(PatternError) as error:
         Pattern(text)
@@ -158,7 +168,9 @@ def test_links_to_other_folders_are_followed(tmp_path: Path) -> None:
     assert len(find_files(str(tmp_path / "lab" / "*" / "*" / "ik.xml"))) == 1
 
 
-def test_a_pattern_looks_at_a_bounded_number_of_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_pattern_looks_at_a_bounded_number_of_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(file_patterns, "MAX_ENTRIES", 10)
     for number in range(11):
         (tmp_path / f"{number}.xml").touch()
@@ -172,7 +184,9 @@ CHAIN = """<OpenSimDocument Version="40600"><AnalyzeTool name="a"><model_file>m.
 
 
 @pytest.mark.parametrize("last", ["s0.xml", "none.xml"])
-def test_setups_that_name_each_other_are_read_once(last: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_setups_that_name_each_other_are_read_once(
+    last: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """3^30 paths lead through them; in a circle there are more."""
     count = 30
     for number in range(count):

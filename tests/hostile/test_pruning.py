@@ -63,7 +63,9 @@ def test_links_are_neither_followed_nor_removed(tmp_path: Path):
 
 
 @needs_links
-def test_a_folder_that_becomes_a_link_meanwhile_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_folder_that_becomes_a_link_meanwhile_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     from osimlite.base import pruning
 
     cache, home = tmp_path / "cache", tmp_path / "home"
@@ -86,7 +88,10 @@ def test_several_may_prune_at_once(tmp_path: Path):
     for number in range(200):
         make_entry(tmp_path, f"{number % 7}/{number}.json", OLD_S)
     removed: list[int] = []
-    threads = [threading.Thread(target=lambda: removed.append(prune_cache(tmp_path, time.time()))) for _ in range(4)]
+    threads = [
+        threading.Thread(target=lambda: removed.append(prune_cache(tmp_path, time.time())))
+        for _ in range(4)
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -95,7 +100,9 @@ def test_several_may_prune_at_once(tmp_path: Path):
     assert not [*tmp_path.rglob("*.json")]
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="the variable of the cache folder is that of Linux")
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="the variable of the cache folder is that of Linux"
+)
 def test_writing_prunes_once_a_day(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     folder = tmp_path / "osimlite"

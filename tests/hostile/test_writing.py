@@ -85,7 +85,9 @@ def test_a_setup_cannot_name_any_file(study: Path, folder: str, name: str, words
         assert done.code == 0
         return
     assert done.code == 2 and words in " ".join(done.err.split())
-    assert contents(study.parent) == before | {study / "setup.xml": (study / "setup.xml").read_bytes()}
+    assert contents(study.parent) == before | {
+        study / "setup.xml": (study / "setup.xml").read_bytes()
+    }
 
 
 @pytest.mark.parametrize("there", [OWN, OTHER_TABLE, "", "{}", "<html/>"])
@@ -108,7 +110,9 @@ def test_the_same_setup_runs_again_and_beside_its_folder(study: Path) -> None:
     assert (study.parent / "results" / "forces.sto").read_text().startswith("Inverse Dynamics")
 
 
-def test_what_is_farther_away_needs_an_option(study: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_what_is_farther_away_needs_an_option(
+    study: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     away = tmp_path_factory.mktemp("away")
     assert compute(study, str(away), "forces.sto").code == 2
     assert not list(away.iterdir())
@@ -157,7 +161,9 @@ def test_the_input_with_a_hard_link_keeps_its_content(study: Path) -> None:
 
 
 def journal_of(study: Path) -> Path:
-    (study / "bad.xml").write_text(SETUP.format(folder=".", name="b.sto").replace("angles.sto", "gone.sto"))
+    (study / "bad.xml").write_text(
+        SETUP.format(folder=".", name="b.sto").replace("angles.sto", "gone.sto")
+    )
     (study / "setup.xml").write_text(SETUP.format(folder="out", name="forces.sto"))
     return study / ".osimlite-run.jsonl"
 
@@ -223,7 +229,9 @@ def test_findings_are_not_kept_in_a_project(tmp_path: Path, cache: Path) -> None
     assert list(cache.rglob("*.json"))
 
 
-def test_a_relative_cache_folder_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_relative_cache_folder_is_not_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", "cache")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     (tmp_path / "cache").symlink_to(tmp_path / "elsewhere")
@@ -277,7 +285,10 @@ def test_the_default_folder_of_results_is_no_link(study: Path) -> None:
     (study / "model").symlink_to(study.parent / "home")
     done = run("inverse-dynamics", "model.osim", "angles.sto", folder=study)
     assert done.code == 2 and "through this link" in " ".join(done.err.split())
-    assert sorted(path.name for path in (study.parent / "home").iterdir()) == [".bashrc", "thesis.docx"]
+    assert sorted(path.name for path in (study.parent / "home").iterdir()) == [
+        ".bashrc",
+        "thesis.docx",
+    ]
 
 
 def test_the_project_of_a_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -306,7 +317,10 @@ def test_a_program_that_chooses_a_name_replaces_a_link(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "kind"),
     [
-        ("<?xml version='1.0'?>\n<!-- a -- b -->\n<OpenSimDocument Version='1'><Model name='m'>", "<Model>"),
+        (
+            "<?xml version='1.0'?>\n<!-- a -- b -->\n<OpenSimDocument Version='1'><Model name='m'>",
+            "<Model>",
+        ),
         ("<OpenSimDocument><!-- x --><ScaleSet", "<ScaleSet>"),
         ("<Model name='m'>", None),
         (RESULT, "'Inverse Dynamics Generalized Forces'"),

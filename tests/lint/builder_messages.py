@@ -26,7 +26,13 @@ PARTS = (
 )
 """Modules that build what a model describes."""
 
-ERRORS = {"ModelError", "UnsupportedError", "SimulationError", "UnmetConstraintsError", "_Impossible"}
+ERRORS = {
+    "ModelError",
+    "UnsupportedError",
+    "SimulationError",
+    "UnmetConstraintsError",
+    "_Impossible",
+}
 
 
 class Message(NamedTuple):
@@ -50,7 +56,11 @@ def read_messages() -> list[Message]:
     result: dict[Message, None] = {}
     for file in files:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name | ast.Attribute) and node.args:
+            if (
+                isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Name | ast.Attribute)
+                and node.args
+            ):
                 name = node.func.id if isinstance(node.func, ast.Name) else node.func.attr
                 text = _template(node.args[-1 if name == "unsupported" else 0])
                 known = name in ERRORS or (name == "unsupported" and len(node.args) > 1)
@@ -64,7 +74,9 @@ def _template(node: ast.expr) -> str | None:
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         return node.value
     if isinstance(node, ast.JoinedStr):
-        return "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in node.values)
+        return "".join(
+            str(part.value) if isinstance(part, ast.Constant) else "{}" for part in node.values
+        )
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
         left, right = _template(node.left), _template(node.right)
         return None if left is None else left + (right or "{}")

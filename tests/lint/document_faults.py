@@ -19,7 +19,9 @@ def _document(project: Project, draw: random.Random) -> tuple[str, Text]:
     return name, project.documents[name]
 
 
-def leaf_like(project: Project, draw: random.Random, wanted: Callable[[str], bool]) -> tuple[str, Text, Element] | None:
+def leaf_like(
+    project: Project, draw: random.Random, wanted: Callable[[str], bool]
+) -> tuple[str, Text, Element] | None:
     name, text = _document(project, draw)
     result = {
         tag: kept
@@ -48,12 +50,16 @@ def _put(
     return Change(file, what, text.put(*changes), tuple(lines), words, sure)
 
 
-def new_value(file: str, text: Text, leaf: Element, new: str, *, sure: bool, words: tuple[str, ...] = ()) -> Change:
+def new_value(
+    file: str, text: Text, leaf: Element, new: str, *, sure: bool, words: tuple[str, ...] = ()
+) -> Change:
     what = f"{text.path(leaf)}: {text.inside(leaf).strip()!r} -> {new!r}"
     return _put(file, text, what, (leaf.head, leaf.tail, new), sure=sure, words=words)
 
 
-def _reference(project: Project, draw: random.Random) -> tuple[str, Text, int, int, str, str] | None:
+def _reference(
+    project: Project, draw: random.Random
+) -> tuple[str, Text, int, int, str, str] | None:
     """A word of a document that names something in the model or in a table."""
     name, text = _document(project, draw)
     known = set(project.names)
@@ -61,15 +67,21 @@ def _reference(project: Project, draw: random.Random) -> tuple[str, Text, int, i
     for tag, leaves in text.leaves.items():
         for leaf in leaves:
             for word in _WORD.finditer(text.inside(leaf)):
-                if word[0] in known or (word[0].startswith("/") and word[0].rpartition("/")[2] in known):
-                    result.setdefault(tag, []).append((leaf.head + word.start(), leaf.head + word.end()))
+                if word[0] in known or (
+                    word[0].startswith("/") and word[0].rpartition("/")[2] in known
+                ):
+                    result.setdefault(tag, []).append(
+                        (leaf.head + word.start(), leaf.head + word.end())
+                    )
     for tag in _NAMES_SOMETHING:
         for element in text.named.get(tag, ()):
             match = re.search(r'name="([^"]+)"', text.head(element))
             assert match is not None
             if re.search(r"<apply>\s*false", text.whole(element)):
                 continue
-            result.setdefault(tag, []).append((element.start + match.start(1), element.start + match.end(1)))
+            result.setdefault(tag, []).append(
+                (element.start + match.start(1), element.start + match.end(1))
+            )
     if not result:
         return None
     tag = draw.choice(sorted(result))
@@ -84,8 +96,14 @@ def name_misspelt(project: Project, draw: random.Random) -> Change | None:
     name, text, start, end, old, tag = place
     new = misspelt(draw, old)
     # OpenSim takes one slash for many.
-    is_known = new in project.names or re.sub("/+", "/", new).rstrip("/") in ("", old) or new.lower() == "ground"
-    return _put(name, text, f"{tag}: {old!r} -> {new!r}", (start, end, new), sure=not is_known, words=(old,))
+    is_known = (
+        new in project.names
+        or re.sub("/+", "/", new).rstrip("/") in ("", old)
+        or new.lower() == "ground"
+    )
+    return _put(
+        name, text, f"{tag}: {old!r} -> {new!r}", (start, end, new), sure=not is_known, words=(old,)
+    )
 
 
 def name_of_another_kind(project: Project, draw: random.Random) -> Change | None:
@@ -94,7 +112,11 @@ def name_of_another_kind(project: Project, draw: random.Random) -> Change | None
         return None
     name, text, start, end, old, tag = place
     kind = project.components.get(old)
-    new = draw.choice(sorted(other for other, its in project.components.items() if its != kind and other not in old))
+    new = draw.choice(
+        sorted(
+            other for other, its in project.components.items() if its != kind and other not in old
+        )
+    )
     return _put(name, text, f"{tag}: {old!r} -> {new!r}", (start, end, new), words=(old,))
 
 
@@ -104,7 +126,18 @@ def path_for_a_name(project: Project, draw: random.Random) -> Change | None:
         return None
     name, text, start, end, old, tag = place
     last = old.rpartition("/")[2]
-    new = draw.choice(("/", "./", "/bodyset/", "/jointset/", "/forceset/", "/markerset/", "../", "/bodyset/bodyset/"))
+    new = draw.choice(
+        (
+            "/",
+            "./",
+            "/bodyset/",
+            "/jointset/",
+            "/forceset/",
+            "/markerset/",
+            "../",
+            "/bodyset/bodyset/",
+        )
+    )
     new += last
     return _put(name, text, f"{tag}: {old!r} -> {new!r}", (start, end, new), words=(old,))
 
@@ -121,7 +154,9 @@ def name_in_the_model(project: Project, draw: random.Random) -> Change | None:
         return None
     whole = re.compile(rf'(?<=[/>\s"]){re.escape(old)}(?=[</\s"])')
     lines = tuple(k for k, line in enumerate(model.split("\n"), 1) if whole.search(line))
-    return Change("model.osim", f"{old!r} is called {new!r}", whole.sub(new, model), lines, (old,), sure=True)
+    return Change(
+        "model.osim", f"{old!r} is called {new!r}", whole.sub(new, model), lines, (old,), sure=True
+    )
 
 
 _TEXT_FOR_NUMBER = ("abc", "1,5", "--1", "1e", "one", "0x10", "1.2.3", "true")
@@ -149,7 +184,9 @@ def number_out_of_range(project: Project, draw: random.Random) -> Change | None:
         return None
     words = leaf[1].inside(leaf[2]).split()
     at = draw.randrange(len(words))
-    words[at] = draw.choice(("-1", "0", "NaN", "1e30", "-1e30", "Inf", "-Inf", "-" + words[at].lstrip("-"), "0.5"))
+    words[at] = draw.choice(
+        ("-1", "0", "NaN", "1e30", "-1e30", "Inf", "-Inf", "-" + words[at].lstrip("-"), "0.5")
+    )
     return new_value(*leaf, " ".join(words), sure=False)
 
 
@@ -166,7 +203,9 @@ def times(project: Project, draw: random.Random) -> Change | None:
     """Times that are reversed, outside the data, none at all."""
     name, text = _document(project, draw)
     result: dict[str, list[Element]] = {
-        tag: text.leaves[tag] for tag in ("time_range", "initial_time", "final_time") if tag in text.leaves
+        tag: text.leaves[tag]
+        for tag in ("time_range", "initial_time", "final_time")
+        if tag in text.leaves
     }
     if not result:
         return None
@@ -174,14 +213,29 @@ def times(project: Project, draw: random.Random) -> Change | None:
     words = text.inside(leaf).split()
     if len(words) == 2:
         new = draw.choice(
-            ([words[1], words[0]], ["50", "60"], ["-60", "-50"], words[:1], ["NaN", words[1]], [words[0], "NaN"])
+            (
+                [words[1], words[0]],
+                ["50", "60"],
+                ["-60", "-50"],
+                words[:1],
+                ["NaN", words[1]],
+                [words[0], "NaN"],
+            )
         )
         return new_value(name, text, leaf, " ".join(new), sure=True)
     change = new_value(
-        name, text, leaf, draw.choice(["NaN", {"initial_time": "60", "final_time": "-60"}[leaf.tag]]), sure=True
+        name,
+        text,
+        leaf,
+        draw.choice(["NaN", {"initial_time": "60", "final_time": "-60"}[leaf.tag]]),
+        sure=True,
     )
     # It takes two to be in the wrong order.
-    both = [text.text.count("\n", 0, other.head) + 1 for other in (leaf, *text.siblings(leaf)) if other.tag in result]
+    both = [
+        text.text.count("\n", 0, other.head) + 1
+        for other in (leaf, *text.siblings(leaf))
+        if other.tag in result
+    ]
     return change._replace(lines=tuple(both))
 
 
@@ -191,14 +245,18 @@ def wrong_bool(project: Project, draw: random.Random) -> Change | None:
         return None
     new = draw.choice(("yes", "no", "True", "TRUE", "1", "0", "flase", "tru", "on"))
     # What is no truth is false, as it was, where isDisabled was not taken for text.
-    return new_value(*leaf, new, sure=new not in ("True", "TRUE", "1", "0") and leaf[2].tag != "isDisabled")
+    return new_value(
+        *leaf, new, sure=new not in ("True", "TRUE", "1", "0") and leaf[2].tag != "isDisabled"
+    )
 
 
 def other_bool(project: Project, draw: random.Random) -> Change | None:
     leaf = leaf_like(project, draw, lambda text: text in ("true", "false"))
     if leaf is None:
         return None
-    return new_value(*leaf, {"true": "false", "false": "true"}[leaf[1].inside(leaf[2]).strip()], sure=False)
+    return new_value(
+        *leaf, {"true": "false", "false": "true"}[leaf[1].inside(leaf[2]).strip()], sure=False
+    )
 
 
 def word_misspelt(project: Project, draw: random.Random) -> Change | None:
@@ -207,7 +265,12 @@ def word_misspelt(project: Project, draw: random.Random) -> Change | None:
         project, draw, lambda text: bool(text) and not _is_numeric(text) and text not in ("true", "false")
         and text not in project.names and text not in project.texts,
     )  # fmt: skip
-    if leaf is None or "output" in leaf[2].tag or "directory" in leaf[2].tag or leaf[2].tag in ("notes", "point_name"):
+    if (
+        leaf is None
+        or "output" in leaf[2].tag
+        or "directory" in leaf[2].tag
+        or leaf[2].tag in ("notes", "point_name")
+    ):
         return None
     words = leaf[1].inside(leaf[2]).split()
     at = draw.randrange(len(words))
@@ -215,13 +278,19 @@ def word_misspelt(project: Project, draw: random.Random) -> Change | None:
     return new_value(*leaf, " ".join(words), sure=False)
 
 
-def _retagged(name: str, text: Text, element: Element, new: str, what: str, *, sure: bool) -> Change:
+def _retagged(
+    name: str, text: Text, element: Element, new: str, what: str, *, sure: bool
+) -> Change:
     changes = [(element.start + 1, element.start + 1 + len(element.tag), new)]
     if text.text[element.tail : element.tail + 2] == "</":
         changes.append((element.tail + 2, element.tail + 2 + len(element.tag), new))
     change = _put(name, text, what, *changes, around=element, sure=sure)
     # Of two with one tag it is the second that is one too many.
-    twins = [text.text.count("\n", 0, other.start) + 1 for other in text.siblings(element) if other.tag == new]
+    twins = [
+        text.text.count("\n", 0, other.start) + 1
+        for other in text.siblings(element)
+        if other.tag == new
+    ]
     return change._replace(lines=(*change.lines, *twins))
 
 
@@ -239,14 +308,22 @@ def tag_of_another(project: Project, draw: random.Random) -> Change | None:
     element, other = text.any(draw), text.any(draw)
     if element.tag == other.tag:
         return None
-    return _retagged(name, text, element, other.tag, f"<{text.path(element)}> -> <{other.tag}>", sure=False)
+    return _retagged(
+        name, text, element, other.tag, f"<{text.path(element)}> -> <{other.tag}>", sure=False
+    )
 
 
 def element_twice(project: Project, draw: random.Random) -> Change | None:
     name, text = _document(project, draw)
     element = text.any(draw)
     copy = text.whole(element)
-    change = _put(name, text, f"{text.path(element)} twice", (element.end, element.end, "\n" + copy), around=element)
+    change = _put(
+        name,
+        text,
+        f"{text.path(element)} twice",
+        (element.end, element.end, "\n" + copy),
+        around=element,
+    )
     first = text.text.count("\n", 0, element.start) + 1
     return change._replace(lines=(*change.lines, first))
 
@@ -271,7 +348,13 @@ def element_moved(project: Project, draw: random.Random) -> Change | None:
 def element_gone(project: Project, draw: random.Random) -> Change | None:
     name, text = _document(project, draw)
     element = text.any(draw)
-    return _put(name, text, f"{text.path(element)} is gone", (element.start, element.end, ""), around=element)
+    return _put(
+        name,
+        text,
+        f"{text.path(element)} is gone",
+        (element.start, element.end, ""),
+        around=element,
+    )
 
 
 def value_gone(project: Project, draw: random.Random) -> Change | None:
@@ -286,10 +369,19 @@ def broken_markup(project: Project, draw: random.Random) -> Change | None:
         return None
     lines = tuple(range(1, text.text.count("\n") + 2))
     what, new = draw.choice(
-        (("end tag missing", ""), ("end tag of another", "</other>"), ("bare &", " & "), ("bare <", "<"))
+        (
+            ("end tag missing", ""),
+            ("end tag of another", "</other>"),
+            ("bare &", " & "),
+            ("bare <", "<"),
+        )
     )
-    start, end = (element.tail, element.end) if new in ("", "</other>") else (element.head, element.head)
-    return Change(name, f"{text.path(element)}: {what}", text.put((start, end, new)), lines, sure=True)
+    start, end = (
+        (element.tail, element.end) if new in ("", "</other>") else (element.head, element.head)
+    )
+    return Change(
+        name, f"{text.path(element)}: {what}", text.put((start, end, new)), lines, sure=True
+    )
 
 
 def version(project: Project, draw: random.Random) -> Change | None:
@@ -297,9 +389,17 @@ def version(project: Project, draw: random.Random) -> Change | None:
     match = re.search(r' Version="([^"]*)"', text.text)
     assert match is not None
     new = draw.choice(("abc", "", "4.0", "10500", "20000", "20201", "30000", "40000", "99999"))
-    change = _put(name, text, f"version {match[1]} -> {new!r}", (*match.span(1), new), sure=new in ("abc", "4.0"))
+    change = _put(
+        name,
+        text,
+        f"version {match[1]} -> {new!r}",
+        (*match.span(1), new),
+        sure=new in ("abc", "4.0"),
+    )
     # What a document of another version says is another thing anywhere.
-    return change if change.sure else change._replace(lines=tuple(range(1, text.text.count("\n") + 2)))
+    return (
+        change if change.sure else change._replace(lines=tuple(range(1, text.text.count("\n") + 2)))
+    )
 
 
 def root_tag(project: Project, draw: random.Random) -> Change | None:

@@ -80,7 +80,13 @@ def tag(old: str, new: str, marker: str) -> Change:
         start = re.compile(rf"<{re.escape(old)}(?=[\s>/])").search(text, text.index(marker))
         assert start is not None
         end = text.index(f"</{old}>", start.end())
-        text = text[: start.start()] + f"<{new}" + text[start.end() : end] + f"</{new}>" + text[end + len(old) + 3 :]
+        text = (
+            text[: start.start()]
+            + f"<{new}"
+            + text[start.end() : end]
+            + f"</{new}>"
+            + text[end + len(old) + 3 :]
+        )
         return text, start.start()
 
     return change
@@ -115,7 +121,11 @@ def loop(kind: str, coordinates: str = "") -> Change:
 
 
 def _coordinates(*names: str) -> str:
-    return "<coordinates>" + "".join(f'<Coordinate name="{name}" />' for name in names) + "</coordinates>"
+    return (
+        "<coordinates>"
+        + "".join(f'<Coordinate name="{name}" />' for name in names)
+        + "</coordinates>"
+    )
 
 
 def _second_knee(text: str) -> tuple[str, int]:
@@ -133,7 +143,9 @@ def _unclosed(text: str) -> tuple[str, int]:
 
 def _two_knees(text: str) -> tuple[str, int]:
     text = text.replace('<Coordinate name="LKnee_rz">', KNEE)
-    force = re.compile(r'<CoordinateLimitForce name="LKneeLimitTorque">.*?</CoordinateLimitForce>', re.DOTALL)
+    force = re.compile(
+        r'<CoordinateLimitForce name="LKneeLimitTorque">.*?</CoordinateLimitForce>', re.DOTALL
+    )
     return force.sub("", text), text.rindex(KNEE)
 
 
@@ -152,23 +164,51 @@ REFERENCES = [
     Fault("hc_geom_is_a_body", geometry("RightShank PlatformContact"), "OSIM302"),
     Fault("hc_geom_comma", geometry("RFootContact, PlatformContact"), "OSIM301"),
     Fault("hc_geom_wrong_case", geometry("rfootcontact PlatformContact"), "OSIM305"),
-    Fault("joint_parent_misspelled", value("socket_parent_frame", "/bodyset/Platfrom", PLANAR), "OSIM301"),
+    Fault(
+        "joint_parent_misspelled",
+        value("socket_parent_frame", "/bodyset/Platfrom", PLANAR),
+        "OSIM301",
+    ),
     Fault("offset_parent_misspelled", value("socket_parent", "/bodyset/Pelvs", HIP), "OSIM301"),
-    Fault("joint_child_offset_misspelled", value("socket_child_frame", "RightThigh_offst", HIP), "OSIM301"),
-    Fault("joint_parent_wrong_type", value("socket_parent_frame", "/jointset/PlatformToGround", PLANAR), "OSIM302"),
+    Fault(
+        "joint_child_offset_misspelled",
+        value("socket_child_frame", "RightThigh_offst", HIP),
+        "OSIM301",
+    ),
+    Fault(
+        "joint_parent_wrong_type",
+        value("socket_parent_frame", "/jointset/PlatformToGround", PLANAR),
+        "OSIM302",
+    ),
     Fault("joint_parent_empty", value("socket_parent_frame", "", PLANAR), "OSIM303"),
     Fault(
         "joint_parent_removed",
-        pattern(r"(<PlanarJoint [^>]*>.*?)<socket_parent_frame>[^<]*</socket_parent_frame>", r"\1", PLANAR),
+        pattern(
+            r"(<PlanarJoint [^>]*>.*?)<socket_parent_frame>[^<]*</socket_parent_frame>",
+            r"\1",
+            PLANAR,
+        ),
         "OSIM303",
     ),
     Fault("joint_parent_bare_name", value("socket_parent_frame", "Platform", PLANAR), "OSIM304"),
-    Fault("joint_parent_missing_slash", value("socket_parent_frame", "bodyset/Platform", PLANAR), "OSIM304"),
-    Fault("socket_tag_misspelled", tag("socket_parent_frame", "socket_parent_fram", PLANAR), "OSIM101"),
+    Fault(
+        "joint_parent_missing_slash",
+        value("socket_parent_frame", "bodyset/Platform", PLANAR),
+        "OSIM304",
+    ),
+    Fault(
+        "socket_tag_misspelled", tag("socket_parent_frame", "socket_parent_fram", PLANAR), "OSIM101"
+    ),
     Fault("contact_frame_misspelled", value("socket_frame", "/bodyset/RightShnk", FOOT), "OSIM301"),
     Fault("limit_coord_misspelled", value("coordinate", "RHip_rx", LIMIT), "OSIM301"),
-    Fault("limit_coord_path", value("coordinate", "/jointset/RightThighToPelvis/RHip_rz", LIMIT), "OSIM304"),
-    Fault("limit_coord_missing", pattern(r"<coordinate>RHip_rz</coordinate>", "", LIMIT), "OSIM303"),
+    Fault(
+        "limit_coord_path",
+        value("coordinate", "/jointset/RightThighToPelvis/RHip_rz", LIMIT),
+        "OSIM304",
+    ),
+    Fault(
+        "limit_coord_missing", pattern(r"<coordinate>RHip_rz</coordinate>", "", LIMIT), "OSIM303"
+    ),
 ]
 
 STRUCTURE = [
@@ -176,13 +216,23 @@ STRUCTURE = [
     Fault("misspelled_mass_tag", tag("mass", "mas", SHANK), "OSIM101"),
     Fault("case_mass_tag", tag("mass", "Mass", SHANK), "OSIM101"),
     Fault("misspelled_stiffness", tag("stiffness", "stifness", FOOT_FORCE), "OSIM101"),
-    Fault("misspelled_transition_velocity", tag("transition_velocity", "transition_velcity", FOOT_FORCE), "OSIM101"),
+    Fault(
+        "misspelled_transition_velocity",
+        tag("transition_velocity", "transition_velcity", FOOT_FORCE),
+        "OSIM101",
+    ),
     Fault(
         "misspelled_paramset",
-        tag("HuntCrossleyForce::ContactParametersSet", "HuntCrossleyForce::ContactParameterSet", FOOT_FORCE),
+        tag(
+            "HuntCrossleyForce::ContactParametersSet",
+            "HuntCrossleyForce::ContactParameterSet",
+            FOOT_FORCE,
+        ),
         "OSIM102",
     ),
-    Fault("unknown_force_class", tag("HuntCrossleyForce", "HuntCrosslyForce", FOOT_FORCE), "OSIM102"),
+    Fault(
+        "unknown_force_class", tag("HuntCrossleyForce", "HuntCrosslyForce", FOOT_FORCE), "OSIM102"
+    ),
     Fault("unknown_joint_class", tag("PinJoint", "PinJnt", HIP), "OSIM102"),
     Fault(
         "wrong_class_in_set",
@@ -190,7 +240,11 @@ STRUCTURE = [
         "OSIM103",
     ),
     Fault("misspelled_set_tag", tag("ForceSet", "FroceSet", "<ForceSet"), "OSIM101"),
-    Fault("dup_property", put(SHANK, "<mass>1</mass>", "<mass>1</mass>\n<mass>7</mass>", "<mass>7"), "OSIM104"),
+    Fault(
+        "dup_property",
+        put(SHANK, "<mass>1</mass>", "<mass>1</mass>\n<mass>7</mass>", "<mass>7"),
+        "OSIM104",
+    ),
     Fault(
         "missing_objects_wrapper",
         pattern(r"(<BodySet [^>]*>\s*)<objects>(.*?)</objects>", r"\1\2", '<Body name="Platform">'),
@@ -203,7 +257,9 @@ STRUCTURE = [
     Fault("misspelled_gravity", tag("gravity", "gravty", "<Model"), "OSIM101", severity="warning"),
     Fault("misspelled_joint_frames", tag("frames", "frmes", HIP), "OSIM101"),
     Fault("unknown_geometry_class", tag("Brick", "Brik", '<Body name="Platform">'), "OSIM102"),
-    Fault("unknown_attribute", put("<Model", SHANK, '<Body name="RightShank" mass="7">'), "OSIM105"),
+    Fault(
+        "unknown_attribute", put("<Model", SHANK, '<Body name="RightShank" mass="7">'), "OSIM105"
+    ),
 ]
 
 VALUES = [
@@ -245,7 +301,9 @@ VALUES = [
 ]
 
 PHYSICS = [
-    Fault("mass_missing", pattern(rf"({re.escape(SHANK)}.*?)<mass>1</mass>", r"\1", SHANK), "OSIM501"),
+    Fault(
+        "mass_missing", pattern(rf"({re.escape(SHANK)}.*?)<mass>1</mass>", r"\1", SHANK), "OSIM501"
+    ),
     Fault("mass_negative", value("mass", "-1"), "OSIM206"),
     Fault("mass_zero_leaf", value("mass", "0"), "OSIM407"),
     Fault(
@@ -277,7 +335,12 @@ PHYSICS = [
     Fault("stiffness_zero", value("stiffness", "0", FOOT_FORCE), "OSIM206"),
     Fault("stiffness_negative", value("stiffness", "-1e6", FOOT_FORCE), "OSIM206"),
     Fault("dissipation_negative", value("dissipation", "-2", FOOT_FORCE), "OSIM207", "warning"),
-    Fault("transition_velocity_zero", value("transition_velocity", "0", FOOT_FORCE), "OSIM207", "warning"),
+    Fault(
+        "transition_velocity_zero",
+        value("transition_velocity", "0", FOOT_FORCE),
+        "OSIM207",
+        "warning",
+    ),
     Fault("limit_transition_zero", value("transition", "0", LIMIT), "OSIM206"),
     Fault("limit_stiffness_zero", value("upper_stiffness", "0", LIMIT), "OSIM206"),
     Fault("limit_upper_lt_lower", value("upper_limit", "-150", LIMIT), "OSIM507", "warning"),
@@ -311,7 +374,11 @@ NAMES = [
         each(('"Pelvis_tx"', '"Pelvis_ty"'), at='<Coordinate name="Pelvis_ty"'),
         "OSIM311",
     ),
-    Fault("dup_force_name", put("<Model", '<HuntCrossleyForce name="LFootForce">', FOOT_FORCE), "OSIM311"),
+    Fault(
+        "dup_force_name",
+        put("<Model", '<HuntCrossleyForce name="LFootForce">', FOOT_FORCE),
+        "OSIM311",
+    ),
     Fault(
         "dup_contact_name",
         each(("LFootContact", "RFootContact"), at=FOOT),
@@ -321,15 +388,27 @@ NAMES = [
     Fault("name_empty", put("<Model", '<Body name="LeftShank">', '<Body name="">'), "OSIM313"),
     Fault(
         "name_slash",
-        each(('"LeftShank"', '"Left/Shank"'), ("/bodyset/LeftShank", "/bodyset/Left/Shank"), at='<Body name="Left/'),
+        each(
+            ('"LeftShank"', '"Left/Shank"'),
+            ("/bodyset/LeftShank", "/bodyset/Left/Shank"),
+            at='<Body name="Left/',
+        ),
         "OSIM312",
     ),
     Fault(
         "name_space",
-        each(('"LeftShank"', '"Left Shank"'), ("/bodyset/LeftShank", "/bodyset/Left Shank"), at='<Body name="Left '),
+        each(
+            ('"LeftShank"', '"Left Shank"'),
+            ("/bodyset/LeftShank", "/bodyset/Left Shank"),
+            at='<Body name="Left ',
+        ),
         "OSIM312",
     ),
-    Fault("contact_name_space", each(("LFootContact", "LFoot Contact"), at='<ContactSphere name="LFoot '), "OSIM312"),
+    Fault(
+        "contact_name_space",
+        each(("LFootContact", "LFoot Contact"), at='<ContactSphere name="LFoot '),
+        "OSIM312",
+    ),
     Fault("dup_coord_clf", _limit_of_left_knee, "OSIM406"),
 ]
 
@@ -370,7 +449,12 @@ TOPOLOGY = [
     ),
     Fault(
         "pin_two_coords",
-        pattern(rf"({re.escape(HIP)}.*?<coordinates>)", r'\1<Coordinate name="extra" />', "<coordinates>", HIP),
+        pattern(
+            rf"({re.escape(HIP)}.*?<coordinates>)",
+            r'\1<Coordinate name="extra" />',
+            "<coordinates>",
+            HIP,
+        ),
         "OSIM405",
     ),
     Fault(
@@ -387,9 +471,15 @@ TOPOLOGY = [
 ]
 
 FILES = [
-    Fault("version_future", put("<?xml", 'Version="40600"', 'Version="99999"'), "OSIM004", "warning"),
+    Fault(
+        "version_future", put("<?xml", 'Version="40600"', 'Version="99999"'), "OSIM004", "warning"
+    ),
     Fault("version_old", put("<?xml", 'Version="40600"', 'Version="30000"'), "OSIM004"),
-    Fault("version_missing", put("<?xml", '<OpenSimDocument Version="40600">', "<OpenSimDocument>"), "OSIM004"),
+    Fault(
+        "version_missing",
+        put("<?xml", '<OpenSimDocument Version="40600">', "<OpenSimDocument>"),
+        "OSIM004",
+    ),
     Fault("version_text", put("<?xml", 'Version="40600"', 'Version="abc"'), "OSIM004"),
     Fault("xml_unclosed", _unclosed, "OSIM001"),
     Fault("xml_truncated", nowhere(lambda text: text[: len(text) // 2]), "OSIM001"),
@@ -407,7 +497,11 @@ FILES = [
         "OSIM701",
         "warning",
     ),
-    Fault("prescribed_no_function", put(KNEE, "<range>", "<prescribed>true</prescribed><range>"), "OSIM513"),
+    Fault(
+        "prescribed_no_function",
+        put(KNEE, "<range>", "<prescribed>true</prescribed><range>"),
+        "OSIM513",
+    ),
 ]
 
 FAULTS = [*REFERENCES, *STRUCTURE, *VALUES, *PHYSICS, *NAMES, *TOPOLOGY, *FILES]

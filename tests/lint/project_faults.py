@@ -19,9 +19,20 @@ def file_name(project: Project, draw: random.Random) -> Change | None:
     if leaf is None:
         return None
     old = leaf[1].inside(leaf[2]).strip()
-    other = draw.choice([name for name in sorted(project.texts) if Path(name).suffix != Path(old).suffix])
+    other = draw.choice(
+        [name for name in sorted(project.texts) if Path(name).suffix != Path(old).suffix]
+    )
     new = draw.choice(
-        (misspelt(draw, old), f".\\{old}", f"data/{old}", f"../{old}", old.upper(), Path(old).stem, other, f'"{old}"')
+        (
+            misspelt(draw, old),
+            f".\\{old}",
+            f"data/{old}",
+            f"../{old}",
+            old.upper(),
+            Path(old).stem,
+            other,
+            f'"{old}"',
+        )
     )
     is_there = new in project.texts
     return new_value(*leaf, new, sure=not is_there or leaf[2].tag != "states_file", words=())
@@ -36,7 +47,13 @@ def file_of_another_kind(project: Project, draw: random.Random) -> Change | None
     file = draw.choice([name for name in sorted(project.texts) if project.users(name)])
     other = draw.choice([name for name in sorted(project.texts) if name != file])
     new = draw.choice(("", "\n", "no table and no document\n", project.texts[other]))
-    what = "is empty" if not new.strip() else "holds words" if new.startswith("no ") else f"holds {other}"
+    what = (
+        "is empty"
+        if not new.strip()
+        else "holds words"
+        if new.startswith("no ")
+        else f"holds {other}"
+    )
     lines = tuple(range(1, new.count("\n") + 2))
     return Change(file, what, new, lines, sure=not new.strip() or new.startswith("no "))
 
@@ -77,7 +94,9 @@ def faults(project: Project, draw: random.Random) -> Iterator[Fault]:
         change = kind(project, draw)
         if change is None or change.text == project.texts[change.file]:
             continue
-        places = {(change.file, line) for line in change.lines} | {*project.users(change.file).items()}
+        places = {(change.file, line) for line in change.lines} | {
+            *project.users(change.file).items()
+        }
         for word in filter(None, change.words):
             places |= project.places_of(word)
             for table in project.tables.values():
@@ -106,9 +125,13 @@ def harmless(project: Project, draw: random.Random) -> Iterator[Fault]:
 def _same_document(text: Text, draw: random.Random) -> tuple[str, str]:
     element = text.any(draw)
     leaf = text.any(draw, text.leaves)
-    what = draw.choice(("comment", "blanks", "CRLF", "order", "lines", "no indent", "double quotes"))
+    what = draw.choice(
+        ("comment", "blanks", "CRLF", "order", "lines", "no indent", "double quotes")
+    )
     if what == "comment":
-        return what, text.put((element.start, element.start, "<!-- a remark, with <tags> & more -->"))
+        return what, text.put(
+            (element.start, element.start, "<!-- a remark, with <tags> & more -->")
+        )
     if what == "blanks":
         return what, text.put((leaf.head, leaf.head, " \n\t"), (leaf.tail, leaf.tail, "\t\n "))
     if what == "CRLF":
@@ -126,5 +149,6 @@ def _same_document(text: Text, draw: random.Random) -> tuple[str, str]:
         return what, text.text
     other = draw.choice(others)
     return f"{element.tag} and {other.tag} swapped", text.put(
-        (element.start, element.end, text.whole(other)), (other.start, other.end, text.whole(element))
+        (element.start, element.end, text.whole(other)),
+        (other.start, other.end, text.whole(element)),
     )

@@ -1,7 +1,8 @@
 """Single faults at random in whole projects: a model with the setups and the tables that fit it.
 
-A fault knows the lines in which it may be found: those that it changes, and those of other files that name what it
-changes. It is `sure` if it is a fault whatever the project is; of the others OpenSim must say whether they are.
+A fault knows the lines in which it may be found: those that it changes, and those of other files
+that name what it changes. It is `sure` if it is a fault whatever the project is; of the others
+OpenSim must say whether they are.
 """
 
 from __future__ import annotations
@@ -54,7 +55,9 @@ class Table:
         self.is_markers = name.endswith(".trc")
         self.label_line = 3 if self.is_markers else self.lines.index("endheader") + 1
         self.labels = self.lines[self.label_line].split("\t")
-        self.rows = [k for k, line in enumerate(self.lines) if k > self.label_line and line[:1].isdigit()]
+        self.rows = [
+            k for k, line in enumerate(self.lines) if k > self.label_line and line[:1].isdigit()
+        ]
         self.time = int(self.is_markers)
         self.old = "version=1" in self.lines
 
@@ -73,13 +76,21 @@ class Project:
 
     def __init__(self, texts: dict[str, str]) -> None:
         self.texts = texts
-        self.documents = {name: Text(text) for name, text in texts.items() if name.endswith((".xml", ".omoco"))}
-        self.tables = {
-            name: Table(name, text) for name, text in texts.items() if name.endswith((".trc", ".mot", ".sto"))
+        self.documents = {
+            name: Text(text) for name, text in texts.items() if name.endswith((".xml", ".omoco"))
         }
-        self.components: dict[str, str] = {name: tag for tag, name in _NAMED.findall(texts["model.osim"])}
+        self.tables = {
+            name: Table(name, text)
+            for name, text in texts.items()
+            if name.endswith((".trc", ".mot", ".sto"))
+        }
+        self.components: dict[str, str] = {
+            name: tag for tag, name in _NAMED.findall(texts["model.osim"])
+        }
         labels = {label for table in self.tables.values() for label in table.labels[1:] if label}
-        self.names = sorted({*self.components, "ground", *labels, *(label[:-1] for label in labels)})
+        self.names = sorted(
+            {*self.components, "ground", *labels, *(label[:-1] for label in labels)}
+        )
 
     def users(self, file: str) -> dict[str, int]:
         """Every document that names a file, or names one that names it, with the line."""
@@ -87,7 +98,10 @@ class Project:
         for name, document in self.documents.items():
             for line, text in enumerate(document.text.split("\n"), 1):
                 if name != file and re.search(rf"[>\s]{re.escape(file)}[<\s]", text):
-                    result |= {name: line, **{user: at for user, at in self.users(name).items() if user not in result}}
+                    result |= {
+                        name: line,
+                        **{user: at for user, at in self.users(name).items() if user not in result},
+                    }
         return result
 
     def places_of(self, word: str) -> set[Place]:
@@ -104,7 +118,9 @@ class Project:
 _MISSPELT: tuple[Callable[[random.Random, str], str], ...] = (
     lambda draw, word: word[: (at := draw.randrange(len(word)))] + word[at + 1 :],
     lambda draw, word: word[: (at := draw.randrange(len(word)))] + word[at] + word[at:],
-    lambda draw, word: word[: (at := draw.randrange(len(word)))] + draw.choice("abcxyz_1") + word[at + 1 :],
+    lambda draw, word: (
+        word[: (at := draw.randrange(len(word)))] + draw.choice("abcxyz_1") + word[at + 1 :]
+    ),
     lambda draw, word: word.swapcase(),
     lambda draw, word: word[: (at := draw.randrange(len(word)))] + word[at:].swapcase(),
 )
@@ -123,10 +139,17 @@ def walking() -> Project:
         for file in sorted((FIXTURES / folder).iterdir())
         if file.suffix != ".gz"
     }
-    texts["model.osim"] = gzip.decompress((FIXTURES / "setups" / "model.osim.gz").read_bytes()).decode()
+    texts["model.osim"] = gzip.decompress(
+        (FIXTURES / "setups" / "model.osim.gz").read_bytes()
+    ).decode()
     return Project(texts)
 
 
 def pendulum() -> Project:
     """A double pendulum with sensors: they are placed, and followed; a Moco study."""
-    return Project({file.name: file.read_text() for file in sorted((FIXTURES / "pipelines" / "pendulum").iterdir())})
+    return Project(
+        {
+            file.name: file.read_text()
+            for file in sorted((FIXTURES / "pipelines" / "pendulum").iterdir())
+        }
+    )

@@ -1,7 +1,8 @@
 """One fault at a time in a pipeline that is without any, each of which OpenSim 4.6 was asked about.
 
-The numbers are those of the table of faults (``oracle/tools/setup_faults.json`` of the reference data), which says what
-OpenSim does with each: it raises, crashes, hangs, logs a line, or gives other results without a word.
+The numbers are those of the table of faults (``oracle/tools/setup_faults.json`` of the reference
+data), which says what OpenSim does with each: it raises, crashes, hangs, logs a line, or gives
+other results without a word.
 """
 
 from __future__ import annotations
@@ -78,11 +79,12 @@ MANY = "\n".join(COORDS)
 TASK = '<IKMarkerTask name="R.ASIS">\n\t\t\t\t\t<apply>true</apply>\n\t\t\t\t\t<weight>3</weight>'
 COORDINATE_TASK = part("ik.xml", r"<IKCoordinateTask.*?</IKCoordinateTask>")
 ANALYSES = part("so.xml", r"<objects>\n.*</objects>(?=\n\t\t</AnalysisSet>)")
-PLACER = part("scale.xml", r"<marker_file>walk.trc</marker_file>\s*<time_range>0.5 0.6</time_range>\s*<output_m\w*>pl")
-KINEMATICS = part("so.xml", r"<Kinematics .*?</Kinematics>")
-CONTROLLER = (
-    '<PrescribedController name="c"><socket_actuators>/forceset/nosuch</socket_actuators></PrescribedController>'
+PLACER = part(
+    "scale.xml",
+    r"<marker_file>walk.trc</marker_file>\s*<time_range>0.5 0.6</time_range>\s*<output_m\w*>pl",
 )
+KINEMATICS = part("so.xml", r"<Kinematics .*?</Kinematics>")
+CONTROLLER = '<PrescribedController name="c"><socket_actuators>/forceset/nosuch</socket_actuators></PrescribedController>'
 PAIR = part("scale.xml", r"<MarkerPair name.*?</MarkerPair>")
 
 VALUE = '<MocoVariableInfo name="/slider/position/value"'
@@ -115,20 +117,31 @@ def constraint(tag: str, text: str) -> str:
 PATHS = re.sub(r"(?<=\t)(\w+)", r"/jointset/j/\1/value", LABELS)
 BARE = re.sub(r"</?OpenSimDocument.*\n", "", TEXTS["ik.xml"])
 NEVER_SEEN = re.sub(r"(?m)^(\d+\t[\d.]+)(\t[^\t]*){3}", r"\1\tNaN\tNaN\tNaN", TEXTS["walk.trc"])
-TOO_FEW = re.sub(r"(<IK\w+Task name=\"(?!Sternum|R.ASIS|L.ASIS)[^>]*>\s*<apply>)true", r"\1false", TEXTS["ik.xml"])
-STATES = "\n".join(["states", "version=1", "nRows=61", "nColumns=11", "inDegrees=no", "endheader", LABELS, *COORDS])
+TOO_FEW = re.sub(
+    r"(<IK\w+Task name=\"(?!Sternum|R.ASIS|L.ASIS)[^>]*>\s*<apply>)true",
+    r"\1false",
+    TEXTS["ik.xml"],
+)
+STATES = "\n".join(
+    ["states", "version=1", "nRows=61", "nColumns=11", "inDegrees=no", "endheader", LABELS, *COORDS]
+)
 PRESCRIBED = """<OpenSimDocument Version="30000"><ForceSet name="loads"><objects>
     <PrescribedForce name="push"><body>calcn_r</body></PrescribedForce>
 </objects></ForceSet></OpenSimDocument>"""
 
 KNEE, HIP = (
-    part("model.osim", f'<Coordinate name="{name}">.*?</Coordinate>') for name in ("knee_angle_r", "hip_flexion_l")
+    part("model.osim", f'<Coordinate name="{name}">.*?</Coordinate>')
+    for name in ("knee_angle_r", "hip_flexion_l")
 )
-CLAMPED = KNEE.replace("<clamped>false", "<clamped>true").replace("-2.0943950999999998 0.17453293", "0 0.01")
+CLAMPED = KNEE.replace("<clamped>false", "<clamped>true").replace(
+    "-2.0943950999999998 0.17453293", "0 0.01"
+)
 LOCKED = KNEE.replace("<locked>false", "<locked>true")
 MARKERS = part("model.osim", "<MarkerSet .*?</MarkerSet>")
 GROUPS = part("model.osim", r"<groups />\s*</ForceSet>")
-GROUPED = '<groups><ObjectGroup name="some"><members>soleus_r</members></ObjectGroup></groups></ForceSet>'
+GROUPED = (
+    '<groups><ObjectGroup name="some"><members>soleus_r</members></ObjectGroup></groups></ForceSet>'
+)
 
 FAULTS = [
     # Any setup
@@ -538,7 +551,9 @@ HARMLESS = [
     Fault(128, "coords.mot", "every:\n", "\r\n"),
     Fault(129, "coords.mot", "Coordinates", "\ufeffCoordinates"),
     Fault(143, "loads.xml", ">calcn_r<", ">/bodyset/calcn_r<"),
-    Fault(258, "scale.xml", "<preserve_mass_distribution>true", "<preserve_mass_distribution>false"),
+    Fault(
+        258, "scale.xml", "<preserve_mass_distribution>true", "<preserve_mass_distribution>false"
+    ),
 ]
 """What OpenSim takes, with the same results; or that is for a user to choose (301: forces of a group do not act)."""
 
@@ -570,4 +585,6 @@ def put_in(folder: Path, fault: Fault) -> int:
         changed = text.replace(fault.old, fault.new, 1)
     path.write_bytes(changed.encode())
     before, after = text.split("\n"), changed.split("\n")
-    return next((k for k, pair in enumerate(zip(before, after, strict=False), 1) if pair[0] != pair[1]), 1)
+    return next(
+        (k for k, pair in enumerate(zip(before, after, strict=False), 1) if pair[0] != pair[1]), 1
+    )

@@ -17,8 +17,9 @@ SKELETON, LIMB = FIXTURES / "skeleton.osim", FIXTURES / "limb.osim"
 def document(fragment: str) -> str:
     """The skeleton with the elements of `fragment` in place.
 
-    An element takes the place of the first with its tag and, if it has one, its name; of what only the limb has, it
-    keeps what `fragment` does not give. A new member is put at the end of its set, all else at the end of the model.
+    An element takes the place of the first with its tag and, if it has one, its name; of what only
+    the limb has, it keeps what `fragment` does not give. A new member is put at the end of its set,
+    all else at the end of the model.
     """
     text = SKELETON.read_text(encoding="utf-8")
     wrapped = Source(f"<_>{fragment}</_>".encode())
@@ -26,11 +27,17 @@ def document(fragment: str) -> str:
     if not tops or "<<<<" in fragment:
         return _at_the_end(text, fragment)
     spans = [wrapped.spans[number] for number in tops]
-    if any(span.end == span.tag_end and not wrapped.text[: span.end].endswith("/>") for span in spans):
+    if any(
+        span.end == span.tag_end and not wrapped.text[: span.end].endswith("/>") for span in spans
+    ):
         # Not closed: take it as it stands.
         return _placed(text, wrapped, tops[0], len(wrapped.text) - 4)
     limb = LIMB.read_text(encoding="utf-8")
-    of_limb = [top for top in tops if _found(text, wrapped, top) is None and _found(limb, wrapped, top) is not None]
+    of_limb = [
+        top
+        for top in tops
+        if _found(text, wrapped, top) is None and _found(limb, wrapped, top) is not None
+    ]
     text = limb if of_limb else text
     for top in tops:
         if top in of_limb:

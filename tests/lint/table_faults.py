@@ -23,14 +23,26 @@ def header_key(project: Project, draw: random.Random) -> Change | None:
     if table.is_markers:
         keys = table.cells(1)
         at = draw.randrange(len(keys))
-        new = draw.choice((keys[:at] + keys[at + 1 :], [*keys[:at], misspelt(draw, keys[at]), *keys[at + 1 :]]))
-        return Change(table.name, f"header: {keys[at]}", table.with_cells(1, new), (1, 2, 3), sure=new != keys)
-    at = draw.choice([k for k in range(table.label_line) if re.match(r"(\w+=|endheader)", table.lines[k])])
+        new = draw.choice(
+            (keys[:at] + keys[at + 1 :], [*keys[:at], misspelt(draw, keys[at]), *keys[at + 1 :]])
+        )
+        return Change(
+            table.name, f"header: {keys[at]}", table.with_cells(1, new), (1, 2, 3), sure=new != keys
+        )
+    at = draw.choice(
+        [k for k in range(table.label_line) if re.match(r"(\w+=|endheader)", table.lines[k])]
+    )
     key = table.lines[at].split("=")[0]
     new_key = draw.choice(("", misspelt(draw, key), misspelt(draw, key)))
     new_lines = [table.lines[at].replace(key, new_key, 1)] if new_key else []
     sure = key in ("endheader", *_counts(table))
-    return Change(table.name, f"{key} -> {new_key}", table.with_lines(at, *new_lines), _head_lines(table), sure=sure)
+    return Change(
+        table.name,
+        f"{key} -> {new_key}",
+        table.with_lines(at, *new_lines),
+        _head_lines(table),
+        sure=sure,
+    )
 
 
 def _counts(table: Table) -> tuple[str, ...]:
@@ -49,12 +61,22 @@ def header_value(project: Project, draw: random.Random) -> Change | None:
         return Change(table.name, f"{key}: {values[at]} -> {new}", text, (2, 3), sure=sure)
     at = draw.choice([k for k in range(table.label_line) if re.match(r"\w+=", table.lines[k])])
     key, _, value = table.lines[at].partition("=")
-    numbers = ("", "abc", "0", "-1", str(int(value) - 1), str(int(value) + 1)) if value.isdecimal() else ()
+    numbers = (
+        ("", "abc", "0", "-1", str(int(value) - 1), str(int(value) + 1))
+        if value.isdecimal()
+        else ()
+    )
     # The other of yes and no is another project: see other_units.
     units = ("no", "yes", "YES") if key != "inDegrees" else ()
     new = draw.choice((*numbers, *units, "", "true", "double", "Vec3", "1 2"))
     text = table.with_lines(at, f"{key}={new}")
-    return Change(table.name, f"{key}: {value!r} -> {new!r}", text, _head_lines(table), sure=key in _counts(table))
+    return Change(
+        table.name,
+        f"{key}: {value!r} -> {new!r}",
+        text,
+        _head_lines(table),
+        sure=key in _counts(table),
+    )
 
 
 def _used_labels(project: Project, table: Table) -> list[int]:
@@ -63,7 +85,9 @@ def _used_labels(project: Project, table: Table) -> list[int]:
     return [
         k
         for k, label in enumerate(table.labels)
-        if k > table.time and label and (label in components or any(map(project.places_of, {label, label[:-1]} - {""})))
+        if k > table.time
+        and label
+        and (label in components or any(map(project.places_of, {label, label[:-1]} - {""})))
     ]
 
 
@@ -106,7 +130,14 @@ def column_gone(project: Project, draw: random.Random) -> Change | None:
     text = _columns(table, lambda cells: cells[:at] + cells[at + 1 :])
     text = text.replace(f"nColumns={len(table.labels)}", f"nColumns={len(table.labels) - 1}")
     # A study may follow fewer columns.
-    return Change(table.name, f"no column {old!r}", text, (table.label_line + 1,), (old, old[:-1]), sure=table.old)
+    return Change(
+        table.name,
+        f"no column {old!r}",
+        text,
+        (table.label_line + 1,),
+        (old, old[:-1]),
+        sure=table.old,
+    )
 
 
 def columns_swapped(project: Project, draw: random.Random) -> Change | None:
@@ -130,7 +161,10 @@ def cell(project: Project, draw: random.Random) -> Change | None:
     at = draw.randrange(table.time + 1, len(cells))
     new = draw.choice(("NaN", "abc", "", "1,5", "--", "#N/A", "1.2.3", "1e", "1 2", "inf"))
     change = Change(
-        table.name, f"{cells[at]} -> {new!r}", table.with_cells(line, [*cells[:at], new, *cells[at + 1 :]]), (line + 1,)
+        table.name,
+        f"{cells[at]} -> {new!r}",
+        table.with_cells(line, [*cells[:at], new, *cells[at + 1 :]]),
+        (line + 1,),
     )
     return change._replace(sure=cells[at] != "" and (table.old or table.is_markers))
 
@@ -165,10 +199,22 @@ def time(project: Project, draw: random.Random) -> Change | None:
     cells = table.cells(at)
     before = table.cells(table.rows[place - 1])[table.time]
     new = draw.choice(
-        (before, "NaN", "abc", "", "0.0", "-1", "1000", cells[table.time] + "x", f"{float(before) - 0.1:.4f}")
+        (
+            before,
+            "NaN",
+            "abc",
+            "",
+            "0.0",
+            "-1",
+            "1000",
+            cells[table.time] + "x",
+            f"{float(before) - 0.1:.4f}",
+        )
     )
     cells[table.time] = new
-    return Change(table.name, f"time {new!r}", table.with_cells(at, cells), (at + 1, at + 2), sure=True)
+    return Change(
+        table.name, f"time {new!r}", table.with_cells(at, cells), (at + 1, at + 2), sure=True
+    )
 
 
 def cut_off(project: Project, draw: random.Random) -> Change | None:
@@ -202,7 +248,8 @@ def other_units(project: Project, draw: random.Random) -> Change | None:
     def scaled(cells: list[str]) -> list[str]:
         numeric = NUMBER.fullmatch(cells[0].strip()) is not None
         return cells[:kept] + [
-            f"{float(c) * factor:.9g}" if numeric and NUMBER.fullmatch(c) else c for c in cells[kept:]
+            f"{float(c) * factor:.9g}" if numeric and NUMBER.fullmatch(c) else c
+            for c in cells[kept:]
         ]
 
     return Change(table.name, f"numbers times {factor:g}", _columns(table, scaled), lines, words)

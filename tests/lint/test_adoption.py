@@ -38,30 +38,42 @@ def test_hooks_call_commands_that_exist(repo: Path) -> None:
             for name in ("models/walker.osim", "ik.xml", "walk.mot", "a.osim.bak")
             if re.search(hook["files"], name)
         ]
-        assert files == ["models/walker.osim", "ik.xml", "walk.mot"][: 3 if command == "validate" else 2]
+        assert (
+            files
+            == ["models/walker.osim", "ik.xml", "walk.mot"][: 3 if command == "validate" else 2]
+        )
     assert [hook["id"] for hook in hooks] == ["osimlite-validate", "osimlite-format"]
 
 
 def test_the_guide_names_hooks_and_inputs_that_exist(repo: Path, guide: str) -> None:
-    hooks = {hook["id"] for hook in yaml.safe_load((repo / ".pre-commit-hooks.yaml").read_text(encoding="utf-8"))}
+    hooks = {
+        hook["id"]
+        for hook in yaml.safe_load((repo / ".pre-commit-hooks.yaml").read_text(encoding="utf-8"))
+    }
     inputs = yaml.safe_load((repo / "action.yml").read_text(encoding="utf-8"))["inputs"].keys()
     parsed = [yaml.safe_load(block) for block in blocks(guide, "yaml")]
     assert {hook["id"] for hook in parsed[0]["repos"][0]["hooks"]} == hooks
-    (step,) = [step for step in parsed[1]["jobs"]["validate"]["steps"] if "osimlite@" in step["uses"]]
+    (step,) = [
+        step for step in parsed[1]["jobs"]["validate"]["steps"] if "osimlite@" in step["uses"]
+    ]
     assert step["with"].keys() <= inputs
 
 
 def test_hooks_pass_over_xml_of_others(repo: Path, tmp_path: Path) -> None:
     (tmp_path / "pom.xml").write_text("<project>\n<a/></project>")
     (tmp_path / "a.sto").write_text("a\ninDegrees=true\nendheader\ntime\ta\n0\t0\n")
-    (tmp_path / "id.xml").write_text('<OpenSimDocument Version="40600"><InverseDynamicsTol /></OpenSimDocument>')
+    (tmp_path / "id.xml").write_text(
+        '<OpenSimDocument Version="40600"><InverseDynamicsTol /></OpenSimDocument>'
+    )
     for hook in yaml.safe_load((repo / ".pre-commit-hooks.yaml").read_text(encoding="utf-8")):
         command = [sys.executable, "-m", *hook["entry"].split()]
         done = subprocess.run([*command, "pom.xml"], cwd=tmp_path, capture_output=True, text=True)
         assert (done.returncode, done.stderr) == (0, "")
         names = [name for name in ("pom.xml", "id.xml", "a.sto") if re.search(hook["files"], name)]
         done = subprocess.run([*command, *names], cwd=tmp_path, capture_output=True, text=True)
-        assert done.returncode and all(name in done.stdout + done.stderr for name in names if name != "pom.xml")
+        assert done.returncode and all(
+            name in done.stdout + done.stderr for name in names if name != "pom.xml"
+        )
         assert "pom.xml" not in done.stdout + done.stderr
     assert (tmp_path / "pom.xml").read_text() == "<project>\n<a/></project>"
 
@@ -74,7 +86,9 @@ def steps(repo: Path) -> list[dict[str, Any]]:
     return [step for step in result if "run" in step]
 
 
-def act(repo: Path, folder: Path, paths: str, fail_on: str = "") -> subprocess.CompletedProcess[str]:
+def act(
+    repo: Path, folder: Path, paths: str, fail_on: str = ""
+) -> subprocess.CompletedProcess[str]:
     """Run the last step of the action in a folder, as GitHub does."""
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
     given = {"PATHS": paths, "FORMAT": "github", "FAIL_ON": fail_on, "BASELINE": "", "PATH": path}
@@ -112,7 +126,9 @@ def test_the_action_validates(repo: Path, fixtures: Path, tmp_path: Path) -> Non
         ("--fix.osim", ["--fix.osim"]),
     ],
 )
-def test_the_action_checks_every_path(repo: Path, tmp_path: Path, paths: str, found: list[str]) -> None:
+def test_the_action_checks_every_path(
+    repo: Path, tmp_path: Path, paths: str, found: list[str]
+) -> None:
     wrong = '<OpenSimDocument Version="40600"><Model><gravty/></Model></OpenSimDocument>'
     for name in ("a.osim", "b.osim", "-v", "--fix.osim", "sub/c.osim", "sub/deep/d e.osim"):
         place = tmp_path / name
@@ -126,7 +142,9 @@ def test_the_action_checks_every_path(repo: Path, tmp_path: Path, paths: str, fo
 def test_the_action_checks_setups_and_tables(repo: Path, tmp_path: Path) -> None:
     (tmp_path / "pom.xml").write_text("<project/>")
     (tmp_path / "a.sto").write_text("a\ninDegrees=true\nendheader\ntime\ta\n0\t0\n")
-    (tmp_path / "id.xml").write_text('<OpenSimDocument Version="40600"><InverseDynamicsTol /></OpenSimDocument>')
+    (tmp_path / "id.xml").write_text(
+        '<OpenSimDocument Version="40600"><InverseDynamicsTol /></OpenSimDocument>'
+    )
     for paths in (".", "*.xml *.sto"):
         done = act(repo, tmp_path, paths)
         assert (done.returncode, checked(done)) == (1, ["a.sto", "id.xml"]), done.stdout
@@ -148,11 +166,21 @@ def test_the_action_executes_nothing_of_what_was_checked_out(repo: Path, tmp_pat
         (tmp_path / name).mkdir()
         for module in ("__init__", "__main__"):
             (tmp_path / name / f"{module}.py").write_text("print('executed'); raise SystemExit(0)")
-    (tmp_path / "a.osim").write_text('<OpenSimDocument Version="40600"><Model><gravty/></Model></OpenSimDocument>')
+    (tmp_path / "a.osim").write_text(
+        '<OpenSimDocument Version="40600"><Model><gravty/></Model></OpenSimDocument>'
+    )
     done = act(repo, tmp_path, "a.osim")
-    assert (done.returncode, checked(done)) == (1, ["a.osim"]) and "executed" not in done.stdout + done.stderr
+    assert (done.returncode, checked(done)) == (
+        1,
+        ["a.osim"],
+    ) and "executed" not in done.stdout + done.stderr
     assert not (tmp_path / ".osimlite_cache").exists()
-    pythons = [line for step in steps(repo) for line in step["run"].splitlines() if line.strip().startswith("python")]
+    pythons = [
+        line
+        for step in steps(repo)
+        for line in step["run"].splitlines()
+        if line.strip().startswith("python")
+    ]
     assert len(pythons) == 2 and all(line.strip().startswith("python -I -m ") for line in pythons)
 
 
@@ -168,7 +196,10 @@ def test_the_settings_of_the_guide_are_settings(guide: str, tmp_path: Path, fixt
     assert [finding.severity.value for finding in result] == ["warning", "warning"]
     left_out = settings.config_for(tmp_path / "gait10dof.osim", Config())
     assert "OSIM508" not in validate(walker, config=left_out).codes
-    assert settings.config_for(tmp_path / "archive" / "x.osim", Config()).ignore == ("OSIM701", "structure")
+    assert settings.config_for(tmp_path / "archive" / "x.osim", Config()).ignore == (
+        "OSIM701",
+        "structure",
+    )
     codes = {word for word in re.findall(r"OSIM\d{3}", guide)}
     assert codes <= {rule.code for rule in all_rules()}
 
@@ -182,7 +213,9 @@ def test_the_test_of_the_guide_passes(guide: str, tmp_path: Path) -> None:
 
 def test_assert_valid_says_everything(tmp_path: Path) -> None:
     path = tmp_path / "m.osim"
-    path.write_text('<OpenSimDocument Version="40600"><Model><gravty/><foo/></Model></OpenSimDocument>')
+    path.write_text(
+        '<OpenSimDocument Version="40600"><Model><gravty/><foo/></Model></OpenSimDocument>'
+    )
     with pytest.raises(AssertionError, match=r"(?s)gravty.*foo"):
         assert_valid(path)
     assert_valid(path, ignore=["structure"])

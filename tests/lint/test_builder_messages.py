@@ -72,7 +72,9 @@ MODELS = {
         "<geometry>x y</geometry></HuntCrossleyForce::ContactParameters></objects>"
         "</HuntCrossleyForce::ContactParametersSet></HuntCrossleyForce>",
     ),
-    "an inertia that is no number": small_model().replace("<inertia>0.1 0.1", "<inertia>NaN 0.1", 1),
+    "an inertia that is no number": small_model().replace(
+        "<inertia>0.1 0.1", "<inertia>NaN 0.1", 1
+    ),
     "a place that is no number": small_model().replace("<translation>0 0.3", "<translation>0 NaN"),
     "a number of a force that is none": small_model(
         forces=SPRING.replace("</coordinate>", "</coordinate><stiffness>NaN</stiffness>")

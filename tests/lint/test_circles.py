@@ -16,9 +16,7 @@ def test_frames_on_a_circle_are_those_that_lead_back_to_themselves(below: list[i
         "</Station>"
         for k, to in enumerate(below)
     )
-    text = (
-        f'<OpenSimDocument Version="40600"><Model name="m"><components>{parts}</components></Model></OpenSimDocument>'
-    )
+    text = f'<OpenSimDocument Version="40600"><Model name="m"><components>{parts}</components></Model></OpenSimDocument>'
     expected = set()
     for start in range(len(below)):
         here = start

@@ -28,7 +28,9 @@ def known_class(name):
 def test_an_entry_is_a_property_with_a_domain(entry):
     cls, name = entry
     spec = next(spec for spec in field_specs(known_class(cls)).values() if spec.name == name)
-    assert isinstance(spec.kind, Value) and (spec.kind.domain or name in known_class(cls).facts.domains)
+    assert isinstance(spec.kind, Value) and (
+        spec.kind.domain or name in known_class(cls).facts.domains
+    )
 
 
 def test_a_derived_class_inherits_and_zero_differs_from_less():

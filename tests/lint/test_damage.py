@@ -1,7 +1,7 @@
 """Whatever happens to a file, the answer is findings in places that exist, soon, and nothing that was read is lost.
 
-Three hundred damaged files by default; ``OSIMLITE_DAMAGE=20000 OSIMLITE_SEED=7`` asks for others, and
-``OSIMLITE_DAMAGE_FOLDER=...`` for more files to be damaged: all that a folder has.
+Three hundred damaged files by default; ``OSIMLITE_DAMAGE=20000 OSIMLITE_SEED=7`` asks for others,
+and ``OSIMLITE_DAMAGE_FOLDER=...`` for more files to be damaged: all that a folder has.
 """
 
 from __future__ import annotations
@@ -73,17 +73,38 @@ def _numbers_changed(data: bytes, draw: random.Random) -> bytes:
     if not result:
         return data
     place = draw.choice(result)
-    new = draw.choice([b"", b"1e308", b"-1e308", b"1e-320", b"nan", b"7" * 400, b"-", b".", b"1.2.3", b"1,5", b"0"])
+    new = draw.choice(
+        [
+            b"",
+            b"1e308",
+            b"-1e308",
+            b"1e-320",
+            b"nan",
+            b"7" * 400,
+            b"-",
+            b".",
+            b"1.2.3",
+            b"1,5",
+            b"0",
+        ]
+    )
     return data[: place.start()] + new + data[place.end() :]
 
 
 def _other_letters(data: bytes, draw: random.Random) -> bytes:
     text = data.decode("utf-8", "replace").replace("_", draw.choice("_éß\u0660"), 3)
-    return text.encode(draw.choice(["utf-16", "utf-16-be", "latin-1", "utf-8-sig", "utf-32", "cp500"]), "replace")
+    return text.encode(
+        draw.choice(["utf-16", "utf-16-be", "latin-1", "utf-8-sig", "utf-32", "cp500"]), "replace"
+    )
 
 
 def _ends(data: bytes, draw: random.Random) -> bytes:
-    return re.sub(rb"\r?\n", lambda _: draw.choice([b"\r", b"\n", b"\r\n", b"\n\r"]), data, count=draw.choice([0, 9]))
+    return re.sub(
+        rb"\r?\n",
+        lambda _: draw.choice([b"\r", b"\n", b"\r\n", b"\n\r"]),
+        data,
+        count=draw.choice([0, 9]),
+    )
 
 
 def _one_line(data: bytes, draw: random.Random) -> bytes:
@@ -91,9 +112,17 @@ def _one_line(data: bytes, draw: random.Random) -> bytes:
 
 
 def _nested(data: bytes, draw: random.Random) -> bytes:
-    start, tag = draw.randrange(len(data) + 1), draw.choice([b"objects", b"a", b"Body", b"TransformAxis"])
+    start, tag = (
+        draw.randrange(len(data) + 1),
+        draw.choice([b"objects", b"a", b"Body", b"TransformAxis"]),
+    )
     depth = draw.choice([5, 300, 3000])
-    return data[:start] + b"<%s>" % tag * depth + b"</%s>" % tag * draw.choice([depth, depth - 1]) + data[start:]
+    return (
+        data[:start]
+        + b"<%s>" % tag * depth
+        + b"</%s>" % tag * draw.choice([depth, depth - 1])
+        + data[start:]
+    )
 
 
 def _noise(data: bytes, draw: random.Random) -> bytes:
@@ -130,12 +159,22 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[
     folder = tmp_path_factory.mktemp("project")
     for file in (FIXTURES / "setups").iterdir():
         data = file.read_bytes()
-        (folder / file.name.removesuffix(".gz")).write_bytes(gzip.decompress(data) if file.suffix == ".gz" else data)
-    files = [*folder.iterdir(), *(FIXTURES / "documents").iterdir(), FIXTURES / "lint/skeleton.osim"]
+        (folder / file.name.removesuffix(".gz")).write_bytes(
+            gzip.decompress(data) if file.suffix == ".gz" else data
+        )
+    files = [
+        *folder.iterdir(),
+        *(FIXTURES / "documents").iterdir(),
+        FIXTURES / "lint/skeleton.osim",
+    ]
     files += (FIXTURES / "lint").glob("OSIM8*/pass-*.*t[or]*")
     if MORE:
         suffixes = (".osim", ".xml", ".omoco", ".sto", ".mot", ".trc")
-        files += [file for file in Path(MORE).rglob("*") if file.suffix in suffixes and file.stat().st_size < 300_000]
+        files += [
+            file
+            for file in Path(MORE).rglob("*")
+            if file.suffix in suffixes and file.stat().st_size < 300_000
+        ]
     return folder, [(file.name, file.read_bytes()) for file in sorted(files)]
 
 
@@ -171,12 +210,17 @@ def check(folder: Path, name: str, data: bytes) -> None:
 def _unknown(top: Object) -> list[str]:
     """What no class has, however an element without text is written."""
     texts = (
-        re.sub(r"></[^>]*>|\s*/>", "/>", text) for item in top.walk() if item.layout for text in item.layout.unknown
+        re.sub(r"></[^>]*>|\s*/>", "/>", text)
+        for item in top.walk()
+        if item.layout
+        for text in item.layout.unknown
     )
     return sorted(texts)
 
 
-@pytest.mark.skipif(not hasattr(signal, "SIGPROF"), reason="the time of a check cannot be limited here")
+@pytest.mark.skipif(
+    not hasattr(signal, "SIGPROF"), reason="the time of a check cannot be limited here"
+)
 @pytest.mark.parametrize("group", range(GROUPS))
 def test_a_damaged_file_has_findings_in_places_that_exist(project, group):
     folder, victims = project
@@ -202,10 +246,18 @@ MARKERS = b"PathFileType\t4\nDataRate\tUnits\n100\tmm\nFrame#\tTime\t"
     "data",
     [
         pytest.param(
-            HEAD + b"time\t" + b"\t".join(b"c%d" % k for k in range(100_000)) + b"\n" + b"1\t" * 100_000 + b"1\n",
+            HEAD
+            + b"time\t"
+            + b"\t".join(b"c%d" % k for k in range(100_000))
+            + b"\n"
+            + b"1\t" * 100_000
+            + b"1\n",
             marks=pytest.mark.full,
         ),
-        pytest.param(HEAD + b"time\t" + b"a\t" * 100_000 + b"\n" + b"nan\t" * 100_001 + b"\n", marks=pytest.mark.full),
+        pytest.param(
+            HEAD + b"time\t" + b"a\t" * 100_000 + b"\n" + b"nan\t" * 100_001 + b"\n",
+            marks=pytest.mark.full,
+        ),
         HEAD + b"time\t" + b"a\t" * 10_000 + b"\n" + b"nan\t" * 10_001 + b"\n",
         HEAD + b"time a\n" + b"1 " * 700_000 + b"\n",
         HEAD + b"time a\n" + b"1" * 3_000_000 + b" 2\n",

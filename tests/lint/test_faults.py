@@ -65,7 +65,10 @@ def test_the_name_of_a_part_of_a_probe_may_not_be_blank():
         </objects></Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet>
         </Umberger2010MuscleMetabolicsProbe></objects></ProbeSet></Model></OpenSimDocument>"""
     (finding,) = validate(Source(text.encode()), select="OSIM303").findings
-    assert "is blank; it must be that of a Muscle; OpenSim switches the whole probe off" in finding.message
+    assert (
+        "is blank; it must be that of a Muscle; OpenSim switches the whole probe off"
+        in finding.message
+    )
 
 
 def test_a_missing_file_is_no_finding():
@@ -130,7 +133,9 @@ def test_misspelt_contact_is_reported_with_force_place_and_neighbour(tmp_path):
 def test_the_suggestion_is_a_real_neighbour(name, suggestion, tmp_path):
     fault = next(fault for fault in faults.FAULTS if fault.name == name)
     report = validate(faulty(fault.change, tmp_path)[0])
-    assert suggestion in {finding.suggestion for finding in report if finding.code == fault.code}, str(report)
+    assert suggestion in {finding.suggestion for finding in report if finding.code == fault.code}, (
+        str(report)
+    )
 
 
 def test_a_prescribed_controller_wants_the_plain_path(tmp_path):
@@ -139,7 +144,9 @@ def test_a_prescribed_controller_wants_the_plain_path(tmp_path):
 
         actuator = CoordinateActuator(name="motor")
         controller = PrescribedController(
-            name="drive", socket_actuators=[path], ControlFunctions=FunctionSet(objects=[Constant()])
+            name="drive",
+            socket_actuators=[path],
+            ControlFunctions=FunctionSet(objects=[Constant()]),
         )
         model = Model(name="m")
         model.add(actuator, controller)

@@ -156,5 +156,7 @@ def test_a_name_that_a_property_had_in_early_releases_is_known():
         </objects></ControllerSet></AnalyzeTool></OpenSimDocument>"""
     (finding,) = validate(Source(text.encode(), "a.xml"), select="OSIM101").findings
     assert (finding.severity, finding.suggestion) == ("error", "enabled")
-    (finding,) = validate(Source(text.replace("false", "true").encode(), "a.xml"), select="OSIM101").findings
+    (finding,) = validate(
+        Source(text.replace("false", "true").encode(), "a.xml"), select="OSIM101"
+    ).findings
     assert finding.severity == "warning"

@@ -22,7 +22,9 @@ CLONE = REPO.parent / ".mirror" / "opensim-org+opensim-core" / "repo"
 TABLE = json.loads((REPO / "osimlite" / "lint" / "history.json").read_text())
 
 
-def told(text: str, target: str, tmp_path: Path, name: str = "m.xml") -> list[tuple[int | None, str, str]]:
+def told(
+    text: str, target: str, tmp_path: Path, name: str = "m.xml"
+) -> list[tuple[int | None, str, str]]:
     """Line, severity and message of what is said of a version."""
     path = tmp_path / name
     path.write_text(text)
@@ -48,13 +50,26 @@ STUDY = """<OpenSimDocument Version="40000">
 
 
 def test_classes_and_properties_that_came_later_are_told_with_their_line(tmp_path):
-    assert told(STUDY, "", tmp_path) == told(STUDY, "4.6", tmp_path) == told(STUDY, "4.5", tmp_path) == []
+    assert (
+        told(STUDY, "", tmp_path)
+        == told(STUDY, "4.6", tmp_path)
+        == told(STUDY, "4.5", tmp_path)
+        == []
+    )
     goal = (5, "error", "MocoContactImpulseTrackingGoal 'impulse': OpenSim has a MocoContactImpulseTrackingGoal from "
             "version 4.4.1 on; 4.3 refuses it")  # fmt: skip
     divided = "MocoControlGoal 'effort': OpenSim has divide_by_{} from version 4.5 on; {} drops it"
-    properties = [(7, "error", divided.format("duration", "{}")), (8, "info", divided.format("mass", "{}"))]
-    assert told(STUDY, "4.4.1", tmp_path) == [(line, bad, text.format("4.4.1")) for line, bad, text in properties]
-    assert told(STUDY, "4.3", tmp_path) == [goal, *((line, bad, text.format("4.3")) for line, bad, text in properties)]
+    properties = [
+        (7, "error", divided.format("duration", "{}")),
+        (8, "info", divided.format("mass", "{}")),
+    ]
+    assert told(STUDY, "4.4.1", tmp_path) == [
+        (line, bad, text.format("4.4.1")) for line, bad, text in properties
+    ]
+    assert told(STUDY, "4.3", tmp_path) == [
+        goal,
+        *((line, bad, text.format("4.3")) for line, bad, text in properties),
+    ]
     # Of what is no longer a class nothing is said of its properties.
     assert {line for line, _, _ in told(STUDY, "4.1", tmp_path)} == {2, 3, 5, 6}
 
@@ -67,10 +82,17 @@ def controller(version: int, tag: str, value: str) -> str:
 
 
 def test_a_new_name_is_told_with_the_old_and_an_old_one_in_an_old_file_is_none(tmp_path):
-    new, old = controller(40600, "socket_actuators", "/forceset/a"), controller(40000, "actuator_list", "a")
+    new, old = (
+        controller(40600, "socket_actuators", "/forceset/a"),
+        controller(40000, "actuator_list", "a"),
+    )
     name = "ControlSetController 'c': OpenSim has socket_actuators from version 4.5.1 on; 4.5 drops it; before it was "
     assert told(new, "4.5", tmp_path) == [
-        (1, "info", "the file has the format 40600, OpenSim 4.5 writes 40500 and takes it for that"),
+        (
+            1,
+            "info",
+            "the file has the format 40600, OpenSim 4.5 writes 40500 and takes it for that",
+        ),
         (4, "error", name + "called actuator_list"),
     ]
     assert told(new, "4.5.1", tmp_path) == told(old, "4.5", tmp_path) == []
@@ -87,7 +109,9 @@ def test_a_model_made_in_python_is_checked_too():
 
 
 def test_a_release_that_is_not_known_is_refused_with_those_that_are(tmp_path):
-    with pytest.raises(OsimliteError, match=r"of OpenSim '3.3' nothing is known; known are 4\.0, 4\.1.* and 4\.6"):
+    with pytest.raises(
+        OsimliteError, match=r"of OpenSim '3.3' nothing is known; known are 4\.0, 4\.1.* and 4\.6"
+    ):
         Config(target_version="3.3")
     model = REPO / "fixtures" / "walker" / "DynamicWalkerModel.osim"
     done = run("validate", model, "--target-version", "4.7")
@@ -104,9 +128,9 @@ def test_the_table_speaks_of_classes_and_properties_that_exist():
     assert later_than(NEWEST).format == TABLE["formats"][NEWEST] and not later_than(NEWEST).classes
     for tag in TABLE["classes"]:
         assert class_for(tag) is not None, tag
-    assert {first for first, *_ in TABLE["properties"].values()} | set(TABLE["classes"].values()) < set(
-        TABLE["formats"]
-    )
+    assert {first for first, *_ in TABLE["properties"].values()} | set(
+        TABLE["classes"].values()
+    ) < set(TABLE["formats"])
 
 
 @pytest.fixture
@@ -126,12 +150,18 @@ def test_the_table_is_what_the_script_makes_of_the_releases(clone, tmp_path):
 @pytest.mark.parametrize("release", ["4.1", "4.3", "4.5"])
 def test_nothing_is_said_of_what_a_release_came_with(clone, release):
     git = ["git", "-C", clone]
-    listing = subprocess.run([*git, "ls-tree", "-r", release], capture_output=True, text=True, check=True)
+    listing = subprocess.run(
+        [*git, "ls-tree", "-r", release], capture_output=True, text=True, check=True
+    )
     names = (row.split("\t") for row in listing.stdout.splitlines())
-    files = {row.split()[2]: name for row, name in names if name.endswith((".osim", ".xml", ".omoco"))}
+    files = {
+        row.split()[2]: name for row, name in names if name.endswith((".osim", ".xml", ".omoco"))
+    }
     count = 0
     for blob, name in files.items():
-        text = subprocess.run([*git, "cat-file", "blob", blob], capture_output=True, check=True).stdout
+        text = subprocess.run(
+            [*git, "cat-file", "blob", blob], capture_output=True, check=True
+        ).stdout
         if b"<OpenSimDocument" in text and len(text) < 60_000:
             count += 1
             file = f"x.{name.rpartition('.')[2]}"

@@ -24,7 +24,9 @@ def rewrite_table(path: Path, factor: float, columns: slice) -> None:
     for number, line in enumerate(lines[first:], first):
         cells = line.split("\t")
         if len(cells) > 3:
-            cells[columns] = [f"{float(cell) * factor:.6f}" if cell.strip() else cell for cell in cells[columns]]
+            cells[columns] = [
+                f"{float(cell) * factor:.6f}" if cell.strip() else cell for cell in cells[columns]
+            ]
             lines[number] = "\t".join(cells)
     path.write_text("\n".join(lines) + "\n")
 
@@ -38,7 +40,10 @@ ELASTIC = "HuntCrossleyForce", "ElasticFoundationForce"
 def test_other_contacts_push_too(tmp_path: Path, kind: str) -> None:
     folder = copy_lab("ground", tmp_path)
     text = (folder / "leg.osim").read_text()
-    start, end = text.index("<HuntCrossleyForce name"), text.index("</HuntCrossleyForce>") + len("</HuntCrossleyForce>")
+    start, end = (
+        text.index("<HuntCrossleyForce name"),
+        text.index("</HuntCrossleyForce>") + len("</HuntCrossleyForce>"),
+    )
     force = SMOOTH if kind == "smooth" else text[start:end].replace(*ELASTIC)
     (folder / "leg.osim").write_text(text[:start] + force + text[end:])
     assert "OSIM859" in codes(folder / "id.xml")
@@ -56,12 +61,17 @@ def test_ground_once_where_the_contact_is_excluded(tmp_path: Path) -> None:
     folder = copy_lab("ground", tmp_path)
     text = (folder / "leg.osim").read_text()
     name = text.partition('<HuntCrossleyForce name="')[2].partition('"')[0]
-    change(folder / "id.xml", ("<forces_to_exclude>Muscles<", f"<forces_to_exclude>Muscles {name}<"))
+    change(
+        folder / "id.xml", ("<forces_to_exclude>Muscles<", f"<forces_to_exclude>Muscles {name}<")
+    )
     assert "OSIM859" not in codes(folder / "id.xml")
     folder = copy_lab("ground", tmp_path / "off")
     change(
         folder / "leg.osim",
-        (f'<HuntCrossleyForce name="{name}">', f'<HuntCrossleyForce name="{name}"><appliesForce>false</appliesForce>'),
+        (
+            f'<HuntCrossleyForce name="{name}">',
+            f'<HuntCrossleyForce name="{name}"><appliesForce>false</appliesForce>',
+        ),
     )
     assert "OSIM859" not in codes(folder / "id.xml")
 
@@ -82,7 +92,9 @@ def test_loads_in_kilonewtons(tmp_path: Path, unit: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("factor", "said"), [(1.0, ""), (0.1, "cm"), (0.001, "m"), (10.0, "")], ids=["mm", "cm", "m", "too large"]
+    ("factor", "said"),
+    [(1.0, ""), (0.1, "cm"), (0.001, "m"), (10.0, "")],
+    ids=["mm", "cm", "m", "too large"],
 )
 def test_units_of_markers_beside_the_model(tmp_path: Path, factor: float, said: str) -> None:
     """Numbers that are of centimetres or metres in a file that says mm; other sizes have no unit that would explain."""
@@ -136,7 +148,9 @@ def test_motions_by_paths_are_a_warning(tmp_path: Path, label: str) -> None:
     (folder / "walk.mot").write_text(text)
     report = osimlite.validate(folder / "id.xml")
     assert not report.errors
-    assert any(finding.code == "OSIM842" and "by paths" in finding.message for finding in report.findings)
+    assert any(
+        finding.code == "OSIM842" and "by paths" in finding.message for finding in report.findings
+    )
 
 
 def test_a_trial_check_names_ground_that_pushes_twice(tmp_path: Path) -> None:

@@ -58,7 +58,9 @@ def checked(monkeypatch):
 
 
 def codes(project, **options):
-    return sorted(finding.code for finding in check_files([str(project / "m.osim")], Config(), **options))
+    return sorted(
+        finding.code for finding in check_files([str(project / "m.osim")], Config(), **options)
+    )
 
 
 def test_an_unchanged_file_is_not_checked_again(project, checked):
@@ -105,7 +107,9 @@ def test_a_file_that_was_touched_is_read_again_and_not_checked(project, checked,
 
 
 @pytest.mark.parametrize("settled", [False, True])
-def test_a_file_that_changes_at_one_time_and_in_one_size_is_checked_again(project, checked, request, settled):
+def test_a_file_that_changes_at_one_time_and_in_one_size_is_checked_again(
+    project, checked, request, settled
+):
     if settled:
         request.getfixturevalue("later")
     codes(project)
@@ -134,8 +138,12 @@ def test_a_mesh_in_other_letter_case_counts(project, checked):
 
 
 def test_a_model_that_includes_another_file_is_always_checked(project, checked):
-    (project / "markers.osim").write_text('<OpenSimDocument Version="40600"><MarkerSet/></OpenSimDocument>')
-    (project / "m.osim").write_text(MESH.replace("<BodySet>", '<MarkerSet file="markers.osim"/><BodySet>'))
+    (project / "markers.osim").write_text(
+        '<OpenSimDocument Version="40600"><MarkerSet/></OpenSimDocument>'
+    )
+    (project / "m.osim").write_text(
+        MESH.replace("<BodySet>", '<MarkerSet file="markers.osim"/><BodySet>')
+    )
     assert codes(project) == codes(project)
     assert len(checked) == 2
 
@@ -152,7 +160,13 @@ def test_a_broken_entry_is_no_entry(project, checked, content, findings_cache):
 def _places(value, *way):
     """The way to every value in JSON data, and to all that is within it."""
     yield way
-    parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    parts = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    )
     for key, part in parts:
         yield from _places(part, *way, key)
 
@@ -181,7 +195,10 @@ def test_an_entry_with_anything_of_another_type_is_no_entry(project, checked, fi
             entry.write_text(json.dumps(damaged[""]))
             again = check_files([str(project / "m.osim")], Config())
             assert again.findings == first.findings
-            assert [finding.fix for finding in again] == [finding.fix for finding in first], (way, wrong)
+            assert [finding.fix for finding in again] == [finding.fix for finding in first], (
+                way,
+                wrong,
+            )
             tried += 1
     assert len(checked) == 1 + tried and tried > 100
     entry.write_text("[" * 100_000)
@@ -201,7 +218,22 @@ def test_an_entry_with_anything_of_another_type_is_no_entry(project, checked, fi
         {"findings": [["OSIM101", "unknown-tag", "error", "x", 0, 1, 1, "", None, None]]},
         {"findings": [["OSIM101", "unknown-tag", "error", "x", 1, 1, -1, "", None, None]]},
         {"findings": [["OSIM101", "unknown-tag", "error", "x", 1, 1, 1, "", None, [1, []]]]},
-        {"findings": [["OSIM101", "unknown-tag", "error", "x", 1, 1, 1, "", None, [True, [[0, True, "x"]]]]]},
+        {
+            "findings": [
+                [
+                    "OSIM101",
+                    "unknown-tag",
+                    "error",
+                    "x",
+                    1,
+                    1,
+                    1,
+                    "",
+                    None,
+                    [True, [[0, True, "x"]]],
+                ]
+            ]
+        },
         {"outside": [["x", [1, True]]]},
     ],
     ids=str,
@@ -238,7 +270,9 @@ def test_shared_work_finds_the_same_in_the_same_order(project):
         files.append(str(file))
     seen: list[tuple[int, int]] = []
     alone = check_files(files, Config(), cached=False, processes=1)
-    shared = check_files(files, Config(), cached=False, processes=2, progress=lambda *counts: seen.append(counts))
+    shared = check_files(
+        files, Config(), cached=False, processes=2, progress=lambda *counts: seen.append(counts)
+    )
     assert shared.findings == alone.findings and shared.checked == 9
     assert seen == [(count, 9) for count in range(1, 10)]
 

@@ -57,7 +57,14 @@ def test_missing_packages_are_reported_in_every_format_and_are_no_finding(bare, 
     for name in ("json", "sarif", "github"):
         # A note is no finding, so that --fail-on info does not count it.
         done = bare.call(
-            "validate", "--no-cache", "--fail-on", "info", "--format", name, jumping, folder=jumping.parent
+            "validate",
+            "--no-cache",
+            "--fail-on",
+            "info",
+            "--format",
+            name,
+            jumping,
+            folder=jumping.parent,
         )
         assert (done.returncode, done.stderr) == (0, "")
         texts[name] = done.stdout
@@ -69,11 +76,15 @@ def test_missing_packages_are_reported_in_every_format_and_are_no_finding(bare, 
     (invocation,) = json.loads(texts["sarif"])["runs"][0]["invocations"]
     assert WHY in invocation["toolExecutionNotifications"][0]["message"]["text"]
     assert texts["github"].startswith("::notice title=not-measured::") and WHY in texts["github"]
-    done = bare.call("validate", "--no-cache", "--ignore", "OSIM42,OSIM53,OSIM63", jumping, folder=jumping.parent)
+    done = bare.call(
+        "validate", "--no-cache", "--ignore", "OSIM42,OSIM53,OSIM63", jumping, folder=jumping.parent
+    )
     assert "measured" not in done.stdout
 
 
-def test_the_cache_repeats_the_reason_until_it_can_be_measured(bare, jumping, tmp_path, monkeypatch):
+def test_the_cache_repeats_the_reason_until_it_can_be_measured(
+    bare, jumping, tmp_path, monkeypatch
+):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "cache"))
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -84,16 +95,22 @@ def test_the_cache_repeats_the_reason_until_it_can_be_measured(bare, jumping, tm
 
 
 def test_a_comment_is_not_called_unused_where_nobody_measured(bare, jumping):
-    jumping.write_text("<!-- osimlite: ignore OSIM632 OSIM505 -->\n" + jumping.read_text().partition("\n")[2])
+    jumping.write_text(
+        "<!-- osimlite: ignore OSIM632 OSIM505 -->\n" + jumping.read_text().partition("\n")[2]
+    )
     done = bare.call("validate", "--no-cache", "--format", "json", jumping, folder=jumping.parent)
     finding, _ = json.loads(done.stdout)
     assert finding["code"] == "OSIM010" and "'OSIM505'" in finding["message"]
 
 
 def test_a_model_that_cannot_be_computed_is_named_with_the_reason(fixtures):
-    text = (fixtures / "lint" / "OSIM632" / JUMPING).read_text().replace("<PinJoint", "<ScrewJoint", 1)
+    text = (
+        (fixtures / "lint" / "OSIM632" / JUMPING).read_text().replace("<PinJoint", "<ScrewJoint", 1)
+    )
     report = validate(Source(text.replace("</PinJoint>", "</ScrewJoint>", 1).encode(), "m.osim"))
-    assert set(report.codes) >= {"OSIM102"} and not any(code.startswith("OSIM63") for code in report.codes)
+    assert set(report.codes) >= {"OSIM102"} and not any(
+        code.startswith("OSIM63") for code in report.codes
+    )
     (why,) = report.unmeasured
     assert why.startswith("m.osim: ") and "ScrewJoint" in why
 
@@ -127,7 +144,8 @@ def test_the_language_server_does_not_measure(jumping):
 
 
 @pytest.mark.parametrize(
-    ("motion", "said"), [("rotational", "28.65 deg"), ("translational", "0.5 m"), ("coupled", "0.5")]
+    ("motion", "said"),
+    [("rotational", "28.65 deg"), ("translational", "0.5 m"), ("coupled", "0.5")],
 )
 def test_a_value_is_told_in_the_unit_of_what_the_coordinate_moves(motion, said):
     info = CoordinateInfo("q", "/jointset/j/q", "/jointset/j", motion)

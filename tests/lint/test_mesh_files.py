@@ -22,7 +22,10 @@ def test_what_is_no_file_is_not_called_by_its_own_name(tmp_path: Path, name: str
     write(model, tmp_path / "m.osim")
     (finding,) = validate(tmp_path / "m.osim", select=["OSIM701"]).findings
     assert finding.suggestion is None
-    assert finding.message == f"'{name}' of Mesh 'bone' is a folder, a device or a link to nothing, and no file"
+    assert (
+        finding.message
+        == f"'{name}' of Mesh 'bone' is a folder, a device or a link to nothing, and no file"
+    )
 
 
 @pytest.mark.usefixtures("exact_names")

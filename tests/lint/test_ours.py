@@ -59,14 +59,22 @@ def test_a_document_with_another_root_is_told_with_the_right_one(tmp_path, root,
     assert re.sub(" xmlns.*?>", ">", file.read_text()) == SETUP
 
 
-@pytest.mark.parametrize("tag", ["InverseKinematicTool", "inversekinematicstool", "InverseKinemtaicsTool"])
+@pytest.mark.parametrize(
+    "tag", ["InverseKinematicTool", "inversekinematicstool", "InverseKinemtaicsTool"]
+)
 @pytest.mark.parametrize("root", ["OpenSimDocument", "OpenSimDocumnt", None])
 def test_a_misspelt_tool_is_told_with_the_right_name(tmp_path, tag, root):
-    text = SETUP.replace("InverseKinematicsTool", tag).replace("OpenSimDocument", root or "OpenSimDocument")
+    text = SETUP.replace("InverseKinematicsTool", tag).replace(
+        "OpenSimDocument", root or "OpenSimDocument"
+    )
     if root is None:
         text = "\n".join(line for line in text.split("\n") if "OpenSimDocument" not in line)
     (tmp_path / "ik.xml").write_text(text)
-    result = {(finding.line, finding.suggestion) for finding in validate(tmp_path) if finding.code == "OSIM003"}
+    result = {
+        (finding.line, finding.suggestion)
+        for finding in validate(tmp_path)
+        if finding.code == "OSIM003"
+    }
     assert (2 if root is None else 3, "InverseKinematicsTool") in result
     assert root is None or ((2, "OpenSimDocument") in result) == (root != "OpenSimDocument")
 
@@ -88,7 +96,9 @@ def test_what_is_passed_over_is_counted_and_named(tmp_path, monkeypatch, capsys)
     folder = tmp_path / "project"
     folder.mkdir()
     monkeypatch.chdir(folder)
-    (folder / "m.osim").write_text('<OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>')
+    (folder / "m.osim").write_text(
+        '<OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>'
+    )
     for name in ("maven", "urdf"):
         (folder / f"{name}.xml").write_text(OTHERS[name])
     for form in ("concise", "full"):
@@ -107,10 +117,15 @@ def test_what_is_passed_over_is_counted_and_named(tmp_path, monkeypatch, capsys)
 def test_a_folder_that_is_not_there_is_called_one(tmp_path, monkeypatch, capsys, command, path):
     monkeypatch.chdir(tmp_path)
     assert main_code(command, path) == 2
-    assert capsys.readouterr().err == f"osimlite: {path}: there is no such folder (see docs/errors.md#folders)\n"
+    assert (
+        capsys.readouterr().err
+        == f"osimlite: {path}: there is no such folder (see docs/errors.md#folders)\n"
+    )
 
 
-def test_only_folders_that_are_named_lead_to_the_page_about_folders(tmp_path, fixtures, monkeypatch, capsys):
+def test_only_folders_that_are_named_lead_to_the_page_about_folders(
+    tmp_path, fixtures, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     model = str(fixtures / "lint" / "leg.osim")
     assert main_code("upgrade", model, "-o", "no/such.osim") == 2

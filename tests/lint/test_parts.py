@@ -22,7 +22,8 @@ FILES = [
     "OSIM636/fail-02-short-and-long.osim",
 ]
 OWNER = re.compile(
-    r"<(PathSpring|Thelen2003Muscle|Millard2012EquilibriumMuscle|DeGrooteFregly2016Muscle) .*?</\1>", re.S
+    r"<(PathSpring|Thelen2003Muscle|Millard2012EquilibriumMuscle|DeGrooteFregly2016Muscle) .*?</\1>",
+    re.S,
 )
 
 
@@ -34,7 +35,9 @@ def asked(monkeypatch):
 
     def measured(model, **given):
         result = own(model, **given)
-        results.append(sorted(set(result.swept) - set(given["known"][1].swept if given["known"] else ())))
+        results.append(
+            sorted(set(result.swept) - set(given["known"][1].swept if given["known"] else ()))
+        )
         return result
 
     monkeypatch.setattr(osimlite.lint.measuring, "measured", measured)
@@ -74,7 +77,9 @@ def test_a_path_that_changed_is_measured_alone_and_the_others_are_as_they_were(t
     for match in OWNER.finditer(text):
         element = match[0]
         for old in re.findall(r">(0\.\d+|-0\.\d+)", element)[:3]:
-            changed = text.replace(element, element.replace(f">{old}", f">{1.1 * float(old):.5f}", 1))
+            changed = text.replace(
+                element, element.replace(f">{old}", f">{1.1 * float(old):.5f}", 1)
+            )
             told(text)
             once, paths = told(changed), asked[-1]
             assert once == fresh(changed)
@@ -116,7 +121,13 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch, 
     parts.remembered.clear()
     known = parts.recall(own, kept.parents[1])
     assert known.measures == measures_of(text)
-    for wrong in ("{}", "[]", "x", json.dumps([{}, [1]]), kept.read_text().replace('"poses"', "5")[:-9]):
+    for wrong in (
+        "{}",
+        "[]",
+        "x",
+        json.dumps([{}, [1]]),
+        kept.read_text().replace('"poses"', "5")[:-9],
+    ):
         parts.remembered.clear()
         kept.write_text(wrong)
         assert parts.recall(own, kept.parents[1]) is None
@@ -133,5 +144,7 @@ def measures_of(text):
 
 def test_a_model_whose_classes_stand_elsewhere_has_no_parts(fixtures):
     text = (fixtures / "lint" / "OSIM632" / "fail-02-two-coordinates.osim").read_text()
-    subject = Subject(osimlite.io.document.survey.survey(Source(text.encode())), Config(classes=("x.toml",)))
+    subject = Subject(
+        osimlite.io.document.survey.survey(Source(text.encode())), Config(classes=("x.toml",))
+    )
     assert parts.parts_of(subject) is None

@@ -56,7 +56,10 @@ def test_every_file_is_in_one_report_and_again_from_the_cache(project):
 
 
 def test_rules_are_selected_ignored_and_counted(project):
-    assert found("--select", "OSIM802") == ({("data/leg.trc", "OSIM802"), ("leg.mot", "OSIM802")}, 1)
+    assert found("--select", "OSIM802") == (
+        {("data/leg.trc", "OSIM802"), ("leg.mot", "OSIM802")},
+        1,
+    )
     # What remains are warnings.
     assert found("--ignore", "table-count,OSIM803")[1] == 0
     assert found("--ignore", "table-count,OSIM803", "--fail-on", "warning")[1] == 1
@@ -74,9 +77,21 @@ def test_settings_hold_for_tables_and_setups(project):
 
 
 def test_lines_and_comments_ignore(project):
-    change(project / "leg.mot", "version=1", "osimlite: ignore OSIM802, table-setting OSIM809\nversion=1")
-    change(project / "ik.xml", "<InverseKinematicsTool", "<!-- osimlite: ignore OSIM301 -->\n<InverseKinematicsTool")
-    change(project / "ik.xml", '"knee_markr">', '"knee_markr"> <!-- osimlite: ignore OSIM831 OSIM841 -->')
+    change(
+        project / "leg.mot",
+        "version=1",
+        "osimlite: ignore OSIM802, table-setting OSIM809\nversion=1",
+    )
+    change(
+        project / "ik.xml",
+        "<InverseKinematicsTool",
+        "<!-- osimlite: ignore OSIM301 -->\n<InverseKinematicsTool",
+    )
+    change(
+        project / "ik.xml",
+        '"knee_markr">',
+        '"knee_markr"> <!-- osimlite: ignore OSIM831 OSIM841 -->',
+    )
     unused = {("leg.mot", "OSIM010"), ("ik.xml", "OSIM010")}
     assert found()[0] == {("data/leg.trc", "OSIM802"), *unused}
     (comment,) = run(subject_of("leg.mot"))
@@ -88,9 +103,13 @@ def test_lines_and_comments_ignore(project):
 
 
 def test_a_baseline_knows_them_again(project):
-    assert command("validate", ".", "--write-baseline", "known.json").out == "known.json: 5 findings\n"
+    assert (
+        command("validate", ".", "--write-baseline", "known.json").out == "known.json: 5 findings\n"
+    )
     assert found("--baseline", "known.json") == (set(), 0)
-    assert command("validate", ".", "--baseline", "known.json").out.endswith(" files, besides 5 of the baseline.\n")
+    assert command("validate", ".", "--baseline", "known.json").out.endswith(
+        " files, besides 5 of the baseline.\n"
+    )
     change(project / "leg.mot", "nColumns=6", "nColumns=7")
     assert found("--baseline", "known.json") == ({("leg.mot", "OSIM802")}, 1)
 
@@ -108,7 +127,9 @@ def test_formats_for_programs_name_every_file(project):
 def test_findings_that_are_alike_are_folded(project):
     names = "\t".join(f"a{k}" for k in range(8))
     (project / "many.sto").write_text(
-        f"many\nversion=1\nnRows=1\nnColumns=9\nendheader\ntime\t{names}\n0\t" + "\t".join(["x"] * 8) + "\n"
+        f"many\nversion=1\nnRows=1\nnColumns=9\nendheader\ntime\t{names}\n0\t"
+        + "\t".join(["x"] * 8)
+        + "\n"
     )
     concise = command("validate", "many.sto", "--format", "concise").out
     assert concise.count("OSIM807") == 1 and "7 more like this" in concise
@@ -120,6 +141,9 @@ def test_mends_of_a_project(project):
     shown = command("validate", ".", "--diff")
     assert shown.code == 1 and "+nRows=51\n" in shown.out
     assert {path: path.read_bytes() for path in before} == before
-    assert command("validate", ".", "--fix").err == "Mended 3 places; --unsafe-fixes would mend 1 place more.\n"
+    assert (
+        command("validate", ".", "--fix").err
+        == "Mended 3 places; --unsafe-fixes would mend 1 place more.\n"
+    )
     assert found()[0] == {("ik.xml", "OSIM831"), ("ik.xml", "OSIM841")}
     assert found("--unsafe-fixes") == (set(), 0)

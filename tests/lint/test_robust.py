@@ -21,7 +21,10 @@ from osimlite.schema.specs import field_specs
 ROOT = Path(__file__).resolve().parents[2]
 TEXTS = [
     path.read_text()
-    for path in (ROOT / "fixtures/lint/skeleton.osim", ROOT / "fixtures/walker/DynamicWalkerModel.osim")
+    for path in (
+        ROOT / "fixtures/lint/skeleton.osim",
+        ROOT / "fixtures/walker/DynamicWalkerModel.osim",
+    )
 ]
 SCRAPS = [
     "<",
@@ -92,7 +95,10 @@ def test_a_text_may_end_within_a_tag():
         b"<OpenSimDocument Version='40600'/>",
         b"<OpenSimDocument Version='40600'><Model/></OpenSimDocument>",
         b"<OpenSimDocument Version='-1'><Model/></OpenSimDocument>",
-        b"<OpenSimDocument Version='40600'><Model>" + b"<a>" * 5000 + b"</a>" * 5000 + b"</Model></OpenSimDocument>",
+        b"<OpenSimDocument Version='40600'><Model>"
+        + b"<a>" * 5000
+        + b"</a>" * 5000
+        + b"</Model></OpenSimDocument>",
         b"<!DOCTYPE a [<!ENTITY b 'c'>]><OpenSimDocument Version='40600'><Model/></OpenSimDocument>",
         '<OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>'.encode("utf-16"),
     ],
@@ -111,7 +117,9 @@ def renamed(source: Source, number: int, tag: str) -> str:
 
 
 @pytest.mark.parametrize(
-    "path", sorted((ROOT / "fixtures/lint").glob("OSIM[1-7]*/fail-*example.osim")), ids=lambda p: p.parent.name
+    "path",
+    sorted((ROOT / "fixtures/lint").glob("OSIM[1-7]*/fail-*example.osim")),
+    ids=lambda p: p.parent.name,
 )
 @pytest.mark.parametrize("tag", ["Plugin", "Marker"])
 def test_an_object_of_another_class_anywhere_has_a_finding(path, tag):
@@ -119,14 +127,19 @@ def test_an_object_of_another_class_anywhere_has_a_finding(path, tag):
     source = Source.of_file(path)
     known = {span.tag for span in Source(TEXTS[0].encode()).spans}
     for number, span in enumerate(source.spans):
-        if number > 1 and span.tag != tag and (span.tag not in known or span.tag in ("Coordinate", "PinJoint", "Body")):
+        if (
+            number > 1
+            and span.tag != tag
+            and (span.tag not in known or span.tag in ("Coordinate", "PinJoint", "Body"))
+        ):
             assert validate(Source(renamed(source, number, tag).encode())).findings
 
 
 @pytest.mark.parametrize(
     "scrap",
     [
-        # Values with faults in objects that stand nowhere in the model that OpenSim makes of the text.
+        # Values with faults in objects that stand nowhere in the model that OpenSim makes of the
+        # text.
         "<prescribed_function><Constant/><Constant><value>1,5</value></Constant></prescribed_function>",
         "<prescribed_function><Constant/><SimmSpline><x>0 a</x></SimmSpline></prescribed_function>",
         "<prescribed_function><Plugin/><Constant><value>x</value></Constant></prescribed_function>",
@@ -135,7 +148,9 @@ def test_an_object_of_another_class_anywhere_has_a_finding(path, tag):
 def test_what_opensim_leaves_out_has_findings_too(scrap):
     text = TEXTS[0].replace("<range>-2.1 0</range>", f"<range>-2.1 0</range>{scrap}")
     assert validate(Source(text.encode())).errors
-    text = TEXTS[0].replace("</Model>", f'<defaults><Coordinate name="default">{scrap}</Coordinate></defaults></Model>')
+    text = TEXTS[0].replace(
+        "</Model>", f'<defaults><Coordinate name="default">{scrap}</Coordinate></defaults></Model>'
+    )
     assert validate(Source(text.encode())).findings
 
 
@@ -147,13 +162,23 @@ SLOTS = [
 ]
 
 
-@pytest.mark.parametrize("inside", ["", "<PlugIn/>", "<objects/>", "<PlugIn name='a'/><PlugIn name='a'/>", "<Body/>"])
+@pytest.mark.parametrize(
+    "inside", ["", "<PlugIn/>", "<objects/>", "<PlugIn name='a'/><PlugIn name='a'/>", "<Body/>"]
+)
 def test_whatever_stands_in_the_place_of_an_object(inside):
-    members = "".join(f"<{tag} name='{tag}_{slot}'><{slot}>{inside}</{slot}></{tag}>\n" for tag, slot in SLOTS)
-    text = TEXTS[0].replace("</Model>", f"<ComponentSet>\n<objects>\n{members}</objects></ComponentSet>\n</Model>")
+    members = "".join(
+        f"<{tag} name='{tag}_{slot}'><{slot}>{inside}</{slot}></{tag}>\n" for tag, slot in SLOTS
+    )
+    text = TEXTS[0].replace(
+        "</Model>", f"<ComponentSet>\n<objects>\n{members}</objects></ComponentSet>\n</Model>"
+    )
     first = text[: text.index("<ComponentSet>")].count("\n") + 3
     report = validate(Source(text.encode()), select="OSIM1,OSIM204")
-    lines = {finding.line for finding in report if finding.code in ("OSIM102", "OSIM103", "OSIM107", "OSIM204")}
+    lines = {
+        finding.line
+        for finding in report
+        if finding.code in ("OSIM102", "OSIM103", "OSIM107", "OSIM204")
+    }
     assert render(validate(Source(text.encode())))
     if inside == "<PlugIn/>":
         assert lines >= {first + number for number in range(len(SLOTS))}
@@ -163,7 +188,9 @@ def test_a_property_of_tools_is_none_of_parts_of_a_model() -> None:
     body = "<Body name='b'> <weight>1</weight> <coordinates>x</coordinates> </Body>"
     model = f"<Model><BodySet><objects>{body}</objects></BodySet></Model>"
     source = Source(f'<OpenSimDocument Version="40600">{model}</OpenSimDocument>'.encode())
-    weight, coordinates = (finding.message for finding in validate(source, select="OSIM101").findings)
+    weight, coordinates = (
+        finding.message for finding in validate(source, select="OSIM101").findings
+    )
     assert "it is a property of" not in weight
     assert "TransformAxis" in coordinates
 
@@ -172,17 +199,27 @@ def test_a_property_of_tools_is_none_of_parts_of_a_model() -> None:
 @pytest.mark.parametrize("number", ["1e308", "-1e-320", "inf"])
 def test_numbers_beyond_computation_raise_nothing(tag, number, tmp_path):
     body = osimlite.Body(name="body", mass=1.0, inertia=(0.5, 0.5, 0.5, 0.006, -0.002, -0.03))
-    body.wrap_object_set.objects.append(osimlite.WrapSphere(name="ball", radius=0.1, xyz_body_rotation=(0.1, 0.2, 0.3)))
+    body.wrap_object_set.objects.append(
+        osimlite.WrapSphere(name="ball", radius=0.1, xyz_body_rotation=(0.1, 0.2, 0.3))
+    )
     model = osimlite.Model(name="model")
     model.add(body)
     model.add(osimlite.PinJoint(name="joint").between(model.ground, body))
     path = GeometryPath(name="path")
     for name, frame in (("a", "/ground"), ("b", "/bodyset/body")):
-        path.path_point_set.objects.append(PathPoint(name=name, socket_parent_frame=frame, location=(0.5, 0.0, 0.0)))
+        path.path_point_set.objects.append(
+            PathPoint(name=name, socket_parent_frame=frame, location=(0.5, 0.0, 0.0))
+        )
     path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="ball"))
-    model.add(PathSpring(name="spring", resting_length=0.1, stiffness=1.0, dissipation=0.0, geometry_path=path))
+    model.add(
+        PathSpring(
+            name="spring", resting_length=0.1, stiffness=1.0, dissipation=0.0, geometry_path=path
+        )
+    )
     text = osimlite.to_text(model)
-    start = text.index(f"<{tag}>", text.index("<WrapSphere") if tag != "inertia" else 0) + len(tag) + 2
+    start = (
+        text.index(f"<{tag}>", text.index("<WrapSphere") if tag != "inertia" else 0) + len(tag) + 2
+    )
     end = text.index("<", start)
     for words in (text[start:end].split()[1:], []):
         file = tmp_path / "model.osim"
@@ -192,6 +229,12 @@ def test_numbers_beyond_computation_raise_nothing(tag, number, tmp_path):
 
 
 def test_a_byte_that_is_no_character_is_placed_by_the_characters_before_it():
-    text = "<!-- äöü -->".encode() + b"<OpenSimDocument Version='40600'><Model name='\xe4'/></OpenSimDocument>"
+    text = (
+        "<!-- äöü -->".encode()
+        + b"<OpenSimDocument Version='40600'><Model name='\xe4'/></OpenSimDocument>"
+    )
     (finding,) = validate(Source(text), select="OSIM002")
-    assert (finding.line, finding.column) == (1, 13 + len("<OpenSimDocument Version='40600'><Model name='"))
+    assert (finding.line, finding.column) == (
+        1,
+        13 + len("<OpenSimDocument Version='40600'><Model name='"),
+    )

@@ -70,7 +70,9 @@ def test_the_skeleton_is_without_findings(path):
 @of_each(all_rules(), lambda rule: rule.code)
 def test_a_module_that_only_some_subjects_load_is_about_these(rule):
     module = rule.check.__module__.rpartition(".")[2]
-    assert {kind for kind, names in APART.items() if module.startswith(names)} == {rule.about} & {*APART}
+    assert {kind for kind, names in APART.items() if module.startswith(names)} == {rule.about} & {
+        *APART
+    }
 
 
 @of_each(all_rules(), lambda rule: rule.code)
@@ -143,7 +145,10 @@ def test_a_page_says_severity_mends_and_settings():
         "# illegal-name (OSIM312)\n\nSeverity: error; warning in files of a version before 30500\nFix: none\n"
     )
     assert "Fix: sometimes, by --fix\n" in pages["OSIM104"]
-    assert "- `contact-depth = 0.001` (m): surfaces may start this deep inside each other" in pages["OSIM521"]
+    assert (
+        "- `contact-depth = 0.001` (m): surfaces may start this deep inside each other"
+        in pages["OSIM521"]
+    )
     assert "Settings" not in pages["OSIM104"]
 
 
@@ -177,22 +182,40 @@ def test_the_severity_of_an_illegal_name_depends_on_the_version(version, name, s
 @pytest.mark.parametrize(
     ("fragment", "tag", "words"),
     [
-        ('<Marker name="a"><body>pelvis</body></Marker>', "socket_parent_frame", "before version 30501"),
-        ('<PinJoint name="hip"><parent_body>pelvis</parent_body></PinJoint>', "socket_parent_frame", "version 30505"),
-        ('<PinJoint name="hip"><location_in_parent>0 0 0</location_in_parent></PinJoint>', None, "PhysicalOffsetFrame"),
+        (
+            '<Marker name="a"><body>pelvis</body></Marker>',
+            "socket_parent_frame",
+            "before version 30501",
+        ),
+        (
+            '<PinJoint name="hip"><parent_body>pelvis</parent_body></PinJoint>',
+            "socket_parent_frame",
+            "version 30505",
+        ),
+        (
+            '<PinJoint name="hip"><location_in_parent>0 0 0</location_in_parent></PinJoint>',
+            None,
+            "PhysicalOffsetFrame",
+        ),
         (
             '<PinJoint name="hip"><socket_parent_frame_connectee_name>/ground</socket_parent_frame_connectee_name>'
             "</PinJoint>",
             "socket_parent_frame",
             "version 30517",
         ),
-        ('<PathSpring name="s"><isDisabled>true</isDisabled></PathSpring>', "appliesForce", "the opposite value"),
+        (
+            '<PathSpring name="s"><isDisabled>true</isDisabled></PathSpring>',
+            "appliesForce",
+            "the opposite value",
+        ),
     ],
 )
 def test_a_tag_of_an_old_format_is_called_so(fragment, tag, words):
     report = validate(Source(skeleton.document(fragment).encode()), select="OSIM101")
     (finding,) = report.findings
-    assert words in finding.message and "in one of version 40600 OpenSim ignores it" in finding.message
+    assert (
+        words in finding.message and "in one of version 40600 OpenSim ignores it" in finding.message
+    )
     assert finding.suggestion == tag
 
 
@@ -220,7 +243,9 @@ def test_the_place_of_an_old_connector_is_the_name_in_it():
     assert "names 'b'" in finding.message
 
 
-@pytest.mark.parametrize(("tag", "nearest"), [("OpenSim::Body", "Body"), ("xml:Body", "Body"), ("o:body", "Body")])
+@pytest.mark.parametrize(
+    ("tag", "nearest"), [("OpenSim::Body", "Body"), ("xml:Body", "Body"), ("o:body", "Body")]
+)
 def test_a_namespace_does_not_hide_the_right_name(tag, nearest):
     text = f"""<OpenSimDocument Version="40600"><Model name="m"><BodySet>
         <objects> <{tag} name="b"> <mass>1</mass> </{tag}> </objects></BodySet></Model></OpenSimDocument>"""
@@ -235,7 +260,9 @@ GROUPS = [pytest.param(group, id=group.code) for group in groups()]
 def test_the_code_and_the_name_of_a_group_mean_all_its_faults(group):
     members = [rule for rule in all_rules() if rule.group == group.name]
     assert len(members) > 5
-    assert [rule.code for rule in members] == [f"{group.code}{number:02d}" for number in range(1, len(members) + 1)]
+    assert [rule.code for rule in members] == [
+        f"{group.code}{number:02d}" for number in range(1, len(members) + 1)
+    ]
     for path in (FIXTURES / group.code).glob("fail-*"):
         everything = checked(path, group)
         assert len(everything.findings) == int(path.name.split("-")[1])
@@ -253,9 +280,15 @@ def test_the_code_and_the_name_of_a_group_mean_all_its_faults(group):
 
 @pytest.mark.parametrize("word", ["OSIM852", "tool-setting", "OSIM85206", "activation-exponent"])
 def test_a_comment_ignores_a_fault_or_its_group(word, tmp_path):
-    text = (FIXTURES / "OSIM852" / "fail-02-optimization.xml").read_text().replace("../", f"{FIXTURES}/")
+    text = (
+        (FIXTURES / "OSIM852" / "fail-02-optimization.xml")
+        .read_text()
+        .replace("../", f"{FIXTURES}/")
+    )
     path = tmp_path / "run.xml"
-    path.write_text(text.replace("<AnalyzeTool", f"<!-- osimlite: ignore {word} -->\n<AnalyzeTool", 1))
+    path.write_text(
+        text.replace("<AnalyzeTool", f"<!-- osimlite: ignore {word} -->\n<AnalyzeTool", 1)
+    )
     left = [finding.code for finding in validate(path, ignore=MEASURED).findings]
     assert left == ([] if word in ("OSIM852", "tool-setting") else ["OSIM85205"])
 

@@ -47,27 +47,47 @@ def test_settings_come_from_the_nearest_file(tmp_path):
     assert old.ignore == ("OSIM7", "structure", "OSIM505")
     assert old.mesh_paths == (str(tmp_path / "shapes"),)
     assert result.config_for(tmp_path / "x.osim", Config()).ignore == ("OSIM7",)
-    report = validate(Source(TEXT.encode()), config=result.config_for(tmp_path / "x.osim", Config()))
-    assert [(f.code, f.severity.value) for f in report] == [("OSIM505", "info"), ("OSIM101", "error")]
+    report = validate(
+        Source(TEXT.encode()), config=result.config_for(tmp_path / "x.osim", Config())
+    )
+    assert [(f.code, f.severity.value) for f in report] == [
+        ("OSIM505", "info"),
+        ("OSIM101", "error"),
+    ]
 
 
 def test_thresholds_of_a_project_move_what_is_found(tmp_path):
-    (tmp_path / "pyproject.toml").write_text("[tool.osimlite.thresholds]\nlargest-gravity = 10000\n")
+    (tmp_path / "pyproject.toml").write_text(
+        "[tool.osimlite.thresholds]\nlargest-gravity = 10000\n"
+    )
     config = settings_for(tmp_path).config_for(tmp_path / "x.osim", Config())
     assert dict(config.thresholds) == {"largest-gravity": 10000}
     assert validate(Source(TEXT.encode()), config=config).codes == {"OSIM101": 1}
-    own = settings_for(tmp_path).config_for(tmp_path / "x.osim", Config(thresholds={"largest-gravity": 5}))
+    own = settings_for(tmp_path).config_for(
+        tmp_path / "x.osim", Config(thresholds={"largest-gravity": 5})
+    )
     assert validate(Source(TEXT.encode()), config=own).codes == {"OSIM505": 1, "OSIM101": 1}
     assert key_of("x.osim", config) != key_of("x.osim", own) != key_of("x.osim", Config())
 
 
-@pytest.mark.parametrize("rule", [rule for rule in all_rules() if rule.thresholds], ids=lambda rule: rule.code)
+@pytest.mark.parametrize(
+    "rule", [rule for rule in all_rules() if rule.thresholds], ids=lambda rule: rule.code
+)
 def test_each_threshold_moves_the_findings_of_its_rule(rule):
     """With every threshold as wide as can be, or as narrow, the failing fixtures of a rule give other findings."""
-    fixtures = [path for kind in ("osim", "trial") for path in sorted((FIXTURES / rule.code).glob(f"*-*.{kind}"))]
+    fixtures = [
+        path
+        for kind in ("osim", "trial")
+        for path in sorted((FIXTURES / rule.code).glob(f"*-*.{kind}"))
+    ]
     for threshold in rule.thresholds:
         seen = set()
-        for moved in ({}, {threshold.name: 0}, {threshold.name: threshold.default / 100}, {threshold.name: 1e300}):
+        for moved in (
+            {},
+            {threshold.name: 0},
+            {threshold.name: threshold.default / 100},
+            {threshold.name: 1e300},
+        ):
             config = Config((rule.code,), thresholds=moved)
             reports = [
                 trials.checked_trial(path.read_text(), rule, config)
@@ -75,7 +95,9 @@ def test_each_threshold_moves_the_findings_of_its_rule(rule):
                 else validate(path, config=config)
                 for path in fixtures
             ]
-            seen.add(tuple((finding.line, finding.severity) for report in reports for finding in report))
+            seen.add(
+                tuple((finding.line, finding.severity) for report in reports for finding in report)
+            )
         assert len(seen) > 1, f"{threshold.name} of {rule.code} changes nothing"
 
 
@@ -102,13 +124,19 @@ def test_an_osimlite_toml_goes_first_and_a_pyproject_without_a_section_is_passed
         ('select = ["OSIM999"]', "no rule has the code or name 'OSIM999'"),
         ('select = "OSIM1"', "'select' must be a list of texts"),
         ('severity = "error"', "'severity' must be a table"),
-        ('[severity]\nOSIM101 = "fatal"', "a severity is one of error, warning and info, not 'fatal'"),
+        (
+            '[severity]\nOSIM101 = "fatal"',
+            "a severity is one of error, warning and info, not 'fatal'",
+        ),
         ("select = [", "this is no TOML"),
         (
             "[thresholds]\nlargest-gravty = 3",
             "no rule has a threshold 'largest-gravty'; did you mean 'largest-",
         ),
-        ('[thresholds]\nlargest-gravity = "3"', "the threshold 'largest-gravity' must be a number, 0 or more, not '3'"),
+        (
+            '[thresholds]\nlargest-gravity = "3"',
+            "the threshold 'largest-gravity' must be a number, 0 or more, not '3'",
+        ),
         ("[thresholds]\nlargest-gravity = true", "must be a number"),
         ("[thresholds]\nlargest-gravity = -1", "must be a number, 0 or more, not '-1'"),
         ("thresholds = 3", "'thresholds' must be a table"),
@@ -152,7 +180,9 @@ def test_a_baseline_hides_what_it_knows_and_no_more(tmp_path):
 
 def test_a_baseline_holds_wherever_the_project_lies(tmp_path, monkeypatch):
     mesh = "<Mesh><mesh_file>a.vtp</mesh_file></Mesh>"
-    model = TEXT.replace("<foo/>", f"<Ground><attached_geometry>{mesh}</attached_geometry></Ground>")
+    model = TEXT.replace(
+        "<foo/>", f"<Ground><attached_geometry>{mesh}</attached_geometry></Ground>"
+    )
     for place in ("here", "there"):
         (tmp_path / place).mkdir()
         monkeypatch.chdir(tmp_path / place)

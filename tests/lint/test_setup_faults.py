@@ -56,7 +56,11 @@ def test_a_fault_is_found_on_its_line(pipeline, fault):
     elif place == "NumMarkers-values":
         line = 3
     elif place:
-        line = next(k for k, row in enumerate(text.split("\n"), 1) if row.lstrip().startswith(place) or place in row)
+        line = next(
+            k
+            for k, row in enumerate(text.split("\n"), 1)
+            if row.lstrip().startswith(place) or place in row
+        )
     result = checked(pipeline / where)
     assert (where, line) in {(file, at) for file, at, _, _ in result}, f"{where}:{line}\n{result}"
 
@@ -82,7 +86,9 @@ def test_a_controller_names_actuators_by_their_paths_and_names_of_older_document
 ):
     """As OpenSim 4.6 takes them."""
     text = TEXTS["forward.xml"].replace('"40600"', f'"{version}"')
-    text = text.replace("<results_directory>", "<force_set_files>reserves.xml</force_set_files><results_directory>")
+    text = text.replace(
+        "<results_directory>", "<force_set_files>reserves.xml</force_set_files><results_directory>"
+    )
     text = text.replace("<enabled>true", f"<{given}</{given.partition('>')[0]}>\n<enabled>true", 1)
     (pipeline / "forward.xml").write_text(text)
     report = run(subject_of(str(pipeline / "forward.xml")))
@@ -92,7 +98,10 @@ def test_a_controller_names_actuators_by_their_paths_and_names_of_older_document
 @pytest.mark.parametrize("fault", HARMLESS, ids=lambda fault: str(fault.number))
 def test_what_is_harmless_is_not_found(pipeline, fault):
     put_in(pipeline, fault)
-    assert checked(*([pipeline / fault.found_in] if fault.found_in else sorted(pipeline.iterdir()))) == []
+    assert (
+        checked(*([pipeline / fault.found_in] if fault.found_in else sorted(pipeline.iterdir())))
+        == []
+    )
 
 
 def test_every_fault_of_the_table_is_accounted_for():

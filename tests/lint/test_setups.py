@@ -47,7 +47,9 @@ def test_a_folder_is_checked_as_a_whole(project, capsys):
     # The name of a marker is changed in the model alone.
     model = project / "leg.osim"
     model.write_text(model.read_text().replace('"knee_marker"', '"knee"'))
-    report = check_files(sorted(str(file) for file in project.glob("*.xml") if file.name != "pom.xml"), Config())
+    report = check_files(
+        sorted(str(file) for file in project.glob("*.xml") if file.name != "pom.xml"), Config()
+    )
     assert {(finding.file.rpartition("/")[2], finding.code) for finding in report} == {
         ("ik.xml", "OSIM831"),
         ("ik.xml", "OSIM841"),
@@ -63,7 +65,9 @@ def test_what_was_found_in_a_setup_is_found_again_when_its_model_changes(project
     assert dict(check_files(["ik.xml"], Config()).codes) == {"OSIM831": 1, "OSIM841": 1}
 
 
-@pytest.mark.parametrize(("names", "meant"), [(["hip_moter"], "hip_motor"), (["hip_motor", "hip_moter"], None)])
+@pytest.mark.parametrize(
+    ("names", "meant"), [(["hip_moter"], "hip_motor"), (["hip_motor", "hip_moter"], None)]
+)
 def test_no_control_is_to_be_called_what_another_is(project, names, meant):
     node = "<x_nodes><ControlLinearNode><t>0</t><value>1</value></ControlLinearNode></x_nodes>"
     controls = "".join(f'<ControlLinear name="{name}">{node}</ControlLinear>' for name in names)
@@ -82,7 +86,12 @@ def test_no_control_is_to_be_called_what_another_is(project, names, meant):
 
 
 def test_what_another_setup_writes_need_not_be_there(project):
-    later = (project / "ik.xml").read_text().replace("leg.osim", "placed.osim").replace('name="ik"', 'name="again"')
+    later = (
+        (project / "ik.xml")
+        .read_text()
+        .replace("leg.osim", "placed.osim")
+        .replace('name="ik"', 'name="again"')
+    )
     (project / "later.xml").write_text(later)
     assert str(validate(project / "later.xml")) == "nothing found"
     (project / "scale.xml").unlink()
@@ -100,7 +109,9 @@ def test_loads_are_checked_with_the_model_of_the_tool_that_names_them(project, f
     assert (finding.code, finding.line) == ("OSIM831", 6)
 
 
-def test_loads_that_several_tools_read_are_looked_at_with_the_motion_that_is_there(project, fixtures):
+def test_loads_that_several_tools_read_are_looked_at_with_the_motion_that_is_there(
+    project, fixtures
+):
     for name in ("fail-01-pelvis.xml", "pass-id-pelvis.xml"):
         text = (fixtures / "lint" / "OSIM849" / name).read_text().replace("../", "")
         (project / name).write_text(text)
@@ -122,12 +133,15 @@ def test_loads_that_no_subject_bears_are_told(project, fixtures, sizes, line):
     header, _, rows = (project / "leg_grf.mot").read_text().partition("torque_z\n")
     table = [[float(cell) for cell in row.split()] for row in rows.splitlines()]
     scaled = [
-        [*row[:1], *(n * sizes[0] for n in row[1:4]), *row[4:7], *(n * sizes[1] for n in row[7:])] for row in table
+        [*row[:1], *(n * sizes[0] for n in row[1:4]), *row[4:7], *(n * sizes[1] for n in row[7:])]
+        for row in table
     ]
     (project / "leg_grf.mot").write_text(
         header + "torque_z\n" + "\n".join("\t".join(map(repr, row)) for row in scaled) + "\n"
     )
-    assert [(f.code, f.line) for f in validate(project / "leg_grf.xml").findings] == [("OSIM849", line)] * bool(line)
+    assert [(f.code, f.line) for f in validate(project / "leg_grf.xml").findings] == [
+        ("OSIM849", line)
+    ] * bool(line)
 
 
 @pytest.mark.parametrize(
@@ -141,11 +155,22 @@ def test_loads_that_no_subject_bears_are_told(project, fixtures, sizes, line):
             {"OSIM855"},
         ),
         ("leg.trc", "Units", "units", {"OSIM801"}),
-        # A way through a folder that is not there leads nowhere, though the text of the path could be made shorter.
+        # A way through a folder that is not there leads nowhere, though the text of the path could
+        # be made shorter.
         ("ik.xml", ">leg.osim<", ">data/../leg.osim<", {"OSIM821"}),
         ("markers.omoco", "<goals>", "<state_infos><Foo/></state_infos><goals>", {"OSIM102"}),
-        ("markers.omoco", r"<ModelProcessor.*?</ModelProcessor>", '<ModelProcessor name="model"/>', {"OSIM821"}),
-        ("markers.omoco", "<goals>", '<MocoFinalBounds name="time_final_bounds"/><goals>', {"OSIM861"}),
+        (
+            "markers.omoco",
+            r"<ModelProcessor.*?</ModelProcessor>",
+            '<ModelProcessor name="model"/>',
+            {"OSIM821"},
+        ),
+        (
+            "markers.omoco",
+            "<goals>",
+            '<MocoFinalBounds name="time_final_bounds"/><goals>',
+            {"OSIM861"},
+        ),
     ],
 )
 def test_what_mutants_have_shown(project, file, old, new, codes):
@@ -159,7 +184,9 @@ def test_a_file_of_coordinates_in_radians_is_told_to_inverse_kinematics(project)
     text = (project / "ik.xml").read_text()
     task = '<IKCoordinateTask name="knee_angle"><value_type>from_file</value_type><weight>1</weight></IKCoordinateTask>'
     text = text.replace("<objects>", f"<objects>{task}", 1)
-    (project / "ik.xml").write_text(text.replace("</InverseK", "<coordinate_file>leg.mot</coordinate_file></InverseK"))
+    (project / "ik.xml").write_text(
+        text.replace("</InverseK", "<coordinate_file>leg.mot</coordinate_file></InverseK")
+    )
     motion = (project / "leg.mot").read_text()
     (project / "leg.mot").write_text(motion.replace("inDegrees=yes", "inDegrees=no"))
     assert "OSIM847" in validate(project / "ik.xml").codes
@@ -171,7 +198,9 @@ def test_a_file_of_coordinates_in_radians_is_told_to_inverse_kinematics(project)
 def test_what_is_at_the_top_is_read_from_where_it_stands(project, name):
     """OpenSim 4.6 looks for the file of none at the top: tools end as without it."""
     text = (project / name).read_text()
-    (project / name).write_text(re.sub(r"(Document Version=.*?<\w+)", r'\1 file="nowhere.xml"', text, flags=re.DOTALL))
+    (project / name).write_text(
+        re.sub(r"(Document Version=.*?<\w+)", r'\1 file="nowhere.xml"', text, flags=re.DOTALL)
+    )
     (finding,) = validate(project / name).findings
     assert (finding.code, finding.severity) == ("OSIM702", "info")
 
@@ -187,14 +216,22 @@ def test_what_is_at_the_top_is_read_from_where_it_stands(project, name):
 def test_lists_of_analyses_may_be_empty_where_opensim_takes_them(project, analysis, refused):
     text = (project / "analyze.xml").read_text()
     (project / "analyze.xml").write_text(re.sub("<objects>", f"<objects>{analysis}", text, count=1))
-    assert any("OpenSim fails" in f.message or "words for" in f.message for f in validate("analyze.xml")) == refused
+    assert (
+        any(
+            "OpenSim fails" in f.message or "words for" in f.message
+            for f in validate("analyze.xml")
+        )
+        == refused
+    )
 
 
 @pytest.mark.parametrize("tag", ["InverseKinematicsTool", "InverseDynamicsTool", "ForwardTool"])
 @pytest.mark.parametrize("version", [10500, 20201, 20202])
 def test_a_tool_newer_than_its_document_is_refused_as_by_opensim(tmp_path, tag, version):
     tool = f'<{tag} name="x"><model_file></model_file></{tag}>'
-    (tmp_path / "document.xml").write_text(f'<OpenSimDocument Version="{version}">{tool}</OpenSimDocument>')
+    (tmp_path / "document.xml").write_text(
+        f'<OpenSimDocument Version="{version}">{tool}</OpenSimDocument>'
+    )
     (tmp_path / "alone.xml").write_text(tool)
     refused = tag != "ForwardTool" and version < 20202
     assert ("OSIM112" in validate(tmp_path / "document.xml").codes) == refused
@@ -217,7 +254,9 @@ def test_every_class_of_setups_is_checked_by_every_rule(project, tag):
         run(subject_of("setup.xml"))
 
 
-@pytest.mark.parametrize("name", ["ik.xml", "scale.xml", "analyze.xml", "leg_grf.xml", "markers.omoco"])
+@pytest.mark.parametrize(
+    "name", ["ik.xml", "scale.xml", "analyze.xml", "leg_grf.xml", "markers.omoco"]
+)
 def test_no_damage_makes_the_check_fail(project, name):
     good = (project / name).read_bytes()
     draw = random.Random(2)
@@ -241,7 +280,10 @@ def test_no_damage_makes_the_check_fail(project, name):
         ("<output_joint_file> Unassigned </output_joint_file>", "info"),
         ("<use_specified_dt>true</use_specified_dt>", "warning"),
         ("<spring_force_threshold>5</spring_force_threshold>", "warning"),
-        ("<corrective_spring_linear_damping>0 0 1500</corrective_spring_linear_damping>", "warning"),
+        (
+            "<corrective_spring_linear_damping>0 0 1500</corrective_spring_linear_damping>",
+            "warning",
+        ),
         ("<finl_time></finl_time>", "error"),
         ("<finl_time>2</finl_time>", "error"),
         ("<finl_time>1.0</finl_time>", "warning"),
@@ -260,14 +302,31 @@ def test_a_tag_of_older_versions_is_as_bad_as_what_is_lost_with_it(tmp_path, ele
     ("elements", "severities"),
     [
         ("<final_time>2</final_time><final_time> 2 </final_time>", ["warning"]),
-        ("<final_time>2</final_time><final_time>3</final_time><final_time>2</final_time>", ["error", "warning"]),
-        ("<solve_for_equilibrium_for_auxiliary_states>no</solve_for_equilibrium_for_auxiliary_states>", ["warning"]),
-        ("<solve_for_equilibrium_for_auxiliary_states>flase</solve_for_equilibrium_for_auxiliary_states>", ["warning"]),
-        ("<solve_for_equilibrium_for_auxiliary_states>yes</solve_for_equilibrium_for_auxiliary_states>", ["error"]),
-        ("<solve_for_equilibrium_for_auxiliary_states>ture</solve_for_equilibrium_for_auxiliary_states>", ["error"]),
+        (
+            "<final_time>2</final_time><final_time>3</final_time><final_time>2</final_time>",
+            ["error", "warning"],
+        ),
+        (
+            "<solve_for_equilibrium_for_auxiliary_states>no</solve_for_equilibrium_for_auxiliary_states>",
+            ["warning"],
+        ),
+        (
+            "<solve_for_equilibrium_for_auxiliary_states>flase</solve_for_equilibrium_for_auxiliary_states>",
+            ["warning"],
+        ),
+        (
+            "<solve_for_equilibrium_for_auxiliary_states>yes</solve_for_equilibrium_for_auxiliary_states>",
+            ["error"],
+        ),
+        (
+            "<solve_for_equilibrium_for_auxiliary_states>ture</solve_for_equilibrium_for_auxiliary_states>",
+            ["error"],
+        ),
     ],
 )
-def test_what_opensim_ignores_is_no_error_where_it_does_what_is_meant(tmp_path, elements, severities):
+def test_what_opensim_ignores_is_no_error_where_it_does_what_is_meant(
+    tmp_path, elements, severities
+):
     setup = tmp_path / "forward.xml"
     setup.write_text(
         f'<OpenSimDocument Version="40600"><ForwardTool name="run">{elements}</ForwardTool></OpenSimDocument>'
@@ -303,9 +362,15 @@ def test_how_long_a_motion_lasts_that_is_not_there_is_not_known(project, motion,
 
 @pytest.mark.parametrize(
     ("content", "severity"),
-    [("<objects/> <groups/>", "info"), ("", "info"), ("<objects> <IKMarkerTask name='asis'/> </objects>", "error")],
+    [
+        ("<objects/> <groups/>", "info"),
+        ("", "info"),
+        ("<objects> <IKMarkerTask name='asis'/> </objects>", "error"),
+    ],
 )
-def test_what_stands_in_a_set_that_is_read_from_a_file_is_lost_only_if_it_is_something(project, content, severity):
+def test_what_stands_in_a_set_that_is_read_from_a_file_is_lost_only_if_it_is_something(
+    project, content, severity
+):
     setup = project / "ik.xml"
     start, rest = setup.read_text().split("<IKTaskSet")
     tasks, end = rest.split("</IKTaskSet>")
@@ -318,5 +383,10 @@ def test_what_stands_in_a_set_that_is_read_from_a_file_is_lost_only_if_it_is_som
 
 def test_a_weight_of_zero_is_a_warning_where_nobody_gave_it(project):
     setup = project / "ik.xml"
-    setup.write_text(setup.read_text().replace("<weight>1</weight>", "").replace("<weight>2<", "<weight>0<"))
-    assert [str(finding.severity) for finding in validate(setup, select="OSIM851").findings] == ["warning", "info"]
+    setup.write_text(
+        setup.read_text().replace("<weight>1</weight>", "").replace("<weight>2<", "<weight>0<")
+    )
+    assert [str(finding.severity) for finding in validate(setup, select="OSIM851").findings] == [
+        "warning",
+        "info",
+    ]

@@ -23,7 +23,9 @@ def expected(line: bytes, layout: Layout) -> bytes:
         return b"\t".join(map(told, line.split(b"\t")))
     words = line.replace(b"\t", b" ").split(b" ")
     if layout is VECTORS:
-        return b"".join(b",".join(told(part) or b"!" for part in word.split(b",")) for word in words if word)
+        return b"".join(
+            b",".join(told(part) or b"!" for part in word.split(b",")) for word in words if word
+        )
     return b"".join(map(told, words))
 
 
@@ -57,7 +59,11 @@ def test_lines_are_told_each_for_itself(lines):
             check(line, look, layout)
 
 
-@given(st.lists(st.sampled_from(["0", "-0.0", "00.", "1", "-20.5", "0.001", ""]), min_size=1, max_size=9))
+@given(
+    st.lists(
+        st.sampled_from(["0", "-0.0", "00.", "1", "-20.5", "0.001", ""]), min_size=1, max_size=9
+    )
+)
 def test_a_zero_among_markers_is_not_missed(cells):
     zeros = any(cell and not cell.strip("-0.") for cell in cells)
     assert shapes("\t".join([*cells, "\n"]).encode(), MARKERS)[1] == zeros

@@ -28,7 +28,8 @@ def frames(count: int, first: str) -> str:
         for k, link in enumerate(links)
     )
     return model(
-        BODY.format("b", "", ""), f"<ComponentSet name='componentset'><objects>{items}</objects></ComponentSet>"
+        BODY.format("b", "", ""),
+        f"<ComponentSet name='componentset'><objects>{items}</objects></ComponentSet>",
     )
 
 
@@ -49,7 +50,9 @@ KINDS = {
     "elements": lambda n: model(BODY.format("b", "", "<foo>1</foo>" * n)),
     "classes": lambda n: model("<Foo name='x'/>" * n),
     "circle of frames": circle,
-    "sockets to nothing": lambda n: model("", f"<components>{''.join(LOST.format(k) for k in range(n))}</components>"),
+    "sockets to nothing": lambda n: model(
+        "", f"<components>{''.join(LOST.format(k) for k in range(n))}</components>"
+    ),
     "frames of frames": lambda n: frames(n, "/bodyset/b"),
     "frames in a circle": lambda n: frames(n, f"/componentset/f{n - 1}"),
     "names of nothing": lambda n: model(
@@ -83,8 +86,12 @@ def test_four_times_as_much_is_four_times_the_work(kind):
     assert large < 5.5 * small
 
 
-@pytest.mark.parametrize("value", ["1" * choose(1_000_000, 5_000_000), "1 " * 100_000, "x" * 100_000])
+@pytest.mark.parametrize(
+    "value", ["1" * choose(1_000_000, 5_000_000), "1 " * 100_000, "x" * 100_000]
+)
 def test_long_values_are_cut(value):
-    report = check_source(Source.of_characters(model(BODY.format("b", "", "").replace(">1<", f">{value}<"))))
+    report = check_source(
+        Source.of_characters(model(BODY.format("b", "", "").replace(">1<", f">{value}<")))
+    )
     assert report.findings
     assert all(len(finding.message) <= LONGEST for finding in report.findings)

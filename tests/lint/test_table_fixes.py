@@ -15,9 +15,7 @@ from osimlite.lint.engine import run, subject_in
 from osimlite.lint.fixes import edits_of, mended
 
 LINT = Path(__file__).resolve().parents[2] / "fixtures" / "lint"
-MOTION = (
-    b"knee\nversion=1\nnRows=3\nnColumns=3\ninDegrees=yes\nendheader\ntime\tknee\thip\n0\t1\t2\n0.1\t1\t3\n0.2\t1\t4\n"
-)
+MOTION = b"knee\nversion=1\nnRows=3\nnColumns=3\ninDegrees=yes\nendheader\ntime\tknee\thip\n0\t1\t2\n0.1\t1\t3\n0.2\t1\t4\n"
 MARKERS = (LINT / "leg.trc").read_bytes().replace(b"Z3\t\n", b"Z3\n")
 
 BROKEN = [
@@ -64,7 +62,9 @@ def test_a_broken_table_is_as_it_was(what, data, old, new, end):
 @given(st.text(max_size=20), st.sampled_from(["true", "1", "TRUE"]))
 def test_letters_of_any_script_before_a_mend_stay(title, word):
     title = re.sub(r"\s|=", "", title).encode("utf-8", "ignore").decode()
-    data = MOTION.replace(b"knee\n", f"{title or 'k'}\n".encode(), 1).replace(b"\thip", "\tHüfte".encode())
+    data = MOTION.replace(b"knee\n", f"{title or 'k'}\n".encode(), 1).replace(
+        b"\thip", "\tHüfte".encode()
+    )
     assert mend("a.mot", data.replace(b"=yes", f"={word}".encode())) == data
 
 
@@ -143,7 +143,9 @@ def test_a_name_in_a_setup_is_mended_as_surely_as_it_is_known(setup_file, change
 
 def test_only_the_words_of_the_finding_are_replaced(setup_file):
     # Whoever wrote a letter as its number had a reason.
-    broken = SETUP.format(**{**RIGHT, "coordinate": "knee_anlge"}).replace('"knee_anlge"', '"&#107;nee_anlge"')
+    broken = SETUP.format(**{**RIGHT, "coordinate": "knee_anlge"}).replace(
+        '"knee_anlge"', '"&#107;nee_anlge"'
+    )
     assert mend(setup_file, broken.encode(), unsafe=True).decode() == broken
 
 

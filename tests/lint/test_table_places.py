@@ -7,14 +7,18 @@ import pytest
 from osimlite.lint.engine import run
 from osimlite.lint.table import Table
 
-STORAGE = "walk\nversion=1\nnRows=6\nnColumns=3\ninDegrees=yes\nendheader\ntime\thip\tknee\n" + "".join(
-    f"{row / 10:.1f}\t{10 + 1.5 * row:.2f}\t{-20 - row:.2f}\n" for row in range(6)
+STORAGE = (
+    "walk\nversion=1\nnRows=6\nnColumns=3\ninDegrees=yes\nendheader\ntime\thip\tknee\n"
+    + "".join(f"{row / 10:.1f}\t{10 + 1.5 * row:.2f}\t{-20 - row:.2f}\n" for row in range(6))
 )
 MARKERS = (
     "PathFileType\t4\t(X/Y/Z)\tw.trc\n"
     "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n"
     "100\t100\t6\t2\tmm\t100\t1\t6\nFrame#\tTime\tRASI\t\t\tLASI\t\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\t\n\n"
-) + "".join(f"{row + 1}\t{row / 100:.2f}\t{100 + row}\t1000\t50\t{120 + row}\t900\t-150\n" for row in range(6))
+) + "".join(
+    f"{row + 1}\t{row / 100:.2f}\t{100 + row}\t1000\t50\t{120 + row}\t900\t-150\n"
+    for row in range(6)
+)
 
 OF_STORAGE = {
     "NaN": ("13.00", "NaN", ["OSIM807 10:5"]),
@@ -56,10 +60,18 @@ OF_MARKERS = {
     "NaN": ("122\t900", "122\tNaN", ["OSIM812 9:20"]),
     "word": ("102\t1000", "102\tabc", ["OSIM807 9:12"]),
     "0 0 0": ("102\t1000\t50", "0\t0\t0", ["OSIM812 9:8"]),
-    "0 0 0 behind NaN": ("102\t1000\t50\t122\t900\t-150", "NaN\tNaN\tNaN\t0\t0\t0", ["OSIM812 9:20"]),
+    "0 0 0 behind NaN": (
+        "102\t1000\t50\t122\t900\t-150",
+        "NaN\tNaN\tNaN\t0\t0\t0",
+        ["OSIM812 9:20"],
+    ),
     "short row": ("122\t900\t-150", "122\t900", ["OSIM806 9:27"]),
     "tabs at the end": ("122\t900\t-150", "122\t900\t-150\t\t", ["OSIM806 9:33"]),
-    "blanks for tabs": ("3\t0.02\t102\t1000\t50\t122\t900\t-150", "3 0.02 102 1000 50 122 900 -150", ["OSIM806 9:32"]),
+    "blanks for tabs": (
+        "3\t0.02\t102\t1000\t50\t122\t900\t-150",
+        "3 0.02 102 1000 50 122 900 -150",
+        ["OSIM806 9:32"],
+    ),
     "frames": ("\t6\t2", "\t9\t2", ["OSIM802 3:9"]),
     "rate": ("\n100\t100\t6", "\n50\t100\t6", ["OSIM803 3:1"]),
     "rate in words": ("\n100\t100\t6", "\nx\t100\t6", ["OSIM803 3:1"]),
@@ -101,4 +113,6 @@ def test_a_fault_is_found_in_its_line_and_column(name, good, change):
     result = run(Table(text.encode(), file)).findings
     assert [f"{finding.code} {finding.line}:{finding.column}" for finding in result] == wanted
     windows = run(Table(text.replace("\n", "\r\n").encode(), file)).findings
-    assert [(finding.line, finding.column) for finding in windows] == [(one.line, one.column) for one in result]
+    assert [(finding.line, finding.column) for finding in windows] == [
+        (one.line, one.column) for one in result
+    ]

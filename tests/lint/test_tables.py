@@ -21,12 +21,24 @@ def numbers(draw: random.Random) -> str:
     return draw.choice(["%.6f", "%16.8f", "%g", "%.17g", "%.3e", "%+.2f"]) % value
 
 
-@given(st.randoms(use_true_random=False), st.integers(1, 8), st.integers(1, 40), st.sampled_from(["\t", " ", "  \t "]))
+@given(
+    st.randoms(use_true_random=False),
+    st.integers(1, 8),
+    st.integers(1, 40),
+    st.sampled_from(["\t", " ", "  \t "]),
+)
 def test_rows_of_numbers_in_any_form_have_no_fault(draw, columns, count, separator):
-    lines = [separator.join([str(row / 8), *(numbers(draw) for _ in range(columns))]) for row in range(count)]
+    lines = [
+        separator.join([str(row / 8), *(numbers(draw) for _ in range(columns))])
+        for row in range(count)
+    ]
     text = draw.choice(["\n", "\r\n"]).join([*lines, ""])
     rows = Scan(columns + 1).run(text.encode(), 0, 1)
-    assert (rows.count, list(rows.times), rows.faults) == (count, [row / 8 for row in range(count)], {})
+    assert (rows.count, list(rows.times), rows.faults) == (
+        count,
+        [row / 8 for row in range(count)],
+        {},
+    )
 
 
 WRONG = [
@@ -50,12 +62,18 @@ WRONG = [
 ]
 
 
-@given(st.randoms(use_true_random=False), st.integers(1, 6), st.integers(2, 30), st.sampled_from(WRONG))
+@given(
+    st.randoms(use_true_random=False), st.integers(1, 6), st.integers(2, 30), st.sampled_from(WRONG)
+)
 def test_a_cell_that_is_no_number_is_found_where_it_is(draw, columns, count, wrong):
-    rows = [[str(row / 8), *(numbers(draw).strip() for _ in range(columns))] for row in range(count)]
+    rows = [
+        [str(row / 8), *(numbers(draw).strip() for _ in range(columns))] for row in range(count)
+    ]
     row, column = draw.randrange(count), draw.randint(1, columns)
     rows[row][column] = wrong
-    result = Scan(columns + 1).run("".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 5)
+    result = Scan(columns + 1).run(
+        "".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 5
+    )
     (fault,) = result.faults.values()
     place = sum(map(len, rows[row][:column])) + column + 1
     assert (fault.kind, fault.number, fault.line, fault.column) == ("cell", column, row + 5, place)
@@ -63,10 +81,14 @@ def test_a_cell_that_is_no_number_is_found_where_it_is(draw, columns, count, wro
 
 @given(st.randoms(use_true_random=False), st.integers(2, 6), st.integers(3, 30), st.booleans())
 def test_a_row_of_another_length_is_found(draw, columns, count, longer):
-    rows = [[str(row / 8), *(numbers(draw).strip() for _ in range(columns))] for row in range(count)]
+    rows = [
+        [str(row / 8), *(numbers(draw).strip() for _ in range(columns))] for row in range(count)
+    ]
     row = draw.randrange(count)
     rows[row] = [*rows[row], "7"] if longer else rows[row][:-1]
-    result = Scan(columns + 1).run("".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 1)
+    result = Scan(columns + 1).run(
+        "".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 1
+    )
     (fault,) = result.faults.values()
     assert (fault.kind, fault.line, fault.number) == ("row", row + 1, len(rows[row]))
 
@@ -74,7 +96,9 @@ def test_a_row_of_another_length_is_found(draw, columns, count, longer):
 @given(st.binary(max_size=300), st.sampled_from(["a.sto", "a.mot", "a.trc"]), st.data())
 def test_no_bytes_make_the_check_fail(data, name, more):
     start = more.draw(
-        st.sampled_from([b"", b"x\nversion=1\nnRows=1\nendheader\ntime\ta\n0\t1\n", b"PathFileType\t4\n"])
+        st.sampled_from(
+            [b"", b"x\nversion=1\nnRows=1\nendheader\ntime\ta\n0\t1\n", b"PathFileType\t4\n"]
+        )
     )
     run(Table(start + data, name))
 
@@ -108,7 +132,9 @@ def test_a_file_of_many_blocks_is_one_table(tmp_path, monkeypatch):
     lines = [f"{row / 100:.2f}\t{row}\t-1.5" for row in range(200)]
     lines[150] = lines[150].replace("-1.5", "nan")
     path = tmp_path / "walk.sto"
-    path.write_text("x\nversion=1\nnRows=200\nnColumns=3\nendheader\ntime\ta\tb\n" + "\n".join(lines))
+    path.write_text(
+        "x\nversion=1\nnRows=200\nnColumns=3\nendheader\ntime\ta\tb\n" + "\n".join(lines)
+    )
     table = subject_of(str(path))
     (finding,) = run(table).findings
     assert (finding.code, finding.line, finding.column) == ("OSIM807", 157, 10)
@@ -116,11 +142,15 @@ def test_a_file_of_many_blocks_is_one_table(tmp_path, monkeypatch):
     assert (table.span, round(table.step, 9), table.rows.line_of(199)) == ((0.0, 1.99), 0.01, 206)
 
 
-@pytest.mark.parametrize(("times", "severity"), [("0 0.1 0.2 0.2", "info"), ("0 0.1 0.1 0.2", "warning")])
+@pytest.mark.parametrize(
+    ("times", "severity"), [("0 0.1 0.2 0.2", "info"), ("0 0.1 0.1 0.2", "warning")]
+)
 def test_the_last_row_twice_is_how_opensim_ends_some_results(tmp_path, times, severity):
     rows = "".join(f"{time} 0.5\n" for time in times.split())
     file = tmp_path / "states.sto"
-    file.write_text(f"states\nversion=1\nnRows=4\nnColumns=2\ninDegrees=no\nendheader\ntime knee\n{rows}")
+    file.write_text(
+        f"states\nversion=1\nnRows=4\nnColumns=2\ninDegrees=no\nendheader\ntime knee\n{rows}"
+    )
     (finding,) = run(subject_of(str(file))).findings
     assert (finding.code, str(finding.severity)) == ("OSIM808", severity)
 

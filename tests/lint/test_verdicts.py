@@ -80,7 +80,10 @@ def test_a_comment_written_as_an_element_is_one_finding_with_a_fix(tmp_path: Pat
 
 def _apply(path: Path, report: Report) -> str:
     text = path.read_text()
-    edits = sorted((edit for item in report if item.fix for edit in item.fix.edits), key=lambda edit: -edit.start)
+    edits = sorted(
+        (edit for item in report if item.fix for edit in item.fix.edits),
+        key=lambda edit: -edit.start,
+    )
     for edit in edits:
         text = text[: edit.start] + edit.text + text[edit.end :]
     return text
@@ -88,8 +91,13 @@ def _apply(path: Path, report: Report) -> str:
 
 def test_the_location_of_a_moving_point_goes_with_a_fix():
     coordinate = "/jointset/j/q"
-    sockets = "".join(f"<socket_{axis}_coordinate>{coordinate}</socket_{axis}_coordinate>" for axis in "xyz")
-    functions = "".join(f"<{axis}_location><Constant><value>0.1</value></Constant></{axis}_location>" for axis in "xyz")
+    sockets = "".join(
+        f"<socket_{axis}_coordinate>{coordinate}</socket_{axis}_coordinate>" for axis in "xyz"
+    )
+    functions = "".join(
+        f"<{axis}_location><Constant><value>0.1</value></Constant></{axis}_location>"
+        for axis in "xyz"
+    )
     moving = (
         '<MovingPathPoint name="M"><location>0 0 0</location>'
         f"<socket_parent_frame>/bodyset/a</socket_parent_frame>{sockets}{functions}</MovingPathPoint>"
@@ -241,7 +249,9 @@ def test_a_coordinate_that_stands_three_times_is_no_traceback(shared: Path):
 def test_a_file_that_opensim_loads_is_not_said_to_be_refused(shared: Path, number: str):
     (folder,) = (shared / "cases").glob(f"attack-{number}-*")
     report = validate(folder / "m.osim", ignore="OSIM63")
-    claims = [item for item in report.errors if re.search("OpenSim.* refuses|refuses the", item.message)]
+    claims = [
+        item for item in report.errors if re.search("OpenSim.* refuses|refuses the", item.message)
+    ]
     assert not claims, str(report)
 
 

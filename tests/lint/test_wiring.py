@@ -28,14 +28,18 @@ def codes(fragment):
 
 
 def test_outputs_are_those_of_the_catalogue():
-    catalogue = json.loads((HERE.parents[1] / "schemas" / "opensim-4.6.json").read_text())["classes"]
+    catalogue = json.loads((HERE.parents[1] / "schemas" / "opensim-4.6.json").read_text())[
+        "classes"
+    ]
     seen = 0
     for name, module in MODULES.items():
         known = catalogue.get(name)
         if known is None or known["abstract"]:
             continue
         cls = getattr(importlib.import_module(f"{module}"), name)
-        expected = {item["name"]: (item["type"], item["list"]) for item in known.get("outputs") or []}
+        expected = {
+            item["name"]: (item["type"], item["list"]) for item in known.get("outputs") or []
+        }
         assert {word: tuple(output) for word, output in outputs_of(cls).items()} == expected, name
         seen += bool(expected)
     assert seen > 60
@@ -77,7 +81,9 @@ KNEE = "/jointset/knee/knee_angle"
 )
 def test_inputs_are_followed_as_opensim_does(words, right):
     tag = "TableReporter__double_"
-    result = codes(f'<components><{tag} name="r"><input_inputs>{words}</input_inputs></{tag}></components>')
+    result = codes(
+        f'<components><{tag} name="r"><input_inputs>{words}</input_inputs></{tag}></components>'
+    )
     assert result == (set() if right else {"OSIM332"})
 
 
@@ -92,7 +98,9 @@ def test_a_geometry_that_a_frame_draws_takes_no_input():
 def joint(declared, *names):
     custom = CustomJoint(name="j", coordinates=[Coordinate(name=name) for name in declared])
     transform = custom.spatial_transform
-    for axis, name in zip((transform.rotation1, transform.rotation2, transform.translation1), names, strict=False):
+    for axis, name in zip(
+        (transform.rotation1, transform.rotation2, transform.translation1), names, strict=False
+    ):
         axis.coordinates = (name,) if name else ()
     return custom
 
@@ -132,8 +140,14 @@ def test_axes_are_refused_as_opensim_does(declared, names, refused):
             "</socket_body_2></ConstantDistanceConstraint>",
             "OSIM301",
         ),
-        ('<JointInternalPowerProbe name="p"><joint_names>{}</joint_names></JointInternalPowerProbe>', "OSIM301"),
-        ('<ActuatorPowerProbe name="p"><actuator_names>{}</actuator_names></ActuatorPowerProbe>', "OSIM301"),
+        (
+            '<JointInternalPowerProbe name="p"><joint_names>{}</joint_names></JointInternalPowerProbe>',
+            "OSIM301",
+        ),
+        (
+            '<ActuatorPowerProbe name="p"><actuator_names>{}</actuator_names></ActuatorPowerProbe>',
+            "OSIM301",
+        ),
     ],
 )
 def test_names_in_constraints_and_probes_are_followed(fragment, code):

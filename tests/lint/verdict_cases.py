@@ -1,7 +1,7 @@
 """Small models with one fault each, what the linter must say, and what OpenSim 4.6 does (measured).
 
-A model is a pendulum `a` on the pin `q` and a slider `s` that carries `b`; a case adds elements to it.
-`tests/oracle/test_lint_verdicts.py` asks OpenSim for the same.
+A model is a pendulum `a` on the pin `q` and a slider `s` that carries `b`; a case adds elements to
+it. `tests/oracle/test_lint_verdicts.py` asks OpenSim for the same.
 """
 
 from __future__ import annotations
@@ -140,13 +140,19 @@ def expressions() -> list[Case]:
         )
         text = small_model(forces=force)
         cases.append(Case(f"bushing: {variable}", text, code, FAILS if code else RUNS))
-    for variables, formula, code in (("x", "x", ""), ("x", "y", "OSIM606"), ("x", "sin(x", "OSIM606")):
+    for variables, formula, code in (
+        ("x", "x", ""),
+        ("x", "y", "OSIM606"),
+        ("x", "sin(x", "OSIM606"),
+    ):
         function = (
             f"<ExpressionBasedFunction><variables>{variables}</variables>"
             f"<expression>{formula}</expression></ExpressionBasedFunction>"
         )
         verdict = FAILS if code else RUNS
-        cases.append(Case(f"function of {variables}: {formula}", prescribed(function), code, verdict))
+        cases.append(
+            Case(f"function of {variables}: {formula}", prescribed(function), code, verdict)
+        )
     return cases
 
 
@@ -189,21 +195,29 @@ def constraints() -> list[Case]:
             "OSIM422",
             FAILS,
         ),
-        ("a weld of a body with itself", weld("WeldConstraint", socket_frame1=A, socket_frame2=A), "", RUNS),
+        (
+            "a weld of a body with itself",
+            weld("WeldConstraint", socket_frame1=A, socket_frame2=A),
+            "",
+            RUNS,
+        ),
         ("a coupler on itself that holds", coupler("1 0", "q", "q"), "", RUNS),
         ("a coupler on itself", coupler("1 1", "q", "q"), "OSIM422", FAILS),
         ("a coupler with a coefficient too many", coupler("1 0 5", "q", "s"), "OSIM604", RUNS),
         ("a coupler without coordinates", coupler("1 0", "", "s"), "OSIM604", RUNS),
         ("a distance of zero", distance(GROUND, A, "0 0 0", 0), "OSIM206", FAILS),
     )
-    cases = [Case(name, small_model(constraints=text), code, verdict) for name, text, code, verdict in table]
+    cases = [
+        Case(name, small_model(constraints=text), code, verdict)
+        for name, text, code, verdict in table
+    ]
     locked = small_model(constraints=coupler("1 1", "s", "q"), coordinate=LOCKED).replace(
         "<default_value>0.2", f"{LOCKED}<default_value>0.2"
     )
     cases.append(Case("a coupler of two locked coordinates", locked, "OSIM422", FAILS))
-    clamped = small_model(constraints=coupler("1 3", "s", "q"), coordinate="<clamped>true</clamped>").replace(
-        "<default_value>0.2", f"{LOCKED}<default_value>0.2"
-    )
+    clamped = small_model(
+        constraints=coupler("1 3", "s", "q"), coordinate="<clamped>true</clamped>"
+    ).replace("<default_value>0.2", f"{LOCKED}<default_value>0.2")
     cases.append(Case("a coupler beyond a clamp", clamped, "OSIM423", RUNS))
     beyond = prescribed("<Constant><value>5</value></Constant>", "<clamped>true</clamped>")
     cases.append(Case("a function beyond a clamp", beyond, "OSIM423", RUNS))
@@ -221,28 +235,45 @@ def contradictions() -> list[Case]:
         ("slope", "<LinearFunction><coefficients>1 0.3</coefficients></LinearFunction>", "OSIM515"),
     ):
         verdict = FAILS if code else RUNS
-        cases.append(Case(f"locked and prescribed: {name}", prescribed(function, LOCKED), code, verdict))
+        cases.append(
+            Case(f"locked and prescribed: {name}", prescribed(function, LOCKED), code, verdict)
+        )
 
     def spring(first: str, second: str, one: str, two: str, **more: object) -> str:
         sockets = {"socket_body1": first, "socket_body2": second, "point1": one, "point2": two}
         return _tag("PointToPointSpring", **more, **sockets, stiffness=10, rest_length=0.1)
 
     def between(kind: str, first: str, second: str, one: str, two: str, **more: object) -> str:
-        bodies = {"body1": first, "body2": second} if kind.startswith("Exp") else {"bodyA": first, "bodyB": second}
-        points = {"point1": one, "point2": two} if kind.startswith("Exp") else {"pointA": one, "pointB": two}
+        bodies = (
+            {"body1": first, "body2": second}
+            if kind.startswith("Exp")
+            else {"bodyA": first, "bodyB": second}
+        )
+        points = (
+            {"point1": one, "point2": two}
+            if kind.startswith("Exp")
+            else {"pointA": one, "pointB": two}
+        )
         return _tag(kind, **bodies, **points, **more)
 
     springy = {"resting_length": 0.1, "stiffness": 10, "dissipation": 0}
 
     def band(*points: tuple[str, str], kind: str = "PathSpring", off: str = "") -> str:
-        inside = "".join(f"<{key}>{value}</{key}>" for key, value in springy.items() if kind == "PathSpring")
+        inside = "".join(
+            f"<{key}>{value}</{key}>" for key, value in springy.items() if kind == "PathSpring"
+        )
         return f'<{kind} name="f">{off}{path_of(*points)}{inside}</{kind}>'
 
     zero = "0 0 0"
     table = (
         ("a spring on one body", spring(A, A, zero, "1 0 0"), "OSIM542", FAILS),
         ("a spring on ground", spring(GROUND, GROUND, zero, "1 0 0"), "OSIM542", FAILS),
-        ("a spring on a body and its frame", spring(A, "/jointset/j/c", zero, zero), "OSIM542", FAILS),
+        (
+            "a spring on a body and its frame",
+            spring(A, "/jointset/j/c", zero, zero),
+            "OSIM542",
+            FAILS,
+        ),
         ("a spring of no length", spring(GROUND, A, zero, "0 0.3 0"), "OSIM541", FAILS),
         ("a short spring", spring(GROUND, A, zero, "0 0.300000001 0"), "", RUNS),
         (
@@ -302,13 +333,17 @@ def contradictions() -> list[Case]:
             FAILS,
         ),
     )
-    cases += [Case(name, small_model(forces=text), code, verdict) for name, text, code, verdict in table]
+    cases += [
+        Case(name, small_model(forces=text), code, verdict) for name, text, code, verdict in table
+    ]
     for value in ("-1", "0"):
         force = (
             f'<Blankevoort1991Ligament name="f">{path_of((GROUND, "0 1 0"), (A, zero))}'
             f"<slack_length>{value}</slack_length></Blankevoort1991Ligament>"
         )
-        cases.append(Case(f"a slack_length of {value}", small_model(forces=force), "OSIM206", FAILS))
+        cases.append(
+            Case(f"a slack_length of {value}", small_model(forces=force), "OSIM206", FAILS)
+        )
     return cases
 
 
@@ -322,7 +357,14 @@ def cables() -> list[Case]:
         "ContactHalfSpace": "<orientation>0 0 -1.5707963267948966</orientation>",
     }
 
-    def cable(kind: str, end: str, hint: str = "", frame: str = A, middle: str = "", force: str = "PathSpring") -> str:
+    def cable(
+        kind: str,
+        end: str,
+        hint: str = "",
+        frame: str = A,
+        middle: str = "",
+        force: str = "PathSpring",
+    ) -> str:
         def point(name: str, base: str, place: str) -> str:
             return (
                 f'<Scholz2015GeometryPathPoint name="{name}"><PathPoint name="x"><socket_parent_frame>{base}'
@@ -336,16 +378,22 @@ def cables() -> list[Case]:
                 f"</socket_contact_geometry>{hinted}</Scholz2015GeometryPathObstacle>"
             )
 
-        second = f'<ContactSphere name="h"><socket_frame>{A}</socket_frame><location>{middle}</location>'
+        second = (
+            f'<ContactSphere name="h"><socket_frame>{A}</socket_frame><location>{middle}</location>'
+        )
         second = f"{second}<radius>0.12</radius></ContactSphere>" if middle else ""
-        elements = point("p", GROUND, "-0.5 -0.3 0") + over("g", hint) + (over("h", "") if middle else "")
+        elements = (
+            point("p", GROUND, "-0.5 -0.3 0") + over("g", hint) + (over("h", "") if middle else "")
+        )
         elements += point("r", A, end)
         springy = "<resting_length>0.1</resting_length><stiffness>10</stiffness><dissipation>0</dissipation>"
         forces = (
             f'<{force} name="f"><Scholz2015GeometryPath name="path"><path_elements>{elements}</path_elements>'
             f"</Scholz2015GeometryPath>{springy if force == 'PathSpring' else ''}</{force}>"
         )
-        geometry = f'<{kind} name="g"><socket_frame>{frame}</socket_frame>{sizes[kind]}</{kind}>{second}'
+        geometry = (
+            f'<{kind} name="g"><socket_frame>{frame}</socket_frame>{sizes[kind]}</{kind}>{second}'
+        )
         return small_model(forces=forces, geometry=geometry)
 
     cases = []
@@ -355,9 +403,23 @@ def cables() -> list[Case]:
         middle = "0 0 0.2" if is_ring else "0 0 0"
         if not is_plane:
             cases.append(Case(f"a path over a {kind}", cable(kind, "0.4 0.02 0"), "", RUNS))
-            cases.append(Case(f"a hint in the middle of a {kind}", cable(kind, "0.4 0.02 0", middle), "OSIM534", FAILS))
+            cases.append(
+                Case(
+                    f"a hint in the middle of a {kind}",
+                    cable(kind, "0.4 0.02 0", middle),
+                    "OSIM534",
+                    FAILS,
+                )
+            )
         for force in ("PathSpring", "PathActuator", "Millard2012EquilibriumMuscle"):
-            cases.append(Case(f"{force}: a point in a {kind}", cable(kind, inside, force=force), "OSIM534", FAILS))
+            cases.append(
+                Case(
+                    f"{force}: a point in a {kind}",
+                    cable(kind, inside, force=force),
+                    "OSIM534",
+                    FAILS,
+                )
+            )
     sphere = "ContactSphere"
     # OpenSim takes the place in an offset frame for one in its body.
     by_offset = cable(sphere, "0.02 0.32 0", frame="/jointset/j/c")
@@ -370,9 +432,14 @@ def cables() -> list[Case]:
         ),
         Case("a point in a sphere by its offset frame", by_offset, "", RUNS),
         Case(
-            "a point in the second of two obstacles", cable(sphere, "0.4 0.02 0", middle="0.35 0 0"), "OSIM534", FAILS
+            "a point in the second of two obstacles",
+            cable(sphere, "0.4 0.02 0", middle="0.35 0 0"),
+            "OSIM534",
+            FAILS,
         ),
-        Case("a path over two obstacles", cable(sphere, "0.4 0.02 0", middle="-0.55 0 0"), "", RUNS),
+        Case(
+            "a path over two obstacles", cable(sphere, "0.4 0.02 0", middle="-0.55 0 0"), "", RUNS
+        ),
     ]
     return cases
 
@@ -382,10 +449,18 @@ def functions() -> list[Case]:
     table = (
         ("<SimmSpline><x>0 1 2</x><y>0 1 3 4</y></SimmSpline>", "OSIM602", RUNS),
         ("<PiecewiseLinearFunction><x>1</x><y>0.3</y></PiecewiseLinearFunction>", "", RUNS),
-        ("<PiecewiseLinearFunction><x>-1 1 1 2</x><y>0 1 3 4</y></PiecewiseLinearFunction>", "", RUNS),
+        (
+            "<PiecewiseLinearFunction><x>-1 1 1 2</x><y>0 1 3 4</y></PiecewiseLinearFunction>",
+            "",
+            RUNS,
+        ),
         ("<GCVSpline><half_order>1</half_order><x>0 1 2</x><y>0 1 3</y></GCVSpline>", "", RUNS),
         ("<GCVSpline><x>0 1 2</x><y>0 1 3</y></GCVSpline>", "OSIM603", FAILS),
-        ("<GCVSpline><half_order>2</half_order><x>0 1 2</x><y>0 1 3</y></GCVSpline>", "OSIM603", FAILS),
+        (
+            "<GCVSpline><half_order>2</half_order><x>0 1 2</x><y>0 1 3</y></GCVSpline>",
+            "OSIM603",
+            FAILS,
+        ),
         (
             "<StepFunction><transition_start_time>1</transition_start_time>"
             "<transition_end_time>0</transition_end_time></StepFunction>",
@@ -403,7 +478,9 @@ def functions() -> list[Case]:
         ("<SimmSpline><x>0 1</x><y>Inf 0</y></SimmSpline>", "OSIM205", FAILS),
         ("<Constant><value>NaN</value></Constant>", "OSIM205", FAILS),
     )
-    return [Case(function, prescribed(function), code, verdict) for function, code, verdict in table]
+    return [
+        Case(function, prescribed(function), code, verdict) for function, code, verdict in table
+    ]
 
 
 def unused() -> list[Case]:
@@ -423,7 +500,10 @@ def unused() -> list[Case]:
     points = "<x>0 2 1 3</x><y>0 1 2 3</y></GCVSpline>"
     faults = (
         (f'<GCVSpline name="g"><half_order>2</half_order>{points}', "OSIM601"),
-        ('<GCVSpline name="g"><half_order>2</half_order><x>0 1 2 3</x><y>0 1</y></GCVSpline>', "OSIM602"),
+        (
+            '<GCVSpline name="g"><half_order>2</half_order><x>0 1 2 3</x><y>0 1</y></GCVSpline>',
+            "OSIM602",
+        ),
         (f'<GCVSpline name="g">{points.replace("2 1", "1 2")}', "OSIM603"),
         ('<LinearFunction name="g"><coefficients></coefficients></LinearFunction>', "OSIM604"),
         ('<MultiplierFunction name="g" />', "OSIM605"),
@@ -435,9 +515,17 @@ def unused() -> list[Case]:
     )
     cases = []
     for function, code in faults:
-        for enabled, applied, verdict in (("true", "true", FAILS), ("false", "true", RUNS), ("true", "false", FAILS)):
-            text = small_model(forces=actuator.format(applied), controllers=controller.format(enabled, function))
-            cases.append(Case(f"{code}: controller {enabled}, actuator {applied}", text, code, verdict))
+        for enabled, applied, verdict in (
+            ("true", "true", FAILS),
+            ("false", "true", RUNS),
+            ("true", "false", FAILS),
+        ):
+            text = small_model(
+                forces=actuator.format(applied), controllers=controller.format(enabled, function)
+            )
+            cases.append(
+                Case(f"{code}: controller {enabled}, actuator {applied}", text, code, verdict)
+            )
         for applied, verdict in (("true", FAILS), ("false", RUNS)):
             text = small_model(forces=prescribed_force.format(applied, 3 * function))
             cases.append(Case(f"{code}: force {applied}", text, code, verdict))
@@ -455,8 +543,15 @@ def unused() -> list[Case]:
         ("1*x", "false", RUNS),
         ("2*(", "false", FAILS),
     ):
-        force = _tag("ExpressionBasedCoordinateForce", appliesForce=applied, coordinate="q", expression=formula)
-        cases.append(Case(f"{formula}: force {applied}", small_model(forces=force), "OSIM606", verdict))
+        force = _tag(
+            "ExpressionBasedCoordinateForce",
+            appliesForce=applied,
+            coordinate="q",
+            expression=formula,
+        )
+        cases.append(
+            Case(f"{formula}: force {applied}", small_model(forces=force), "OSIM606", verdict)
+        )
     return cases
 
 
@@ -470,9 +565,21 @@ def texts() -> list[Case]:
     plain = small_model(forces=spring)
     table = (
         ("a mass in a section", "<mass>1<", f"<mass>{section('1')}<", "", RUNS),
-        ("a mass in two sections", "<mass>1<", f"<mass>{section('1')}{section('')}<", "OSIM107", FAILS),
+        (
+            "a mass in two sections",
+            "<mass>1<",
+            f"<mass>{section('1')}{section('')}<",
+            "OSIM107",
+            FAILS,
+        ),
         ("a mass before a section", "<mass>1<", f"<mass>1{section(' ')}<", "OSIM107", FAILS),
-        ("a mass with blanks in a section", "<mass>1<", f"<mass>{section(' 1 ')}<", "OSIM107", FAILS),
+        (
+            "a mass with blanks in a section",
+            "<mass>1<",
+            f"<mass>{section(' 1 ')}<",
+            "OSIM107",
+            FAILS,
+        ),
         (
             "a name with a blank in a section",
             "<coordinate>q<",
@@ -494,11 +601,20 @@ def texts() -> list[Case]:
             "",
             RUNS,
         ),
-        ("text that nobody reads", "<mass>1</mass>", f"<mass>1</mass>{section('x')}{section('y')}", "", RUNS),
+        (
+            "text that nobody reads",
+            "<mass>1</mass>",
+            f"<mass>1</mass>{section('x')}{section('y')}",
+            "",
+            RUNS,
+        ),
         ("an instruction in a list", "<range>-2 2<", "<range>-2<?x y?> 2<", "OSIM107", FAILS),
         ("an instruction before a value", "<mass>1<", "<mass><?x y?>1<", "", RUNS),
     )
-    return [Case(name, plain.replace(old, new, 1), code, verdict) for name, old, new, code, verdict in table]
+    return [
+        Case(name, plain.replace(old, new, 1), code, verdict)
+        for name, old, new, code, verdict in table
+    ]
 
 
 def frames() -> list[Case]:
@@ -508,11 +624,18 @@ def frames() -> list[Case]:
         return f'<PhysicalOffsetFrame name="{name}"><socket_parent>{parent}</socket_parent></PhysicalOffsetFrame>'
 
     def extra(*frames: str) -> str:
-        return f'<ComponentSet name="componentset"><objects>{"".join(frames)}</objects></ComponentSet>'
+        return (
+            f'<ComponentSet name="componentset"><objects>{"".join(frames)}</objects></ComponentSet>'
+        )
 
     of_joint = small_model().replace(f"<socket_parent>{A}<", "<socket_parent>/jointset/j/c<")
     return [
-        Case("a frame on itself", small_model(extra=extra(frame("x", "/componentset/x"))), "OSIM411", FAILS),
+        Case(
+            "a frame on itself",
+            small_model(extra=extra(frame("x", "/componentset/x"))),
+            "OSIM411",
+            FAILS,
+        ),
         Case(
             "two frames on each other",
             small_model(extra=extra(frame("x", "/componentset/y"), frame("y", "/componentset/x"))),
@@ -546,7 +669,9 @@ def poses() -> list[Case]:
         ),
     )
     return [
-        Case("a gimbal at 90 degrees", joint("GimbalJoint", "1.5707963267948966"), "OSIM416", FAILS),
+        Case(
+            "a gimbal at 90 degrees", joint("GimbalJoint", "1.5707963267948966"), "OSIM416", FAILS
+        ),
         Case("a ball at 90 degrees", joint("BallJoint", "1.5707963267948966"), "", RUNS),
         Case("a ball at -90 degrees", joint("BallJoint", "-1.5707963267948966"), "", RUNS),
         Case("a gimbal at 1.57", joint("GimbalJoint", "1.57"), "", RUNS),
@@ -566,15 +691,26 @@ def others() -> list[Case]:
 
     disabled = "<enabled>false</enabled>"
     return [
-        Case("an external force", small_model(forces='<ExternalForce name="e"/>'), "OSIM543", FAILS),
+        Case(
+            "an external force", small_model(forces='<ExternalForce name="e"/>'), "OSIM543", FAILS
+        ),
         Case(
             "an external force that is off",
-            small_model(forces='<ExternalForce name="e"><appliesForce>false</appliesForce></ExternalForce>'),
+            small_model(
+                forces='<ExternalForce name="e"><appliesForce>false</appliesForce></ExternalForce>'
+            ),
             "OSIM543",
             FAILS,
         ),
-        Case("a reflex on a motor", small_model(forces=motor, controllers=reflex()), "OSIM544", FAILS),
-        Case("a reflex that is off", small_model(forces=motor, controllers=reflex(disabled)), "OSIM544", FAILS),
+        Case(
+            "a reflex on a motor", small_model(forces=motor, controllers=reflex()), "OSIM544", FAILS
+        ),
+        Case(
+            "a reflex that is off",
+            small_model(forces=motor, controllers=reflex(disabled)),
+            "OSIM544",
+            FAILS,
+        ),
         Case(
             "a class after 4.6",
             small_model(forces='<CoordinateLinearStopForce name="x"/>'),

@@ -26,18 +26,26 @@ def test_it_says_what_the_exercise_says() -> None:
     ]
     assert sum(body.mass for body in model.body_set.objects) == 6.0
     assert len(model.force_set.objects) == 10
-    assert all(model.tree().resolve(use).target is not None for use in model.tree().uses() if use.value)
+    assert all(
+        model.tree().resolve(use).target is not None for use in model.tree().uses() if use.value
+    )
 
 
 def test_it_is_written_and_read_back() -> None:
     text = to_text(dynamic_walker())
     model = read_text(text)
     assert to_text(model) == text
-    assert all(model.tree().resolve(use).target is not None for use in model.tree().uses() if use.value)
+    assert all(
+        model.tree().resolve(use).target is not None for use in model.tree().uses() if use.value
+    )
 
 
-@pytest.mark.parametrize(("thigh", "shank", "width", "slope"), [(0.42, 0.4, 0.1, 3.0), (0.3, 0.5, 0.2, 0.0)])
-def test_its_parameters_go_where_they_belong(thigh: float, shank: float, width: float, slope: float) -> None:
+@pytest.mark.parametrize(
+    ("thigh", "shank", "width", "slope"), [(0.42, 0.4, 0.1, 3.0), (0.3, 0.5, 0.2, 0.0)]
+)
+def test_its_parameters_go_where_they_belong(
+    thigh: float, shank: float, width: float, slope: float
+) -> None:
     model = dynamic_walker(thigh_length=thigh, shank_length=shank, pelvis_width=width, slope=slope)
     at = {c.path: c for c in model.components()}
     assert at["/jointset/RightThighToPelvis/Pelvis_offset"].translation == (0.0, 0.0, width)

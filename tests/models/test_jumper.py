@@ -57,7 +57,9 @@ def test_it_flies_and_lands_on_its_feet(jump):
     simulation, motion = jump
     events = motion.summary["contact_events"]
     left = max(event["time_s"] for event in events if event["event"] == "end")
-    back = [event["contact"] for event in events if event["event"] == "begin" and event["time_s"] > left]
+    back = [
+        event["contact"] for event in events if event["event"] == "begin" and event["time_s"] > left
+    ]
     assert sorted(back) == sorted(simulation.engine.contacts)
     assert min(event["time_s"] for event in events if event["time_s"] > left) - left > 0.4
     bent = dict(zip(motion.coordinates, motion.values[-1], strict=True))

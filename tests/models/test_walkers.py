@@ -23,7 +23,9 @@ def test_the_file_is_the_model(fixtures, name):
 def test_the_furthest_walker_is_the_exercise_but_for_its_start():
     model, exercise = furthest_walker(), dynamic_walker()
     model.name = exercise.name
-    for one, other in zip(model.components(Coordinate), exercise.components(Coordinate), strict=True):
+    for one, other in zip(
+        model.components(Coordinate), exercise.components(Coordinate), strict=True
+    ):
         if other.name in FURTHEST_START:
             other.default_value, other.default_speed_value = FURTHEST_START[other.name]
             other.range = one.range
@@ -43,6 +45,10 @@ def test_the_furthest_walker_makes_four_steps(accuracy):
         _, depths = along_slope(engine, start[None])
     assert [step.foot for step in walk.steps] == [1, 0, 1, 0] and walk.scuffs == []
     assert (walk.ending, walk.fell_on) == ("fell", "RKneeForce")
-    assert walk.distance == pytest.approx(0.5136, abs=1e-3) and walk.end == pytest.approx(1.7175, abs=1e-3)
-    standing = {engine.contacts[index]: depth for index, depth in enumerate(depths[0]) if depth > 0.0}
+    assert walk.distance == pytest.approx(0.5136, abs=1e-3) and walk.end == pytest.approx(
+        1.7175, abs=1e-3
+    )
+    standing = {
+        engine.contacts[index]: depth for index, depth in enumerate(depths[0]) if depth > 0.0
+    }
     assert standing == {"RFootForce": pytest.approx(8e-4, abs=1e-5)}

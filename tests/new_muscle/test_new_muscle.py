@@ -67,7 +67,11 @@ def findings(path, old, new):
 def test_it_is_read_and_written(file, straight_muscle):
     model = osimlite.read(file)
     muscle = model["/forceset/biceps"]
-    assert type(muscle) is straight_muscle and muscle.grip == 1.2 and muscle.geometry_path.name == "path"
+    assert (
+        type(muscle) is straight_muscle
+        and muscle.grip == 1.2
+        and muscle.geometry_path.name == "path"
+    )
     assert osimlite.to_text(model).count("<grip>1.2</grip>") == 1
 
 
@@ -75,7 +79,9 @@ def test_states_and_outputs_have_their_names(file, straight_muscle):
     model = osimlite.read(file)
     assert states_of(model["/forceset/biceps"]) == ["activation"]
     assert "/forceset/biceps/activation" in variables(model.tree(), "state variable")
-    assert "spare_force" in outputs_of(straight_muscle) and "fiber_force" in outputs_of(straight_muscle)
+    assert "spare_force" in outputs_of(straight_muscle) and "fiber_force" in outputs_of(
+        straight_muscle
+    )
 
 
 def test_the_linter_knows_its_domains(file):
@@ -84,7 +90,11 @@ def test_the_linter_knows_its_domains(file):
         ("<width>-1</width>", "OSIM206", "more than 0: OpenSim refuses the model"),
         ("<rise_time>0</rise_time>", "OSIM206", "accelerations become NaN"),
         ("<rise_time>-1</rise_time>", "OSIM207", "it should be more than 0"),
-        ("<pennation_angle_at_optimal>0.1</pennation_angle_at_optimal>", "OSIM207", "should be 0 to 0"),
+        (
+            "<pennation_angle_at_optimal>0.1</pennation_angle_at_optimal>",
+            "OSIM207",
+            "should be 0 to 0",
+        ),
         ("<width>0.1</width>", "OSIM209", "its grip is above 1 + width: OpenSim refuses the model"),
     ):
         every = findings(file, "<grip>1.2</grip>", f"<grip>1.2</grip>{new}")
@@ -98,11 +108,14 @@ def test_the_linter_knows_its_domains(file):
 
 @pytest.mark.parametrize("engine", ["compiled"])
 def test_it_moves_and_is_recorded(file, engine):
-    trajectory = osimlite.simulate(osimlite.read(file), to=0.05, engine=engine, accuracy=1e-9, controls={"biceps": 1.0})
+    trajectory = osimlite.simulate(
+        osimlite.read(file), to=0.05, engine=engine, accuracy=1e-9, controls={"biceps": 1.0}
+    )
     activation = trajectory.auxiliary["/forceset/biceps/activation"]
     assert activation[0] == 0.4
     assert activation[-1] == pytest.approx(1.0 - 0.6 * math.exp(-0.05 / 0.02), rel=1e-7)
-    # At the start: strength, activation, 1 - 0.2 / 0.5 for the strain; the load is drawn towards ground.
+    # At the start: strength, activation, 1 - 0.2 / 0.5 for the strain; the load is drawn towards
+    # ground.
     force = 100.0 * 0.4 * (1.0 - 0.2 / 0.5)
     assert trajectory.forces["biceps"][0] == pytest.approx(force, rel=1e-12)
     assert trajectory.values[-1][0] < 0.32
@@ -124,7 +137,9 @@ def test_mujoco_has_it(file):
     compiled = mujoco.MjModel.from_xml_string(mjcf.text)
     actuator = compiled.actuator("biceps")
     # Least squares fit the curves; strength, vmax and fvmax are the model's.
-    assert (actuator.gainprm[2], actuator.gainprm[6], actuator.gainprm[8]) == pytest.approx((100.0, 10.0, 1.2))
+    assert (actuator.gainprm[2], actuator.gainprm[6], actuator.gainprm[8]) == pytest.approx(
+        (100.0, 10.0, 1.2)
+    )
     assert actuator.dynprm[:2].tolist() == [0.02, 0.02]
     assert mjcf.fidelity.translated["/forceset/biceps"] == "actuator biceps"
 

@@ -41,7 +41,10 @@ def differences(function, w, ways):
     """Derivatives (m, ways) of an array along ways (n, ways): central differences, extrapolated from two steps."""
 
     def extrapolated(way):
-        one, two, four = ((function(w + k * way) - function(w - k * way)) / (2.0 * k * STEP) for k in (0.25, 0.5, 1.0))
+        one, two, four = (
+            (function(w + k * way) - function(w - k * way)) / (2.0 * k * STEP)
+            for k in (0.25, 0.5, 1.0)
+        )
         return (64.0 * one - 20.0 * two + four) / 45.0
 
     return np.array([extrapolated(STEP * way) for way in ways.T]).T
@@ -51,7 +54,9 @@ def worst(found, wanted, name):
     """The greatest difference over the greatest entry of its row, and where it is."""
     off = np.abs(found - wanted) / np.maximum(1.0, np.abs(wanted).max(axis=1, keepdims=True))
     row, column = np.unravel_index(np.argmax(off), off.shape)
-    return off[row, column], f"{name(row)} by number {column}: {found[row, column]} and {wanted[row, column]}"
+    return off[
+        row, column
+    ], f"{name(row)} by number {column}: {found[row, column]} and {wanted[row, column]}"
 
 
 def check(study, folder, *, tolerance=1e-7, curved=True):
@@ -99,13 +104,17 @@ GROUP = {"contact_force_paths": ("/forceset/contact0", "/forceset/contact1"), "e
          "alternative_frame_paths": BODIES}  # fmt: skip
 FOOT = [
     osimlite.MocoStepTimeAsymmetryGoalGroup(
-        contact_force_paths=(f"/forceset/contact{k}",), foot_position_contact_force_path=f"/forceset/contact{k}"
+        contact_force_paths=(f"/forceset/contact{k}",),
+        foot_position_contact_force_path=f"/forceset/contact{k}",
     )
     for k in range(2)
 ]
 PAIR = osimlite.MocoPeriodicityGoalPair
 PARAMETER = osimlite.MocoParameter(
-    name="mass", moco_bounds=osimlite.MocoBounds(bounds=(0.5, 2.0)), component_paths=(BODIES[1],), property_name="mass"
+    name="mass",
+    moco_bounds=osimlite.MocoBounds(bounds=(0.5, 2.0)),
+    component_paths=(BODIES[1],),
+    property_name="mass",
 )
 SWING = "/jointset/j0/q0/value"
 FRAMES = {"frame_paths": BODIES}
@@ -182,7 +191,11 @@ PATHS = {
     },
 }  # fmt: skip
 """By classes of path constraints what they ask for."""
-OF_MUSCLES = "MocoInitialActivationGoal", "MocoInitialForceEquilibriumDGFGoal", "MocoInitialVelocityEquilibriumDGFGoal"
+OF_MUSCLES = (
+    "MocoInitialActivationGoal",
+    "MocoInitialForceEquilibriumDGFGoal",
+    "MocoInitialVelocityEquilibriumDGFGoal",
+)
 NOT_LINEAR = "MocoStepTimeAsymmetryGoal", "MocoContactImpulseTrackingGoal"
 
 
@@ -190,7 +203,11 @@ NOT_LINEAR = "MocoStepTimeAsymmetryGoal", "MocoContactImpulseTrackingGoal"
 def test_goals(kind, tmp_path):
     tables(tmp_path)
     model = links("implicit", "elastic") if kind in OF_MUSCLES else links()
-    study = study_of(model, getattr(osimlite, kind)(name="goal", **GOALS[kind]), transcription_scheme="trapezoidal")
+    study = study_of(
+        model,
+        getattr(osimlite, kind)(name="goal", **GOALS[kind]),
+        transcription_scheme="trapezoidal",
+    )
     if kind == "MocoExpressionBasedParameterGoal":
         study.problem.phases.parameters = [PARAMETER.copy_deep()]
     check(study, tmp_path, curved=kind not in NOT_LINEAR)
@@ -201,7 +218,9 @@ def test_every_class_is_checked():
     known = {"goals": GOALS, "constraints": PATHS}
     for package, cases in known.items():
         folder = Path(optimal.__file__).parent / package
-        assert {file.stem for file in folder.glob("moco_*.py")} == {module_name(kind) for kind in cases}
+        assert {file.stem for file in folder.glob("moco_*.py")} == {
+            module_name(kind) for kind in cases
+        }
 
 
 @pytest.mark.parametrize("everywhere", [False, True])
@@ -210,7 +229,12 @@ def test_path_constraints(kind, everywhere, tmp_path):
     constraint = getattr(osimlite, kind)(name="path", **PATHS[kind])
     effort = osimlite.MocoControlGoal(name="effort")
     check(
-        study_of(links(), effort, constraints=[constraint], enforce_path_constraint_mesh_interior_points=everywhere),
+        study_of(
+            links(),
+            effort,
+            constraints=[constraint],
+            enforce_path_constraint_mesh_interior_points=everywhere,
+        ),
         tmp_path,
     )
 
@@ -227,9 +251,13 @@ IMPLICIT = {
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_schemes_and_dynamics(scheme, mode, tmp_path):
     """With muscles of all kinds, a free mass, and controls that are free between nodes."""
-    choices = {"interpolate_control_mesh_interior_points": False} | (IMPLICIT if mode == "implicit" else {})
+    choices = {"interpolate_control_mesh_interior_points": False} | (
+        IMPLICIT if mode == "implicit" else {}
+    )
     model = links("implicit", "elastic", "rigid")
-    study = study_of(model, osimlite.MocoControlGoal(name="effort"), transcription_scheme=scheme, **choices)
+    study = study_of(
+        model, osimlite.MocoControlGoal(name="effort"), transcription_scheme=scheme, **choices
+    )
     study.problem.phases.parameters = [PARAMETER.copy_deep()]
     check(study, tmp_path)
 
@@ -260,12 +288,16 @@ def test_models_with_constraints(scheme, method, derived, mode, tmp_path):
 def test_loads_over_time(mode, tmp_path):
     """Loads are numbers that are renewed for each time, and push as they do where time is a symbol."""
     tables(tmp_path)
-    model = osimlite.modify(links(), osimlite.ModOpAddExternalLoads(filepath=str(tmp_path / "loads.xml")))
+    model = osimlite.modify(
+        links(), osimlite.ModOpAddExternalLoads(filepath=str(tmp_path / "loads.xml"))
+    )
     sine = osimlite.Sine(amplitude=30.0, omega=4.0, phase=0.2, offset=3.0)
     push = osimlite.PrescribedForce(name="push", socket_frame=BODIES[0])
     push.torqueFunctions.objects = [sine.copy_deep() for _ in range(3)]
     model.add(push)
-    problem = problem_of(study_of(model, osimlite.MocoControlGoal(name="effort"), multibody_dynamics_mode=mode))
+    problem = problem_of(
+        study_of(model, osimlite.MocoControlGoal(name="effort"), multibody_dynamics_mode=mode)
+    )
     check(problem, tmp_path)
     assert len(problem.loads) == 9
     program = Program(problem)
@@ -278,7 +310,10 @@ def test_loads_over_time(mode, tmp_path):
         rates = values[:count] / (w[1] - w[0])
         wanted = np.array(f.dynamics(t, x, u, [])).ravel()
         if mode == "implicit":
-            wanted, rates = np.array(f.residual(t, x, rates, u, [], []))[2:4].ravel(), values[count:][:2]
+            wanted, rates = (
+                np.array(f.residual(t, x, rates, u, [], []))[2:4].ravel(),
+                values[count:][:2],
+            )
         assert rates == pytest.approx(wanted, rel=1e-11, abs=1e-11)
 
 

@@ -51,7 +51,9 @@ def test_a_fault_is_told(kind, tmp_path):
     study = tmp_path / "study.omoco"
     assert said_of(study) == ("", [])
     untold = []
-    for number, (sort, change) in enumerate(islice(faults(whole, random.Random(SEED)), WANTED // len(STUDIES))):
+    for number, (sort, change) in enumerate(
+        islice(faults(whole, random.Random(SEED)), WANTED // len(STUDIES))
+    ):
         file = tmp_path / change.file
         if change.text is None:
             file.unlink()

@@ -86,7 +86,9 @@ def test_names_of_coordinates_will_do(tmp_path):
     write_sto(tmp_path / "squat-25.sto", "", table.times, short, rows, in_degrees=True)
     again = problem_of_inverse(squat(tmp_path), folder=tmp_path)
     times = np.linspace(0.0, 1.0, 5)
-    assert again.functions.numbers(times) == pytest.approx(made.functions.numbers(times), rel=1e-9, abs=1e-9)
+    assert again.functions.numbers(times) == pytest.approx(
+        made.functions.numbers(times), rel=1e-9, abs=1e-9
+    )
 
 
 def test_setups_are_run_and_tell_the_motion_too(tmp_path):
@@ -94,10 +96,18 @@ def test_setups_are_run_and_tell_the_motion_too(tmp_path):
     outcome = osimlite.run(tmp_path / "setup.xml", simulates=True)
     assert outcome.done
     assert ("not simulated", "the motion was given") in outcome.told
-    page = osimlite.report({tmp_path / "setup.xml": outcome}, tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "<h1>squat</h1>" in page and "<h2>Controls</h2>" in page and "<h2>Contact forces</h2>" not in page
+    page = osimlite.report({tmp_path / "setup.xml": outcome}, tmp_path / "page.html").read_text(
+        encoding="utf-8"
+    )
+    assert (
+        "<h1>squat</h1>" in page
+        and "<h2>Controls</h2>" in page
+        and "<h2>Contact forces</h2>" not in page
+    )
     table = outcome.tables["squat_solution.sto"]
-    assert {"/jointset/hip_r/hip_flexion_r/value", "/jointset/hip_r/hip_flexion_r/speed"} <= {*table.columns}
+    assert {"/jointset/hip_r/hip_flexion_r/value", "/jointset/hip_r/hip_flexion_r/speed"} <= {
+        *table.columns
+    }
     speed = np.gradient(table["/jointset/hip_r/hip_flexion_r/value"], table.times)
     assert np.abs(speed - table["/jointset/hip_r/hip_flexion_r/speed"])[2:-2].max() < 0.3
 
@@ -112,14 +122,22 @@ def test_a_study_with_a_motion(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda phase: setattr(phase, "time_final_bounds", osimlite.MocoFinalBounds(bounds=(0.9, 1.1))), "be fixed"),
+        (
+            lambda phase: setattr(
+                phase, "time_final_bounds", osimlite.MocoFinalBounds(bounds=(0.9, 1.1))
+            ),
+            "be fixed",
+        ),
         (
             lambda phase: phase.parameters.append(
                 osimlite.MocoParameter(component_paths=("/bodyset/torso",), property_name="mass")
             ),
             "parameters",
         ),
-        (lambda phase: phase.goals.append(osimlite.MocoAverageSpeedGoal(name="speed")), "where the motion is given"),
+        (
+            lambda phase: phase.goals.append(osimlite.MocoAverageSpeedGoal(name="speed")),
+            "where the motion is given",
+        ),
     ],
 )
 def test_what_a_given_motion_excludes(change, words, tmp_path):

@@ -53,7 +53,9 @@ def test_the_second_step_mirrors_the_first(walk):
             assert column[-1] == pytest.approx(2.0 * column[half])
             continue
         other = re.sub(r"_([rl])(?=/|$)", lambda side: "_l" if side[1] == "r" else "_r", name)
-        np.testing.assert_allclose(column[half:], columns[other][: half + 1], rtol=0.0, atol=2e-3, err_msg=name)
+        np.testing.assert_allclose(
+            column[half:], columns[other][: half + 1], rtol=0.0, atol=2e-3, err_msg=name
+        )
         assert column[-1] == pytest.approx(column[0], abs=2e-3)
 
 
@@ -75,7 +77,11 @@ def test_the_ground_pushes_in_two_humps(walk):
     stance = np.concatenate([up[strike:-1], up[:strike]])
     stance = stance[: np.flatnonzero(stance < 0.02)[0]]
     third = len(stance) // 3
-    first, valley, second = stance[:third].max(), stance[third : 2 * third].min(), stance[third:].max()
+    first, valley, second = (
+        stance[:third].max(),
+        stance[third : 2 * third].min(),
+        stance[third:].max(),
+    )
     assert first > 1.1 and second > 1.0 and valley < 0.9
 
 
@@ -84,7 +90,9 @@ def test_it_takes_as_much_energy_as_people(walk):
     folder, found = walk
     model, motion = osimlite.read(folder / "human-walks.osim"), found.trajectory
     initial = {name: float(motion.columns[name][0]) for name in motion.names["states"]}
-    trajectory = osimlite.simulate(model, to=motion.times[-1], initial=initial, controls=found.controls, accuracy=1e-5)
+    trajectory = osimlite.simulate(
+        model, to=motion.times[-1], initial=initial, controls=found.controls, accuracy=1e-5
+    )
     (power,) = trajectory.probes.values()
     assert 3.0 < np.trapezoid(power, trajectory.times) / trajectory.times[-1] / 1.2 / 75.0 < 4.2
 
@@ -107,11 +115,14 @@ def test_a_report_shows_what_was_found(walk):
     told = dict(outcome.told)
     assert {"effort", "roughness", "objective"} <= {*told}
     near = re.fullmatch(
-        r"within 0\.01 rad or m of it up to (\S+) s of (\S+) s, (\S+) off at the end \(\w+\)", told["simulated"]
+        r"within 0\.01 rad or m of it up to (\S+) s of (\S+) s, (\S+) off at the end \(\w+\)",
+        told["simulated"],
     )
     assert near is not None
     # On so coarse a mesh for a while.
-    assert 0.03 < float(near[1]) <= float(near[2]) == pytest.approx(found.states.times[-1], rel=1e-3)
+    assert (
+        0.03 < float(near[1]) <= float(near[2]) == pytest.approx(found.states.times[-1], rel=1e-3)
+    )
     page = osimlite.report({file: outcome}, folder / "page.html").read_text(encoding="utf-8")
     assert [title for title in re.findall("<h2>(.+?)</h2>", page) if title != "Joint angles"] == [
         "Controls",
@@ -124,7 +135,9 @@ def test_a_report_shows_what_was_found(walk):
     assert {*up} == {"r", "l"}
     stride = found.stride.times
     assert np.trapezoid(up["r"] + up["l"], stride) / stride[-1] == pytest.approx(WEIGHT, rel=0.03)
-    assert {*collect_controls([trial])} == {name.rpartition("/")[2][:-2] for name in found.controls.columns}
+    assert {*collect_controls([trial])} == {
+        name.rpartition("/")[2][:-2] for name in found.controls.columns
+    }
 
 
 @pytest.mark.parametrize(
@@ -137,4 +150,7 @@ def test_a_report_shows_what_was_found(walk):
 def test_what_is_not_simulated(change, said, walk):
     folder, found = walk
     with pytest.raises(osimlite.OsimliteError, match=said):
-        simulated(osimlite.moco.problem_of(folder / "human-walks.omoco"), replace(found.trajectory, **change))
+        simulated(
+            osimlite.moco.problem_of(folder / "human-walks.omoco"),
+            replace(found.trajectory, **change),
+        )

@@ -13,13 +13,27 @@ from osimlite.optimal.refinement import carried, errors
 from tests.optimal.studies import study, study_file
 
 integrate = pytest.importorskip("scipy.integrate")
-ORDERS = {"trapezoidal": 3, "hermite-simpson": 4, "legendre-gauss-3": 4, "legendre-gauss-radau-2": 3}
+ORDERS = {
+    "trapezoidal": 3,
+    "hermite-simpson": 4,
+    "legendre-gauss-3": 4,
+    "legendre-gauss-radau-2": 3,
+}
 """Of the error of an interval: rates are a polynomial through two, three, three and two points, and integrated."""
 
 
 def found_on(folder, intervals, **choices):
-    given = study(folder, "pendulum-50", num_mesh_intervals=intervals, optim_convergence_tolerance=1e-8, **choices)
-    given.solver.optim_constraint_tolerance, given.solver.optim_hessian_approximation = 1e-10, "exact"
+    given = study(
+        folder,
+        "pendulum-50",
+        num_mesh_intervals=intervals,
+        optim_convergence_tolerance=1e-8,
+        **choices,
+    )
+    given.solver.optim_constraint_tolerance, given.solver.optim_hessian_approximation = (
+        1e-10,
+        "exact",
+    )
     program, found = Program(problem_of(given)), solve(given)
     assert found.success
     return program, found, program.layout.taken(found.trajectory)
@@ -44,9 +58,13 @@ def test_errors_bound_those_of_an_integration(tmp_path):
 
         def rate(t, y, first=first, last=last):
             part = (t - times[first]) / (times[last] - times[first])
-            return np.array(functions.dynamics(t, y, u[first] + part * (u[last] - u[first]), [])).ravel()
+            return np.array(
+                functions.dynamics(t, y, u[first] + part * (u[last] - u[first]), [])
+            ).ravel()
 
-        end = integrate.solve_ivp(rate, times[[first, last]], x[first], rtol=1e-11, atol=1e-12).y[:, -1]
+        end = integrate.solve_ivp(rate, times[[first, last]], x[first], rtol=1e-11, atol=1e-12).y[
+            :, -1
+        ]
         # At the ends much of the error within has gone.
         assert (np.abs(end - x[last]) / sizes).max() < error
 
@@ -62,9 +80,19 @@ def test_intervals_split_where_it_is_needed(hessian, tmp_path):
     given = study(tmp_path, "pendulum-50", num_mesh_intervals=15)
     found = solve(given, refine=Refinement(1e-5, hessian), tell=told.append)
     assert found.success
-    assert [each.intervals for each in found.rounds] == sorted(each.intervals for each in found.rounds)
-    assert found.rounds[0].intervals == 15 and found.rounds[0].error > 1e-4 and found.rounds[-1].error <= 1e-5
-    assert found.iterations == sum(each.iterations for each in found.rounds) == len(told) - len(found.rounds)
+    assert [each.intervals for each in found.rounds] == sorted(
+        each.intervals for each in found.rounds
+    )
+    assert (
+        found.rounds[0].intervals == 15
+        and found.rounds[0].error > 1e-4
+        and found.rounds[-1].error <= 1e-5
+    )
+    assert (
+        found.iterations
+        == sum(each.iterations for each in found.rounds)
+        == len(told) - len(found.rounds)
+    )
     lengths = np.diff(found.states.times[::2])
     assert len(lengths) == found.rounds[-1].intervals and lengths.max() / lengths.min() > 1.9
     finest = solve(study(tmp_path, "pendulum-50", num_mesh_intervals=200))
@@ -73,7 +101,9 @@ def test_intervals_split_where_it_is_needed(hessian, tmp_path):
     # A new search starts where this one ends, on the mesh that it has.
     given.solver.mesh = tuple((found.states.times[::2] / found.states.times[-1]).tolist())
     program = Program(problem_of(given))
-    assert errors(program, program.layout.taken(found.trajectory)).max() == pytest.approx(found.rounds[-1].error)
+    assert errors(program, program.layout.taken(found.trajectory)).max() == pytest.approx(
+        found.rounds[-1].error
+    )
 
 
 @pytest.mark.parametrize(
@@ -91,7 +121,9 @@ def test_words_that_are_no_refinement(words, said):
 
 def test_what_has_no_error_here_is_refused(tmp_path):
     given = study(tmp_path, "pendulum-50", multibody_dynamics_mode="implicit")
-    with pytest.raises(osimlite.OsimliteError, match="refined with multibody_dynamics_mode explicit only"):
+    with pytest.raises(
+        osimlite.OsimliteError, match="refined with multibody_dynamics_mode explicit only"
+    ):
         solve(given, refine=1e-3)
     hanging = study(tmp_path, "hanging-25")
     hanging.problem.phases.goals[1].enabled = False

@@ -8,7 +8,9 @@ import pytest
 from osimlite.optimal.sparse import SparseMatrix
 
 
-@pytest.mark.parametrize(("count", "shape"), [(0, (3, 4)), (30, (7, 5)), (200, (40, 60)), (5, (6, 1))])
+@pytest.mark.parametrize(
+    ("count", "shape"), [(0, (3, 4)), (30, (7, 5)), (200, (40, 60)), (5, (6, 1))]
+)
 def test_products(count: int, shape: tuple[int, int]) -> None:
     rng = np.random.default_rng(count)
     rows, columns = (rng.integers(0, size, count) for size in shape)

@@ -42,14 +42,18 @@ def test_ours_costs_no_more(name, solved, tmp_path):
     said, found = moco_said(name), solved(name)
     assert found.success
     if name == "squat-25":
-        # At the tolerance of the study a search ends some 4e-4 to 2e-3 above the optimum, where rounding has led it.
+        # At the tolerance of the study a search ends some 4e-4 to 2e-3 above the optimum, where
+        # rounding has led it.
         assert found.objective == pytest.approx(said["objective"], rel=2e-3)
         found = solve(study(tmp_path, name, optim_convergence_tolerance=1e-5))
     assert found.objective <= said["objective"] * (1.0 + 1e-4)
     assert found.objective == pytest.approx(sum(found.terms.values()))
     if name != "squat-25":
         # The same steps, as the same numbers come of the same program.
-        assert (found.iterations, found.objective) == (said["iterations"], pytest.approx(said["objective"], rel=1e-7))
+        assert (found.iterations, found.objective) == (
+            said["iterations"],
+            pytest.approx(said["objective"], rel=1e-7),
+        )
 
 
 @pytest.mark.parametrize("name", STUDIES)
@@ -66,7 +70,9 @@ def test_scaled_variables_find_it_too(name, hessian, tmp_path):
     found = solve(study(tmp_path, name, **scaled))
     assert found.success
     # At the tolerance of the squat limited memory ends up to 4e-4 above the optimum.
-    assert found.objective <= moco_said(name)["objective"] * (1.0 + (1e-4 if hessian == "exact" else 5e-4))
+    assert found.objective <= moco_said(name)["objective"] * (
+        1.0 + (1e-4 if hessian == "exact" else 5e-4)
+    )
     if name == "squat-25":
         assert found.iterations < 40
 
@@ -75,9 +81,13 @@ def test_nothing_to_make_small():
     """There second derivatives are those of constraints whose multipliers vanish: they are left out."""
 
     def found(hessian):
-        given = small.study_of(small.coupled(small.links(), "q1"), optim_hessian_approximation=hessian)
+        given = small.study_of(
+            small.coupled(small.links(), "q1"), optim_hessian_approximation=hessian
+        )
         given.problem.phases.state_infos = [
-            osimlite.MocoVariableInfo(name="/jointset/j0/q0/value", bounds=(-2.0, 2.0), initial_bounds=(-0.5,))
+            osimlite.MocoVariableInfo(
+                name="/jointset/j0/q0/value", bounds=(-2.0, 2.0), initial_bounds=(-0.5,)
+            )
         ]
         return solve(given)
 
@@ -88,7 +98,9 @@ def test_nothing_to_make_small():
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_schemes_agree(scheme, tmp_path):
-    found = solve(study(tmp_path, "sliding-100", transcription_scheme=scheme, num_mesh_intervals=40))
+    found = solve(
+        study(tmp_path, "sliding-100", transcription_scheme=scheme, num_mesh_intervals=40)
+    )
     # 2 sqrt(distance / acceleration): 1 m at 25 m/s2.
     assert found.success
     assert found.objective == pytest.approx(0.4, abs=2e-3)
@@ -99,7 +111,10 @@ def test_implicit_dynamics_agree(tmp_path, solved):
     implicit = solve(study(tmp_path, "pendulum-50", multibody_dynamics_mode="implicit"))
     assert implicit.success
     assert implicit.objective == pytest.approx(explicit.objective, rel=1e-4)
-    assert implicit.trajectory.names["derivatives"] == ("/jointset/j0/q0/accel", "/jointset/j1/q1/accel")
+    assert implicit.trajectory.names["derivatives"] == (
+        "/jointset/j0/q0/accel",
+        "/jointset/j1/q1/accel",
+    )
 
 
 def test_the_file_comes_back_and_starts_another_search(tmp_path, solved):
@@ -131,7 +146,10 @@ def test_implicit_tendons(tmp_path):
     found = solve(hanging())
     assert found.success
     assert found.objective <= said["objective"] * (1.0 + 1e-4)
-    assert "/forceset/muscle/implicitderiv_normalized_tendon_force" in found.trajectory.names["derivatives"]
+    assert (
+        "/forceset/muscle/implicitderiv_normalized_tendon_force"
+        in found.trajectory.names["derivatives"]
+    )
 
 
 def test_progress_names_what_is_violated_and_when(tmp_path):
@@ -166,7 +184,9 @@ def test_parameters_are_found(tmp_path):
     given = study(tmp_path, "sliding-100", num_mesh_intervals=20)
     bounds = osimlite.MocoBounds(bounds=(1.0, 4.0))
     given.problem.phases.parameters.append(
-        osimlite.MocoParameter(name="mass", moco_bounds=bounds, component_paths=("/body",), property_name="mass")
+        osimlite.MocoParameter(
+            name="mass", moco_bounds=bounds, component_paths=("/body",), property_name="mass"
+        )
     )
     found = solve(given)
     assert found.success
@@ -187,7 +207,9 @@ def _frames(tmp_path, kind, **given):
     """Moco's swing of the pendulum, and a goal of its second body."""
     changed, found = study(tmp_path, "pendulum-50"), moco_found(tmp_path, "pendulum-50")
     reference = osimlite.TableProcessor(filepath=str(found))
-    goal = kind(**{"name": "follow", "frame_paths": ["/bodyset/b1"], "states_reference": reference} | given)
+    goal = kind(
+        **{"name": "follow", "frame_paths": ["/bodyset/b1"], "states_reference": reference} | given
+    )
     changed.problem.phases.goals = [goal]
     return changed, found
 
@@ -210,10 +232,18 @@ def test_frames_follow_their_own_motion(kind, tmp_path):
 @pytest.mark.parametrize(
     ("kind", "given", "said"),
     [
-        (FOLLOWED[0], {"frame_paths": ["/bodyset/b2"]}, "no frame '/bodyset/b2'; did you mean '/bodyset/b"),
+        (
+            FOLLOWED[0],
+            {"frame_paths": ["/bodyset/b2"]},
+            "no frame '/bodyset/b2'; did you mean '/bodyset/b",
+        ),
         (FOLLOWED[0], {"frame_paths": []}, "frame_paths names no frames"),
         (FOLLOWED[1], {"states_reference": osimlite.TableProcessor()}, "names no file to follow"),
-        (FOLLOWED[1], {"rotation_reference_file": "turns.sto"}, "names a file and a states_reference"),
+        (
+            FOLLOWED[1],
+            {"rotation_reference_file": "turns.sto"},
+            "names a file and a states_reference",
+        ),
         (FOLLOWED[2], {}, "no state '/tau0'"),
     ],
 )
@@ -233,7 +263,9 @@ def test_frames_that_are_not_told(kind, given, said, tmp_path):
 )
 def test_expressions_that_are_none(expression, variables, said, tmp_path):
     changed = study(tmp_path, "pendulum-50")
-    goal = osimlite.MocoExpressionBasedParameterGoal(name="e", expression=expression, variables=variables)
+    goal = osimlite.MocoExpressionBasedParameterGoal(
+        name="e", expression=expression, variables=variables
+    )
     changed.problem.phases.goals = [goal]
     with pytest.raises(osimlite.OsimliteError, match=said):
         problem_of(changed)
@@ -256,9 +288,21 @@ ONE = osimlite.MocoContactImpulseTrackingGoalGroup(external_force_name="foot")
             "no frame '/bodyset/b2'",
         ),
         (osimlite.MocoGeneralizedForceTrackingGoal, {}, "names no table"),
-        (osimlite.MocoGeneralizedForceTrackingGoal, {"force_paths": ["/tau2"]}, "no force '/tau2'; did you mean '/tau"),
-        (osimlite.MocoGeneralizedForceTrackingGoal, {"force_paths": ["/tau0", "/tau."]}, "match '/tau0' twice"),
-        (osimlite.MocoGeneralizedForceTrackingGoal, {"force_paths": ["/tau("]}, "'/tau\\(' is no pattern"),
+        (
+            osimlite.MocoGeneralizedForceTrackingGoal,
+            {"force_paths": ["/tau2"]},
+            "no force '/tau2'; did you mean '/tau",
+        ),
+        (
+            osimlite.MocoGeneralizedForceTrackingGoal,
+            {"force_paths": ["/tau0", "/tau."]},
+            "match '/tau0' twice",
+        ),
+        (
+            osimlite.MocoGeneralizedForceTrackingGoal,
+            {"force_paths": ["/tau("]},
+            "'/tau\\(' is no pattern",
+        ),
         (osimlite.MocoContactImpulseTrackingGoal, {}, "its impulse_axis is -1"),
         (osimlite.MocoContactImpulseTrackingGoal, {"impulse_axis": 1}, "it has 0 contact_groups"),
         (
@@ -279,14 +323,30 @@ def test_loads_that_are_none(kind, given, said, tmp_path):
     ("given", "said"),
     [
         ({}, "names no output_path"),
-        ({"output_path": "/bodyset/b2|position"}, "no component '/bodyset/b2'; did you mean '/bodyset/b"),
-        ({"output_path": "/bodyset/b1|rotation"}, "the output 'rotation' of /bodyset/b1 has no formula"),
-        ({"output_path": "/bodyset/b1|position", "output_index": 3}, "no component of output_index 3"),
-        ({"output_path": "/jointset/j0/q0|value", "output_index": 0}, "no component of output_index 0"),
+        (
+            {"output_path": "/bodyset/b2|position"},
+            "no component '/bodyset/b2'; did you mean '/bodyset/b",
+        ),
+        (
+            {"output_path": "/bodyset/b1|rotation"},
+            "the output 'rotation' of /bodyset/b1 has no formula",
+        ),
+        (
+            {"output_path": "/bodyset/b1|position", "output_index": 3},
+            "no component of output_index 3",
+        ),
+        (
+            {"output_path": "/jointset/j0/q0|value", "output_index": 0},
+            "no component of output_index 0",
+        ),
         ({"output_path": "/bodyset/b1|position", "exponent": 0}, "exponent is 0"),
         ({"output_path": "/bodyset/b1|position", "operation": "addition"}, "need each other"),
         (
-            {"output_path": "/|com_position", "second_output_path": "/tau0|actuation", "operation": "addition"},
+            {
+                "output_path": "/|com_position",
+                "second_output_path": "/tau0|actuation",
+                "operation": "addition",
+            },
             "outputs are of different types",
         ),
     ],
@@ -303,11 +363,17 @@ def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
     text = path.read_text()
     factor = '<scale_factors><MocoScaleFactor name="factor"/></scale_factors>\n'
     path.write_text(re.sub(r"(<MocoFinalTimeGoal .*?>\n)", rf"\1{factor}", text))
-    line = next(k for k, words in enumerate(path.read_text().splitlines(), 1) if "<MocoScaleFactor" in words)
-    with pytest.raises(osimlite.OsimliteError, match="MocoScaleFactor 'factor': no file says which") as raised:
+    line = next(
+        k for k, words in enumerate(path.read_text().splitlines(), 1) if "<MocoScaleFactor" in words
+    )
+    with pytest.raises(
+        osimlite.OsimliteError, match="MocoScaleFactor 'factor': no file says which"
+    ) as raised:
         solve(path)
     assert (raised.value.file, raised.value.line) == (str(path), line)
-    with pytest.raises(osimlite.OsimliteError, match="'factor': the goal follows no column '/tau0'"):
+    with pytest.raises(
+        osimlite.OsimliteError, match="'factor': the goal follows no column '/tau0'"
+    ):
         solve(path, scaled={"factor": "/tau0"})
     path.write_text(text.replace('name="/tau0"', 'name="/tau2"'))
     with pytest.raises(osimlite.OsimliteError, match="no control '/tau2'; did you mean '/tau"):
@@ -322,12 +388,26 @@ def test_settings_without_effect_are_refused(tmp_path):
 
 
 def test_what_the_solver_makes_a_cost(tmp_path):
-    choices = {"minimize_implicit_multibody_accelerations": True, "implicit_multibody_accelerations_weight": 1e-3}
+    choices = {
+        "minimize_implicit_multibody_accelerations": True,
+        "implicit_multibody_accelerations_weight": 1e-3,
+    }
     found = solve(study(tmp_path, "pendulum-50", multibody_dynamics_mode="implicit", **choices))
-    accelerations = [found.trajectory.columns[name] for name in found.trajectory.names["derivatives"]]
+    accelerations = [
+        found.trajectory.columns[name] for name in found.trajectory.names["derivatives"]
+    ]
     squares, times = np.square(accelerations).sum(axis=0), found.trajectory.times
     # Simpson's rule over each interval and its middle.
-    each = (squares[:-2:2] + 4.0 * squares[1::2] + squares[2::2]) * (times[2::2] - times[:-2:2]) / 6.0
+    each = (
+        (squares[:-2:2] + 4.0 * squares[1::2] + squares[2::2]) * (times[2::2] - times[:-2:2]) / 6.0
+    )
     assert found.terms["accelerations"] == pytest.approx(1e-3 * each.sum(), rel=1e-9)
-    held = solve(study(tmp_path, "squat-25", minimize_lagrange_multipliers=True, lagrange_multiplier_weight=1e-6))
+    held = solve(
+        study(
+            tmp_path,
+            "squat-25",
+            minimize_lagrange_multipliers=True,
+            lagrange_multiplier_weight=1e-6,
+        )
+    )
     assert found.success and held.success and 0.0 < held.terms["multipliers"] < 1e-3

@@ -31,7 +31,9 @@ def gait(intervals):
     return osimlite.MocoTrack(
         name="gait",
         model=osimlite.ModelProcessor(filepath="2D_gait.osim"),
-        states_reference=osimlite.TableProcessor(filepath="referenceCoordinates.sto", operators=operators),
+        states_reference=osimlite.TableProcessor(
+            filepath="referenceCoordinates.sto", operators=operators
+        ),
         allow_unused_references=True,
         track_reference_position_derivatives=True,
         apply_tracked_states_to_guess=True,
@@ -63,7 +65,9 @@ def test_moco_s_walk_is_one_here(example, tmp_path):
     way = np.random.default_rng(0).normal(size=len(w)) * 1e-2
     way[:2] = 0.01, -0.02
     gradient, numbers = program.slopes(w)
-    change = (program.values(w + 1e-5 * way)[0].sum() - program.values(w - 1e-5 * way)[0].sum()) / 2e-5
+    change = (
+        program.values(w + 1e-5 * way)[0].sum() - program.values(w - 1e-5 * way)[0].sum()
+    ) / 2e-5
     assert gradient @ way == pytest.approx(change, rel=1e-6)
     assert np.isfinite(numbers).all()
 
@@ -71,10 +75,15 @@ def test_moco_s_walk_is_one_here(example, tmp_path):
 def test_what_tools_do_not_do_is_refused(example):
     tool = gait(10)
     tool.final_time = 3.0
-    with pytest.raises(osimlite.OsimliteError, match=r"from 0 s to 3 s there are no data; they are from 0 s to 0.47"):
+    with pytest.raises(
+        osimlite.OsimliteError,
+        match=r"from 0 s to 3 s there are no data; they are from 0 s to 0.47",
+    ):
         problem_of_track(tool, folder=Path(example))
     tool.states_reference.filepath = ""
-    with pytest.raises(osimlite.OsimliteError, match="give it a states_reference or a markers_reference"):
+    with pytest.raises(
+        osimlite.OsimliteError, match="give it a states_reference or a markers_reference"
+    ):
         problem_of_track(tool, folder=Path(example))
 
 
@@ -85,9 +94,14 @@ def test_a_setup_is_run(example, tmp_path):
     lines = []
     outcome = osimlite.run(tmp_path / "track.xml", progress=lines.append)
     assert outcome.done and outcome.summary["status"] == "Solve_Succeeded"
-    assert sorted(path.name for path in outcome.files) == ["gait_solution.sto", "gait_tracked_states.sto"]
+    assert sorted(path.name for path in outcome.files) == [
+        "gait_solution.sto",
+        "gait_tracked_states.sto",
+    ]
     assert "largest violation /jointset/" in lines[0]
     written = MocoTrajectory.read(tmp_path / "gait_solution.sto")
-    assert float(written.header["objective"]) == pytest.approx(outcome.summary["objective"], abs=1e-6)
+    assert float(written.header["objective"]) == pytest.approx(
+        outcome.summary["objective"], abs=1e-6
+    )
     followed = read_sto(tmp_path / "gait_tracked_states.sto")
     assert len(followed.columns) == 20 and len(followed.times) == 50

@@ -17,21 +17,32 @@ def links(*muscles, count=2):
     model = osimlite.Model(name="links")
     inertia, parent = (0.1, 0.2, 0.3, 0.0, 0.0, 0.0), "/ground"
     floor = osimlite.ContactHalfSpace(
-        name="floor", socket_frame="/ground", location=(0.0, -0.6, 0.0), orientation=(0.0, 0.0, -np.pi / 2)
+        name="floor",
+        socket_frame="/ground",
+        location=(0.0, -0.6, 0.0),
+        orientation=(0.0, 0.0, -np.pi / 2),
     )
     model.add(floor)
     for k in range(count):
-        body = osimlite.Body(name=f"b{k}", mass=1.0 + k, mass_center=(-0.5, 0.02 * k, 0.01), inertia=inertia)
+        body = osimlite.Body(
+            name=f"b{k}", mass=1.0 + k, mass_center=(-0.5, 0.02 * k, 0.01), inertia=inertia
+        )
         model.add(body)
-        joint = osimlite.PinJoint(name=f"j{k}", socket_child_frame="offset", socket_parent_frame=parent)
+        joint = osimlite.PinJoint(
+            name=f"j{k}", socket_child_frame="offset", socket_parent_frame=parent
+        )
         joint.frames.append(
-            osimlite.PhysicalOffsetFrame(name="offset", socket_parent=f"/bodyset/b{k}", translation=(-1.0, 0.0, 0.1))
+            osimlite.PhysicalOffsetFrame(
+                name="offset", socket_parent=f"/bodyset/b{k}", translation=(-1.0, 0.0, 0.1)
+            )
         )
         joint.coordinates[0].name = f"q{k}"
         model.add(joint)
         ball = osimlite.ContactSphere(name=f"ball{k}", socket_frame=f"/bodyset/b{k}", radius=0.1)
         model.add(ball)
-        model.add(osimlite.CoordinateActuator(name=f"motor{k}", coordinate=f"q{k}", optimal_force=10.0))
+        model.add(
+            osimlite.CoordinateActuator(name=f"motor{k}", coordinate=f"q{k}", optimal_force=10.0)
+        )
         contact = osimlite.SmoothSphereHalfSpaceForce(
             name=f"contact{k}",
             socket_sphere=ball.path,
@@ -65,7 +76,9 @@ def links(*muscles, count=2):
         for frame, place in ends:
             path.path_point_set.objects.append(
                 osimlite.PathPoint(
-                    name=f"p{len(path.path_point_set.objects)}", socket_parent_frame=frame, location=place
+                    name=f"p{len(path.path_point_set.objects)}",
+                    socket_parent_frame=frame,
+                    location=place,
                 )
             )
         muscle.geometry_path = path
@@ -105,18 +118,24 @@ def tied(model):
 
 def study_of(model, *goals, constraints=(), **solver):
     """A study of it over about a second, on a mesh of two intervals."""
-    phase = osimlite.MocoPhase(name="phases", model=osimlite.ModelProcessor(name="model", model=model))
+    phase = osimlite.MocoPhase(
+        name="phases", model=osimlite.ModelProcessor(name="model", model=model)
+    )
     phase.time_initial_bounds = osimlite.MocoInitialBounds(bounds=(0.0, 0.2))
     phase.time_final_bounds = osimlite.MocoFinalBounds(bounds=(0.6, 0.9))
     endings = ("activation", 0.3, 0.7), ("normalized_tendon_force", 0.2, 0.6)
-    for ending, low, high in endings if any(model.components(osimlite.DeGrooteFregly2016Muscle)) else ():
+    for ending, low, high in (
+        endings if any(model.components(osimlite.DeGrooteFregly2016Muscle)) else ()
+    ):
         info = osimlite.MocoVariableInfo(name=f".*/{ending}", bounds=(low, high))
         phase.state_infos_pattern.append(info)
     phase.control_infos_pattern.append(osimlite.MocoVariableInfo(name=".*", bounds=(0.1, 0.9)))
     phase.goals, phase.path_constraints = [*goals], [*constraints]
     choices = {"num_mesh_intervals": 2, "optim_hessian_approximation": "exact"} | solver
     problem = osimlite.MocoProblem(name="problem", phases=phase)
-    return osimlite.MocoStudy(name="small", problem=problem, solver=osimlite.MocoCasADiSolver(**choices))
+    return osimlite.MocoStudy(
+        name="small", problem=problem, solver=osimlite.MocoCasADiSolver(**choices)
+    )
 
 
 def tables(folder):
@@ -130,14 +149,27 @@ def tables(folder):
     }
     swing = np.stack([np.sin(2 * t), 0.5 * t, 0.1 * t * t, np.cos(3 * t), t, 0.2 * t], axis=1)
     write_sto(folder / "motion.sto", "", t, tuple(motion), np.column_stack([*motion.values()]))
-    write_sto(folder / "controls.sto", "", t, ("/forceset/motor0", "/forceset/motor1"), 0.2 + swing[:, :2])
+    write_sto(
+        folder / "controls.sto", "", t, ("/forceset/motor0", "/forceset/motor1"), 0.2 + swing[:, :2]
+    )
     write_sto(folder / "vectors.sto", "", t, BODIES, swing, kind="Vec3")
     half = np.stack([np.cos(t), 0 * t, 0.3 * t, np.sin(t)], axis=1)
-    write_sto(folder / "turns.sto", "", t, BODIES, np.hstack([half, half[:, [0, 2, 1, 3]]]), kind="Quaternion")
+    write_sto(
+        folder / "turns.sto",
+        "",
+        t,
+        BODIES,
+        np.hstack([half, half[:, [0, 2, 1, 3]]]),
+        kind="Quaternion",
+    )
     write_sto(folder / "moments.sto", "", t, ("q0_moment", "q1_moment"), swing[:, :2])
     columns = [f"{what}_{axis}" for what in "fp" for axis in "xyz"]
-    write_sto(folder / "loads.sto", "", t, columns, np.hstack([20.0 * swing[:, 1:4], 0.1 * swing[:, :3]]))
-    force = osimlite.ExternalForce(name="foot", applied_to_body="b1", force_identifier="f_", point_identifier="p_")
+    write_sto(
+        folder / "loads.sto", "", t, columns, np.hstack([20.0 * swing[:, 1:4], 0.1 * swing[:, :3]])
+    )
+    force = osimlite.ExternalForce(
+        name="foot", applied_to_body="b1", force_identifier="f_", point_identifier="p_"
+    )
     loads = osimlite.ExternalLoads(name="loads", datafile="loads.sto")
     loads.objects.append(force)
     osimlite.write(loads, folder / "loads.xml")

@@ -64,7 +64,13 @@ def _placed():
     ]  # fmt: skip
     goals[0].translation_weights.objects.append(osimlite.MocoWeight(name=BODIES[1], weight=2.0))
     away = osimlite.MocoFrameDistanceConstraint(name="away", frame_pairs=[pair])
-    study = study_of(links(), *goals, constraints=[away], transcription_scheme="legendre-gauss-2", mesh=(0.0, 0.4, 1.0))
+    study = study_of(
+        links(),
+        *goals,
+        constraints=[away],
+        transcription_scheme="legendre-gauss-2",
+        mesh=(0.0, 0.4, 1.0),
+    )
     mass = osimlite.MocoParameter(
         name="mass",
         moco_bounds=osimlite.MocoBounds(bounds=(0.5, 2.0)),
@@ -77,7 +83,9 @@ def _placed():
 
 def _pushed():
     group = osimlite.MocoContactTrackingGoalGroup(
-        contact_force_paths=("/forceset/contact1",), external_force_name="foot", alternative_frame_paths=BODIES[:1]
+        contact_force_paths=("/forceset/contact1",),
+        external_force_name="foot",
+        alternative_frame_paths=BODIES[:1],
     )
     goals = [
         osimlite.MocoContactTrackingGoal(name="contact", contact_groups=[group], external_loads_file="loads.xml",
@@ -99,12 +107,18 @@ def project(kind: str, folder: Path) -> Project:
     tables(folder)
     columns = [f"/jointset/j{k}/q{k}/{what}" for what in ("value", "speed") for k in range(2)]
     guess = folder / "guess.sto"
-    write_sto(guess, "", TIMES * 0.8, (*columns, *MOTORS), np.tile(0.2 * np.sin(TIMES)[:, None], (1, 6)))
+    write_sto(
+        guess, "", TIMES * 0.8, (*columns, *MOTORS), np.tile(0.2 * np.sin(TIMES)[:, None], (1, 6))
+    )
     counts = {"states": 4, "controls": 2} | dict.fromkeys(
         ("derivatives", "input_controls", "multipliers", "parameters", "slacks"), 0
     )
-    head = "\n".join(["inDegrees=no", *(f"num_{name}={count}" for name, count in sorted(counts.items()))])
-    guess.write_text(f"{head}\nDataType=double\nversion=3\nendheader{guess.read_text().partition('endheader')[2]}")
+    head = "\n".join(
+        ["inDegrees=no", *(f"num_{name}={count}" for name, count in sorted(counts.items()))]
+    )
+    guess.write_text(
+        f"{head}\nDataType=double\nversion=3\nendheader{guess.read_text().partition('endheader')[2]}"
+    )
     osimlite.write(study.problem.phases.model.model, folder / "model.osim")
     study.problem.phases.model = osimlite.ModelProcessor(name="model", filepath="model.osim")
     study.solver.optim_max_iterations = 1

@@ -20,9 +20,12 @@ except ImportError:
 else:
     _names = opensim.ArrayStr()
     opensim.OpenSimObject.getRegisteredTypenames(_names)
-    PRISTINE = [opensim.OpenSimObject.newInstanceOfType(_names.get(k)) for k in range(_names.getSize())]
+    PRISTINE = [
+        opensim.OpenSimObject.newInstanceOfType(_names.get(k)) for k in range(_names.getSize())
+    ]
 finally:
-    # It puts its folder into the paths of libraries and programs, and with these its CasADi into processes to come.
+    # It puts its folder into the paths of libraries and programs, and with these its CasADi into
+    # processes to come.
     os.environ.clear()
     os.environ.update(_environment)
 """One object of each class, as OpenSim makes it before it has read any file: made while tests are collected."""
@@ -33,7 +36,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         parameters = getattr(getattr(item, "callspec", None), "params", {})
         engines = [value for value in parameters.values() if isinstance(value, str)]
-        if item.path.name in ("test_constrained_simulation.py", "test_corpus_motions.py") and "bullet" in engines:
+        if (
+            item.path.name in ("test_constrained_simulation.py", "test_corpus_motions.py")
+            and "bullet" in engines
+        ):
             item.add_marker("full")
 
 
@@ -49,7 +55,9 @@ def opensim_says() -> Iterator[Callable[[Path], str | None]]:
     """Asks OpenSim about a file: None if it takes it, else what it says."""
     pytest.importorskip("opensim")
     command = [sys.executable, "-W", "ignore", str(Path(__file__).with_name("opensim_verdicts.py"))]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
         assert process.stdin is not None and process.stdout is not None
 
         def ask(path: Path) -> str | None:

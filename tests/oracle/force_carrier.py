@@ -51,7 +51,11 @@ def carrier(kinds) -> Model:
         for index, coordinate in enumerate(joint.coordinates):
             coordinate.name = f"q{number}_{index}"
         at, turned = (0.1, 0.2 * number, -0.05), (0.3, -0.2, 0.1)
-        model.add(joint.between(below, body, at=at, turned=turned, child_at=(0, 0.1, 0.03), child_turned=(0.1, 0, 1)))
+        model.add(
+            joint.between(
+                below, body, at=at, turned=turned, child_at=(0, 0.1, 0.03), child_turned=(0.1, 0, 1)
+            )
+        )
         below = body
     return model
 
@@ -59,8 +63,8 @@ def carrier(kinds) -> Model:
 def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
     """Accelerations, records with their labels, and energy at some states.
 
-    `counted` says how often OpenSim counts the energy of the forces; None if it has an energy of its own. Returns how
-    many numbers of the records differ from zero.
+    `counted` says how often OpenSim counts the energy of the forces; None if it has an energy of
+    its own. Returns how many numbers of the records differ from zero.
     """
     busy = 0
     from osimlite.simulation.engines.bullet.engine import BulletEngine
@@ -81,21 +85,28 @@ def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
             put(map(theirs.getCoordinateSet().get, names), state, q, u)
             state.setTime(TIME)
             theirs.realizeAcceleration(state)
-            expected = [theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names]
+            expected = [
+                theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names
+            ]
             ours = engine.acceleration(TIME, q.tolist(), u.tolist())
             scale = max(1.0, np.abs(expected).max())
             assert np.abs(np.subtract(ours, expected)).max() <= tolerance * scale
             labels, values = [], []
             forces = theirs.getForceSet()
             for number in range(forces.getSize()):
-                result, row = forces.get(number).getRecordLabels(), forces.get(number).getRecordValues(state)
+                result, row = (
+                    forces.get(number).getRecordLabels(),
+                    forces.get(number).getRecordValues(state),
+                )
                 labels += [result.get(index) for index in range(result.getSize())]
                 values += [row.get(index) for index in range(result.getSize())]
             busy += np.count_nonzero(values)
             y = engine.state.pack(q, u)
             assert list(engine.columns) == labels
             recorded = engine.force_records(TIME, y)
-            assert recorded == pytest.approx(values, rel=tolerance, abs=tolerance * max(1.0, *map(abs, [0, *values])))
+            assert recorded == pytest.approx(
+                values, rel=tolerance, abs=tolerance * max(1.0, *map(abs, [0, *values]))
+            )
             if counted is not None:
                 kinetic, gravity, stored = engine.energies(TIME, y)
                 assert kinetic == pytest.approx(theirs.calcKineticEnergy(state), rel=1e-10)
@@ -104,7 +115,11 @@ def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
     return busy
 
 
-PAIRS = (("/ground", "/bodyset/b2/f2"), ("/bodyset/b1/f1", "/bodyset/b0"), ("/bodyset/b0/f0", "/bodyset/b1/f1"))
+PAIRS = (
+    ("/ground", "/bodyset/b2/f2"),
+    ("/bodyset/b1/f1", "/bodyset/b0"),
+    ("/bodyset/b0/f0", "/bodyset/b1/f1"),
+)
 DAMPING = {"rotational_damping": (0.3, 0.2, 0.1), "translational_damping": (2.0, 1.0, 3.0)}
 
 
@@ -133,7 +148,9 @@ def along(kind, **more):
         force = kind(name=f"along{number}", **more)
         path = GeometryPath(name="path")
         for index, (frame, at) in enumerate(route):
-            path.path_point_set.objects.append(PathPoint(name=f"p{index}", socket_parent_frame=frame, location=at))
+            path.path_point_set.objects.append(
+                PathPoint(name=f"p{index}", socket_parent_frame=frame, location=at)
+            )
         force.geometry_path = path
         result.append(force)
     return result

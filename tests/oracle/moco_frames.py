@@ -1,6 +1,7 @@
 """OpenSim's Moco on a study with goals and a path constraint of frames: writes the study and where one step leads.
 
-Run in a folder with ``model.osim``, ``places.sto``, ``turns.sto``, ``spins.sto``, ``pulls.sto`` and ``motion.sto``.
+Run in a folder with ``model.osim``, ``places.sto``, ``turns.sto``, ``spins.sto``, ``pulls.sto`` and
+``motion.sto``.
 """
 
 from __future__ import annotations
@@ -63,7 +64,9 @@ times.setTargetAsymmetry(-0.1)
 problem.addGoal(times)
 
 heavy = osim.MocoExpressionBasedParameterGoal("heavy", 0.6, "square(m - 0.7) + 1/m")
-heavy.addParameter(osim.MocoParameter("mass", "/bodyset/b1", "mass", osim.MocoBounds(0.5, 2.0)), "m")
+heavy.addParameter(
+    osim.MocoParameter("mass", "/bodyset/b1", "mass", osim.MocoBounds(0.5, 2.0)), "m"
+)
 problem.addGoal(heavy)
 
 apart = osim.MocoFrameDistanceConstraint()

@@ -42,7 +42,9 @@ for number, (joint, side, frame, measures) in enumerate(
         goal.setReactionWeight(measures[0], 0.3)
     problem.addGoal(goal)
 
-for number, (paths, normalize) in enumerate([([], False), (["/forceset/.*"], True), ([".*"], False)]):
+for number, (paths, normalize) in enumerate(
+    [([], False), (["/forceset/.*"], True), ([".*"], False)]
+):
     goal = osim.MocoGeneralizedForceTrackingGoal(f"force{number}", 1.0)
     goal.setReference(osim.TableProcessor("moments.sto"))
     names = osim.StdVectorString()

@@ -1,6 +1,7 @@
 """OpenSim's Moco on a study of goals of outputs: writes the study and where one step leads.
 
-Run in a folder with ``model.osim``, and ``outputs.json`` with the class, and the properties of each goal.
+Run in a folder with ``model.osim``, and ``outputs.json`` with the class, and the properties of each
+goal.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ import opensim as osim
 from tests.oracle.moco_studies import begun, ended
 
 study, problem = begun([-1, 1.2], [-5, 7], [-10, 12], "/tau.*")
-for number, (kind, path, index, exponent, operation, second) in enumerate(json.loads(Path("outputs.json").read_text())):
+for number, (kind, path, index, exponent, operation, second) in enumerate(
+    json.loads(Path("outputs.json").read_text())
+):
     goal = getattr(osim, kind)(f"g{number}", 1.0)
     goal.setOutputPath(path)
     goal.setOutputIndex(index)

@@ -29,4 +29,8 @@ def ended(study):
         solution.unseal()
     solution.write("theirs.sto")
     names = solution.getObjectiveTermNames()
-    print(json.dumps({name: solution.getObjectiveTermByIndex(place) for place, name in enumerate(names)}))
+    print(
+        json.dumps(
+            {name: solution.getObjectiveTermByIndex(place) for place, name in enumerate(names)}
+        )
+    )

@@ -39,7 +39,9 @@ class Beside:
         self.paths, self.right = osimlite.paths(self.model), osimlite.paths(self.model, "geodesic")
         self.default = self.paths.mechanism.assemble({})
         infos = self.paths.mechanism.coordinates
-        self.coordinates = [opensim.Coordinate.safeDownCast(self.theirs.getComponent(info.path)) for info in infos]
+        self.coordinates = [
+            opensim.Coordinate.safeDownCast(self.theirs.getComponent(info.path)) for info in infos
+        ]
 
     def at(self, pose: Pose, aside: float = 0.0) -> np.ndarray:
         """Take both to a pose; returns the values of the coordinates."""
@@ -84,7 +86,9 @@ class Beside:
 
     def is_free(self, item: Any) -> bool:
         """Whether constraints move nothing with the pose: how OpenSim would bring it about is another question."""
-        places = [self.paths.mechanism.coordinate_index(value.coordinate) for value in item.pose.values]
+        places = [
+            self.paths.mechanism.coordinate_index(value.coordinate) for value in item.pose.values
+        ]
         return not tied(self.paths, self.default)[places].any()
 
     def _of_points(self) -> Iterator[tuple[str, str, float, float]]:
@@ -92,7 +96,9 @@ class Beside:
         for point in self.measures.moving_points:
             points = tree.by_path[point.owner].geometry_path.path_point_set.objects
             (own,) = (item for item in points if item.name == point.point)
-            theirs = opensim.MovingPathPoint.safeDownCast(self.theirs.getComponent(tree.path_of(own)))
+            theirs = opensim.MovingPathPoint.safeDownCast(
+                self.theirs.getComponent(tree.path_of(own))
+            )
             pose, places = Pose((point.end,)), []
             mechanism = self.paths.mechanism
             info = mechanism.coordinates[mechanism.coordinate_index(point.end.coordinate)]
@@ -149,7 +155,9 @@ def main(files: list[str]) -> None:
             for code, owner, told, result in Beside(Path(file)).findings():
                 counts[code] += 1
                 off = abs(told - result) / max(1.0, abs(told))
-                worst.setdefault(code, []).append((off, f"{Path(file).name} {owner}: {told:.9g} {result:.9g}"))
+                worst.setdefault(code, []).append(
+                    (off, f"{Path(file).name} {owner}: {told:.9g} {result:.9g}")
+                )
         except (OsimliteError, RuntimeError) as error:
             print(file, str(error)[:100])
     for code, rows in sorted(worst.items()):

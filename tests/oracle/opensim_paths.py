@@ -18,20 +18,28 @@ JUMP = 1e-11
 def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
     """Compare at random poses within the ranges of the coordinates, and random speeds; locked coordinates rest.
 
-    Where bodies are tied to each other, the poses are near the default one. Paths whose lengths jump at a pose, here or
-    in OpenSim, are left out: there rounding decides. Where rounding is magnified, lengths are as equal as those of
-    poses that are hardly apart; where OpenSim has no length (NaN), there is none here.
+    Where bodies are tied to each other, the poses are near the default one. Paths whose lengths
+    jump at a pose, here or in OpenSim, are left out: there rounding decides. Where rounding is
+    magnified, lengths are as equal as those of poses that are hardly apart; where OpenSim has no
+    length (NaN), there is none here.
     """
     opensim.Logger.setLevelString("off")
     theirs = opensim.Model(str(file))
     state = theirs.initSystem()
     model = osimlite.read(file)
     paths = osimlite.paths(model)
-    infos, tied = paths.mechanism.coordinates, any(item.bodies for item in paths.mechanism.constraints)
-    coordinates = [opensim.Coordinate.safeDownCast(theirs.getComponent(info.path)) for info in infos]
+    infos, tied = (
+        paths.mechanism.coordinates,
+        any(item.bodies for item in paths.mechanism.constraints),
+    )
+    coordinates = [
+        opensim.Coordinate.safeDownCast(theirs.getComponent(info.path)) for info in infos
+    ]
     along = [_path(theirs, model, name) for name in paths.names]
     # OpenSim projects speeds to 1e-10 only.
-    coupled = 1e-8 if any(not isinstance(item, Lock) for item in paths.mechanism.constraints) else 0.0
+    coupled = (
+        1e-8 if any(not isinstance(item, Lock) for item in paths.mechanism.constraints) else 0.0
+    )
     rng = np.random.default_rng(seed)
     for _ in range(poses):
         low, high = np.clip([info.range for info in infos], -2.0, 2.0).reshape(-1, 2).T

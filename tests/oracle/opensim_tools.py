@@ -1,7 +1,8 @@
 """Runs tools as standard input asks, one line of JSON each: the folder, the class and the setup; run by tests.
 
-Each runs in a child of this process, so that a crash is an answer too and nothing reaches the next. The answer is how
-the run ended (``done``, ``false``, ``raises``, ``crashes``, ``hangs``), what was raised, and the warnings of the log.
+Each runs in a child of this process, so that a crash is an answer too and nothing reaches the next.
+The answer is how the run ended (``done``, ``false``, ``raises``, ``crashes``, ``hangs``), what was
+raised, and the warnings of the log.
 """
 
 from __future__ import annotations
@@ -57,9 +58,17 @@ def answer(folder: str, kind: str, setup: str) -> dict[str, object]:
         end = pipe.read().decode("utf-8", "replace")
     _, status = os.waitpid(child, 0)
     lines = (Path(folder) / LOG).read_text(errors="replace").splitlines()
-    told = [line for line in lines if line.startswith(("[warning]", "[error]")) and "Couldn't find file" not in line]
+    told = [
+        line
+        for line in lines
+        if line.startswith(("[warning]", "[error]")) and "Couldn't find file" not in line
+    ]
     if status:
-        end = "hangs" if status & 127 in (signal.SIGXCPU, signal.SIGALRM, signal.SIGKILL) else "crashes"
+        end = (
+            "hangs"
+            if status & 127 in (signal.SIGXCPU, signal.SIGALRM, signal.SIGKILL)
+            else "crashes"
+        )
     how, _, message = end.partition(" ")
     return {"end": how, "message": " ".join(message.split()), "log": told}
 

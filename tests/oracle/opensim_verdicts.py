@@ -1,7 +1,8 @@
 """Says of each model file named on standard input whether OpenSim takes it; run by tests, in a process of its own.
 
-Each file is loaded and initialised in a child of this process, so that a crash in OpenSim is a verdict too and nothing
-that one file does to OpenSim's defaults reaches the next. One line of JSON answers each line: None, or the message.
+Each file is loaded and initialised in a child of this process, so that a crash in OpenSim is a
+verdict too and nothing that one file does to OpenSim's defaults reaches the next. One line of JSON
+answers each line: None, or the message.
 """
 
 from __future__ import annotations

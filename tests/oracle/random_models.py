@@ -52,7 +52,12 @@ class RandomModel:
 
     def add_body(self, number: int) -> None:
         inertia = (*self.vector(0.08, 0.05), *self.vector(0.005))
-        body = Body(name=f"b{number}", mass=self.number(0.3, 3.0), mass_center=self.vector(0.2), inertia=inertia)
+        body = Body(
+            name=f"b{number}",
+            mass=self.number(0.3, 3.0),
+            mass_center=self.vector(0.2),
+            inertia=inertia,
+        )
         self.model.add(body)
         parent = self.choice([self.model.ground, *self.bodies])
         kind = self.choice(list(COORDINATES))
@@ -86,8 +91,16 @@ class RandomModel:
             if driver is not None:
                 axis.function = LinearFunction(coefficients=(1.0, 0.0))
             elif self.number(0.0, 1.0) < 0.4:
-                driver, polynomial = self.choice(names), PolynomialFunction(coefficients=self.vector(0.2))
-                wave = Sine(amplitude=self.number(-0.3, 0.3), omega=self.number(0.5, 2.0), phase=0.3, offset=0.0)
+                driver, polynomial = (
+                    self.choice(names),
+                    PolynomialFunction(coefficients=self.vector(0.2)),
+                )
+                wave = Sine(
+                    amplitude=self.number(-0.3, 0.3),
+                    omega=self.number(0.5, 2.0),
+                    phase=0.3,
+                    offset=0.0,
+                )
                 axis.function = self.choice([polynomial, wave])
             axis.coordinates = [] if driver is None else [driver]
 

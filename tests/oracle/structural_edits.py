@@ -1,6 +1,7 @@
 """Edits of a model's text at random: elements taken out, doubled, swapped, moved, renamed; values and names changed.
 
-Every edit leaves well-formed XML, or nearly so, that says something else. Rare tags are drawn as often as common ones.
+Every edit leaves well-formed XML, or nearly so, that says something else. Rare tags are drawn as
+often as common ones.
 """
 
 from __future__ import annotations
@@ -137,7 +138,9 @@ class Text:
             while above and self.elements[above[-1]].end <= span.start:
                 above.pop()
             parent = above[-1] if above else -1
-            self.elements.append(Element(span.tag, parent, span.start, span.tag_end, span.inner_end, span.end))
+            self.elements.append(
+                Element(span.tag, parent, span.start, span.tag_end, span.inner_end, span.end)
+            )
             above.append(number)
         self.by_tag: dict[str, list[Element]] = {}
         for element in self.elements[2:]:
@@ -151,7 +154,9 @@ class Text:
         for element in self.elements[1:]:
             if _NAME.search(self.head(element)):
                 self.named.setdefault(element.tag, []).append(element)
-        self.names = sorted({_NAME.search(self.head(e))[1] for group in self.named.values() for e in group})  # type: ignore[index]
+        elements = [element for group in self.named.values() for element in group]
+        matches = [_NAME.search(self.head(element)) for element in elements]
+        self.names = sorted({match[1] for match in matches if match})
 
     def whole(self, element: Element) -> str:
         return self.text[element.start : element.end]
@@ -171,7 +176,11 @@ class Text:
         return "/".join(reversed(words[:4]))
 
     def siblings(self, element: Element) -> list[Element]:
-        return [other for other in self.elements if other.parent == element.parent and other is not element]
+        return [
+            other
+            for other in self.elements
+            if other.parent == element.parent and other is not element
+        ]
 
     def any(self, draw: random.Random, groups: dict[str, list[Element]] | None = None) -> Element:
         """An element; each tag as often as any other in half of the cases."""
@@ -203,10 +212,14 @@ def _attribute(text: Text, draw: random.Random) -> tuple[str, str] | None:
         head[:open_end]
         + f' {draw.choice(["id", "Name", "class", "type", "version", "mass"])}="{draw.choice(["", "1", "a"])}"'
         + head[open_end:],
-        head[:open_end] + f' file="{draw.choice(["", "missing.xml", "missing.osim"])}"' + head[open_end:],
+        head[:open_end]
+        + f' file="{draw.choice(["", "missing.xml", "missing.osim"])}"'
+        + head[open_end:],
     ]
     if name is None:
-        choices.append(head[:open_end] + f' name="{draw.choice(text.names or ["a"])}"' + head[open_end:])
+        choices.append(
+            head[:open_end] + f' name="{draw.choice(text.names or ["a"])}"' + head[open_end:]
+        )
     else:
         choices += [
             head.replace(name[0], ""),
@@ -225,7 +238,9 @@ def _delete(text: Text, draw: random.Random) -> tuple[str, str] | None:
 
 def _empty(text: Text, draw: random.Random) -> tuple[str, str] | None:
     element = text.any(draw)
-    return f"{text.path(element)} emptied", text.put((element.head, element.tail, "")) if text.inside(element) else None  # type: ignore[return-value]
+    return f"{text.path(element)} emptied", text.put(
+        (element.head, element.tail, "")
+    ) if text.inside(element) else None  # type: ignore[return-value]
 
 
 def _unwrap(text: Text, draw: random.Random) -> tuple[str, str] | None:
@@ -269,7 +284,9 @@ def _copy(text: Text, draw: random.Random) -> tuple[str, str] | None:
     if target is None:
         return None
     at = draw.choice((target.head, target.tail))
-    return f"{text.path(element)} copied into {text.path(target)}", text.put((at, at, text.whole(element)))
+    return f"{text.path(element)} copied into {text.path(target)}", text.put(
+        (at, at, text.whole(element))
+    )
 
 
 def _move(text: Text, draw: random.Random) -> tuple[str, str] | None:
@@ -321,7 +338,9 @@ def _value(text: Text, draw: random.Random) -> tuple[str, str] | None:
             text.inside(other),
         )
     )
-    return f"{text.path(element)}: {old[:80]!r} -> {new[:80]!r}", text.put((element.head, element.tail, new))
+    return f"{text.path(element)}: {old[:80]!r} -> {new[:80]!r}", text.put(
+        (element.head, element.tail, new)
+    )
 
 
 def _class(text: Text, draw: random.Random) -> tuple[str, str] | None:
@@ -354,7 +373,15 @@ def _version(text: Text, draw: random.Random) -> tuple[str, str] | None:
     match = re.search(r'\sVersion="([^"]*)"', text.text)
     if match is None:
         return None
-    new = draw.choice((*(f' Version="{v}"' for v in VERSIONS), ' Version="abc"', ' Version=""', "", ' version="40600"'))
+    new = draw.choice(
+        (
+            *(f' Version="{v}"' for v in VERSIONS),
+            ' Version="abc"',
+            ' Version=""',
+            "",
+            ' version="40600"',
+        )
+    )
     return f"{match[0]} -> {new}", text.put((match.start(), match.end(), new))
 
 
@@ -389,7 +416,19 @@ def _rename(text: Text, draw: random.Random) -> tuple[str, str] | None:
             draw.choice(text.names),
             f"{old}_2",
             old.swapcase(),
-            draw.choice(("", " ", f"{old} ", f" {old}", f"{old[:1]} {old[1:]}", f"{old}/a", f"{old}*", "ground", "..")),
+            draw.choice(
+                (
+                    "",
+                    " ",
+                    f"{old} ",
+                    f" {old}",
+                    f"{old[:1]} {old[1:]}",
+                    f"{old}/a",
+                    f"{old}*",
+                    "ground",
+                    "..",
+                )
+            ),
             draw.choice(("default", "/", "é", "1", "UNASSIGNED", f"{old}_0", f"{old}_offset")),
         )
     )

@@ -28,7 +28,11 @@ def model(request):
 
 def test_actuators_of_coordinates(model, tmp_path):
     for name in ("q0_0", "q1_0", "q2_0"):
-        model.add(CoordinateActuator(name=f"on_{name}", coordinate=name, optimal_force=7.0, max_control=0.1))
+        model.add(
+            CoordinateActuator(
+                name=f"on_{name}", coordinate=name, optimal_force=7.0, max_control=0.1
+            )
+        )
     drive(model, "on_q0_0", "on_q1_0")
     compare(model, tmp_path)
 
@@ -37,7 +41,14 @@ def test_actuators_by_torque(model, tmp_path):
     axis = (1.0, 2.0, -0.5)
     model.add(
         TorqueActuator(name="a", bodyA="b2", bodyB="b0", axis=axis, optimal_force=3.0),
-        TorqueActuator(name="b", bodyA="b1", bodyB="ground", axis=axis, torque_is_global=False, optimal_force=2.0),
+        TorqueActuator(
+            name="b",
+            bodyA="b1",
+            bodyB="ground",
+            axis=axis,
+            torque_is_global=False,
+            optimal_force=2.0,
+        ),
         TorqueActuator(
             name="c",
             bodyA="/bodyset/b2/f2",
@@ -75,7 +86,12 @@ def test_actuators_at_points(model, tmp_path):
 def test_actuators_between_points(model, there, tmp_path):
     model.add(
         PointToPointActuator(
-            name="p", bodyA="b0", bodyB="b2", pointA=(0.1, 0.2, 0.3), pointB=(1, 2, 3), points_are_global=there
+            name="p",
+            bodyA="b0",
+            bodyB="b2",
+            pointA=(0.1, 0.2, 0.3),
+            pointB=(1, 2, 3),
+            points_are_global=there,
         )
     )
     drive(model, "p")
@@ -94,14 +110,25 @@ def test_actuators_along_paths(model, tmp_path):
 
 
 def test_pneumatic_muscles(model, tmp_path):
-    model.add(*along(McKibbenActuator, optimal_force=30.0, number_of_turns=2.5, thread_length=0.7, cord_length=0.2))
+    model.add(
+        *along(
+            McKibbenActuator,
+            optimal_force=30.0,
+            number_of_turns=2.5,
+            thread_length=0.7,
+            cord_length=0.2,
+        )
+    )
     drive(model, "along0", "along1")
     assert compare(model, tmp_path) > 0
 
 
 def test_prescribed_forces(model, tmp_path):
     wave = Sine(amplitude=2.0, omega=5.0, phase=0.2, offset=0.1)
-    line, spline = LinearFunction(coefficients=(3.0, -1.0)), SimmSpline(x=(0.0, 0.2, 0.5, 1.0), y=(0.0, 3.0, -2.0, 1.0))
+    line, spline = (
+        LinearFunction(coefficients=(3.0, -1.0)),
+        SimmSpline(x=(0.0, 0.2, 0.5, 1.0), y=(0.0, 3.0, -2.0, 1.0)),
+    )
     number = 0
     for frame in ("/bodyset/b2", "/bodyset/b1/f1"):
         for point_there in (False, True):
@@ -109,13 +136,28 @@ def test_prescribed_forces(model, tmp_path):
                 for parts in ("f", "fp", "t", "fpt"):
                     number += 1
                     force = PrescribedForce(
-                        name=f"push{number}", socket_frame=frame, pointIsGlobal=point_there, forceIsGlobal=force_there
+                        name=f"push{number}",
+                        socket_frame=frame,
+                        pointIsGlobal=point_there,
+                        forceIsGlobal=force_there,
                     )
                     if "f" in parts:
-                        force.forceFunctions.objects += [wave.model_copy(), line.model_copy(), Constant(value=2.0)]
+                        force.forceFunctions.objects += [
+                            wave.model_copy(),
+                            line.model_copy(),
+                            Constant(value=2.0),
+                        ]
                     if "p" in parts:
-                        force.pointFunctions.objects += [spline.model_copy(), wave.model_copy(), line.model_copy()]
+                        force.pointFunctions.objects += [
+                            spline.model_copy(),
+                            wave.model_copy(),
+                            line.model_copy(),
+                        ]
                     if "t" in parts:
-                        force.torqueFunctions.objects += [line.model_copy(), spline.model_copy(), wave.model_copy()]
+                        force.torqueFunctions.objects += [
+                            line.model_copy(),
+                            spline.model_copy(),
+                            wave.model_copy(),
+                        ]
                     model.add(force)
     compare(model, tmp_path)

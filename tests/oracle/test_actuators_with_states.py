@@ -51,7 +51,8 @@ TIMES = {
     "deactivation_time_constant": (0.03, 0.08),
     "activation_dynamics_smoothing": (0.1, 10),
 }
-# A process of OpenSim has one set of these times for all of De Groote's muscles; here the usual one.
+# A process of OpenSim has one set of these times for all of De Groote's muscles; here the usual
+# one.
 DEGROOTE = {
     **SMOOTH,
     "default_normalized_tendon_force": (0.1, 0.4),
@@ -77,7 +78,11 @@ RIGID = {"ignore_tendon_compliance": True}
 CASES = {
     "coordinate": (
         "ActivationCoordinateActuator",
-        {"optimal_force": (20, 300), "activation_time_constant": (0.005, 0.05), "default_activation": (-1, 1)},
+        {
+            "optimal_force": (20, 300),
+            "activation_time_constant": (0.005, 0.05),
+            "default_activation": (-1, 1),
+        },
         {"coordinate": "x"},
     ),
     "clutched": (
@@ -91,7 +96,11 @@ CASES = {
         {},
     ),
     "degroote": ("DeGrooteFregly2016Muscle", DEGROOTE, {}),
-    "degroote, implicit": ("DeGrooteFregly2016Muscle", DEGROOTE, {"tendon_compliance_dynamics_mode": "implicit"}),
+    "degroote, implicit": (
+        "DeGrooteFregly2016Muscle",
+        DEGROOTE,
+        {"tendon_compliance_dynamics_mode": "implicit"},
+    ),
     "degroote, rigid": ("DeGrooteFregly2016Muscle", DEGROOTE, RIGID),
     "degroote, rigid, without states": (
         "DeGrooteFregly2016Muscle",
@@ -104,7 +113,11 @@ CASES = {
     "schutte, passive curve": (
         "Schutte1993Muscle_Deprecated",
         {**TIMED, "damping": (0.05, 0.2)},
-        {"passive_force_length_curve": SimmSpline(x=(0.0, 0.5, 1.0, 1.3, 2.0), y=(-0.1, 0.0, 0.05, 0.3, 2.0))},
+        {
+            "passive_force_length_curve": SimmSpline(
+                x=(0.0, 0.5, 1.0, 1.3, 2.0), y=(-0.1, 0.0, 0.05, 0.3, 2.0)
+            )
+        },
     ),
     "delp": ("Delp1990Muscle_Deprecated", {**TIMED, "mass": (0.002, 0.004)}, {}),
     "thelen, first form": ("Thelen2003Muscle_Deprecated", THELEN, {}),
@@ -177,7 +190,9 @@ def test_states_and_steps(case, tmp_path):
     ours = read_sto(tmp_path / "states.sto")
     assert ours.columns == theirs.columns
     assert trajectory.summary["steps"] == len(theirs.rows) - 1
-    assert ours.rows[-1] == pytest.approx(theirs.rows[-1], rel=1e-9, abs=1e-9 * np.abs(theirs.rows[-1]).max())
+    assert ours.rows[-1] == pytest.approx(
+        theirs.rows[-1], rel=1e-9, abs=1e-9 * np.abs(theirs.rows[-1]).max()
+    )
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -188,7 +203,8 @@ def test_states_of_what_is_off(case, tmp_path):
     actuator.appliesForce = False
     trajectory = osimlite.simulate(model, 0.05, accuracy=1e-5, engine="compiled")
     assert trajectory.forces == {}
-    # OpenSim's ClutchedPathSpring pulls whatever the file says, and its Delp1990Muscle cannot be computed.
+    # OpenSim's ClutchedPathSpring pulls whatever the file says, and its Delp1990Muscle cannot be
+    # computed.
     if case in ("clutched", "delp"):
         assert trajectory.speeds[-1, 0] == pytest.approx(9.80665 * 0.05)
         return
@@ -204,7 +220,11 @@ def test_states_of_what_is_off(case, tmp_path):
 def test_constants_of_the_first_muscle_count_for_all(tmp_path):
     """As in a process that computes no other model of such muscles."""
     model, _ = made("degroote", 0.9)
-    slow = {"activation_time_constant": 0.03, "deactivation_time_constant": 0.12, "activation_dynamics_smoothing": 5.0}
+    slow = {
+        "activation_time_constant": 0.03,
+        "deactivation_time_constant": 0.12,
+        "activation_dynamics_smoothing": 5.0,
+    }
     first = class_for("DeGrooteFregly2016Muscle")(name="first", geometry_path=line(), **slow)
     model.force_set.objects.insert(0, first)
     osimlite.write(model, tmp_path / "model.osim")
@@ -216,7 +236,9 @@ state = model.initSystem()
 model.realizeAcceleration(state)
 print(model.getStateVariableDerivativeValue(state, "/forceset/mu/activation"))
 """
-    result = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
+    result = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
     mechanism = build_mechanism(model)
     engine = CompiledEngine(mechanism, force_elements(model, mechanism))
     y = engine.state.default()

@@ -48,12 +48,20 @@ def over(kind, frame, *location, hint=(nan, nan, nan)):
 HIGH, LOW, END = at(GROUND, -0.1, 0.1, 0), at(GROUND, -0.1, 0.03, 0.01), at(B2, 0, 0.02, 0)
 UP = {"hint": (0, 0.1, 0)}
 PATHS = {
-    "straight": (at(GROUND, 0.1, 0.1, 0), at(B1, 0.1, 0, 0.05), at(F1, 0.02, 0.0, 0.01), at(B2, 0.1, -0.1, 0)),
+    "straight": (
+        at(GROUND, 0.1, 0.1, 0),
+        at(B1, 0.1, 0, 0.05),
+        at(F1, 0.02, 0.0, 0.01),
+        at(B2, 0.1, -0.1, 0),
+    ),
     "over a sphere": (HIGH, over("sphere", B0, 0.1, 0, 0, hint=(0.01, 0.08, 0.01)), END),
     "over a cylinder": (HIGH, over("cylinder", B0, 0.1, 0, 0, hint=(0.01, 0.08, 0.01)), END),
     "over an ellipsoid": (HIGH, over("ellipsoid", B0, 0.1, 0, 0, hint=(0.01, 0.08, 0.01)), END),
     "over a torus": (HIGH, over("torus", B0, 0.1, -0.08, 0, hint=(0.08, 0, 0.03)), END),
-    **{f"over a {kind} without a hint": (LOW, over(kind, B0, 0.1, 0, 0.01), END) for kind in SURFACES},
+    **{
+        f"over a {kind} without a hint": (LOW, over(kind, B0, 0.1, 0, 0.01), END)
+        for kind in SURFACES
+    },
     "beside a sphere": (HIGH, over("sphere", B0, 0.1, -0.1, 0, **UP), at(B2, 0, 0.1, 0)),
     "over several": (
         *(at(GROUND, -0.1, 0.05, 0), over("sphere", B0, 0, 0, 0, **UP), at(B0, 0.1, 0.12, 0.01)),
@@ -71,15 +79,24 @@ def carrier(elements):
     """Three bodies in a row, and a spring along a path."""
     model, body = Model(name="cables"), None
     for number in range(3):
-        below, body = body or model.ground, Body(name=f"b{number}", mass=1.0, inertia=(0.1, 0.2, 0.3, 0, 0, 0))
+        below, body = (
+            body or model.ground,
+            Body(name=f"b{number}", mass=1.0, inertia=(0.1, 0.2, 0.3, 0, 0, 0)),
+        )
         if number == 1:
-            frame = PhysicalOffsetFrame(name="f1", socket_parent="..", translation=(0.02, -0.03, 0.05))
+            frame = PhysicalOffsetFrame(
+                name="f1", socket_parent="..", translation=(0.02, -0.03, 0.05)
+            )
             frame.orientation = (0.1, 0.3, 0.0)
             body.subcomponents.append(frame)
         model.add(body)
         coordinate = Coordinate(name=f"q{number}", range=(-3, 3), default_value=0.1 * number)
         joint = osimlite.PinJoint(name=f"j{number}", coordinates=[coordinate])
-        model.add(joint.between(below, body, at=(0.2 * (number > 0), 0, 0), turned=(0.3 - 0.2 * number, 0.1, 0)))
+        model.add(
+            joint.between(
+                below, body, at=(0.2 * (number > 0), 0, 0), turned=(0.3 - 0.2 * number, 0.1, 0)
+            )
+        )
     path = Scholz2015GeometryPath(name="path")
     for number, (first, *rest) in enumerate(elements):
         if first in SURFACES:
@@ -87,7 +104,9 @@ def carrier(elements):
             place = {"name": f"o{number}", "socket_frame": frame, "location": location}
             model.add(SURFACES[first].model_copy(update=place))
             surface = f"/contactgeometryset/o{number}"
-            element = Scholz2015GeometryPathObstacle(socket_contact_geometry=surface, contact_hint=hint)
+            element = Scholz2015GeometryPathObstacle(
+                socket_contact_geometry=surface, contact_hint=hint
+            )
         else:
             point = PathPoint(name="point", socket_parent_frame=first, location=rest[0])
             element = Scholz2015GeometryPathPoint(path_point=point)
@@ -118,9 +137,15 @@ def test_cable(elements, tmp_path):
         path = opensim.PathSpring.safeDownCast(theirs.getForceSet().get(0)).getPath()
         name = "/forceset/spring"
         assert paths.lengths(q)[name] == pytest.approx(path.getLength(state), rel=0, abs=1e-12)
-        assert paths.speeds(q, u)[name] == pytest.approx(path.getLengtheningSpeed(state), rel=0, abs=1e-9)
+        assert paths.speeds(q, u)[name] == pytest.approx(
+            path.getLengtheningSpeed(state), rel=0, abs=1e-9
+        )
         expected = [coordinate.getAccelerationValue(state) for coordinate in coordinates]
-        assert engine.acceleration(0.0, q.tolist(), u.tolist()) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+        assert engine.acceleration(0.0, q.tolist(), u.tolist()) == pytest.approx(
+            expected, rel=1e-9, abs=1e-9
+        )
         arms = [path.computeMomentArm(state, coordinate) for coordinate in coordinates]
         result = paths.moment_arms(q)[name]
-        assert [result.get(info.path, 0.0) for info in mechanism.coordinates] == pytest.approx(arms, rel=0, abs=1e-9)
+        assert [result.get(info.path, 0.0) for info in mechanism.coordinates] == pytest.approx(
+            arms, rel=0, abs=1e-9
+        )

@@ -13,7 +13,9 @@ import pytest
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = [
     pytest.mark.oracle,
-    pytest.mark.skipif(find_spec("casadi") is None, reason="needs the casadi package (extra 'casadi')"),
+    pytest.mark.skipif(
+        find_spec("casadi") is None, reason="needs the casadi package (extra 'casadi')"
+    ),
 ]
 
 SCRIPT = """
@@ -55,8 +57,12 @@ def test_accelerations_are_those_of_opensim(number, shared):
         vector = opensim.Vector(len(controls), 0.0)
         for name, value in zip(controls, u, strict=True):
             single = opensim.Vector(1, value)
-            opensim.ScalarActuator.safeDownCast(model.getComponent(name)).addInControls(single, vector)
+            opensim.ScalarActuator.safeDownCast(model.getComponent(name)).addInControls(
+                single, vector
+            )
         model.setControls(state, vector)
         model.realizeAcceleration(state)
         wanted = np.array([model.getStateVariableDerivativeValue(state, name) for name in states])
-        assert np.max(np.abs(np.array(xdot) - wanted) / np.maximum(1.0, np.abs(wanted).max())) < 1e-9
+        assert (
+            np.max(np.abs(np.array(xdot) - wanted) / np.maximum(1.0, np.abs(wanted).max())) < 1e-9
+        )

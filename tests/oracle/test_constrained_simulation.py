@@ -28,20 +28,28 @@ def engine(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-def both(path: Path, to: float, accuracy: float, seed: int, **settings: Any) -> tuple[Any, Any, tuple[int, int]]:
+def both(
+    path: Path, to: float, accuracy: float, seed: int, **settings: Any
+) -> tuple[Any, Any, tuple[int, int]]:
     """Ends (2, n) of values and speeds of either program from the same random speeds, and how many steps each took."""
     rng = np.random.default_rng(seed)
     with Simulation(osimlite.read(path), **settings) as simulation:
         mechanism = simulation.mechanism
         free = [info for info in mechanism.coordinates if not (info.locked or info.prescribed)]
-        u = mechanism.project_speeds(mechanism.assemble({}), rng.uniform(-1.0, 1.0, len(mechanism.coordinates)))
+        u = mechanism.project_speeds(
+            mechanism.assemble({}), rng.uniform(-1.0, 1.0, len(mechanism.coordinates))
+        )
         speeds = {info.path: float(u[mechanism.coordinate_index(info.path)]) for info in free}
         trajectory = simulation.run(to, accuracy=accuracy, initial_speeds=speeds)
     opensim.Logger.setLevelString("off")
     model = opensim.Model(str(path))
     state = model.initSystem()
-    coordinates = [model.getCoordinateSet().get(index) for index in range(len(mechanism.coordinates))]
-    for info, coordinate, value in zip(mechanism.coordinates, coordinates, trajectory.values[0], strict=True):
+    coordinates = [
+        model.getCoordinateSet().get(index) for index in range(len(mechanism.coordinates))
+    ]
+    for info, coordinate, value in zip(
+        mechanism.coordinates, coordinates, trajectory.values[0], strict=True
+    ):
         if not info.locked:
             coordinate.setValue(state, float(value), False)
     for coordinate, speed in zip(coordinates, trajectory.speeds[0], strict=True):
@@ -61,7 +69,9 @@ def test_motion_under_constraints(case: str, engine: str, tmp_path: Path) -> Non
     CASES[case](model, bodies)
     model.finalizeConnections()
     model.printToXML(str(tmp_path / "model.osim"))
-    ours, theirs, (our_steps, their_steps) = both(tmp_path / "model.osim", 1.0, 1e-6, 5, engine=engine)
+    ours, theirs, (our_steps, their_steps) = both(
+        tmp_path / "model.osim", 1.0, 1e-6, 5, engine=engine
+    )
     assert np.abs(ours - theirs).max() < 1e-8
     assert our_steps == their_steps
 
@@ -86,7 +96,9 @@ def test_real_models_without_muscles(name: str, engine: str, corpus: Any, tmp_pa
     osimlite.write(model, tmp_path / "model.osim")
     # Knees that turn about several axes have OpenSim's derivatives.
     path = tmp_path / "model.osim"
-    ours, theirs, (our_steps, their_steps) = both(path, CORPUS[name], 1e-6, 7, engine=engine, opensim_derivatives=True)
+    ours, theirs, (our_steps, their_steps) = both(
+        path, CORPUS[name], 1e-6, 7, engine=engine, opensim_derivatives=True
+    )
     assert np.abs(ours - theirs).max() < 1e-9
     assert our_steps == their_steps
 
@@ -94,11 +106,13 @@ def test_real_models_without_muscles(name: str, engine: str, corpus: Any, tmp_pa
 def four_bars() -> osimlite.Model:
     """Crank, coupler and rocker on pins, the last of which closes the loop.
 
-    OpenSim halves a body for that and gives one half a wrong inertia; not so for 2 kg about the body's origin.
+    OpenSim halves a body for that and gives one half a wrong inertia; not so for 2 kg about the
+    body's origin.
     """
     model, inertia = osimlite.Model(name="four_bars"), (0.3, 0.2, 0.4, 0.0, 0.0, 0.0)
     crank, coupler, rocker = (
-        model.add(osimlite.Body(name=name, mass=2.0, inertia=inertia)) for name in ("crank", "coupler", "rocker")
+        model.add(osimlite.Body(name=name, mass=2.0, inertia=inertia))
+        for name in ("crank", "coupler", "rocker")
     )
     for name, (one, at), (two, child_at) in (
         ("a", (model.ground, (0.0, 0.0, 0.0)), (crank, (0.0, 0.2, 0.0))),
@@ -106,7 +120,9 @@ def four_bars() -> osimlite.Model:
         ("c", (model.ground, (0.7, 0.0, 0.0)), (rocker, (0.0, 0.3, 0.0))),
         ("d", (coupler, (0.35, 0.0, 0.0)), (rocker, (0.0, -0.3, 0.0))),
     ):
-        joint = osimlite.PinJoint(name=name, coordinates=[osimlite.Coordinate(name=f"angle_{name}")])
+        joint = osimlite.PinJoint(
+            name=name, coordinates=[osimlite.Coordinate(name=f"angle_{name}")]
+        )
         model.add(joint.between(one, two, at=at, child_at=child_at))
     return model
 
@@ -121,15 +137,21 @@ def test_a_loop_of_four_bars(engine: str, tmp_path: Path) -> None:
 def tilted_chain() -> osimlite.Model:
     """Four bars on pins, one of whose axes is all but parallel to the others, the last bar's end held at its place.
 
-    What holds the end in the plane says almost nothing: OpenSim leaves that equation out of accelerations.
+    What holds the end in the plane says almost nothing: OpenSim leaves that equation out of
+    accelerations.
     """
     model, inertia = osimlite.Model(name="chain"), (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
     parent: osimlite.Body | osimlite.Ground = model.ground
     for number, angle in enumerate((0.3, 0.5, -0.9, 0.4)):
-        body = model.add(osimlite.Body(name=f"bar_{number}", mass=1.0, mass_center=(0.0, -0.5, 0.0), inertia=inertia))
+        body = model.add(
+            osimlite.Body(
+                name=f"bar_{number}", mass=1.0, mass_center=(0.0, -0.5, 0.0), inertia=inertia
+            )
+        )
         turn = (2e-6, 0.0, 0.0) if number == 2 else (0.0, 0.0, 0.0)
         joint = osimlite.PinJoint(
-            name=f"pin_{number}", coordinates=[osimlite.Coordinate(name=f"angle_{number}", default_value=angle)]
+            name=f"pin_{number}",
+            coordinates=[osimlite.Coordinate(name=f"angle_{number}", default_value=angle)],
         )
         at = (0.0, 0.0, 0.0) if number == 0 else (0.0, -1.0, 0.0)
         model.add(joint.between(parent, body, at=at, turned=turn, child_turned=turn))

@@ -59,7 +59,9 @@ def _chain(rng: np.random.Generator) -> tuple[Any, Bodies]:
 
 
 def _point(model: Any, bodies: Bodies) -> None:
-    model.addConstraint(opensim.PointConstraint(bodies[1], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1)))
+    model.addConstraint(
+        opensim.PointConstraint(bodies[1], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1))
+    )
 
 
 def _rod(model: Any, bodies: Bodies) -> None:
@@ -78,7 +80,13 @@ def _line(model: Any, bodies: Bodies) -> None:
 
 def _weld(model: Any, bodies: Bodies) -> None:
     constraint = opensim.WeldConstraint(
-        "weld", bodies[1], _vec(0.1, 0.2, 0.3), _vec(0.3, 0.2, 0.1), bodies[2], _vec(0.0, 0.1, 0.0), _vec(0.1, 0.3, 0.2)
+        "weld",
+        bodies[1],
+        _vec(0.1, 0.2, 0.3),
+        _vec(0.3, 0.2, 0.1),
+        bodies[2],
+        _vec(0.0, 0.1, 0.0),
+        _vec(0.1, 0.3, 0.2),
     )
     model.addConstraint(constraint)
 
@@ -86,10 +94,14 @@ def _weld(model: Any, bodies: Bodies) -> None:
 def _point_on_offset_frame(model: Any, bodies: Bodies) -> None:
     """OpenSim takes the location in the body, not in the frame."""
     frame = opensim.PhysicalOffsetFrame(
-        "spot", bodies[1], opensim.Transform(opensim.Rotation(0.5, opensim.CoordinateAxis(1)), _vec(0.3, 0.0, 0.1))
+        "spot",
+        bodies[1],
+        opensim.Transform(opensim.Rotation(0.5, opensim.CoordinateAxis(1)), _vec(0.3, 0.0, 0.1)),
     )
     bodies[1].addComponent(frame)
-    constraint = opensim.PointConstraint(bodies[0], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1))
+    constraint = opensim.PointConstraint(
+        bodies[0], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1)
+    )
     constraint.updSocket("body_1").connect(frame)
     model.addConstraint(constraint)
 
@@ -104,7 +116,9 @@ def _rolling(model: Any, bodies: Bodies) -> None:
     with NamedTemporaryFile("w", suffix=".xml") as file:
         file.write(text)
         file.flush()
-        constraint = opensim.Constraint.safeDownCast(opensim.OpenSimObject.makeObjectFromFile(file.name))
+        constraint = opensim.Constraint.safeDownCast(
+            opensim.OpenSimObject.makeObjectFromFile(file.name)
+        )
     model.addConstraint(constraint.clone())
 
 
@@ -146,7 +160,10 @@ def _linear(coefficients: tuple[float, ...]) -> Any:
 
 
 def _prescribed(model: Any, bodies: Bodies) -> None:
-    for joint, place, function in (("pin", 0, opensim.Sine(0.4, 3.0, 0.2, 0.1)), ("ball", 1, _linear((0.5, 0.2)))):
+    for joint, place, function in (
+        ("pin", 0, opensim.Sine(0.4, 3.0, 0.2, 0.1)),
+        ("ball", 1, _linear((0.5, 0.2))),
+    ):
         coordinate = model.updJointSet().get(joint).upd_coordinates(place)
         coordinate.setPrescribedFunction(function)
         coordinate.set_prescribed(True)
@@ -224,7 +241,10 @@ def _built(model: Any, folder: Path) -> Mechanism:
 def _no_further_than(mechanism: Mechanism, ours: Any, theirs: Any) -> None:
     """Our default pose is as near to the default values as OpenSim's, if that fulfils the constraints."""
     wanted, state = mechanism.values({}), mechanism.at(theirs)
-    if any(np.abs(item.position_errors(state)).max(initial=0.0) > 1e-9 for item in mechanism.constraints):
+    if any(
+        np.abs(item.position_errors(state)).max(initial=0.0) > 1e-9
+        for item in mechanism.constraints
+    ):
         # It never assembles loops that only joints close, and cannot always reach what it wants.
         return
     counted = np.array([not info.yielding for info in mechanism.coordinates])
@@ -237,8 +257,12 @@ def _no_further_than(mechanism: Mechanism, ours: Any, theirs: Any) -> None:
 def _loaded(folder: Path, mechanism: Mechanism) -> tuple[Any, Any, list[Any]]:
     model = opensim.Model(str(folder / "model.osim"))
     state = model.initSystem()
-    coordinates = [model.getCoordinateSet().get(index) for index in range(len(mechanism.coordinates))]
-    assert [item.getAbsolutePathString() for item in coordinates] == [info.path for info in mechanism.coordinates]
+    coordinates = [
+        model.getCoordinateSet().get(index) for index in range(len(mechanism.coordinates))
+    ]
+    assert [item.getAbsolutePathString() for item in coordinates] == [
+        info.path for info in mechanism.coordinates
+    ]
     return model, state, coordinates
 
 
@@ -246,7 +270,9 @@ def _numbers(what: str, state: Any, coordinates: list[Any]) -> Any:
     return np.array([getattr(item, f"get{what}Value")(state) for item in coordinates])
 
 
-def _go(rng: np.random.Generator, mechanism: Mechanism, state: Any, coordinates: list[Any]) -> tuple[Any, Any, float]:
+def _go(
+    rng: np.random.Generator, mechanism: Mechanism, state: Any, coordinates: list[Any]
+) -> tuple[Any, Any, float]:
     """Both to the same random state that fulfils the constraints."""
     time = float(rng.uniform(0.0, 2.0))
     q, _ = mechanism.default_state()
@@ -281,7 +307,9 @@ def test_constrained_motion(case: str, tmp_path: Path) -> None:
         assert np.abs(result - udot).max() < 1e-9 * (1.0 + np.abs(udot).max())
 
 
-@pytest.mark.parametrize(("kind", "count"), [("PinJoint", 1), ("BallJoint", 3), ("UniversalJoint", 2)])
+@pytest.mark.parametrize(
+    ("kind", "count"), [("PinJoint", 1), ("BallJoint", 3), ("UniversalJoint", 2)]
+)
 def test_a_loop_splits_a_body(kind: str, count: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(12)
     model, bodies = _chain(rng)
@@ -299,7 +327,9 @@ def test_a_loop_splits_a_body(kind: str, count: int, tmp_path: Path) -> None:
         q, u, time = _go(rng, mechanism, state, coordinates)
         _unbroken(model, state)
         udot = _numbers("Acceleration", state, coordinates)
-        assert np.abs(theirs.acceleration(q, u, time=time) - udot).max() < 1e-9 * (1.0 + np.abs(udot).max())
+        assert np.abs(theirs.acceleration(q, u, time=time) - udot).max() < 1e-9 * (
+            1.0 + np.abs(udot).max()
+        )
 
 
 def test_a_weld_that_closes_a_loop_is_a_constraint(tmp_path: Path) -> None:

@@ -61,7 +61,8 @@ def test_published_models(corpus, name, tmp_path):
     model = next(model for model in corpus if model.id == name)
     shutil.copytree(model.path.parent, tmp_path / "model")
     path = tmp_path / "model" / model.path.name
-    # As OpenSim prints it: where it brings an old file up to date, it keeps six digits of some numbers.
+    # As OpenSim prints it: where it brings an old file up to date, it keeps six digits of some
+    # numbers.
     path.write_bytes(gzip.decompress(model.converted.read_bytes()))
     compare(path)
 
@@ -88,13 +89,17 @@ def balls(count=2) -> Model:
     model.add(floor)
     surfaces = [floor]
     for number in range(count):
-        body = model.add(Body(name=f"ball{number}", mass=0.5, inertia=(0.002, 0.002, 0.002, 0, 0, 0)))
+        body = model.add(
+            Body(name=f"ball{number}", mass=0.5, inertia=(0.002, 0.002, 0.002, 0, 0, 0))
+        )
         joint = osimlite.FreeJoint(name=f"free{number}")
         values = (0.1, 0.0, 0.2, 0.12 * number, 0.2 + 0.3 * number, 0.03 * number)
         speeds = (1.0, 0.0, 3.0 * number, 0.3 - 0.6 * number, -1.0 * number, 0.0)
         for index, axis in enumerate(("rx", "ry", "rz", "tx", "ty", "tz")):
             joint.coordinates[index] = Coordinate(
-                name=f"{axis}{number}", default_value=values[index], default_speed_value=speeds[index]
+                name=f"{axis}{number}",
+                default_value=values[index],
+                default_speed_value=speeds[index],
             )
         model.add(joint.between(model.ground, body))
         sphere = ContactSphere(name=f"sphere{number}", socket_frame=body, radius=0.1)
@@ -112,13 +117,20 @@ def test_balls_at_several_accuracies(tmp_path):
     for accuracy in (1e-3, 1e-5, 1e-7, 1e-9):
         ours, trajectory = by_osimlite(path, 0.5, accuracy)
         theirs = by_opensim(path, 0.5, accuracy)
-        error, their_error = (max(abs(result[label] - exact[label]) for label in ours) for result in (ours, theirs))
-        # OpenSim hands out states between its steps, so that the two agree no better than they are exact.
+        error, their_error = (
+            max(abs(result[label] - exact[label]) for label in ours) for result in (ours, theirs)
+        )
+        # OpenSim hands out states between its steps, so that the two agree no better than they are
+        # exact.
         assert error < 10.0 * max(their_error, 1e-8)
         errors.append(error)
     assert errors[-1] < 1e-6 and errors == sorted(errors, reverse=True)
     names = {event["contact"] for event in trajectory.summary["contact_events"]}
-    assert names == {"contact (sphere0, floor)", "contact (sphere1, floor)", "contact (sphere1, sphere0)"}
+    assert names == {
+        "contact (sphere0, floor)",
+        "contact (sphere1, floor)",
+        "contact (sphere1, sphere0)",
+    }
 
 
 def terrain(folder) -> Model:
@@ -126,22 +138,42 @@ def terrain(folder) -> Model:
     model = dynamic_walker()
     platform, feet = "/bodyset/Platform", []
     for side in ("R", "L"):
-        feet.append(next(item for item in model.components(ContactSphere) if item.name == f"{side}FootContact"))
+        feet.append(
+            next(
+                item
+                for item in model.components(ContactSphere)
+                if item.name == f"{side}FootContact"
+            )
+        )
     ramp = ContactHalfSpace(
-        name="ramp", socket_frame=platform, location=(0.5, 0.03, 0.0), orientation=(0, 0, UP[2] + 0.15)
+        name="ramp",
+        socket_frame=platform,
+        location=(0.5, 0.03, 0.0),
+        orientation=(0, 0, UP[2] + 0.15),
     )
     boulders = [
-        ContactSphere(name=f"boulder{k}", socket_frame=platform, location=(0.15 * k - 0.3, -0.25, 0.2), radius=0.3)
+        ContactSphere(
+            name=f"boulder{k}",
+            socket_frame=platform,
+            location=(0.15 * k - 0.3, -0.25, 0.2),
+            radius=0.3,
+        )
         for k in range(4)
     ]
     write_obj(folder / "rock.obj", *block((0.2, 0.3, 0.12)))
-    rock = ContactMesh(name="rock", socket_frame=platform, location=(0.1, 0.02, -0.2), filename="rock.obj")
+    rock = ContactMesh(
+        name="rock", socket_frame=platform, location=(0.1, 0.02, -0.2), filename="rock.obj"
+    )
     model.add(ramp, *boulders, rock)
     for foot, name in zip(feet, "RL", strict=True):
         model.add(touching(f"{name}Terrain", (foot, ramp, *boulders)))
         model.add(touching(f"{name}Rock", (foot, rock), 1e7, ElasticFoundationForce))
     for name in ("RHip_rz", "LHip_rz", "RKnee_rz", "LKnee_rz"):
-        model.add(SpringGeneralizedForce(name=f"{name}_spring", coordinate=name, stiffness=20.0, viscosity=0.5))
+        model.add(
+            SpringGeneralizedForce(
+                name=f"{name}_spring", coordinate=name, stiffness=20.0, viscosity=0.5
+            )
+        )
     model.add(
         PointToPointSpring(
             name="band",
@@ -151,7 +183,11 @@ def terrain(folder) -> Model:
             rest_length=0.1,
         ),
         ExpressionBasedPointToPointForce(
-            name="magnet", body1="Platform", body2="LeftShank", point1=(0.3, 0, 0), expression="0.01/(0.1+d^2)"
+            name="magnet",
+            body1="Platform",
+            body2="LeftShank",
+            point1=(0.3, 0, 0),
+            expression="0.01/(0.1+d^2)",
         ),
     )
     return model
@@ -172,12 +208,16 @@ def foot(folder) -> Model:
             filename="foot.vtp",
         )
         model.add(sole)
-        model.add(touching(f"{side}FootForce", (sole, "PlatformContact"), 3e6, ElasticFoundationForce))
+        model.add(
+            touching(f"{side}FootForce", (sole, "PlatformContact"), 3e6, ElasticFoundationForce)
+        )
     return model
 
 
 @pytest.mark.parametrize(
-    ("make", "met"), [(terrain, {"Terrain", "Rock"}), (foot, {"Foot"})], ids=["terrain", "mesh feet"]
+    ("make", "met"),
+    [(terrain, {"Terrain", "Rock"}), (foot, {"Foot"})],
+    ids=["terrain", "mesh feet"],
 )
 def test_walkers(make, met, tmp_path):
     path = tmp_path / "walker.osim"

@@ -38,7 +38,9 @@ def by_opensim(radii, positions, velocities):
     opensim.Logger.setLevelString("error")
     model = opensim.Model()
     model.setGravity(opensim.Vec3(0))
-    plane = opensim.ContactHalfSpace(opensim.Vec3(0), opensim.Vec3(0, 0, -np.pi / 2), model.getGround(), "plane")
+    plane = opensim.ContactHalfSpace(
+        opensim.Vec3(0), opensim.Vec3(0, 0, -np.pi / 2), model.getGround(), "plane"
+    )
     model.addContactGeometry(plane)
     contact = opensim.HuntCrossleyForce()
     contact.setName("contact")
@@ -50,7 +52,9 @@ def by_opensim(radii, positions, velocities):
         model.addBody(body)
         joints.append(opensim.FreeJoint(f"joint{i}", model.getGround(), body))
         model.addJoint(joints[-1])
-        model.addContactGeometry(opensim.ContactSphere(float(radius), opensim.Vec3(0), body, f"sphere{i}"))
+        model.addContactGeometry(
+            opensim.ContactSphere(float(radius), opensim.Vec3(0), body, f"sphere{i}")
+        )
         contact.addGeometry(f"sphere{i}")
     for name, value in zip(PROPERTIES, MATERIAL, strict=True):
         getattr(contact, f"set{name}")(value)
@@ -64,7 +68,9 @@ def by_opensim(radii, positions, velocities):
     record = contact.getRecordValues(state)
     labels = contact.getRecordLabels()
     columns = {labels.get(i): record.get(i) for i in range(labels.size())}
-    forces = [[columns[f"contact.body{i}.force.{axis}"] for axis in "XYZ"] for i in range(len(radii))]
+    forces = [
+        [columns[f"contact.body{i}.force.{axis}"] for axis in "XYZ"] for i in range(len(radii))
+    ]
     return np.array(forces), model.calcPotentialEnergy(state)
 
 

@@ -50,7 +50,9 @@ def compare_controls(path, times, tolerance=1e-12) -> None:
         theirs.realizeVelocity(state)
         system.applied(time, system.state.default())
         expected = theirs.getControls(state).to_numpy()
-        assert np.abs(system.controls() - expected).max() <= tolerance * max(1.0, np.abs(expected).max())
+        assert np.abs(system.controls() - expected).max() <= tolerance * max(
+            1.0, np.abs(expected).max()
+        )
 
 
 TIMES = [-1.0, -0.1, 0.0, 0.013, 0.2, 0.3, 0.37, 0.5, 0.61, 0.99, 1.0, 1.7]
@@ -75,7 +77,12 @@ def test_controls_that_a_search_writes(tmp_path, interpolation):
 
 
 def motors(model, *names) -> None:
-    model.add(*(CoordinateActuator(name=f"on_{name}", coordinate=name, optimal_force=7.0) for name in names))
+    model.add(
+        *(
+            CoordinateActuator(name=f"on_{name}", coordinate=name, optimal_force=7.0)
+            for name in names
+        )
+    )
 
 
 @pytest.mark.parametrize("start", [-0.1, 0.37, 0.5])
@@ -85,8 +92,18 @@ def test_controls_from_a_file(model, method, start, tmp_path):
     motors(model, "q0_0", "q1_0", "q2_0")
     times = np.linspace(start, 1.0, 23)
     rows = np.column_stack([np.sin((3.0 + k) * times + k) for k in range(2)])
-    write_sto(tmp_path / "controls.sto", "controls", times, ["on_q0_0", "/forceset/on_q2_0"], rows.tolist())
-    model.add(PrescribedController(name="brain", controls_file="controls.sto", interpolation_method=method))
+    write_sto(
+        tmp_path / "controls.sto",
+        "controls",
+        times,
+        ["on_q0_0", "/forceset/on_q2_0"],
+        rows.tolist(),
+    )
+    model.add(
+        PrescribedController(
+            name="brain", controls_file="controls.sto", interpolation_method=method
+        )
+    )
     assert compare(model, tmp_path) > 0
     # Far outside, splines of high degree have lost digits.
     compare_controls(tmp_path / "model.osim", TIMES, 1e-11)
@@ -97,23 +114,39 @@ def test_a_file_with_equal_times_and_labels(model, method, tmp_path):
     """The last row at a time counts, and the first column of a label."""
     motors(model, "q0_0")
     rows = [[float(number), 5.0] for number in range(6)]
-    write_sto(tmp_path / "controls.sto", "controls", [0.0, 0.2, 0.37, 0.37, 0.4, 0.7], ["on_q0_0", "on_q0_0"], rows)
-    model.add(PrescribedController(name="brain", controls_file="controls.sto", interpolation_method=method))
+    write_sto(
+        tmp_path / "controls.sto",
+        "controls",
+        [0.0, 0.2, 0.37, 0.37, 0.4, 0.7],
+        ["on_q0_0", "on_q0_0"],
+        rows,
+    )
+    model.add(
+        PrescribedController(
+            name="brain", controls_file="controls.sto", interpolation_method=method
+        )
+    )
     assert compare(model, tmp_path) > 0
 
 
 def test_a_column_beside_a_function_of_the_same_name(model, tmp_path):
     """The function counts, and the column does not."""
     model.add(CoordinateActuator(name="motor", coordinate="q1_0", optimal_force=7.0))
-    write_sto(tmp_path / "controls.sto", "controls", [0.0, 1.0], ["/forceset/motor"], [[1.0], [2.0]])
-    brain = PrescribedController(name="brain", controls_file="controls.sto", socket_actuators=("/forceset/motor",))
+    write_sto(
+        tmp_path / "controls.sto", "controls", [0.0, 1.0], ["/forceset/motor"], [[1.0], [2.0]]
+    )
+    brain = PrescribedController(
+        name="brain", controls_file="controls.sto", socket_actuators=("/forceset/motor",)
+    )
     brain.ControlFunctions.objects.append(Constant(value=5.0))
     model.add(brain)
     assert compare(model, tmp_path) > 0
 
 
 def nodes(*points) -> str:
-    return "".join(f"<ControlLinearNode><t>{t}</t><value>{x}</value></ControlLinearNode>" for t, x in points)
+    return "".join(
+        f"<ControlLinearNode><t>{t}</t><value>{x}</value></ControlLinearNode>" for t, x in points
+    )
 
 
 POINTS = {
@@ -126,7 +159,9 @@ POINTS = {
 
 
 @pytest.mark.parametrize("points", POINTS.values(), ids=POINTS)
-@pytest.mark.parametrize("more", ["", "<extrapolate>false</extrapolate>", "<use_steps>true</use_steps>"])
+@pytest.mark.parametrize(
+    "more", ["", "<extrapolate>false</extrapolate>", "<use_steps>true</use_steps>"]
+)
 @pytest.mark.parametrize("enabled", [True, False])
 def test_control_sets(model, enabled, more, points, tmp_path):
     """A set enables its controller; limits and controls of other than the model do nothing."""
@@ -144,7 +179,10 @@ def test_control_sets(model, enabled, more, points, tmp_path):
         "</OpenSimDocument>"
     )
     brain = ControlSetController(
-        name="brain", controls_file="controls.xml", socket_actuators=("/forceset/on_q0_0",), enabled=enabled
+        name="brain",
+        controls_file="controls.xml",
+        socket_actuators=("/forceset/on_q0_0",),
+        enabled=enabled,
     )
     model.add(brain)
     assert compare(model, tmp_path) == 3 * STATES
@@ -154,7 +192,9 @@ def test_control_sets(model, enabled, more, points, tmp_path):
 def test_a_control_set_in_a_table(model, tmp_path):
     motors(model, "q0_0", "q1_0")
     rows = [[1.0, 2.0], [3.0, 5.0]]
-    write_sto(tmp_path / "controls.sto", "controls", [0.0, 0.2], ["on_q0_0", "on_q1_0.excitation"], rows)
+    write_sto(
+        tmp_path / "controls.sto", "controls", [0.0, 0.2], ["on_q0_0", "on_q1_0.excitation"], rows
+    )
     model.add(ControlSetController(name="brain", controls_file="controls.sto"))
     assert compare(model, tmp_path) == 2 * STATES
     compare_controls(tmp_path / "model.osim", TIMES)
@@ -169,7 +209,13 @@ def test_synergies(model, frames, tmp_path):
     body.point_is_global, body.spatial_force_is_global = here, there
     model.add(body)
     drive(model, "on_q0_0", "on_q1_0")
-    write_sto(tmp_path / "signals.sto", "signals", [0.0, 0.3, 0.5], ["a", "b"], [[0.0, 1.0], [2.0, -1.0], [1.0, 5.0]])
+    write_sto(
+        tmp_path / "signals.sto",
+        "signals",
+        [0.0, 0.3, 0.5],
+        ["a", "b"],
+        [[0.0, 1.0], [2.0, -1.0], [1.0, 5.0]],
+    )
     model.subcomponents += [
         SignalGenerator(name="wave", function=Sine(amplitude=2.0, omega=3.0, phase=0.1)),
         TableSource__double_(name="table", filename="signals.sto"),
@@ -197,21 +243,37 @@ def test_reflexes(model, tmp_path):
     model.add(*along(RigidTendonMuscle, optimal_fiber_length=0.4, max_contraction_velocity=3.0))
     drive(model, "along0", "along1")
     for name, gain in (("first", 2.0), ("second", 3.0)):
-        model.add(ToyReflexController(name=name, gain=gain, socket_actuators=("/forceset/along0", "/forceset/along1")))
+        model.add(
+            ToyReflexController(
+                name=name, gain=gain, socket_actuators=("/forceset/along0", "/forceset/along1")
+            )
+        )
     assert compare(model, tmp_path, counted=None) == 2 * STATES
 
 
 @pytest.mark.parametrize("words", ["on_q0_0", "on_q1_0 on_q0_0"])
 def test_a_column_beside_a_function_of_the_same_name_in_an_old_document(model, words, tmp_path):
     motors(model, "q0_0", "q1_0")
-    write_sto(tmp_path / "controls.sto", "controls", [0.0, 1.0], ["on_q0_0", "on_q1_0"], [[1.0, 4.0], [2.0, 7.0]])
-    brain = PrescribedController(name="brain", controls_file="controls.sto", socket_actuators=("/forceset/on_q0_0",))
-    brain.ControlFunctions.objects += [Constant(value=5.0 + number) for number in range(len(words.split()))]
+    write_sto(
+        tmp_path / "controls.sto",
+        "controls",
+        [0.0, 1.0],
+        ["on_q0_0", "on_q1_0"],
+        [[1.0, 4.0], [2.0, 7.0]],
+    )
+    brain = PrescribedController(
+        name="brain", controls_file="controls.sto", socket_actuators=("/forceset/on_q0_0",)
+    )
+    brain.ControlFunctions.objects += [
+        Constant(value=5.0 + number) for number in range(len(words.split()))
+    ]
     model.add(brain)
     text = osimlite.to_text(model).replace('Version="40600"', 'Version="40500"')
     paths = "<socket_actuators>/forceset/on_q0_0</socket_actuators>"
     assert paths in text
-    (tmp_path / "old.osim").write_text(text.replace(paths, f"<actuator_list>{words}</actuator_list>"))
+    (tmp_path / "old.osim").write_text(
+        text.replace(paths, f"<actuator_list>{words}</actuator_list>")
+    )
     compare_controls(tmp_path / "old.osim", TIMES)
 
 

@@ -95,7 +95,9 @@ def test_derivatives(both: Both, corpus_model: Any, engine: str) -> None:
     with Simulation(both.ours, engine, folder=both.folder, **CHOICES) as simulation:
         layout, mechanism = simulation.state, simulation.mechanism
         free = [mechanism.coordinates[place] for place in layout.order]
-        paths = [f"{info.path}/{what}" for what in ("value", "speed") for info in free] + layout.paths
+        paths = [
+            f"{info.path}/{what}" for what in ("value", "speed") for info in free
+        ] + layout.paths
         rest = simulation.initial_state({}, {}, equilibrate=is_settled)
         assert rest == pytest.approx(_numbers(both, start, paths), abs=1e-12)
         n = len(free)
@@ -108,9 +110,13 @@ def test_derivatives(both: Both, corpus_model: Any, engine: str) -> None:
         for path, value in zip(paths, y, strict=True):
             both.theirs.setStateVariableValue(state, path, value)
         both.theirs.realizeAcceleration(state)
-        expected = np.array([both.theirs.getStateVariableDerivativeValue(state, path) for path in paths])
+        expected = np.array(
+            [both.theirs.getStateVariableDerivativeValue(state, path) for path in paths]
+        )
         # Of the value of a coordinate, OpenSim gives the speed.
-        owners = [opensim.Coordinate.safeDownCast(both.theirs.getComponent(info.path)) for info in free]
+        owners = [
+            opensim.Coordinate.safeDownCast(both.theirs.getComponent(info.path)) for info in free
+        ]
         expected[:n] = [owner.getQDotValue(state) for owner in owners]
         result = np.array(simulation.engine.derivative(0.0, y))
         for part in (slice(n), slice(n, 2 * n), slice(2 * n, None)):
@@ -122,7 +128,9 @@ def _moved(both: Both, paths: Sequence[str], apart: float = 0.0) -> tuple[Any, i
     """Where OpenSim ends (n,), from a start that may be some way apart, and after how many steps."""
     start = opensim.State(both.start)
     for path in paths if apart else ():
-        coordinate = opensim.Coordinate.safeDownCast(both.theirs.getComponent(path.rpartition("/")[0]))
+        coordinate = opensim.Coordinate.safeDownCast(
+            both.theirs.getComponent(path.rpartition("/")[0])
+        )
         if path.endswith("/value") and coordinate is not None and not coordinate.getLocked(start):
             coordinate.setValue(start, coordinate.getValue(start) * (1.0 + apart) + apart, False)
     manager = opensim.Manager(both.theirs)
@@ -147,20 +155,32 @@ def test_motions(both: Both, corpus_model: Any) -> None:
         return
     with Simulation(both.ours, "compiled", folder=both.folder, **CHOICES) as simulation:
         # OpenSim's optimizer may start 1e-10 apart.
-        moving = {info.path for info in simulation.mechanism.coordinates if not (info.locked or info.prescribed)}
+        moving = {
+            info.path
+            for info in simulation.mechanism.coordinates
+            if not (info.locked or info.prescribed)
+        }
         own = set(simulation.state.paths)
         start = zip(paths, _numbers(both, both.start, paths).tolist(), strict=True)
-        initial = {path: value for path, value in start if path in own or path.rpartition("/")[0] in moving}
-        trajectory = simulation.run(SECONDS, accuracy=ACCURACY, report_interval=SECONDS, initial=initial)
+        initial = {
+            path: value for path, value in start if path in own or path.rpartition("/")[0] in moving
+        }
+        trajectory = simulation.run(
+            SECONDS, accuracy=ACCURACY, report_interval=SECONDS, initial=initial
+        )
     expected, steps = _moved(both, paths)
     result = {path: values[-1] for path, values in trajectory.auxiliary.items()}
     coordinates = simulation.mechanism.coordinates
-    for info, value, speed in zip(coordinates, trajectory.values[-1], trajectory.speeds[-1], strict=True):
+    for info, value, speed in zip(
+        coordinates, trajectory.values[-1], trajectory.speeds[-1], strict=True
+    ):
         result |= {f"{info.path}/value": value, f"{info.path}/speed": speed}
     scale = max(1.0, np.abs(expected).max())
     off = max(abs(result[path] - value) for path, value in zip(paths, expected, strict=True))
     if corpus_model.id in SENSITIVE:
-        assert off <= 10.0 * max(np.abs(_moved(both, paths, apart)[0] - expected).max() for apart in (1e-14, 1e-11))
+        assert off <= 10.0 * max(
+            np.abs(_moved(both, paths, apart)[0] - expected).max() for apart in (1e-14, 1e-11)
+        )
     else:
         assert off < NEAR * scale
         # What reports at times of its own cuts OpenSim's rows, not its steps.

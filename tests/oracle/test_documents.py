@@ -37,7 +37,8 @@ for path in sys.argv[2:]:
 def printed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of the documents as OpenSim prints them."""
     folder = tmp_path_factory.mktemp("printed")
-    # In a process of its own, and last what has defaults: in OpenSim they are those of all that is read later.
+    # In a process of its own, and last what has defaults: in OpenSim they are those of all that is
+    # read later.
     paths = sorted(DOCUMENTS, key=lambda path: path.stem == "defaults")
     subprocess.run([sys.executable, "-c", PRINT, folder, *paths], check=True)
     return folder
@@ -51,13 +52,19 @@ def without_comments(text: str) -> str:
 def test_opensim_prints_the_same(path: Path, printed: Path) -> None:
     target = printed / path.name
     result = read_document(Source.of_file(path), of=Object)
-    lines = osimlite.to_text(result.top, numbers="opensim", comments=False).splitlines(keepends=True)
+    lines = osimlite.to_text(result.top, numbers="opensim", comments=False).splitlines(
+        keepends=True
+    )
     # OpenSim drops what it does not know; here it is kept.
     unknown = [note.word for note in result.notes if note.kind == "unknown-tag"]
-    ours = "".join(line for line in lines if not any(line.strip().startswith(f"<{tag}>") for tag in unknown))
+    ours = "".join(
+        line for line in lines if not any(line.strip().startswith(f"<{tag}>") for tag in unknown)
+    )
     theirs = target.read_text()
     assert ours == without_comments(theirs)
-    assert osimlite.to_text(osimlite.read_document(target), numbers="opensim") == without_comments(theirs)
+    assert osimlite.to_text(osimlite.read_document(target), numbers="opensim") == without_comments(
+        theirs
+    )
 
 
 @pytest.mark.parametrize("name", OLD)

@@ -22,7 +22,9 @@ def test_paths_are_opensims_where_the_driver_has_brought_the_model(shared):
     opensim.Logger.setLevelString("off")
     theirs = opensim.Model(str(file))
     state = theirs.initSystem()
-    values = {info.path: value for info, value in zip(mechanism.coordinates, q.tolist(), strict=True)}
+    values = {
+        info.path: value for info, value in zip(mechanism.coordinates, q.tolist(), strict=True)
+    }
     moved = 0.0
     for path, value in values.items():
         coordinate = opensim.Coordinate.safeDownCast(theirs.getComponent(path))

@@ -29,7 +29,10 @@ TRANSITION = 0.1
 
 def touching_pair(rng, round_one):
     """Half axes, angles and the centre of the second of two ellipsoids that overlap a little."""
-    radii = rng.uniform(0.3, 1.0, 3), np.full(3, rng.uniform(0.3, 1.0)) if round_one else rng.uniform(0.3, 1.0, 3)
+    radii = (
+        rng.uniform(0.3, 1.0, 3),
+        np.full(3, rng.uniform(0.3, 1.0)) if round_one else rng.uniform(0.3, 1.0, 3),
+    )
     angles = rng.uniform(-2.0, 2.0, (2, 3))
     along = rng.normal(size=3)
     along /= np.linalg.norm(along)
@@ -58,11 +61,15 @@ def by_opensim(radii, angles, center, velocity):
     force = opensim.HuntCrossleyForce()
     force.setName("contact")
     force.set_transition_velocity(TRANSITION)
-    for name, size, turn, frame in zip(("one", "two"), radii, angles, (model.getGround(), body), strict=True):
+    for name, size, turn, frame in zip(
+        ("one", "two"), radii, angles, (model.getGround(), body), strict=True
+    ):
         if np.ptp(size) == 0.0:
             geometry = opensim.ContactSphere(size[0], zero, frame, name)
         else:
-            geometry = opensim.ContactEllipsoid(opensim.Vec3(*size), zero, opensim.Vec3(*turn), frame, name)
+            geometry = opensim.ContactEllipsoid(
+                opensim.Vec3(*size), zero, opensim.Vec3(*turn), frame, name
+            )
         model.addContactGeometry(geometry)
         force.addGeometry(name)
     for name, value in MATERIAL.items():
@@ -75,7 +82,9 @@ def by_opensim(radii, angles, center, velocity):
     model.realizeDynamics(state)
     labels, row = force.getRecordLabels(), force.getRecordValues(state)
     result = {labels.get(k): row.get(k) for k in range(labels.size())}
-    parts = [[result[f"contact.body.{what}.{axis}"] for axis in "XYZ"] for what in ("force", "torque")]
+    parts = [
+        [result[f"contact.body.{what}.{axis}"] for axis in "XYZ"] for what in ("force", "torque")
+    ]
     return np.array(parts), model.calcPotentialEnergy(state)
 
 
@@ -104,16 +113,27 @@ def test_in_a_model(kinds, tmp_path):
         orientation=(0.5, -0.3, 0.7),
         radii=(0.2, 0.5, 0.4),
     )
-    other = ContactEllipsoid(name="other", socket_frame="/ground", location=(0.5, 0.3, 0.4), radii=(0.6, 0.3, 0.4))
-    ball = ContactSphere(name="ball", socket_frame="/bodyset/b0/f0", location=(0.4, 0.1, 0.2), radius=0.35)
-    plane = ContactHalfSpace(name="plane", socket_frame="/ground", location=(0, -0.6, 0), orientation=(0.1, 0.2, -1.4))
+    other = ContactEllipsoid(
+        name="other", socket_frame="/ground", location=(0.5, 0.3, 0.4), radii=(0.6, 0.3, 0.4)
+    )
+    ball = ContactSphere(
+        name="ball", socket_frame="/bodyset/b0/f0", location=(0.4, 0.1, 0.2), radius=0.35
+    )
+    plane = ContactHalfSpace(
+        name="plane", socket_frame="/ground", location=(0, -0.6, 0), orientation=(0.1, 0.2, -1.4)
+    )
     model.add(egg, other, ball, plane)
-    for number, surfaces in enumerate(((egg, other), (egg, ball), (other, ball), (ball, plane, egg))):
+    for number, surfaces in enumerate(
+        ((egg, other), (egg, ball), (other, ball), (ball, plane, egg))
+    ):
         force = HuntCrossleyForce(name=f"contact{number}", transition_velocity=0.1)
         for index, surface in enumerate(surfaces):
             force.contact_parameters.objects.append(
                 HuntCrossleyForce.ContactParameters(
-                    geometry=(surface,), stiffness=1e4 * (1 + index), dissipation=0.01, static_friction=0.5
+                    geometry=(surface,),
+                    stiffness=1e4 * (1 + index),
+                    dissipation=0.01,
+                    static_friction=0.5,
                 )
             )
         model.add(force)

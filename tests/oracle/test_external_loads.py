@@ -22,7 +22,9 @@ pytestmark = pytest.mark.oracle
 from tests.oracle.force_carrier import JOINTS, carrier  # noqa: E402
 from tests.oracle.opensim_runs import inverse_dynamics, put  # noqa: E402
 
-LABELS = [f"{side}{what}{axis}" for side in ("", "1_") for what in ("f_v", "f_p", "m_") for axis in "xyz"]
+LABELS = [
+    f"{side}{what}{axis}" for side in ("", "1_") for what in ("f_v", "f_p", "m_") for axis in "xyz"
+]
 
 
 def write_data(path, rows, start=0.0, end=1.0):
@@ -45,9 +47,16 @@ def loads(names):
             **{what: f"1_{start}" for what, start in ids.items()},
         ),
         ExternalForce(name="at_the_origin", applied_to_body=third, force_identifier="1_f_v"),
-        ExternalForce(name="turning", applied_to_body=third, force_expressed_in_body=second, torque_identifier="m_"),
+        ExternalForce(
+            name="turning",
+            applied_to_body=third,
+            force_expressed_in_body=second,
+            torque_identifier="m_",
+        ),
         ExternalForce(name="framed", applied_to_body=framed, force_expressed_in_body=framed, **ids),
-        ExternalForce(name="off", applied_to_body=first, appliesForce=False, force_identifier="f_v"),
+        ExternalForce(
+            name="off", applied_to_body=first, appliesForce=False, force_identifier="f_v"
+        ),
     ]
     forces[-2].point_expressed_in_body = framed
     return ExternalLoads(name="loads", objects=forces, datafile="data.mot")
@@ -111,9 +120,13 @@ def test_accelerations_and_records(kinds, within, rows, tmp_path, monkeypatch):
             put(map(theirs.getCoordinateSet().get, names), state, q, u)
             state.setTime(time)
             theirs.realizeAcceleration(state)
-            expected = [theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names]
+            expected = [
+                theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names
+            ]
             ours = engine.acceleration(time, q.tolist(), u.tolist())
-            assert np.abs(np.subtract(ours, expected)).max() <= 1e-9 * max(1.0, np.abs(expected).max())
+            assert np.abs(np.subtract(ours, expected)).max() <= 1e-9 * max(
+                1.0, np.abs(expected).max()
+            )
             labels, values = [], []
             for number in range(added.getSize()):
                 force = added.get(number)
@@ -135,12 +148,17 @@ def test_inverse_dynamics(corpus, name, tmp_path, monkeypatch, capfd):
     model = read_text(text)
     mechanism = build_mechanism(model, opensim_derivatives=True)
     times = np.linspace(0.0, 1.0, 120)
-    values = np.array([0.2 * np.sin(3.0 * times + index) for index in range(len(mechanism.coordinates))]).T
+    values = np.array(
+        [0.2 * np.sin(3.0 * times + index) for index in range(len(mechanism.coordinates))]
+    ).T
     values += mechanism.values({})
     write_sto("motion.mot", "motion", times, mechanism.coordinate_names, values.tolist())
     write_data("data.mot", 700, -0.05, 1.02)
     bodies = [body.name for body in mechanism.bodies]
-    write_loads(tmp_path / "loads.xml", (bodies[-1], bodies[0], bodies[len(bodies) // 2], f"/bodyset/{bodies[-2]}"))
+    write_loads(
+        tmp_path / "loads.xml",
+        (bodies[-1], bodies[0], bodies[len(bodies) // 2], f"/bodyset/{bodies[-2]}"),
+    )
     theirs = inverse_dynamics("model.osim", "motion.mot", "loads.xml")
     capfd.readouterr()
     motion = RecordedMotion.read(mechanism, "motion.mot")

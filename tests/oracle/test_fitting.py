@@ -62,12 +62,19 @@ tool.run()
 def ask(script: str, folder: Path, *words: str) -> None:
     """Let OpenSim work in a process of its own, which may crash."""
     done = subprocess.run(
-        [sys.executable, "-c", script, *words], cwd=folder, capture_output=True, text=True, timeout=240, check=False
+        [sys.executable, "-c", script, *words],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("name", ["m0005", "m0013", "m0036", "m0065", "m0109", "m0139", "m0163", "m0172", "m0954"])
+@pytest.mark.parametrize(
+    "name", ["m0005", "m0013", "m0036", "m0065", "m0109", "m0139", "m0163", "m0172", "m0954"]
+)
 @pytest.mark.parametrize("ground", [False, True])
 def test_real_models_are_scaled_alike(corpus: Any, name: str, ground: bool, tmp_path: Path) -> None:
     """By random factors of all bodies, with the mass of a subject or without."""
@@ -75,7 +82,10 @@ def test_real_models_are_scaled_alike(corpus: Any, name: str, ground: bool, tmp_
     (tmp_path / "model.osim").write_bytes(gzip.decompress(converted.read_bytes()))
     model = osimlite.read(tmp_path / "model.osim")
     rng = np.random.default_rng(int(name[1:]) + ground)
-    factors = {body.name: rng.uniform(0.8, 1.3, 3).round(6).tolist() for body in model.components(osimlite.Body)}
+    factors = {
+        body.name: rng.uniform(0.8, 1.3, 3).round(6).tolist()
+        for body in model.components(osimlite.Body)
+    }
     if ground:
         factors["ground"] = [1.0, 1.0, 1.0]
     mass, preserves = float(rng.choice([70.0, -1.0])), bool(rng.random() < 0.5)
@@ -89,17 +99,25 @@ def model_with(kind: str) -> osimlite.Model:
     """A pelvis, a thigh and a shank with markers, whose knee is clamped, coupled, locked or loose."""
     model = osimlite.Model(name="leg")
     carrier: Any = model.ground
-    for number, joint in enumerate((osimlite.FreeJoint, osimlite.BallJoint, osimlite.UniversalJoint)):
+    for number, joint in enumerate(
+        (osimlite.FreeJoint, osimlite.BallJoint, osimlite.UniversalJoint)
+    ):
         body = osimlite.Body(name=f"b{number}", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
         model.add(body)
         at = model.add(
             osimlite.PhysicalOffsetFrame(
-                name=f"f{number}", socket_parent=carrier, translation=(0.0, -0.4 * (number > 0), 0.0)
+                name=f"f{number}",
+                socket_parent=carrier,
+                translation=(0.0, -0.4 * (number > 0), 0.0),
             )
         )
         model.add(joint(name=f"j{number}", socket_parent_frame=at, socket_child_frame=body))
-        for count, point in enumerate(((0.1, 0.0, 0.05), (0.0, -0.2, -0.06), (-0.08, -0.3, 0.04), (0.02, -0.1, 0.1))):
-            model.add(osimlite.Marker(name=f"m{number}{count}", socket_parent_frame=body, location=point))
+        for count, point in enumerate(
+            ((0.1, 0.0, 0.05), (0.0, -0.2, -0.06), (-0.08, -0.3, 0.04), (0.02, -0.1, 0.1))
+        ):
+            model.add(
+                osimlite.Marker(name=f"m{number}{count}", socket_parent_frame=body, location=point)
+            )
         carrier = body
     knee = [item for item in model.components(osimlite.Coordinate) if "/j2/" in item.path]
     for number, item in enumerate(knee):
@@ -114,7 +132,9 @@ def model_with(kind: str) -> osimlite.Model:
                 name="c",
                 independent_coordinate_names=("knee0",),
                 dependent_coordinate_name="knee1",
-                coupled_coordinates_function=osimlite.PolynomialFunction(coefficients=(0.4, -0.3, 0.05)),
+                coupled_coordinates_function=osimlite.PolynomialFunction(
+                    coefficients=(0.4, -0.3, 0.05)
+                ),
             )
         )
     return model
@@ -133,7 +153,9 @@ def test_minima_are_those_of_opensim(kind: str, tmp_path: Path) -> None:
     for frame in range(12):
         q = mechanism.assemble(0.3 * np.sin(0.3 * frame + 1.3 * np.arange(count)))
         state = mechanism.at(q)
-        row = np.concatenate([state.point(*station) for station in stations]) + rng.normal(0.0, 0.01, 3 * len(names))
+        row = np.concatenate([state.point(*station) for station in stations]) + rng.normal(
+            0.0, 0.01, 3 * len(names)
+        )
         if frame % 3 == 1:
             row[3 * (frame % 12) :][:3] = np.nan
         rows.append(row.tolist())
@@ -180,7 +202,8 @@ def test_public_setups_at_the_best_accuracy(
     ours = run_inverse_kinematics(tool, subject, data)
     mechanism = ours.mechanism
     assert theirs.columns == ours.coordinates and not ours.unsettled
-    # In single frames, which ones depends on the processor, its line search gives up before the minimum.
+    # In single frames, which ones depends on the processor, its line search gives up before the
+    # minimum.
     apart = np.abs(ours.in_degrees - theirs.rows).max(axis=1)
     assert np.count_nonzero(apart > 2e-5) <= 0.05 * len(apart) and apart.max() < 1e-3
     tasks = tasks_of(subject, mechanism, tool.ik_task_set.objects, data, None)
@@ -188,7 +211,9 @@ def test_public_setups_at_the_best_accuracy(
     markers = [Marker(stations[name], weight) for name, weight in tasks.weights.items()]
     turning = [info.motion_type == "rotational" for info in mechanism.coordinates]
     poses = np.where(turning, np.deg2rad(theirs.rows), theirs.rows)
-    for q, measured, wanted, cost in zip(poses, ours.measured, tasks.wanted, ours.costs, strict=True):
+    for q, measured, wanted, cost in zip(
+        poses, ours.measured, tasks.wanted, ours.costs, strict=True
+    ):
         goals = [
             0.5 * goal.weight * (q[goal.coordinate] - value) ** 2
             for goal, value in zip(tasks.goals, wanted, strict=True)
@@ -216,7 +241,9 @@ def test_the_setup_of_a_fit_makes_the_same_model_in_opensim(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("step", [8.0, 40.0])
-def test_who_turns_around_is_held_at_the_end_of_the_range_in_opensim(step: float, tmp_path: Path) -> None:
+def test_who_turns_around_is_held_at_the_end_of_the_range_in_opensim(
+    step: float, tmp_path: Path
+) -> None:
     """And goes on at the other end here; the cost is never larger."""
     angles = np.arange(100.0, 480.0, step)
     model = turner(-180.0, 180.0)
@@ -231,7 +258,9 @@ def test_who_turns_around_is_held_at_the_end_of_the_range_in_opensim(step: float
     markers = [Marker(station) for station in stations]
     turned = [info.motion_type == "rotational" for info in mechanism.coordinates]
     values = np.where(turned, np.radians(theirs.rows), theirs.rows)
-    costs = np.array([cost_of(mechanism, markers, place, q) for place, q in zip(places, values, strict=True)])
+    costs = np.array(
+        [cost_of(mechanism, markers, place, q) for place, q in zip(places, values, strict=True)]
+    )
     assert (ours.costs <= costs * (1.0 + 1e-9)).all()
     held = (angles > 185.0) & (angles < 300.0)
     assert theirs["pelvis_rotation"][held] == pytest.approx(np.full(held.sum(), 180.0), abs=0.1)

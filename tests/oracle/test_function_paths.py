@@ -52,17 +52,45 @@ OF_TWO = (
 )
 PATHS = {
     "a spline": ((ONE,), SPLINE, (), None),
-    "a polynomial of one": ((OTHER,), PolynomialFunction(coefficients=(1.0, 2.0, 3.0, 4.0)), (), None),
-    "a multiple of a sine": ((LAST,), MultiplierFunction(scale=-0.4, function=Sine(omega=1.3, offset=2.0)), (), None),
+    "a polynomial of one": (
+        (OTHER,),
+        PolynomialFunction(coefficients=(1.0, 2.0, 3.0, 4.0)),
+        (),
+        None,
+    ),
+    "a multiple of a sine": (
+        (LAST,),
+        MultiplierFunction(scale=-0.4, function=Sine(omega=1.3, offset=2.0)),
+        (),
+        None,
+    ),
     "lines": ((ONE,), PiecewiseLinearFunction(x=(-1.0, 0.0, 0.7), y=(0.4, 0.2, 0.5)), (), None),
-    "a step": ((ONE,), StepFunction(transition_start_time=-0.5, transition_end_time=0.6, end_value=0.3), (), None),
+    "a step": (
+        (ONE,),
+        StepFunction(transition_start_time=-0.5, transition_end_time=0.6, end_value=0.3),
+        (),
+        None,
+    ),
     "a linear function": ((ONE, LAST), LinearFunction(coefficients=(0.3, -0.2, 1.0)), (), None),
     "a polynomial of three": ((LAST, ONE, OTHER), polynomial(3, 5), (), None),
-    "a multiple of a polynomial": ((ONE, OTHER), MultiplierFunction(scale=0.3, function=polynomial(2, 3)), (), None),
-    "other moment arms": ((ONE, OTHER), polynomial(2, 2), (polynomial(2, 3), polynomial(2, 1)), None),
+    "a multiple of a polynomial": (
+        (ONE, OTHER),
+        MultiplierFunction(scale=0.3, function=polynomial(2, 3)),
+        (),
+        None,
+    ),
+    "other moment arms": (
+        (ONE, OTHER),
+        polynomial(2, 2),
+        (polynomial(2, 3), polynomial(2, 1)),
+        None,
+    ),
     "another speed": ((ONE, OTHER), polynomial(2, 2), (), polynomial(4, 2)),
     "all others": ((ONE,), SPLINE, (Sine(amplitude=0.3),), expression("v*q+0.1", "q", "v")),
-    **{f"formula {k}": ((ONE, OTHER), expression(text, "x", "y"), (), None) for k, text in enumerate(OF_TWO)},
+    **{
+        f"formula {k}": ((ONE, OTHER), expression(text, "x", "y"), (), None)
+        for k, text in enumerate(OF_TWO)
+    },
 }
 
 
@@ -72,10 +100,15 @@ def model(request):
     model = carrier(request.param)
     for number, (coordinates, length, arms, speed) in enumerate(PATHS.values()):
         path = FunctionBasedPath(
-            name="path", coordinate_paths=coordinates, length_function=length, lengthening_speed_function=speed
+            name="path",
+            coordinate_paths=coordinates,
+            length_function=length,
+            lengthening_speed_function=speed,
         )
         path.moment_arm_functions += arms
-        spring = PathSpring(name=f"spring{number}", resting_length=0.2, stiffness=30.0, dissipation=0.4)
+        spring = PathSpring(
+            name=f"spring{number}", resting_length=0.2, stiffness=30.0, dissipation=0.4
+        )
         spring.geometry_path = path
         model.add(spring)
     return model

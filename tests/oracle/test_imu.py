@@ -99,14 +99,24 @@ def real_model(corpus: Any, name: str, folder: Path) -> osimlite.Model:
     return osimlite.read(folder / "model.osim")
 
 
-def write_orientations(path: Path, times: Sequence[float], names: Sequence[str], rotations: Any) -> None:
+def write_orientations(
+    path: Path, times: Sequence[float], names: Sequence[str], rotations: Any
+) -> None:
     """Rotation matrices (t, k, 3, 3) as a table of quaternions."""
     rows = quaternion(rotations).reshape(len(times), -1).tolist()
     write_sto(path, "orientations", times, names, rows, kind="Quaternion", has_missing=True)
 
 
 @pytest.mark.parametrize(
-    ("name", "axis"), [("m0013", "x"), ("m0172", "-z"), ("m0954", "Y"), ("m0097", "z"), ("m0109", "-x"), ("m0163", "")]
+    ("name", "axis"),
+    [
+        ("m0013", "x"),
+        ("m0172", "-z"),
+        ("m0954", "Y"),
+        ("m0097", "z"),
+        ("m0109", "-x"),
+        ("m0163", ""),
+    ],
 )
 def test_sensors_are_placed_alike(corpus: Any, name: str, axis: str, tmp_path: Path) -> None:
     """Worn on random bodies, turned at random; the model of m0097 has its sensors already."""
@@ -114,17 +124,24 @@ def test_sensors_are_placed_alike(corpus: Any, name: str, axis: str, tmp_path: P
     bodies = [body.name for body in model.body_set.objects]
     worn = [str(body) for body in rng.choice(bodies, min(5, len(bodies)), replace=False)]
     names = [f"{body}_imu" for body in worn] + ["nowhere_imu", "plain"]
-    write_orientations(tmp_path / "standing.sto", [0.5, 0.6], names, rotation_of(rng.normal(size=(2, len(names), 4))))
+    write_orientations(
+        tmp_path / "standing.sto",
+        [0.5, 0.6],
+        names,
+        rotation_of(rng.normal(size=(2, len(names), 4))),
+    )
     turn = " ".join(map(str, rng.uniform(-3.0, 3.0, 3)))
-    (tmp_path / "placer.xml").write_text(PLACER.format(base=names[0] if axis else "", axis=axis, turn=turn))
+    (tmp_path / "placer.xml").write_text(
+        PLACER.format(base=names[0] if axis else "", axis=axis, turn=turn)
+    )
     ask(PLACE, tmp_path)
     outcome = osimlite.run(tmp_path / "placer.xml", tmp_path / "ours", check=False)
     assert outcome.summary["left_out"] == ("nowhere_imu", "plain")
     ours = osimlite.read(tmp_path / "ours" / "placed.osim")
     assert_same(ours, osimlite.read(tmp_path / "placed.osim"))
-    assert {imu.path for imu in ours.components(osimlite.IMU)} >= {f"/componentset/{body}_imu" for body in worn} - {
-        imu.path for imu in model.components(osimlite.IMU)
-    }
+    assert {imu.path for imu in ours.components(osimlite.IMU)} >= {
+        f"/componentset/{body}_imu" for body in worn
+    } - {imu.path for imu in model.components(osimlite.IMU)}
 
 
 def wear(model: osimlite.Model) -> list[str]:
@@ -133,22 +150,33 @@ def wear(model: osimlite.Model) -> list[str]:
     for frame in (*model.components(osimlite.Body), model.ground):
         turn = tuple(rng.uniform(-3.0, 3.0, 3).tolist())
         names.append(f"{frame.name}_imu")
-        frame.components.append(osimlite.PhysicalOffsetFrame(name=names[-1], socket_parent="..", orientation=turn))
+        frame.components.append(
+            osimlite.PhysicalOffsetFrame(name=names[-1], socket_parent="..", orientation=turn)
+        )
     return names
 
 
-def trial(folder: Path, model: osimlite.Model, names: Sequence[str], noise: float, *, markers: bool) -> Any:
+def trial(
+    folder: Path, model: osimlite.Model, names: Sequence[str], noise: float, *, markers: bool
+) -> Any:
     """A motion that sensors, and if asked for markers, have measured; the rotations (t, k, 3, 3), with gaps of two."""
     mechanism, rng = osimlite.mechanism(model), np.random.default_rng(3)
     frames = {path.rpartition("/")[2]: frame for path, frame in mechanism.frames.items()}
     times, rotations, rows = [0.1 * k for k in range(12)], [], []
     for time in times:
-        q = mechanism.assemble(0.3 * np.sin(3.0 * time + 1.3 * np.arange(len(mechanism.coordinates))))
+        q = mechanism.assemble(
+            0.3 * np.sin(3.0 * time + 1.3 * np.arange(len(mechanism.coordinates)))
+        )
         state = mechanism.at(q)
         off = [rotation_xyz(angles) for angles in rng.normal(0.0, noise, (len(names), 3))]
-        placed = [(state.transform(frames[name].body) @ frames[name].transform)[:3, :3] for name in names]
+        placed = [
+            (state.transform(frames[name].body) @ frames[name].transform)[:3, :3] for name in names
+        ]
         rotations.append(np.array(off) @ placed)
-        places = [state.point(*mechanism.stations[marker.path]) for marker in model.components(osimlite.Marker)]
+        places = [
+            state.point(*mechanism.stations[marker.path])
+            for marker in model.components(osimlite.Marker)
+        ]
         rows.append((np.concatenate(places) + rng.normal(0.0, 0.01, 3 * len(places))).tolist())
     result = np.array(rotations)
     result[[3, 7, 8], [2, 3, 2]] = np.nan
@@ -186,9 +214,18 @@ def test_minima_of_angles_are_those_of_opensim(kind: str, markers: bool, tmp_pat
     ask(SOLVE, tmp_path, str(accuracy), json.dumps(weights))
     theirs = np.array(json.loads((tmp_path / "theirs.json").read_text()))
     source = tmp_path / "trial.trc" if markers else None
-    ours = osimlite.inverse_kinematics(model, source, orientations=tmp_path / "trial.sto", weights=weights)
-    assert not ours.unsettled and len(ours.sensors) == 4 and np.isnan(ours.orientation_errors).sum() == 3
-    mechanism, shares = osimlite.mechanism(model), np.array([weights.get(name, 1.0) for name in names])
+    ours = osimlite.inverse_kinematics(
+        model, source, orientations=tmp_path / "trial.sto", weights=weights
+    )
+    assert (
+        not ours.unsettled
+        and len(ours.sensors) == 4
+        and np.isnan(ours.orientation_errors).sum() == 3
+    )
+    mechanism, shares = (
+        osimlite.mechanism(model),
+        np.array([weights.get(name, 1.0) for name in names]),
+    )
     stations = [mechanism.stations[marker.path] for marker in model.components(osimlite.Marker)]
     for number, q in enumerate(theirs):
         angles = squared(mechanism, names, q, rotations[number])
@@ -199,14 +236,23 @@ def test_minima_of_angles_are_those_of_opensim(kind: str, markers: bool, tmp_pat
             cost += 0.5 * np.mean(np.sum((places - ours.measured[number]) ** 2, axis=1))
         assert ours.costs[number] <= cost + 1e-9 * (kind == "coupled") + 1e-13
     if kind != "clamped":
-        assert np.rad2deg(ours.values) == pytest.approx(np.rad2deg(theirs), abs=1e-3 if kind == "coupled" else 1e-5)
+        assert np.rad2deg(ours.values) == pytest.approx(
+            np.rad2deg(theirs), abs=1e-3 if kind == "coupled" else 1e-5
+        )
 
 
 @pytest.mark.parametrize(
     ("results", "motion", "errors"),
-    [("here", "", "true"), ("here", "away/it", "true"), ("", "here/it.sto", "false"), ("here", "a.b/", "true")],
+    [
+        ("here", "", "true"),
+        ("here", "away/it", "true"),
+        ("", "here/it.sto", "false"),
+        ("here", "a.b/", "true"),
+    ],
 )
-def test_the_tool_writes_opensims_files(results: str, motion: str, errors: str, tmp_path: Path) -> None:
+def test_the_tool_writes_opensims_files(
+    results: str, motion: str, errors: str, tmp_path: Path
+) -> None:
     """Names, headers, columns, digits; each frame fits no worse, and better by less than OpenSim stops short."""
     model: Any = model_with("loose")
     names = wear(model)
@@ -222,18 +268,28 @@ def test_the_tool_writes_opensims_files(results: str, motion: str, errors: str, 
     ask(TRACK, tmp_path)
     theirs = {path.name: path.read_text() for path in (tmp_path / "here").iterdir()}
     outcome = osimlite.run(tmp_path / "tool.xml", check=False)
-    assert {path.name for path in outcome.files} == set(theirs) and len(theirs) == 1 + (errors == "true")
+    assert {path.name for path in outcome.files} == set(theirs) and len(theirs) == 1 + (
+        errors == "true"
+    )
     for path in outcome.files:
         assert path.parent == tmp_path / "here"
-        known = [line for line in theirs[path.name].splitlines() if not line.startswith("OpenSimVersion")]
+        known = [
+            line for line in theirs[path.name].splitlines() if not line.startswith("OpenSimVersion")
+        ]
         lines = path.read_text().splitlines()
         head = known.index("endheader") + 2
         assert lines[:head] == known[:head] and len(lines) == len(known)
-        values, asked = (np.array([line.split("\t") for line in text[head:]], dtype=float) for text in (lines, known))
+        values, asked = (
+            np.array([line.split("\t") for line in text[head:]], dtype=float)
+            for text in (lines, known)
+        )
         assert values[:, 0].tolist() == asked[:, 0].tolist()
         if "Errors" in path.name:
             assert ((values == 0.0) == (asked == 0.0)).all() and (asked == 0.0).any()
-            weights = [{"b0_imu": 0.0, "b1_imu": 3.0}.get(name, 1.0) for name in lines[head - 1].split("\t")[1:]]
+            weights = [
+                {"b0_imu": 0.0, "b1_imu": 3.0}.get(name, 1.0)
+                for name in lines[head - 1].split("\t")[1:]
+            ]
             shares = np.array(weights)[None] * (asked[:, 1:] > 0.0)
             ours, cost = (np.sum(shares * table[:, 1:] ** 2, axis=1) for table in (values, asked))
             assert (ours <= cost + 1e-12).all() and (ours >= cost - 1e-3).all()

@@ -1,7 +1,8 @@
 """Runge-Kutta-Merson over OpenSim's own accelerations takes the very steps of OpenSim's Manager.
 
-Both run on one machine with one library, so nothing but a different method, or a different order of rounding, could
-make the steps differ: where the states are the same numbers, they are compared without tolerance.
+Both run on one machine with one library, so nothing but a different method, or a different order of
+rounding, could make the steps differ: where the states are the same numbers, they are compared
+without tolerance.
 """
 
 from __future__ import annotations
@@ -89,7 +90,10 @@ def test_recorded_steps(walker, shared):
     """Not only the run of this day: times and states of the reference data."""
     f, y0 = dynamics(walker, walker.initSystem())
     with (shared / "oracle" / "trajectory_default_internal_steps.csv").open() as text:
-        rows = [[float(x) for x in row] for row in csv.reader(line for line in text if line[0] not in "#t")]
+        rows = [
+            [float(x) for x in row]
+            for row in csv.reader(line for line in text if line[0] not in "#t")
+        ]
     steps = list(runge_kutta_merson(f, 0.0, y0, 8).steps(2.0))
     assert len(rows) == 1 + len(steps) == 136
     for row, (t, y) in zip(rows[1:], steps, strict=True):
@@ -153,7 +157,9 @@ def test_a_free_joint_counts_one_coordinate_more():
     model.addBody(body)
     joint = opensim.FreeJoint("joint", model.getGround(), body)
     model.addJoint(joint)
-    for index, (value, speed) in enumerate([(0.3, 4.0), (0.2, -3.0), (-0.5, 5.0), (0, 1), (0, 2), (0, 3)]):
+    for index, (value, speed) in enumerate(
+        [(0.3, 4.0), (0.2, -3.0), (-0.5, 5.0), (0, 1), (0, 2), (0, 3)]
+    ):
         joint.upd_coordinates(index).setDefaultValue(value)
         joint.upd_coordinates(index).setDefaultSpeedValue(speed)
     times, last, measured = manager_run(model, 1.0, 1e-6)
@@ -200,5 +206,6 @@ def test_semi_explicit_steps_are_simbody_s(fixtures, path, until, accuracy):
     assert len(times) == taken + 1
     assert (found.summary["steps"], found.summary["attempted_steps"]) == (taken, attempted)
     own = [*found.values[-1], *found.speeds[-1], *(rows[-1] for rows in found.auxiliary.values())]
-    # Contact makes a hundred times as much of every rounding in a second. Locked coordinates are no states there.
+    # Contact makes a hundred times as much of every rounding in a second. Locked coordinates are no
+    # states there.
     assert max(min(abs(here - there) for here in own) for there in last) < 1e-6

@@ -49,8 +49,14 @@ def text(bodies: list[str], joints: list[Joint], offsets: list[bool]) -> str:
     """A model of bodies and of joints from a class, a parent and a child, some on offset frames."""
     written = []
     for number, ((cls, parent, child), is_offset) in enumerate(zip(joints, offsets, strict=True)):
-        coordinates = "".join(f'<Coordinate name="j{number}_{k}" />' for k in range(COORDINATES[cls]))
-        frames = f"<frames>{OFFSET.format('p', parent)}{OFFSET.format('c', child)}</frames>" if is_offset else ""
+        coordinates = "".join(
+            f'<Coordinate name="j{number}_{k}" />' for k in range(COORDINATES[cls])
+        )
+        frames = (
+            f"<frames>{OFFSET.format('p', parent)}{OFFSET.format('c', child)}</frames>"
+            if is_offset
+            else ""
+        )
         written.append(
             f'<{cls} name="j{number}"><socket_parent_frame>{"p" if is_offset else parent}</socket_parent_frame>'
             f"<socket_child_frame>{'c' if is_offset else child}</socket_child_frame>{frames}"
@@ -73,24 +79,34 @@ def graph(draw: random.Random) -> str:
     """Some bodies, some without mass or with a frame, and joints between them that close up to two loops."""
     names = [f"b{number}" for number in range(draw.randint(1, 5))]
     light, frame = draw.choice((0.0, 0.2)), f"<components>{OFFSET.format('f', '..')}</components>"
-    bodies = [body(name, float(draw.random() >= light), frame * (draw.random() < 0.25)) for name in names]
+    bodies = [
+        body(name, float(draw.random() >= light), frame * (draw.random() < 0.25)) for name in names
+    ]
     group = {name: name for name in [*names, "ground"]}
     joints: list[Joint] = []
     for _ in range(draw.randint(0, len(names) + 1)):
         one, two = draw.sample([*group], 2)
         if group[one] != group[two]:
-            group = {name: group[one] if held == group[two] else held for name, held in group.items()}
-            parent, child = ("/ground" if end == "ground" else f"/bodyset/{end}" for end in (one, two))
+            group = {
+                name: group[one] if held == group[two] else held for name, held in group.items()
+            }
+            parent, child = (
+                "/ground" if end == "ground" else f"/bodyset/{end}" for end in (one, two)
+            )
             joints.append((draw.choice([*COORDINATES]), parent, child))
     for _ in range(draw.randint(0, 2) if joints else 0):
         cls, one, two = draw.choice(joints)
         parent, child = draw.sample([one, two], 2)
-        joints.insert(draw.randint(0, len(joints)), (draw.choice([cls, *COORDINATES]), parent, child))
+        joints.insert(
+            draw.randint(0, len(joints)), (draw.choice([cls, *COORDINATES]), parent, child)
+        )
     return text(bodies, joints, [draw.random() < 0.4 for _ in joints])
 
 
 @pytest.mark.timeout(7200)
-def test_what_opensim_says_of_random_joints(opensim_says: Callable[[Path], str | None], tmp_path: Path) -> None:
+def test_what_opensim_says_of_random_joints(
+    opensim_says: Callable[[Path], str | None], tmp_path: Path
+) -> None:
     draw, path = random.Random(int(os.environ.get("OSIMLITE_SEED", "1"))), tmp_path / "m.osim"
     refused = 0
     for _ in range(WANTED):
@@ -139,9 +155,13 @@ def test_a_joint_that_stands_twice_moves_as_in_opensim(
     other = ("PinJoint", "/ground", "/bodyset/b1")
     joints = [other, (first, *ends), (second, *(ends[::-1] if reverse else ends))]
     path.write_text(text(bodies, joints, [False] * 3))
-    done = subprocess.run([sys.executable, "-c", ASK, path], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", ASK, path], capture_output=True, text=True, timeout=60, check=False
+    )
     (finding,) = (finding for finding in validate(path, select="OSIM404"))
-    assert ("refuses" in finding.message.replace("or refuses the model where", "")) == (done.returncode != 0)
+    assert ("refuses" in finding.message.replace("or refuses the model where", "")) == (
+        done.returncode != 0
+    )
     if done.returncode != 0:
         return
     if second == "FreeJoint":

@@ -38,7 +38,9 @@ MORE = """
 
 
 @pytest.mark.parametrize("name", ["arm26", "jumper", "gait10", "Rajagopal2016", "gait2392"])
-def test_joint_reactions(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_joint_reactions(
+    corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     monkeypatch.chdir(tmp_path)
     ids = {"arm26": "m0001", "gait10": "m0005", "Rajagopal2016": "m0954", "gait2392": "m0013"}
     model: Model = jumper() if name == "jumper" else osimlite.read(real(corpus, ids[name]))
@@ -68,7 +70,9 @@ CONSTRAINED = """
 
 
 @pytest.mark.parametrize("name", ["couplers", "points on lines", "a point of the shoulder"])
-def test_forces_of_constraints(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_forces_of_constraints(
+    corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     monkeypatch.chdir(tmp_path)
     ids = {"couplers": "m0954", "points on lines": "m0466", "a point of the shoulder": "m0163"}
     model = osimlite.read(real(corpus, ids[name]))
@@ -77,19 +81,32 @@ def test_forces_of_constraints(corpus: Any, tmp_path: Path, monkeypatch: pytest.
     for coordinate in model.components(Coordinate):
         coordinate.locked = False
     # OpenSim's moment on the thorax is not about the point that it writes.
-    joints = [joint.name for joint in model.joint_set.objects if type(joint).__name__ != "ScapulothoracicJoint"]
+    joints = [
+        joint.name
+        for joint in model.joint_set.objects
+        if type(joint).__name__ != "ScapulothoracicJoint"
+    ]
     ours, theirs = both(tmp_path, model, "AnalyzeTool", CONSTRAINED.format(joints=" ".join(joints)))
-    assert any("_mobility_F0" in label or "_Fx" in label for label in read_sto(theirs / "it_F_forces.sto").columns)
+    assert any(
+        "_mobility_F0" in label or "_Fx" in label
+        for label in read_sto(theirs / "it_F_forces.sto").columns
+    )
     largest = max(np.abs(read_sto(file).rows).max() for file in theirs.iterdir())
     compare(ours, theirs, 1e-8, 1e-10 * largest)
 
 
-def test_what_rolls_on_a_surface_is_free(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_rolls_on_a_surface_is_free(
+    corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """OpenSim's tools never turn such constraints on, whatever `isEnforced` says."""
     monkeypatch.chdir(tmp_path)
     model = osimlite.read(real(corpus, "m0001"))
     bodies = [model.tree().path_of(body) or "" for body in model.body_set.objects]
-    model.add(RollingOnSurfaceConstraint(name="roll", socket_rolling_body=bodies[-1], socket_surface_body=bodies[0]))
+    model.add(
+        RollingOnSurfaceConstraint(
+            name="roll", socket_rolling_body=bodies[-1], socket_surface_body=bodies[0]
+        )
+    )
     ours, theirs = both(tmp_path, model, "AnalyzeTool", CONSTRAINED.format(joints="ALL"))
     assert not any("roll" in label for label in read_sto(theirs / "it_F_forces.sto").columns)
     compare(ours, theirs, 1e-8, 1e-8)

@@ -65,13 +65,18 @@ def test_a_muscle_without_equilibrium(tmp_path: Path, which: str) -> None:
     for name in ("so_K_dudt.sto", "so_B_acc_global.sto"):
         assert (gaps[name] == either).all(), name
     forces = result.tables["so_F_forces.sto"]
-    for column, rows in (("calf", calf), ("quad", quad), ("hip_flexion_reserve", np.zeros_like(calf))):
+    for column, rows in (
+        ("calf", calf),
+        ("quad", quad),
+        ("hip_flexion_reserve", np.zeros_like(calf)),
+    ):
         assert (np.isnan(forces[column]) == rows).all(), column
     words = [said for name, said in result.told if name == "no equilibrium"]
     for name, rows in (("calf", calf), ("quad", quad)):
-        assert any(f"/forceset/{name}'" in said and f"at {rows.sum()} of 51 moments" in said for said in words) == (
-            rows.any()
-        )
+        assert any(
+            f"/forceset/{name}'" in said and f"at {rows.sum()} of 51 moments" in said
+            for said in words
+        ) == (rows.any())
 
 
 def compare_runs(folder: Path, setup: str, tolerance: float = 2e-6) -> None:
@@ -131,7 +136,14 @@ def test_a_motion_off_the_constraints_is_tracked(tmp_path: Path, setup: str) -> 
     rows = table.rows.copy()
     rows[:, 1] += 3.0 * np.sin(5.0 * table.times + 1.0)
     (folder / "walk.mot").unlink()
-    write_sto(folder / "walk.mot", "m", table.times.tolist(), table.columns, rows.tolist(), in_degrees=True)
+    write_sto(
+        folder / "walk.mot",
+        "m",
+        table.times.tolist(),
+        table.columns,
+        rows.tolist(),
+        in_degrees=True,
+    )
     compare_runs(folder, setup)
 
 

@@ -34,8 +34,8 @@ SECONDS = 90 if "OSIMLITE_BREAKAGES" not in os.environ else 3600
 # Errors that OpenSim passes over in silence, and computes something other than what the text says.
 SILENT = {"OSIM108", "OSIM311", "OSIM322", "OSIM406", "OSIM410", "OSIM414"}
 SILENTLY = ("OpenSim switches the whole probe off", "OpenSim welds a hidden body between them")
-# Said by Simbody when a model whose references all lead somewhere cannot take its first pose: constraints that cannot
-# be met, a cable with no way around its obstacles.
+# Said by Simbody when a model whose references all lead somewhere cannot take its first pose:
+# constraints that cannot be met, a cable with no way around its obstacles.
 ASSEMBLY = ("projectQ", "CableSpan")
 
 
@@ -106,7 +106,12 @@ def targets_of(source: Source) -> Iterator[Target]:
     seen = set()
     for use in subject.uses:
         target = subject.resolution(use).target
-        if target is None or target.source_index is None or target is use.owner or target.source_index in seen:
+        if (
+            target is None
+            or target.source_index is None
+            or target is use.owner
+            or target.source_index in seen
+        ):
             continue
         seen.add(target.source_index)
         span = source.spans[target.source_index]
@@ -144,7 +149,10 @@ def broken(model: Victim, draw: random.Random) -> Breakage:
         return _without_target(model, draw)
     place = draw.choice(model.places[draw.choice(sorted(model.places))])
     end = place.start + len(place.word)
-    if draw.random() < 0.05 and (around := _element_around(model.text, place.start, end)) is not None:
+    if (
+        draw.random() < 0.05
+        and (around := _element_around(model.text, place.start, end)) is not None
+    ):
         text = model.text[: around[0]] + model.text[around[1] :]
         return Breakage(f"{model.name} {place.kind}: '{place.word}' left out with its tag", text)
     new = draw.choice(CHANGES)(draw, place.word, model.names)
@@ -157,7 +165,10 @@ def broken(model: Victim, draw: random.Random) -> Breakage:
 
 def _element_around(text: str, start: int, end: int) -> tuple[int, int] | None:
     """The element that holds nothing but the characters from `start` to `end`."""
-    before, after = re.search(r"<[^<>/]+>\s*\Z", text[max(0, start - 200) : start]), text.find(">", end)
+    before, after = (
+        re.search(r"<[^<>/]+>\s*\Z", text[max(0, start - 200) : start]),
+        text.find(">", end),
+    )
     if before is None or not text[end : after + 1].lstrip().startswith("</"):
         return None
     return start - len(before[0]), after + 1
@@ -187,12 +198,18 @@ def _without_target(model: Victim, draw: random.Random) -> Breakage:
     what = f"{model.name} {target.cls} '{target.name}'"
     if new is None:
         return Breakage(f"{what} taken out", model.text[: target.start] + model.text[target.end :])
-    return Breakage(f"{what} called '{new}'", model.text[: target.name_start] + new + model.text[name_end:])
+    return Breakage(
+        f"{what} called '{new}'", model.text[: target.name_start] + new + model.text[name_end:]
+    )
 
 
 @pytest.mark.timeout(SECONDS + 300)
-def test_the_verdict_on_broken_references_of_real_models_is_that_of_opensim(corpus, opensim_says, tmp_path):
-    victims = [result for model in corpus if (result := victim(model, tmp_path / model.id)) is not None]
+def test_the_verdict_on_broken_references_of_real_models_is_that_of_opensim(
+    corpus, opensim_says, tmp_path
+):
+    victims = [
+        result for model in corpus if (result := victim(model, tmp_path / model.id)) is not None
+    ]
     draw = random.Random(int(os.environ.get("OSIMLITE_SEED", "1")))
     wrong, refused, asked = [], 0, 0
     end = time.monotonic() + SECONDS
@@ -206,11 +223,15 @@ def test_the_verdict_on_broken_references_of_real_models_is_that_of_opensim(corp
         if message is not None and any(words in message for words in ASSEMBLY):
             message = None
         report = validate(path, ignore="OSIM63")
-        errors = [f for f in report.errors if f.code not in SILENT and not f.message.endswith(SILENTLY)]
+        errors = [
+            f for f in report.errors if f.code not in SILENT and not f.message.endswith(SILENTLY)
+        ]
         refused += message is not None
         if bool(errors) != (message is not None):
             ours = "; ".join(map(str, errors[:3])) or "no error"
-            wrong.append(f"{what}\n  OpenSim: {(message or 'takes it').splitlines()[0][:300]}\n  here: {ours}")
+            wrong.append(
+                f"{what}\n  OpenSim: {(message or 'takes it').splitlines()[0][:300]}\n  here: {ours}"
+            )
     print(f"{asked} cases, {refused} refused by OpenSim, {len(wrong)} with another verdict")
     assert asked == WANTED or "OSIMLITE_BREAKAGES" not in os.environ
     assert not wrong, f"{len(wrong)} of {asked}:\n" + "\n".join(wrong)

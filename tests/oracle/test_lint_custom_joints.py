@@ -28,15 +28,15 @@ def square(*coefficients: float) -> str:
     return f"<PolynomialFunction><coefficients>{' '.join(map(str, coefficients))}</coefficients></PolynomialFunction>"
 
 
-def document(coordinates: str, on: dict[int, tuple[str, str]], axes: tuple[str, ...] = (), inside: str = "") -> str:
+def document(
+    coordinates: str, on: dict[int, tuple[str, str]], axes: tuple[str, ...] = (), inside: str = ""
+) -> str:
     """A body on a custom joint: its coordinates, those on each axis with their function, and the axes."""
     rows = ""
     for number, name in enumerate(AXES):
         names, function = on.get(number, ("", ""))
         axis = axes[number] if axes else (X, Y, Z)[number % 3]
-        rows += (
-            f'<TransformAxis name="{name}"><coordinates>{" ".join(names)}</coordinates><axis>{axis}</axis>{function}'
-        )
+        rows += f'<TransformAxis name="{name}"><coordinates>{" ".join(names)}</coordinates><axis>{axis}</axis>{function}'
         rows += "</TransformAxis>"
     return f"""<OpenSimDocument Version="40600"><Model name="m">
         <BodySet><objects><Body name="b">
@@ -62,9 +62,13 @@ CASES = {
     "no coefficient": document("a", {0: ("a", linear())}),
     "on no axis": document("ab", ONE),
     "no second variable": document("ab", {0: ("ab", linear(1, 0))}),
-    "no second variable, elsewhere": document("ab", {0: ("ab", linear(1, 0)), 1: ("b", linear(1, 0))}),
+    "no second variable, elsewhere": document(
+        "ab", {0: ("ab", linear(1, 0)), 1: ("b", linear(1, 0))}
+    ),
     "second variable of a spline": document("ab", {0: ("ab", SPLINE)}),
-    "second variable of a spline, elsewhere": document("ab", {0: ("ab", SPLINE), 1: ("b", linear(1, 0))}),
+    "second variable of a spline, elsewhere": document(
+        "ab", {0: ("ab", SPLINE), 1: ("b", linear(1, 0))}
+    ),
     "the same motion": document("ab", {0: ("ab", linear(1, 1, 0))}),
     "the same motions": document("ab", {0: ("ab", linear(1, 1, 0)), 1: ("ab", linear(1, 1, 0))}),
     "two motions": document("ab", {0: ("ab", linear(1, 1, 0)), 1: ("ab", linear(1, -1, 0))}),
@@ -72,7 +76,13 @@ CASES = {
     "flat in the default pose": document("a", {0: ("a", square(1, 0, 0))}),
     "polynomial": document("a", {0: ("a", square(1, 0.5, 0))}),
     "times 0": document(
-        "a", {0: ("a", f"<MultiplierFunction><function>{linear(1, 0)}</function><scale>0</scale></MultiplierFunction>")}
+        "a",
+        {
+            0: (
+                "a",
+                f"<MultiplierFunction><function>{linear(1, 0)}</function><scale>0</scale></MultiplierFunction>",
+            )
+        },
     ),
     "nothing to multiply": document("a", {0: ("a", "<MultiplierFunction/>")}),
     "no coordinate": document("", {}),
@@ -85,8 +95,13 @@ CASES = {
     "in one plane": document("a", ONE, (X, Y, "1 1 0", X, Y, Z)),
 }
 
-# OpenSim computes something, without a message, that depends on what is in memory or is no function of both variables.
-SILENT = ("one coefficient", "no second variable, elsewhere", "second variable of a spline, elsewhere")
+# OpenSim computes something, without a message, that depends on what is in memory or is no function
+# of both variables.
+SILENT = (
+    "one coefficient",
+    "no second variable, elsewhere",
+    "second variable of a spline, elsewhere",
+)
 
 
 def fails(path: Path) -> bool:

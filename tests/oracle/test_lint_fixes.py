@@ -78,7 +78,11 @@ def test_safe_mends_of_damaged_real_files_give_the_models_back(corpus, tmp_path)
         original = printed(result.text, path)
         for damage in DAMAGE:
             place = draw.choice(result.places[draw.choice(sorted(result.places))])
-            text = result.text[: place.start] + damage(place.word) + result.text[place.start + len(place.word) :]
+            text = (
+                result.text[: place.start]
+                + damage(place.word)
+                + result.text[place.start + len(place.word) :]
+            )
             fixed, count = safely_mended(text)
             mends += count
             if count and fixed != result.text and printed(fixed, path) != original:

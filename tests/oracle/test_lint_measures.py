@@ -15,4 +15,6 @@ def test_what_is_told_is_what_opensim_gives(code, fixtures):
     (file,) = (fixtures / "lint" / code).glob("fail-02-*")
     rows = [(told, result) for of, _, told, result in Beside(file).findings() if of == code]
     assert rows
-    assert [told for told, _ in rows] == pytest.approx([result for _, result in rows], rel=1e-9, abs=1e-12)
+    assert [told for told, _ in rows] == pytest.approx(
+        [result for _, result in rows], rel=1e-9, abs=1e-12
+    )

@@ -56,30 +56,98 @@ YEARS_BETWEEN = """<?xml version="1.0" encoding="UTF-8"?>
 <Connector_PhysicalFrame_ name="child_frame"><connectee_name>ball</connectee_name></Connector_PhysicalFrame_>
 </connectors></WeldJoint></objects></JointSet></Model></OpenSimDocument>
 """
-PARENT = (
-    '<Connector_PhysicalFrame_ name="parent_frame"><connectee_name>ground</connectee_name></Connector_PhysicalFrame_>'
-)
+PARENT = '<Connector_PhysicalFrame_ name="parent_frame"><connectee_name>ground</connectee_name></Connector_PhysicalFrame_>'
 
 VECTORS = (
-    *("1 1 1", "1, 1, 1", "1,1 1", "[1 1 1]", "~(1,1,1)", "1 1 1 1", "1 1", "NaN 1 1", "1 Inf 1", "1e400 1 1"),
-    *("1e-320 1 1", "1. .5 +1e0", "1.5x 1 1", "a 1 1", "", "1,,1 1", "{1 1 1}", "[1 1 1", "1 1e 1", "<!-- a -->1 1 1"),
+    *(
+        "1 1 1",
+        "1, 1, 1",
+        "1,1 1",
+        "[1 1 1]",
+        "~(1,1,1)",
+        "1 1 1 1",
+        "1 1",
+        "NaN 1 1",
+        "1 Inf 1",
+        "1e400 1 1",
+    ),
+    *(
+        "1e-320 1 1",
+        "1. .5 +1e0",
+        "1.5x 1 1",
+        "a 1 1",
+        "",
+        "1,,1 1",
+        "{1 1 1}",
+        "[1 1 1",
+        "1 1e 1",
+        "<!-- a -->1 1 1",
+    ),
     *("1 <!-- a --> 1 1", "<x/>", "1 1 1<x/>"),
 )
-ACCELERATION_STAGE = ("4", "0", "-7", "+3", " 2 ", "3.0", "1e1", "abc", "", "4 4", "NaN", "99999999999", "0x3")
-NUMBERS = ("abc", "", "NaN", "-inf", "1e400", "1e-400", "1,5", "1 2", "5kg", "5e", "nan nan", "<x/>")
+ACCELERATION_STAGE = (
+    "4",
+    "0",
+    "-7",
+    "+3",
+    " 2 ",
+    "3.0",
+    "1e1",
+    "abc",
+    "",
+    "4 4",
+    "NaN",
+    "99999999999",
+    "0x3",
+)
+NUMBERS = (
+    "abc",
+    "",
+    "NaN",
+    "-inf",
+    "1e400",
+    "1e-400",
+    "1,5",
+    "1 2",
+    "5kg",
+    "5e",
+    "nan nan",
+    "<x/>",
+)
 
 DEFAULTS = (
     *(f"<ControlLinear><default_max>{text}</default_max></ControlLinear>" for text in NUMBERS),
-    *(f"<CMC_Joint><weight>{text}</weight></CMC_Joint>" for text in (*NUMBERS, "1,5 2", "(1 2)", "1 2 a")),
-    *(f"<CMC_Joint><active>{text}</active></CMC_Joint>" for text in ("", "abc", "<x/>", "a<!-- b --> c")),
+    *(
+        f"<CMC_Joint><weight>{text}</weight></CMC_Joint>"
+        for text in (*NUMBERS, "1,5 2", "(1 2)", "1 2 a")
+    ),
+    *(
+        f"<CMC_Joint><active>{text}</active></CMC_Joint>"
+        for text in ("", "abc", "<x/>", "a<!-- b --> c")
+    ),
     "<ControlLinear><x_nodes><ControlLinearNode/></x_nodes></ControlLinear>",
     "<ControlLinear><x_nodes><Body/></x_nodes></ControlLinear>",
 )
 
-LISTS = ("0 1 2", "0,1,2", "0, 1 , 2", "(0 1 2)", "0,1 2", "0 1,2", "(0,1 2)", "0 1 2,", "0,,1,2", "0 1 5kg", "[0 1 2")
+LISTS = (
+    "0 1 2",
+    "0,1,2",
+    "0, 1 , 2",
+    "(0 1 2)",
+    "0,1 2",
+    "0 1,2",
+    "(0,1 2)",
+    "0 1 2,",
+    "0,,1,2",
+    "0 1 5kg",
+    "[0 1 2",
+)
 
 CASES: dict[str, tuple[str, str, str]] = {
-    **{text: (OLD, '<Model name="old">', f'<Model name="old"><defaults>{text}</defaults>') for text in DEFAULTS},
+    **{
+        text: (OLD, '<Model name="old">', f'<Model name="old"><defaults>{text}</defaults>')
+        for text in DEFAULTS
+    },
     **{
         f"list {text}": (
             OLD,
@@ -88,12 +156,30 @@ CASES: dict[str, tuple[str, str, str]] = {
         )
         for text in LISTS
     },
-    **{f"scale {text}": (OLD, "<scale_factors>1 1 1<", f"<scale_factors>{text}<") for text in VECTORS},
-    **{f"place {text}": (OLD, "<location_in_parent>0 0 0<", f"<location_in_parent>{text}<") for text in VECTORS},
-    **{f"frame {text}": (OLD, "<transform>0 0 0 1 0 0<", f"<transform>{text} 1 0 0<") for text in VECTORS},
-    **{f"shown {text}": (OLD, ">4</display_preference", f">{text}</display_preference") for text in ACCELERATION_STAGE},
-    **{f"skin {text}": (OLD, ">3</display_preference", f">{text}</display_preference") for text in ACCELERATION_STAGE},
-    **{f"path {text}": (OLD, ">1</display_preference", f">{text}</display_preference") for text in ACCELERATION_STAGE},
+    **{
+        f"scale {text}": (OLD, "<scale_factors>1 1 1<", f"<scale_factors>{text}<")
+        for text in VECTORS
+    },
+    **{
+        f"place {text}": (OLD, "<location_in_parent>0 0 0<", f"<location_in_parent>{text}<")
+        for text in VECTORS
+    },
+    **{
+        f"frame {text}": (OLD, "<transform>0 0 0 1 0 0<", f"<transform>{text} 1 0 0<")
+        for text in VECTORS
+    },
+    **{
+        f"shown {text}": (OLD, ">4</display_preference", f">{text}</display_preference")
+        for text in ACCELERATION_STAGE
+    },
+    **{
+        f"skin {text}": (OLD, ">3</display_preference", f">{text}</display_preference")
+        for text in ACCELERATION_STAGE
+    },
+    **{
+        f"path {text}": (OLD, ">1</display_preference", f">{text}</display_preference")
+        for text in ACCELERATION_STAGE
+    },
     **{f"inertia {text}": (OLD, "<inertia_yy>1<", f"<inertia_yy>{text}<") for text in NUMBERS},
     **{
         f"control {text}": (OLD, "<min_control>0<", f"<min_control>{text}<")
@@ -104,7 +190,11 @@ CASES: dict[str, tuple[str, str, str]] = {
         for text in ("1e30", "1.6", "1.5707963267948961", "1.57", "0", "-0.1")
     },
     "joint missing": (OLD, "<Joint/>", ""),
-    "joint of a body missing": (OLD, "</Body>\n</objects>", "</Body><Body name='b'><mass>1</mass></Body></objects>"),
+    "joint of a body missing": (
+        OLD,
+        "</Body>\n</objects>",
+        "</Body><Body name='b'><mass>1</mass></Body></objects>",
+    ),
     "joint renamed": (OLD, '<Body name="ball"><mass>1', '<Body name="ball"><joint/><mass>1'),
     "no parent": (OLD, "<parent_body>ground</parent_body>", ""),
     "no bodies": (OLD, "BodySet>", "Bodyset>"),
@@ -112,7 +202,11 @@ CASES: dict[str, tuple[str, str, str]] = {
     "element in a motion type": (OLD, "rotational<", "rotational<a/><"),
     "model takes the name": (OLD, '<Model name="old">', '<Model name="turn">'),
     "function takes the name": (OLD, "<Constant>", '<Constant name="turn">'),
-    "body takes the name": (OLD, '<Body name="ground">', '<Body name="turn"><Joint/></Body><Body name="ground">'),
+    "body takes the name": (
+        OLD,
+        '<Body name="ground">',
+        '<Body name="turn"><Joint/></Body><Body name="ground">',
+    ),
     "axis takes the name": (OLD, '<TransformAxis name="rotation1">', '<TransformAxis name="turn">'),
     "no class as function": (OLD, "<Constant><value>0</value></Constant>", "<orientation/>"),
     "foreign class as function": (OLD, "<Constant><value>0</value></Constant>", "<Body name='c'/>"),
@@ -121,15 +215,35 @@ CASES: dict[str, tuple[str, str, str]] = {
         "<CoordinateSet><objects>",
         "<CoordinateSet><objects><WeldConstraint name='w'/>",
     ),
-    "coordinate doubled": (OLD, '<Coordinate name="turn">', '<Coordinate name="turn"/><Coordinate name="turn">'),
+    "coordinate doubled": (
+        OLD,
+        '<Coordinate name="turn">',
+        '<Coordinate name="turn"/><Coordinate name="turn">',
+    ),
     "set for a coordinate": (OLD, '<Coordinate name="turn">', '<BodySet><Coordinate name="turn">'),
-    "connector renamed": (YEARS_BETWEEN, PARENT, PARENT.replace("Connector_PhysicalFrame_", "Connector_Frame_")),
+    "connector renamed": (
+        YEARS_BETWEEN,
+        PARENT,
+        PARENT.replace("Connector_PhysicalFrame_", "Connector_Frame_"),
+    ),
     "connector missing": (YEARS_BETWEEN, PARENT, ""),
     "connector without a name": (YEARS_BETWEEN, PARENT, PARENT.replace(' name="parent_frame"', "")),
-    "connector without a connectee": (YEARS_BETWEEN, PARENT, PARENT.replace("connectee_name", "connectee")),
+    "connector without a connectee": (
+        YEARS_BETWEEN,
+        PARENT,
+        PARENT.replace("connectee_name", "connectee"),
+    ),
     "connector twice": (YEARS_BETWEEN, PARENT, PARENT + PARENT),
-    "connector twice, first wrong": (YEARS_BETWEEN, PARENT, PARENT.replace(">ground<", ">nobody<") + PARENT),
-    "connector twice, last wrong": (YEARS_BETWEEN, PARENT, PARENT + PARENT.replace(">ground<", ">nobody<")),
+    "connector twice, first wrong": (
+        YEARS_BETWEEN,
+        PARENT,
+        PARENT.replace(">ground<", ">nobody<") + PARENT,
+    ),
+    "connector twice, last wrong": (
+        YEARS_BETWEEN,
+        PARENT,
+        PARENT + PARENT.replace(">ground<", ">nobody<"),
+    ),
     "no connectors": (YEARS_BETWEEN, "connectors>", "Connectors>"),
 }
 

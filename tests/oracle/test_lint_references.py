@@ -24,7 +24,10 @@ def breakages(text: str, count: int, seed: int) -> list[tuple[str, str]]:
     """Randomly changed references: letters swapped, dropped, doubled, in another case; other names; other forms."""
     draw = random.Random(seed)
     places = [match for match in REFERENCE.finditer(text) if match[2] != ".."]
-    names = sorted({word for match in places for word in match[2].split()} | {"RHip_rz", "/jointset/RightShankToThigh"})
+    names = sorted(
+        {word for match in places for word in match[2].split()}
+        | {"RHip_rz", "/jointset/RightShankToThigh"}
+    )
     result = []
     for _ in range(count):
         match = draw.choice(places)
@@ -52,7 +55,12 @@ def breakages(text: str, count: int, seed: int) -> list[tuple[str, str]]:
             ]
         )
         new = " ".join(words)
-        result.append((f"{match[1]}: {match[2]} -> {new}", text[: match.start(2)] + new + text[match.end(2) :]))
+        result.append(
+            (
+                f"{match[1]}: {match[2]} -> {new}",
+                text[: match.start(2)] + new + text[match.end(2) :],
+            )
+        )
     return result
 
 

@@ -22,7 +22,9 @@ POINTS = "".join(
     for body in ("pelvis", "shank")
 )
 PATH = f'<GeometryPath name="path"><PathPointSet><objects>{POINTS}</objects></PathPointSet></GeometryPath>'
-FIBRES = "<optimal_fiber_length>0.1</optimal_fiber_length><tendon_slack_length>0.2</tendon_slack_length>"
+FIBRES = (
+    "<optimal_fiber_length>0.1</optimal_fiber_length><tendon_slack_length>0.2</tendon_slack_length>"
+)
 
 
 def muscle(inside: str, kind: str = "Millard2012EquilibriumMuscle", path: str = PATH) -> str:
@@ -30,11 +32,18 @@ def muscle(inside: str, kind: str = "Millard2012EquilibriumMuscle", path: str = 
     return SKELETON.replace("</objects>\n\t\t</ForceSet>", f"{force}\n</objects>\n\t\t</ForceSet>")
 
 
-def curve(tag: str, kind: str = "Millard2012EquilibriumMuscle", more: str = "", **values: float) -> str:
-    return muscle(f'{more}<{tag} name="c">{"".join(f"<{k}>{v}</{k}>" for k, v in values.items())}</{tag}>', kind)
+def curve(
+    tag: str, kind: str = "Millard2012EquilibriumMuscle", more: str = "", **values: float
+) -> str:
+    return muscle(
+        f'{more}<{tag} name="c">{"".join(f"<{k}>{v}</{k}>" for k, v in values.items())}</{tag}>',
+        kind,
+    )
 
 
-def by_functions(coordinates: str = "/jointset/knee/knee_angle", length: str = "0.1 0.4", more: str = "") -> str:
+def by_functions(
+    coordinates: str = "/jointset/knee/knee_angle", length: str = "0.1 0.4", more: str = ""
+) -> str:
     return muscle(
         "",
         path=f'<FunctionBasedPath name="path"><coordinate_paths>{coordinates}</coordinate_paths><length_function>'
@@ -48,7 +57,9 @@ CLASSIC = "<fiber_damping>0</fiber_damping>"
 
 
 REFUSED = {
-    "order": curve("ActiveForceLengthCurve", min_norm_active_fiber_length=0.8, transition_norm_fiber_length=0.7),
+    "order": curve(
+        "ActiveForceLengthCurve", min_norm_active_fiber_length=0.8, transition_norm_fiber_length=0.7
+    ),
     "plateau": curve("ActiveForceLengthCurve", max_norm_active_fiber_length=1),
     "shallow": curve("ActiveForceLengthCurve", shallow_ascending_slope=3.75),
     "isometric": curve("ForceVelocityCurve", isometric_slope=1),
@@ -63,43 +74,70 @@ REFUSED = {
     "end of a mass": curve("ForceVelocityCurve", ACCELERATION, concentric_slope_at_vmax=0.3),
     "long toe": curve("FiberForceLengthCurve", strain_at_one_norm_force=5),
     "corner of toe": curve(
-        "FiberForceLengthCurve", stiffness_at_low_force=0.2, stiffness_at_one_norm_force=1.44, curviness=0.5
+        "FiberForceLengthCurve",
+        stiffness_at_low_force=0.2,
+        stiffness_at_one_norm_force=1.44,
+        curviness=0.5,
     ),
-    "soft end": curve("FiberCompressiveForceLengthCurve", ACCELERATION, stiffness_at_zero_length=-1, curviness=0.5),
-    "only stiffness": curve("FiberCompressiveForceCosPennationCurve", ACCELERATION, stiffness_at_perpendicular=-20),
-    "right angle": curve("FiberCompressiveForceCosPennationCurve", ACCELERATION, engagement_angle_in_degrees=90),
+    "soft end": curve(
+        "FiberCompressiveForceLengthCurve", ACCELERATION, stiffness_at_zero_length=-1, curviness=0.5
+    ),
+    "only stiffness": curve(
+        "FiberCompressiveForceCosPennationCurve", ACCELERATION, stiffness_at_perpendicular=-20
+    ),
+    "right angle": curve(
+        "FiberCompressiveForceCosPennationCurve", ACCELERATION, engagement_angle_in_degrees=90
+    ),
     "rigid": muscle("<ignore_tendon_compliance>true</ignore_tendon_compliance>", THELEN),
     "excited": muscle("<ignore_activation_dynamics>true</ignore_activation_dynamics>", THELEN),
-    "old rigid": muscle("<ignore_tendon_compliance>true</ignore_tendon_compliance>", "Schutte1993Muscle_Deprecated"),
-    "old excited": muscle("<ignore_activation_dynamics>true</ignore_activation_dynamics>", "Delp1990Muscle_Deprecated"),
+    "old rigid": muscle(
+        "<ignore_tendon_compliance>true</ignore_tendon_compliance>", "Schutte1993Muscle_Deprecated"
+    ),
+    "old excited": muscle(
+        "<ignore_activation_dynamics>true</ignore_activation_dynamics>", "Delp1990Muscle_Deprecated"
+    ),
     "first excited": muscle(
-        "<ignore_activation_dynamics>true</ignore_activation_dynamics>", "Thelen2003Muscle_Deprecated"
+        "<ignore_activation_dynamics>true</ignore_activation_dynamics>",
+        "Thelen2003Muscle_Deprecated",
     ),
     "early line": muscle("<fv_linear_extrap_threshold>0.7</fv_linear_extrap_threshold>", THELEN),
     "full": muscle("<min_control>1</min_control><minimum_activation>1</minimum_activation>"),
     "below": muscle("<minimum_activation>0.02</minimum_activation>"),
-    "classic": muscle(f"<min_control>0</min_control>{CLASSIC}<minimum_activation>0.005</minimum_activation>"),
-    "tense": muscle("<default_normalized_tendon_force>6</default_normalized_tendon_force>", "DeGrooteFregly2016Muscle"),
+    "classic": muscle(
+        f"<min_control>0</min_control>{CLASSIC}<minimum_activation>0.005</minimum_activation>"
+    ),
+    "tense": muscle(
+        "<default_normalized_tendon_force>6</default_normalized_tendon_force>",
+        "DeGrooteFregly2016Muscle",
+    ),
     "of nothing": by_functions("", "0.4"),
-    "of one twice": by_functions("/jointset/knee/knee_angle /jointset/knee/knee_angle", "0.1 0.1 0.4"),
+    "of one twice": by_functions(
+        "/jointset/knee/knee_angle /jointset/knee/knee_angle", "0.1 0.1 0.4"
+    ),
     "of too few": by_functions(length="0.4"),
-    "flat arm": by_functions(more="<moment_arm_functions><Constant><value>1</value></Constant></moment_arm_functions>"),
+    "flat arm": by_functions(
+        more="<moment_arm_functions><Constant><value>1</value></Constant></moment_arm_functions>"
+    ),
     "optimal force": muscle("<optimal_force>1</optimal_force>", "DeGrooteFregly2016Muscle"),
     "no path": muscle("", path=""),
     "name of a set": SKELETON.replace('<BodySet name="bodyset">', '<BodySet name="body set">'),
-    "no coordinates": SKELETON.replace("<coordinates>", "<coordinates></coordinates><!--", 1).replace(
-        "</coordinates>\n", "-->\n", 1
-    ),
+    "no coordinates": SKELETON.replace(
+        "<coordinates>", "<coordinates></coordinates><!--", 1
+    ).replace("</coordinates>\n", "-->\n", 1),
 }
 TAKEN = {
     "muscle": muscle(""),
-    "damped end": curve("ForceVelocityCurve", concentric_slope_at_vmax=0.9, eccentric_slope_at_vmax=0.3),
+    "damped end": curve(
+        "ForceVelocityCurve", concentric_slope_at_vmax=0.9, eccentric_slope_at_vmax=0.3
+    ),
     "classic end": curve("ForceVelocityCurve", more=CLASSIC, concentric_slope_at_vmax=0.2),
     "least": curve("ActiveForceLengthCurve", minimum_value=2),
     "at rest": curve("ForceVelocityCurve", isometric_slope=1.1),
     "long toe": curve("FiberForceLengthCurve", strain_at_one_norm_force=4.9),
     "late line": muscle("<fv_linear_extrap_threshold>0.72</fv_linear_extrap_threshold>", THELEN),
-    "undamped": muscle("<min_control>0.005</min_control><minimum_activation>0.005</minimum_activation>"),
+    "undamped": muscle(
+        "<min_control>0.005</min_control><minimum_activation>0.005</minimum_activation>"
+    ),
     "by functions": by_functions(),
     "shallow": curve("ActiveForceLengthCurve", shallow_ascending_slope=3.6),
     "eccentric": curve("ForceVelocityCurve", eccentric_slope_near_vmax=0.39),
@@ -109,7 +147,10 @@ TAKEN = {
 
 
 def test_opensim_refuses_what_is_an_error_and_takes_what_is_none(tmp_path: Path) -> None:
-    cases = {**{f"refused {k}": v for k, v in REFUSED.items()}, **{f"taken {k}": v for k, v in TAKEN.items()}}
+    cases = {
+        **{f"refused {k}": v for k, v in REFUSED.items()},
+        **{f"taken {k}": v for k, v in TAKEN.items()},
+    }
     files = []
     for number, text in enumerate(cases.values()):
         files.append(tmp_path / f"{number}.osim")
@@ -121,11 +162,17 @@ def test_opensim_refuses_what_is_an_error_and_takes_what_is_none(tmp_path: Path)
     verdicts = [json.loads(line) for line in done.stdout.splitlines()]
     for (name, text), verdict in zip(cases.items(), verdicts, strict=True):
         errors = validate(Source(text.encode())).errors
-        assert bool(errors) == (verdict is not None) == name.startswith("refused"), (name, verdict, errors)
+        assert bool(errors) == (verdict is not None) == name.startswith("refused"), (
+            name,
+            verdict,
+            errors,
+        )
 
 
 @pytest.mark.parametrize(("name", "points"), [("fail-01-example", 2), ("pass-example", 4)])
-def test_a_path_goes_straight_through_a_surface_that_holds_its_point(name: str, points: int) -> None:
+def test_a_path_goes_straight_through_a_surface_that_holds_its_point(
+    name: str, points: int
+) -> None:
     """As rule OSIM616 says."""
     import opensim
 

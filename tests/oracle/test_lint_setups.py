@@ -38,7 +38,9 @@ def results(folder: Path, fault: Fault, tool: str) -> list[list[float]]:
     put_in(folder, fault)
     setup, file = RESULTS[tool]
     program = f"import opensim; opensim.Logger.setLevelString('off'); assert opensim.{tool}('{setup}').run()"
-    subprocess.run([sys.executable, "-c", program], cwd=folder, check=True, timeout=100, capture_output=True)
+    subprocess.run(
+        [sys.executable, "-c", program], cwd=folder, check=True, timeout=100, capture_output=True
+    )
     rows = (folder / file).read_text().split("endheader")[1].split("\n")[2:]
     return [list(map(float, row.split())) for row in rows if row.strip()]
 
@@ -46,7 +48,9 @@ def results(folder: Path, fault: Fault, tool: str) -> list[list[float]]:
 @pytest.fixture(scope="module")
 def control(tmp_path_factory):
     """What the tools compute without a fault."""
-    return {tool: results(tmp_path_factory.mktemp("control") / tool, CONTROL, tool) for tool in RESULTS}
+    return {
+        tool: results(tmp_path_factory.mktemp("control") / tool, CONTROL, tool) for tool in RESULTS
+    }
 
 
 @pytest.mark.parametrize("number", SILENT, ids=str)
@@ -56,6 +60,8 @@ def test_opensim_computes_something_else(tmp_path, control, number):
     result = results(tmp_path / "faulty", fault, tool)
     assert len(result) == len(control[tool])
     largest = max(
-        abs(a - b) for one, other in zip(result, control[tool], strict=True) for a, b in zip(one, other, strict=True)
+        abs(a - b)
+        for one, other in zip(result, control[tool], strict=True)
+        for a, b in zip(one, other, strict=True)
     )
     assert largest > least

@@ -1,7 +1,7 @@
 """Real models, edited at random: what OpenSim refuses has an error, and no error claims a refusal that does not come.
 
-A hundred edits by default; ``OSIMLITE_EDITS=2000 OSIMLITE_SEED=7`` asks for others, and waits for them. Models as
-published, of all versions of the format, and in OpenSim's own print of them.
+A hundred edits by default; ``OSIMLITE_EDITS=2000 OSIMLITE_SEED=7`` asks for others, and waits for
+them. Models as published, of all versions of the format, and in OpenSim's own print of them.
 """
 
 from __future__ import annotations
@@ -80,7 +80,10 @@ def victims(models: list[CorpusModel], folder: Path) -> list[Path]:
 def test_the_verdict_on_edited_models_is_that_of_opensim(corpus, opensim_says, tmp_path):
     taken = [path for path in victims(corpus, tmp_path) if opensim_says(path) is None]
     texts = [Text(path.read_bytes().decode("utf-8", "replace")) for path in taken]
-    before = [Counter((f.code, f.message) for f in validate(path, ignore="OSIM63").errors) for path in taken]
+    before = [
+        Counter((f.code, f.message) for f in validate(path, ignore="OSIM63").errors)
+        for path in taken
+    ]
     draw = random.Random(int(os.environ.get("OSIMLITE_SEED", "1")))
     counts: Counter[str] = Counter()
     wrong = []
@@ -105,7 +108,9 @@ def test_the_verdict_on_edited_models_is_that_of_opensim(corpus, opensim_says, t
             )
         elif message is None and claims:
             counts["claimed wrongly"] += 1
-            wrong.append(f"{taken[number].parent.name} {edit.what}\n  OpenSim takes it\n  {claims[0]}")
+            wrong.append(
+                f"{taken[number].parent.name} {edit.what}\n  OpenSim takes it\n  {claims[0]}"
+            )
     print(dict(counts))
     assert counts["edits"] == WANTED or "OSIMLITE_EDITS" not in os.environ
     assert not wrong, f"{counts}:\n" + "\n".join(wrong)

@@ -45,10 +45,20 @@ def test_opensim_refuses_the_studies_with_errors(tmp_path: Path) -> None:
         put_in(folder, fault)
     folders = [str(tmp_path / str(fault.number)) for fault in asked]
     run = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *folders], capture_output=True, text=True, timeout=120, check=True
+        [sys.executable, "-c", PROGRAM, *folders],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
     )
-    said = dict(json.loads(line) for line in run.stdout.splitlines() if line.startswith(f'["{tmp_path}'))
+    said = dict(
+        json.loads(line) for line in run.stdout.splitlines() if line.startswith(f'["{tmp_path}')
+    )
     assert said.keys() == set(folders)
     for fault, path in zip(asked, folders, strict=True):
-        assert (said[path] is True) == (fault.number in SOLVED | {"control"}), f"{fault.number}: {said[path]}"
-        assert bool(validate(path, ignore="OSIM111").findings) == (fault.number != "control"), fault.number
+        assert (said[path] is True) == (fault.number in SOLVED | {"control"}), (
+            f"{fault.number}: {said[path]}"
+        )
+        assert bool(validate(path, ignore="OSIM111").findings) == (fault.number != "control"), (
+            fault.number
+        )

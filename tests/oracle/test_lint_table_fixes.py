@@ -24,7 +24,9 @@ def read(path):
         labels, times = list(table.getColumnLabels()), list(table.getIndependentColumn())
         return labels, times, numbers, markers.getTableMetaDataString("Units")
     storage = opensim.Storage(str(path))
-    labels = [storage.getColumnLabels().get(index) for index in range(storage.getColumnLabels().getSize())]
+    labels = [
+        storage.getColumnLabels().get(index) for index in range(storage.getColumnLabels().getSize())
+    ]
     rows = [storage.getStateVector(row) for row in range(storage.getSize())]
     numbers = [[row.getData().get(index) for index in range(row.getSize())] for row in rows]
     return labels, [row.getTime() for row in rows], numbers, storage.isInDegrees()
@@ -48,7 +50,9 @@ def test_opensim_reads_what_was_meant(what, data, old, new, tmp_path):
 
 
 @pytest.mark.parametrize("version", [b"1", b"3\nDataType=double"])
-@pytest.mark.parametrize("line", [b"osimlite: ignore OSIM809", b"# osimlite: ignore OSIM809, OSIM804"])
+@pytest.mark.parametrize(
+    "line", [b"osimlite: ignore OSIM809", b"# osimlite: ignore OSIM809, OSIM804"]
+)
 def test_opensim_passes_over_a_line_that_ignores_a_finding(line, version, tmp_path):
     path = tmp_path / "a.sto"
     data = MOTION.replace(b"version=1", b"version=" + version)
@@ -74,8 +78,14 @@ def tool_in(path):
     """What OpenSim's tool holds after it has read a setup."""
     tool = opensim.InverseKinematicsTool(str(path), False)
     tasks = tool.getIKTaskSet()
-    weights = [(tasks.get(index).getName(), tasks.get(index).getWeight()) for index in range(tasks.getSize())]
-    values = [tool.getPropertyByName(name).toString() for name in ("accuracy", "constraint_weight", "marker_file")]
+    weights = [
+        (tasks.get(index).getName(), tasks.get(index).getWeight())
+        for index in range(tasks.getSize())
+    ]
+    values = [
+        tool.getPropertyByName(name).toString()
+        for name in ("accuracy", "constraint_weight", "marker_file")
+    ]
     return *values, tool.getOutputMotionFileName(), weights
 
 

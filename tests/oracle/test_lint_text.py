@@ -58,10 +58,13 @@ TAKEN = {
     "hyphens in a comment": changed(b"<gravity>", b"<!-- a -- b --><gravity>"),
     "character reference": changed(b'"x"', b'"x&#65;y"'),
     "doctype": HEAD + b'<!DOCTYPE OpenSimDocument SYSTEM "a.dtd">\n' + ROOT,
-    "doctype with public name": HEAD + b"<!DOCTYPE OpenSimDocument PUBLIC '-//a' \"it's\">\n" + ROOT,
+    "doctype with public name": HEAD
+    + b"<!DOCTYPE OpenSimDocument PUBLIC '-//a' \"it's\">\n"
+    + ROOT,
     "doctype that declares nothing": HEAD + b"<!-- < -->\n<!DOCTYPE OpenSimDocument [ ]>\n" + ROOT,
     "schema": changed(
-        b"<OpenSimDocument ", b'<OpenSimDocument xmlns:xsi="http://a" xsi:noNamespaceSchemaLocation="b" '
+        b"<OpenSimDocument ",
+        b'<OpenSimDocument xmlns:xsi="http://a" xsi:noNamespaceSchemaLocation="b" ',
     ),
 }
 REFUSED = {
@@ -82,8 +85,13 @@ REFUSED = {
     "cut off": (HEAD + ROOT)[:-30],
     "another case": changed(b"</gravity>", b"</Gravity>"),
     "doctype with declarations": HEAD + b"<!DOCTYPE OpenSimDocument [<!ELEMENT a ANY>]>\n" + ROOT,
-    **{f"doctype with {words}": HEAD + doctype.encode() + ROOT for words, doctype in DOCTYPES.items()},
-    "entity of elsewhere": HEAD + b'<!DOCTYPE a SYSTEM "a.dtd">' + ROOT.replace(b"0 -5", b"&nm;0 -5"),
+    **{
+        f"doctype with {words}": HEAD + doctype.encode() + ROOT
+        for words, doctype in DOCTYPES.items()
+    },
+    "entity of elsewhere": HEAD
+    + b'<!DOCTYPE a SYSTEM "a.dtd">'
+    + ROOT.replace(b"0 -5", b"&nm;0 -5"),
     "entity of an unread entity": HEAD + b"<!DOCTYPE a [%a;]>" + ROOT.replace(b"0 -5", b"&nm;0 -5"),
     "white space in a name": changed(b'"x"', b'"x\ty"'),
 }

@@ -15,7 +15,12 @@ pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, STATES, carrier, compare  # noqa: E402
 
-MATERIAL = {"dissipation": 0.3, "static_friction": 0.8, "dynamic_friction": 0.4, "viscous_friction": 0.2}
+MATERIAL = {
+    "dissipation": 0.3,
+    "static_friction": 0.8,
+    "dynamic_friction": 0.4,
+    "viscous_friction": 0.2,
+}
 
 
 @pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
@@ -35,19 +40,31 @@ def foundation(name, surfaces, stiffness):
 
 def meshes(model, kinds, tmp_path, sizes=(0.5, 0.4, 0.6)):
     result = []
-    for number, (frame, kind) in enumerate(zip(("/bodyset/b1/f1", "/bodyset/b2", "/bodyset/b0"), kinds, strict=False)):
+    for number, (frame, kind) in enumerate(
+        zip(("/bodyset/b1/f1", "/bodyset/b2", "/bodyset/b0"), kinds, strict=False)
+    ):
         shape = block if number % 2 else ball
-        WRITERS[kind](tmp_path / f"mesh{number}{kind}", *shape(np.array(sizes) * (1.0 + 0.3 * number)))
+        WRITERS[kind](
+            tmp_path / f"mesh{number}{kind}", *shape(np.array(sizes) * (1.0 + 0.3 * number))
+        )
         place = {"location": (0.1, 0.05, -0.1), "orientation": (0.4, -0.2, 0.7 * number)}
-        result.append(ContactMesh(name=f"m{number}", socket_frame=frame, filename=f"mesh{number}{kind}", **place))
+        result.append(
+            ContactMesh(
+                name=f"m{number}", socket_frame=frame, filename=f"mesh{number}{kind}", **place
+            )
+        )
     model.add(*result)
     return result
 
 
-@pytest.mark.parametrize("kinds", [(".obj", ".vtp"), (".stl", ".stla")], ids=["polygons", "triangles"])
+@pytest.mark.parametrize(
+    "kinds", [(".obj", ".vtp"), (".stl", ".stla")], ids=["polygons", "triangles"]
+)
 @pytest.mark.parametrize("carried", ["/ground", "/bodyset/b0/f0"])
 def test_meshes_on_a_plane(model, carried, kinds, tmp_path):
-    plane = ContactHalfSpace(name="plane", socket_frame=carried, location=(0, -0.3, 0), orientation=(0.1, 0.2, -1.4))
+    plane = ContactHalfSpace(
+        name="plane", socket_frame=carried, location=(0, -0.3, 0), orientation=(0.1, 0.2, -1.4)
+    )
     model.add(plane)
     for number, mesh in enumerate(meshes(model, kinds, tmp_path)):
         model.add(foundation(f"contact{number}", (mesh, plane), (1e4, 0.0)))
@@ -55,9 +72,13 @@ def test_meshes_on_a_plane(model, carried, kinds, tmp_path):
 
 
 def test_meshes_on_spheres_and_what_touches_nothing(model, tmp_path):
-    sphere = ContactSphere(name="sphere", socket_frame="/ground", location=(0.3, 0.1, 0), radius=0.6)
+    sphere = ContactSphere(
+        name="sphere", socket_frame="/ground", location=(0.3, 0.1, 0), radius=0.6
+    )
     egg = ContactEllipsoid(name="egg", socket_frame="/ground", radii=(1.0, 1.2, 0.9))
-    plane = ContactHalfSpace(name="plane", socket_frame="/ground", location=(0, 5, 0), orientation=(0, 0, 1.5))
+    plane = ContactHalfSpace(
+        name="plane", socket_frame="/ground", location=(0, 5, 0), orientation=(0, 0, 1.5)
+    )
     model.add(sphere, egg, plane)
     result = meshes(model, (".obj", ".vtp"), tmp_path)
     # Neither the egg nor the two without a mesh touch anything in such a force.

@@ -70,7 +70,13 @@ def test_markers_controls_and_bounds_over_time(tmp_path):
     t = np.linspace(0.0, 1.0, 31)
     places = np.stack([np.cos(2 * t), np.sin(2 * t), 0.01 * t], axis=1)
     write_trc(tmp_path / "markers.trc", t, ("tip",), places)
-    write_sto(tmp_path / "controls.sto", "", t, ("/tau0", "/tau1"), np.stack([np.sin(3 * t), t * t], axis=1))
+    write_sto(
+        tmp_path / "controls.sto",
+        "",
+        t,
+        ("/tau0", "/tau1"),
+        np.stack([np.sin(3 * t), t * t], axis=1),
+    )
     columns = {
         "/jointset/j0/q0/value": np.sin(2 * t),
         "/jointset/j0/q0/speed": 2 * np.cos(2 * t),
@@ -83,12 +89,14 @@ def test_markers_controls_and_bounds_over_time(tmp_path):
     }
     guess = tmp_path / "guess.sto"
     write_sto(guess, "", t, tuple(columns), np.column_stack([*columns.values()]), has_missing=True)
-    counts = (
-        "num_controls=2\nnum_derivatives=0\nnum_input_controls=0\nnum_multipliers=0\nnum_parameters=2\nnum_slacks=0\n"
-    )
+    counts = "num_controls=2\nnum_derivatives=0\nnum_input_controls=0\nnum_multipliers=0\nnum_parameters=2\nnum_slacks=0\n"
     text = guess.read_text().partition("endheader")[2]
-    guess.write_text(f"inDegrees=no\n{counts}num_states=4\nDataType=double\nversion=3\nendheader{text}")
-    said = [_said(tmp_path, command) for command in (["-m", "tests.oracle.moco_goals"], ["-c", OURS])]
+    guess.write_text(
+        f"inDegrees=no\n{counts}num_states=4\nDataType=double\nversion=3\nendheader{text}"
+    )
+    said = [
+        _said(tmp_path, command) for command in (["-m", "tests.oracle.moco_goals"], ["-c", OURS])
+    ]
     theirs, (terms, missed, objective, success, factors) = said
     assert terms == pytest.approx(theirs, rel=1e-10)
     assert missed < 1e-6 and success
@@ -141,7 +149,14 @@ def test_frames_and_expressions(tmp_path):
         write_sto(tmp_path / f"{name}.sto", "", t, bodies, swing, kind="Vec3")
     half = np.stack([np.cos(t), 0 * t, 0.3 * t, np.sin(t)], axis=1)
     half /= np.linalg.norm(half, axis=1, keepdims=True)
-    write_sto(tmp_path / "turns.sto", "", t, bodies, np.hstack([half, half[:, [0, 2, 1, 3]]]), kind="Quaternion")
+    write_sto(
+        tmp_path / "turns.sto",
+        "",
+        t,
+        bodies,
+        np.hstack([half, half[:, [0, 2, 1, 3]]]),
+        kind="Quaternion",
+    )
     motion = {
         "/jointset/j0/q0/value": np.sin(2 * t),
         "/jointset/j0/q0/speed": 2 * np.cos(2 * t),
@@ -149,7 +164,10 @@ def test_frames_and_expressions(tmp_path):
         "/jointset/j1/q1/speed": np.full(21, 0.3),
     }
     write_sto(tmp_path / "motion.sto", "", t, tuple(motion), np.column_stack([*motion.values()]))
-    theirs, ours = (_said(tmp_path, command) for command in (["-m", "tests.oracle.moco_frames"], ["-c", OUR_FRAMES]))
+    theirs, ours = (
+        _said(tmp_path, command)
+        for command in (["-m", "tests.oracle.moco_frames"], ["-c", OUR_FRAMES])
+    )
     terms, success, mass, nearest, farthest = ours
     assert terms == pytest.approx(theirs, rel=1e-9)
     assert success
@@ -206,7 +224,11 @@ def test_outputs(tmp_path):
     model.addMarker(osim.Marker("tip", model.getBodySet().get(1), osim.Vec3(0.1, 0.05, 0.02)))
     muscle = osim.DeGrooteFregly2016Muscle()
     muscle.setName("muscle")
-    for name, value in (("max_isometric_force", 30.0), ("optimal_fiber_length", 0.4), ("tendon_slack_length", 0.1)):
+    for name, value in (
+        ("max_isometric_force", 30.0),
+        ("optimal_fiber_length", 0.4),
+        ("tendon_slack_length", 0.1),
+    ):
         getattr(muscle, f"set_{name}")(value)
     muscle.set_ignore_tendon_compliance(True)
     muscle.set_pennation_angle_at_optimal(0.2)
@@ -216,14 +238,23 @@ def test_outputs(tmp_path):
     model.finalizeConnections()
     model.printToXML(str(tmp_path / "model.osim"))
     (tmp_path / "outputs.json").write_text(json.dumps(OF_OUTPUTS))
-    theirs, ours = (_said(tmp_path, command) for command in (["-m", "tests.oracle.moco_outputs"], ["-c", OUR_OUTPUTS]))
+    theirs, ours = (
+        _said(tmp_path, command)
+        for command in (["-m", "tests.oracle.moco_outputs"], ["-c", OUR_OUTPUTS])
+    )
     terms, success, high = ours
-    # OpenSim says of values and speeds that they need no states, so that Moco takes those of an evaluation before.
+    # OpenSim says of values and speeds that they need no states, so that Moco takes those of an
+    # evaluation before.
     table = read_sto(tmp_path / "theirs.sto")
-    q, u = (np.stack([table[f"/jointset/j{k}/q{k}/{what}"] for k in (0, 1)]) for what in ("value", "speed"))
+    q, u = (
+        np.stack([table[f"/jointset/j{k}/q{k}/{what}"] for k in (0, 1)])
+        for what in ("value", "speed")
+    )
     simpson = np.convolve([1, 4, 1], [1, 0, 1, 0, 1, 0, 1]) / 24
     theirs |= zip(
-        ("g11", "g12", "g19"), (simpson @ np.abs(q[0]) ** 3, simpson @ u[1], simpson @ u.sum(axis=0)), strict=True
+        ("g11", "g12", "g19"),
+        (simpson @ np.abs(q[0]) ** 3, simpson @ u[1], simpson @ u.sum(axis=0)),
+        strict=True,
     )
     named = {f"g{number}": output for number, output in enumerate(OF_OUTPUTS)}
     assert {named[name]: value for name, value in terms.items()} == pytest.approx(
@@ -251,7 +282,9 @@ def test_loads(kind, tmp_path):
     model.addContactGeometry(floor)
     b1 = model.getBodySet().get(1)
     for number in range(2):
-        sphere = osim.ContactSphere(0.1, osim.Vec3(0.02 - 0.1 * number, -0.05, 0.01), b1, f"sphere{number}")
+        sphere = osim.ContactSphere(
+            0.1, osim.Vec3(0.02 - 0.1 * number, -0.05, 0.01), b1, f"sphere{number}"
+        )
         model.addContactGeometry(sphere)
         model.addComponent(osim.SmoothSphereHalfSpaceForce(f"contact{number}", sphere, floor))
     # A body that is welded to the second one, and one on a hinge of that.
@@ -265,10 +298,16 @@ def test_loads(kind, tmp_path):
     for body, joint in ((load, weld), (last, hinge)):
         model.addBody(body)
         model.addJoint(joint)
-    for number, dynamics in enumerate(("implicit", "explicit" if kind == "explicit" else "implicit")):
+    for number, dynamics in enumerate(
+        ("implicit", "explicit" if kind == "explicit" else "implicit")
+    ):
         muscle = osim.DeGrooteFregly2016Muscle()
         muscle.setName(f"muscle{number}")
-        for name, value in (("max_isometric_force", 30.0), ("optimal_fiber_length", 0.4), ("tendon_slack_length", 0.2)):
+        for name, value in (
+            ("max_isometric_force", 30.0),
+            ("optimal_fiber_length", 0.4),
+            ("tendon_slack_length", 0.2),
+        ):
             getattr(muscle, f"set_{name}")(value)
         muscle.set_ignore_tendon_compliance(False)
         muscle.set_tendon_compliance_dynamics_mode(dynamics)
@@ -280,7 +319,11 @@ def test_loads(kind, tmp_path):
     if kind == "constrained":
         place = last.findStationLocationInGround(model.initSystem(), at).to_numpy()
         far = float(np.linalg.norm(place - [0.0, 2.0, 0.5]))
-        model.addConstraint(osim.ConstantDistanceConstraint(model.getGround(), osim.Vec3(0.0, 2.0, 0.5), last, at, far))
+        model.addConstraint(
+            osim.ConstantDistanceConstraint(
+                model.getGround(), osim.Vec3(0.0, 2.0, 0.5), last, at, far
+            )
+        )
         coupler = osim.CoordinateCouplerConstraint()
         names = osim.ArrayStr()
         names.append("q0")
@@ -294,7 +337,13 @@ def test_loads(kind, tmp_path):
     labels = ["q0_moment", "q2_moment"] + ["q1_moment"] * (kind != "constrained")
     columns = np.stack([3 * np.sin(2 * t), 1 + t * t, np.cos(t)], axis=1)[:, : len(labels)]
     write_sto(tmp_path / "moments.sto", "", t, labels, columns)
-    write_sto(tmp_path / "loads.sto", "", t, ["f_x", "f_y", "f_z"], np.stack([5 * t, 20 + t, 0 * t], axis=1))
+    write_sto(
+        tmp_path / "loads.sto",
+        "",
+        t,
+        ["f_x", "f_y", "f_z"],
+        np.stack([5 * t, 20 + t, 0 * t], axis=1),
+    )
     force = osim.ExternalForce()
     force.setName("foot")
     force.set_applied_to_body("b1")
@@ -303,7 +352,10 @@ def test_loads(kind, tmp_path):
     loads.setDataFileName("loads.sto")
     loads.cloneAndAppend(force)
     loads.printToXML(str(tmp_path / "loads.xml"))
-    theirs, ours = (_said(tmp_path, command) for command in (["-m", "tests.oracle.moco_loads"], ["-c", OUR_LOADS]))
+    theirs, ours = (
+        _said(tmp_path, command)
+        for command in (["-m", "tests.oracle.moco_loads"], ["-c", OUR_LOADS])
+    )
     assert ours == pytest.approx(theirs, rel=1e-9)
 
 
@@ -314,13 +366,24 @@ def test_loads_of_a_motion_that_is_given(tmp_path):
     model = coupled(links("rigid", "implicit", count=3), "q1")
     motion = osimlite.PositionMotion(name="motion")
     for number in range(3):
-        sine = osimlite.Sine(name=f"/jointset/j{number}/q{number}", amplitude=0.3 + number, omega=2.0, phase=0.1)
+        sine = osimlite.Sine(
+            name=f"/jointset/j{number}/q{number}", amplitude=0.3 + number, omega=2.0, phase=0.1
+        )
         motion.functions.objects.append(sine)
     model.add(motion)
     osimlite.write(model, tmp_path / "model.osim")
     t = np.linspace(0.0, 1.0, 21)
-    write_sto(tmp_path / "moments.sto", "", t, ["q0_moment", "q2_moment"], np.stack([3 * np.sin(2 * t), t], axis=1))
-    theirs, ours = (_said(tmp_path, command) for command in (["-m", "tests.oracle.moco_loads"], ["-c", OUR_LOADS]))
+    write_sto(
+        tmp_path / "moments.sto",
+        "",
+        t,
+        ["q0_moment", "q2_moment"],
+        np.stack([3 * np.sin(2 * t), t], axis=1),
+    )
+    theirs, ours = (
+        _said(tmp_path, command)
+        for command in (["-m", "tests.oracle.moco_loads"], ["-c", OUR_LOADS])
+    )
     assert {"joint0", "joint1", "joint2", "force0", "force1", "force2"} <= theirs.keys()
     assert ours == pytest.approx(theirs, rel=1e-9)
 
@@ -375,7 +438,8 @@ def test_states_that_are_moved_onto_constraints(scheme, mode, tmp_path):
     terms, missed, left, objective, slack = ours
     assert terms == pytest.approx(theirs, rel=1e-9)
     assert missed < 1e-6 < slack
-    # The search can end where it finds no better step, within the tolerance that is asked of the constraints.
+    # The search can end where it finds no better step, within the tolerance that is asked of the
+    # constraints.
     assert left < 1e-4
     assert objective <= sum(theirs.values()) * (1.0 + 1e-4)
 
@@ -394,13 +458,21 @@ print(json.dumps(solution.getStatus()))
     [
         (r"<bounds>(0.6 0.9)<", "nan 1", "bounds is nan, which is no number"),
         (r"<bounds>(0.6 0.9)<", "-2 -1", "ends at -1 s at the latest, and begins at 0 s"),
-        (r"<bounds>(0.6 0.9)<", "5 9", "data from 0 s to 1 s, and the motion is at least from 0.2 s to 5 s"),
+        (
+            r"<bounds>(0.6 0.9)<",
+            "5 9",
+            "data from 0 s to 1 s, and the motion is at least from 0.2 s to 5 s",
+        ),
         (
             r"(<MocoVariableInfo name=\"/jointset/j0/q0/value.*?</MocoVariableInfo>)",
             '<Constant name="no" />',
             "its place",
         ),
-        (r"<MocoControlTrackingGoalReference name=\"(/forceset/motor0)", "/motor0", "has no control '/motor0'"),
+        (
+            r"<MocoControlTrackingGoalReference name=\"(/forceset/motor0)",
+            "/motor0",
+            "has no control '/motor0'",
+        ),
     ],
 )
 def test_what_moco_takes_without_a_word(old, new, said, tmp_path):

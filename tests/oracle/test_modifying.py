@@ -38,10 +38,16 @@ CASES: dict[str, list[Any]] = {
         p.ModOpIgnoreActivationDynamics(),
         p.ModOpScaleMaxIsometricForce(scale_factor=2.0),
     ],
-    "reserves": [p.ModOpAddReserves(optimal_force=50.0, bound=2.0), p.ModOpAddReserves(optimal_force=3.0)],
+    "reserves": [
+        p.ModOpAddReserves(optimal_force=50.0, bound=2.0),
+        p.ModOpAddReserves(optimal_force=3.0),
+    ],
     "residuals": [p.ModOpRemoveMuscles(), p.ModOpAddReserves(skip_residual_coordinates=True)],
     "actuators": [p.ModOpReplaceMusclesWithPathActuators()],
-    "welds": [p.ModOpReplaceJointsWithWelds(joint_paths=LEGS), p.ModOpAddReserves(optimal_force=1.0)],
+    "welds": [
+        p.ModOpReplaceJointsWithWelds(joint_paths=LEGS),
+        p.ModOpAddReserves(optimal_force=1.0),
+    ],
 }
 
 
@@ -50,7 +56,9 @@ def changed(folder: Path, model: Path, operators: list[Any]) -> list[Any]:
     osimlite.write(osimlite.read(model), folder / "model.osim")
     processor = p.ModelProcessor(name="processor", filepath="model.osim", operators=operators)
     osimlite.write(processor, folder / "processor.xml")
-    subprocess.run([sys.executable, "-c", SCRIPT], cwd=folder, check=True, capture_output=True, timeout=100)
+    subprocess.run(
+        [sys.executable, "-c", SCRIPT], cwd=folder, check=True, capture_output=True, timeout=100
+    )
     osimlite.write(processed(processor, folder), folder / "ours.osim")
     ours, theirs = (osimlite.read(folder / f"{name}.osim") for name in ("ours", "theirs"))
     return [str(item) for item in differences(ours, theirs)]

@@ -19,7 +19,15 @@ from osimlite.schema.joints import ConstantCurvatureJoint
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
-JOINT_TYPES = ("PinJoint", "SliderJoint", "PlanarJoint", "UniversalJoint", "GimbalJoint", "BallJoint", "FreeJoint")
+JOINT_TYPES = (
+    "PinJoint",
+    "SliderJoint",
+    "PlanarJoint",
+    "UniversalJoint",
+    "GimbalJoint",
+    "BallJoint",
+    "FreeJoint",
+)
 
 
 def _vector(rng: np.random.Generator, size: float) -> Any:
@@ -31,14 +39,22 @@ def _body(model: Any, name: str, rng: np.random.Generator, **changed: Any) -> An
     body.setName(name)
     body.set_mass(changed.get("mass", rng.uniform(0.5, 2.0)))
     body.set_mass_center(_vector(rng, 0.2))
-    body.set_inertia(opensim.Vec6(*changed.get("inertia", (*rng.uniform(0.2, 0.3, 3), *rng.uniform(-0.03, 0.03, 3)))))
+    body.set_inertia(
+        opensim.Vec6(
+            *changed.get("inertia", (*rng.uniform(0.2, 0.3, 3), *rng.uniform(-0.03, 0.03, 3)))
+        )
+    )
     model.addBody(body)
     return body
 
 
-def _join(model: Any, kind: str, name: str, parent: Any, child: Any, rng: np.random.Generator) -> None:
+def _join(
+    model: Any, kind: str, name: str, parent: Any, child: Any, rng: np.random.Generator
+) -> None:
     spots = [_vector(rng, size) for size in (0.3, 1.0, 0.3, 1.0)]
-    model.addJoint(getattr(opensim, kind)(name, parent, spots[0], spots[1], child, spots[2], spots[3]))
+    model.addJoint(
+        getattr(opensim, kind)(name, parent, spots[0], spots[1], child, spots[2], spots[3])
+    )
 
 
 def _model() -> Any:
@@ -58,8 +74,12 @@ def _built(model: Any, folder: Path) -> Mechanism:
 
 def _same_motion(model: Any, state: Any, mechanism: Mechanism) -> None:
     model.realizeAcceleration(state)
-    coordinates = [model.getCoordinateSet().get(index) for index in range(len(mechanism.coordinates))]
-    assert [item.getAbsolutePathString() for item in coordinates] == [i.path for i in mechanism.coordinates]
+    coordinates = [
+        model.getCoordinateSet().get(index) for index in range(len(mechanism.coordinates))
+    ]
+    assert [item.getAbsolutePathString() for item in coordinates] == [
+        i.path for i in mechanism.coordinates
+    ]
     q, u, udot = (
         np.array([getattr(item, f"get{what}Value")(state) for item in coordinates])
         for what in ("", "Speed", "Acceleration")
@@ -78,7 +98,9 @@ def _same_motion(model: Any, state: Any, mechanism: Mechanism) -> None:
 
 @pytest.mark.parametrize("kind", ["EllipsoidJoint", "ScapulothoracicJoint"])
 @pytest.mark.parametrize("radii", [(0.07, 0.15, 0.09), (-0.07, -0.15, -0.09), (0.0, 0.1, -0.2)])
-def test_an_ellipsoid_may_be_mirrored(kind: str, radii: tuple[float, float, float], tmp_path: Path) -> None:
+def test_an_ellipsoid_may_be_mirrored(
+    kind: str, radii: tuple[float, float, float], tmp_path: Path
+) -> None:
     rng = np.random.default_rng(4)
     model = _model()
     body = _body(model, "scapula", rng)
@@ -163,7 +185,8 @@ def test_a_ball_speeds_up_where_its_angles_have_no_rates(lock: bool, tmp_path: P
     turns = [0.3, np.pi / 2, 0.2, 0.0], [0.5, 1.5, 2.5, 0.0]
     assert mechanism.project_speeds(*turns) == pytest.approx(turns[1], abs=1e-15)
     locked = replace(
-        mechanism, coordinates=(replace(mechanism.coordinates[0], locked=True), *mechanism.coordinates[1:])
+        mechanism,
+        coordinates=(replace(mechanism.coordinates[0], locked=True), *mechanism.coordinates[1:]),
     )
     with pytest.raises(SimulationError, match="their rates are not defined"):
         locked.acceleration(*turns)
@@ -206,7 +229,9 @@ def test_a_rod_that_bends_evenly_ends_where_opensims_does(tmp_path):
             theirs.getCoordinateSet().get(name).setValue(state, value, False)
         theirs.realizePosition(state)
         placed = theirs.getBodySet().get(0).getTransformInGround(state)
-        result = [[placed.R().get(row, k) for k in range(3)] + [placed.p().get(row)] for row in range(3)]
+        result = [
+            [placed.R().get(row, k) for k in range(3)] + [placed.p().get(row)] for row in range(3)
+        ]
         assert np.array(result) == pytest.approx(mechanism.body_transforms(q)["tip"][:3], abs=1e-12)
 
 
@@ -214,8 +239,14 @@ def test_a_rod_that_bends_evenly_ends_where_opensims_does(tmp_path):
 def test_a_constant_turn_before_another(angle: float, tmp_path: Path) -> None:
     """OpenSim turns the body by the angle, but not the axis after it that the angular velocity is about."""
     model = osimlite.Model(name="m")
-    body = model.add(osimlite.Body(name="b", mass=1.0, mass_center=(0.1, 0.2, 0.3), inertia=(1.0, 1.5, 1.7, 0, 0, 0)))
-    joint = CustomJoint(name="j", coordinates=[osimlite.Coordinate(name=name) for name in ("first", "last")])
+    body = model.add(
+        osimlite.Body(
+            name="b", mass=1.0, mass_center=(0.1, 0.2, 0.3), inertia=(1.0, 1.5, 1.7, 0, 0, 0)
+        )
+    )
+    joint = CustomJoint(
+        name="j", coordinates=[osimlite.Coordinate(name=name) for name in ("first", "last")]
+    )
     turns = joint.spatial_transform
     for axis, coordinate in ((turns.rotation1, "first"), (turns.rotation3, "last")):
         axis.coordinates, axis.function = (coordinate,), LinearFunction(coefficients=(1.0, 0.0))

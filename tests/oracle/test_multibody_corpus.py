@@ -91,10 +91,14 @@ def _same_bodies(model: Any, state: Any, mechanism: Mechanism, q: Any, u: Any) -
         assert kinematics.origins[index] == pytest.approx(position, abs=1e-11)
         velocity = their_body.getVelocityInGround(state)
         expected = np.concatenate([velocity.get(part).to_numpy() for part in (0, 1)])
-        assert kinematics.velocities[index] == pytest.approx(expected, abs=1e-9 * (1.0 + np.abs(expected).max()))
+        assert kinematics.velocities[index] == pytest.approx(
+            expected, abs=1e-9 * (1.0 + np.abs(expected).max())
+        )
     if mechanism.total_mass == 0.0:
         return
-    assert mechanism.center_of_mass(q) == pytest.approx(model.calcMassCenterPosition(state).to_numpy(), abs=1e-11)
+    assert mechanism.center_of_mass(q) == pytest.approx(
+        model.calcMassCenterPosition(state).to_numpy(), abs=1e-11
+    )
     energy = model.calcKineticEnergy(state)
     assert mechanism.kinetic_energy(q, u) == pytest.approx(energy, rel=1e-10, abs=1e-12)
 

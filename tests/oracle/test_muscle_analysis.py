@@ -34,17 +34,32 @@ MORE = """<output_precision>17</output_precision><initial_time>0.1</initial_time
 OTHERS = """<MuscleAnalysis name="Some"><muscle_list> {muscle} </muscle_list>
     <moment_arm_coordinate_list> {coordinate} </moment_arm_coordinate_list></MuscleAnalysis>
     <MuscleAnalysis name="No"><compute_moments>false</compute_moments></MuscleAnalysis>"""
-KEPT = ("name", "max_isometric_force", "optimal_fiber_length", "tendon_slack_length", "pennation_angle_at_optimal")
+KEPT = (
+    "name",
+    "max_isometric_force",
+    "optimal_fiber_length",
+    "tendon_slack_length",
+    "pennation_angle_at_optimal",
+)
 CLASSES: dict[str, tuple[type[Muscle], dict[str, Any]]] = {
     "millard": (Millard2012EquilibriumMuscle, {}),
     "millard, rigid tendon": (Millard2012EquilibriumMuscle, {"ignore_tendon_compliance": True}),
-    "millard, damping that does not count": (Millard2012EquilibriumMuscle, {"fiber_damping": 0.0005}),
-    "millard, with a mass": (Millard2012AccelerationMuscle, {"default_activation": 0.3, "fiber_damping": 0.2}),
+    "millard, damping that does not count": (
+        Millard2012EquilibriumMuscle,
+        {"fiber_damping": 0.0005},
+    ),
+    "millard, with a mass": (
+        Millard2012AccelerationMuscle,
+        {"default_activation": 0.3, "fiber_damping": 0.2},
+    ),
     "thelen": (Thelen2003Muscle, {}),
     "thelen, shortest fibers": (Thelen2003Muscle, {"default_fiber_length": 0.001}),
     "degroote": (DeGrooteFregly2016Muscle, {"fiber_damping": 0.1}),
     "degroote, rigid tendon": (DeGrooteFregly2016Muscle, {"ignore_tendon_compliance": True}),
-    "degroote, implicit": (DeGrooteFregly2016Muscle, {"tendon_compliance_dynamics_mode": "implicit"}),
+    "degroote, implicit": (
+        DeGrooteFregly2016Muscle,
+        {"tendon_compliance_dynamics_mode": "implicit"},
+    ),
     "meyer": (MeyerFregly2016Muscle, {"ignore_tendon_compliance": True, "fiber_damping": 0.05}),
     "rigid": (RigidTendonMuscle, {}),
     "first thelen": (Thelen2003Muscle_Deprecated, {}),
@@ -55,16 +70,23 @@ CLASSES: dict[str, tuple[type[Muscle], dict[str, Any]]] = {
 def compare(ours: Path, theirs: Path, tolerance: float = 1e-8, small: float = 5e-7) -> None:
     """All files are there, with the same words, and numbers that differ by parts of the largest of their columns.
 
-    Velocities of fibers are those that OpenSim's search leaves, up to 1e-10 of the strength; here they are exact.
+    Velocities of fibers are those that OpenSim's search leaves, up to 1e-10 of the strength; here
+    they are exact.
     """
-    assert sorted(path.name for path in ours.iterdir()) == sorted(path.name for path in theirs.iterdir())
+    assert sorted(path.name for path in ours.iterdir()) == sorted(
+        path.name for path in theirs.iterdir()
+    )
     for file in ours.iterdir():
-        one, two = (path.read_text().partition("endheader\n") for path in (file, theirs / file.name))
+        one, two = (
+            path.read_text().partition("endheader\n") for path in (file, theirs / file.name)
+        )
         assert (one[0], one[2].partition("\n")[0]) == (two[0], two[2].partition("\n")[0]), file.name
         mine, known = read_sto(file).rows, read_sto(theirs / file.name).rows
         assert np.isnan(mine).tolist() == np.isnan(known).tolist(), file.name
         largest = np.abs(np.nan_to_num(known)).max(axis=0)
-        assert (np.abs(np.nan_to_num(mine - known)).max(axis=0) <= tolerance * largest + small).all(), file.name
+        assert (
+            np.abs(np.nan_to_num(mine - known)).max(axis=0) <= tolerance * largest + small
+        ).all(), file.name
 
 
 def with_muscles_of(model: Model, cls: type[Muscle], more: dict[str, Any]) -> Model:
@@ -89,7 +111,9 @@ def test_classes(
     compare(*both(tmp_path, with_muscles_of(model, *CLASSES[case]), "AnalyzeTool", more))
 
 
-def test_no_dynamics_without_mass(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_dynamics_without_mass(
+    corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     model = osimlite.read(next(item.path for item in corpus if item.id == "m0001"))
     for body in model.body_set.objects:
@@ -100,7 +124,9 @@ def test_no_dynamics_without_mass(corpus: Any, tmp_path: Path, monkeypatch: pyte
 
 
 @pytest.mark.parametrize("name", ["gait10_subject01", "gait2354_subject01_simbody"])
-def test_models_of_walking(shared: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_models_of_walking(
+    shared: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     monkeypatch.chdir(tmp_path)
     packed = shared / "oracle" / "tools" / "reference" / "models" / f"{name}.osim.gz"
     (tmp_path / "read.osim").write_bytes(gzip.decompress(packed.read_bytes()))
@@ -112,4 +138,7 @@ def test_rajagopal(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     """Eighty muscles, patellas on couplers; OpenSim ends its search for equilibrium at 1e-8 of a strength."""
     monkeypatch.chdir(tmp_path)
     model = osimlite.read(next(item.path for item in corpus if item.id == "m0954"))
-    compare(*both(tmp_path, model, "AnalyzeTool", MORE.format(equilibrium="true", others="")), small=1e-7)
+    compare(
+        *both(tmp_path, model, "AnalyzeTool", MORE.format(equilibrium="true", others="")),
+        small=1e-7,
+    )

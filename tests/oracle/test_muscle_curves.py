@@ -49,10 +49,14 @@ def test_muscles_are_told_as_by_opensim(corpus, tmp_path, number, coordinate, va
             for quantity, ask in ASKED.items():
                 scale = strength if quantity.endswith("force") else 1.0
                 expected = getattr(muscle, ask)(state)
-                assert curves.columns[quantity][row, index] == pytest.approx(expected, abs=1e-8 * scale), (
+                assert curves.columns[quantity][row, index] == pytest.approx(
+                    expected, abs=1e-8 * scale
+                ), (
                     path,
                     quantity,
                 )
             arm = muscle.getGeometryPath().computeMomentArm(state, moved)
-            assert curves.columns[f"moment_arm_{coordinate}"][row, index] == pytest.approx(arm, abs=1e-10)
+            assert curves.columns[f"moment_arm_{coordinate}"][row, index] == pytest.approx(
+                arm, abs=1e-10
+            )
     assert np.isfinite(list(curves.columns.values())).all()

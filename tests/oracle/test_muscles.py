@@ -32,7 +32,10 @@ pytestmark = pytest.mark.oracle
 
 USUAL = {"max_isometric_force": 700.0, "optimal_fiber_length": 0.06, "tendon_slack_length": 0.2}
 VELOCITY = ForceVelocityCurve(
-    concentric_slope_at_vmax=0.1, concentric_slope_near_vmax=0.3, eccentric_slope_at_vmax=0.05, eccentric_curviness=0.5
+    concentric_slope_at_vmax=0.1,
+    concentric_slope_near_vmax=0.3,
+    eccentric_slope_at_vmax=0.05,
+    eccentric_curviness=0.5,
 )
 MUSCLES = {
     "Thelen": Thelen2003Muscle(pennation_angle_at_optimal=0.3, Af=0.3),
@@ -40,19 +43,29 @@ MUSCLES = {
         pennation_angle_at_optimal=0.2,
         force_velocity_curve=VELOCITY,
         fiber_force_length_curve=FiberForceLengthCurve(
-            strain_at_zero_force=-0.1, stiffness_at_low_force=0.3, stiffness_at_one_norm_force=4.0, curviness=0.6
+            strain_at_zero_force=-0.1,
+            stiffness_at_low_force=0.3,
+            stiffness_at_one_norm_force=4.0,
+            curviness=0.6,
         ),
         tendon_force_length_curve=TendonForceLengthCurve(strain_at_one_norm_force=0.08),
     ),
     "undamped": Millard2012EquilibriumMuscle(
         fiber_damping=0.0005,
         force_velocity_curve=VELOCITY,
-        active_force_length_curve=ActiveForceLengthCurve(minimum_value=0.2, transition_norm_fiber_length=0.8),
+        active_force_length_curve=ActiveForceLengthCurve(
+            minimum_value=0.2, transition_norm_fiber_length=0.8
+        ),
     ),
     "excited": Millard2012EquilibriumMuscle(
-        ignore_activation_dynamics=True, minimum_activation=0.0, min_control=0.0, pennation_angle_at_optimal=0.1
+        ignore_activation_dynamics=True,
+        minimum_activation=0.0,
+        min_control=0.0,
+        pennation_angle_at_optimal=0.1,
     ),
-    "rigid": Millard2012EquilibriumMuscle(ignore_tendon_compliance=True, pennation_angle_at_optimal=0.1),
+    "rigid": Millard2012EquilibriumMuscle(
+        ignore_tendon_compliance=True, pennation_angle_at_optimal=0.1
+    ),
     "mass": Millard2012AccelerationMuscle(),
     "pennate mass": Millard2012AccelerationMuscle(
         pennation_angle_at_optimal=0.4,
@@ -63,7 +76,9 @@ MUSCLES = {
         muscle_first_order_activation_dynamic_model=MuscleFirstOrderActivationDynamicModel(
             activation_time_constant=0.02, minimum_activation=0.05
         ),
-        fiber_compressive_force_length_curve=FiberCompressiveForceLengthCurve(norm_length_at_zero_force=0.8),
+        fiber_compressive_force_length_curve=FiberCompressiveForceLengthCurve(
+            norm_length_at_zero_force=0.8
+        ),
         fiber_compressive_force_cos_pennation_curve=FiberCompressiveForceCosPennationCurve(
             engagement_angle_in_degrees=40.0
         ),
@@ -94,11 +109,17 @@ def random_states(engine, seed):
     parts = {"activation": (0.0, 1.1), "fiber_length": (0.02, 0.11), "fiber_velocity": (-0.4, 0.4)}
     while True:
         names = [path.rpartition("/")[2] for path in engine.state.paths]
-        yield [rng.uniform(0.2, 0.32), rng.choice([0.0, rng.uniform(-1, 1)]), *(rng.uniform(*parts[x]) for x in names)]
+        yield [
+            rng.uniform(0.2, 0.32),
+            rng.choice([0.0, rng.uniform(-1, 1)]),
+            *(rng.uniform(*parts[x]) for x in names),
+        ]
 
 
 def put(engine, theirs, state, y):
-    paths = [f"{engine.mechanism.coordinates[0].path}/{what}" for what in ("value", "speed")] + engine.state.paths
+    paths = [
+        f"{engine.mechanism.coordinates[0].path}/{what}" for what in ("value", "speed")
+    ] + engine.state.paths
     for path, value in zip(paths, y, strict=True):
         theirs.setStateVariableValue(state, path, float(value))
     return paths
@@ -106,14 +127,18 @@ def put(engine, theirs, state, y):
 
 def test_a_start_derivatives_records_and_energy(both):
     engine, theirs, start = both
-    assert engine.state.default()[2:] == [theirs.getStateVariableValue(start, path) for path in engine.state.paths]
+    assert engine.state.default()[2:] == [
+        theirs.getStateVariableValue(start, path) for path in engine.state.paths
+    ]
     for y, _ in zip(random_states(engine, 1), range(60), strict=False):
         state = opensim.State(start)
         paths = put(engine, theirs, state, y)
         try:
             theirs.realizeAcceleration(state)
         except RuntimeError:
-            with pytest.raises(SimulationError, match="no solution of the equations of '/forceset/mu', whose path"):
+            with pytest.raises(
+                SimulationError, match="no solution of the equations of '/forceset/mu', whose path"
+            ):
                 engine.derivative(0.0, y)
             continue
         expected = [theirs.getStateVariableDerivativeValue(state, path) for path in paths]
@@ -152,12 +177,19 @@ def test_the_steps_of_a_motion(both, engine, tmp_path):
     manager.initialize(start)
     end = manager.integrate(to)
     trajectory = osimlite.simulate(
-        osimlite.read(tmp_path / "model.osim"), to, engine, accuracy=1e-5, initial={"x": 0.27}, equilibrate=True
+        osimlite.read(tmp_path / "model.osim"),
+        to,
+        engine,
+        accuracy=1e-5,
+        initial={"x": 0.27},
+        equilibrate=True,
     )
     assert trajectory.summary["steps"] == manager.getStatesTable().getNumRows() - 1
     result = trajectory.auxiliary | {"/jointset/slide/x/value": trajectory.values[:, 0]}
     for path, values in result.items():
-        assert values[-1] == pytest.approx(theirs.getStateVariableValue(end, path), rel=1e-9, abs=1e-9)
+        assert values[-1] == pytest.approx(
+            theirs.getStateVariableValue(end, path), rel=1e-9, abs=1e-9
+        )
 
 
 def test_a_step_to_where_there_is_no_solution_is_tried_smaller(tmp_path):
@@ -176,7 +208,11 @@ def test_a_step_to_where_there_is_no_solution_is_tried_smaller(tmp_path):
     for engine in ("bullet", "compiled"):
         trajectory = osimlite.simulate(model, 0.01, engine, accuracy=1e-3)
         steps = trajectory.summary["steps"]
-        assert steps == manager.getStatesTable().getNumRows() - 1 < trajectory.summary["attempted_steps"] - 5
+        assert (
+            steps
+            == manager.getStatesTable().getNumRows() - 1
+            < trajectory.summary["attempted_steps"] - 5
+        )
         for path, values in trajectory.auxiliary.items():
             assert values[-1] == pytest.approx(theirs.getStateVariableValue(end, path), rel=1e-9)
 
@@ -204,18 +240,27 @@ def test_whole_models(name, corpus):
             trajectories.append(simulation.run(0.05, accuracy=1e-5, equilibrate=True))
             layout, mechanism = simulation.state, simulation.mechanism
             coordinates = [mechanism.coordinates[place].path for place in layout.order]
-            paths = [f"{path}/{what}" for what in ("value", "speed") for path in coordinates] + layout.paths
+            paths = [
+                f"{path}/{what}" for what in ("value", "speed") for path in coordinates
+            ] + layout.paths
             rest = simulation.initial_state({}, {}, equilibrate=True)
-            assert rest == pytest.approx([theirs.getStateVariableValue(start, path) for path in paths], abs=1e-14)
+            assert rest == pytest.approx(
+                [theirs.getStateVariableValue(start, path) for path in paths], abs=1e-14
+            )
             for _ in range(3):
                 n = len(coordinates)
-                y = [*(x + rng.uniform(-0.1, 0.1) for x in rest[:n]), *rng.uniform(-1.0, 1.0, n).tolist()]
+                y = [
+                    *(x + rng.uniform(-0.1, 0.1) for x in rest[:n]),
+                    *rng.uniform(-1.0, 1.0, n).tolist(),
+                ]
                 y += [x * rng.uniform(0.9, 1.1) for x in rest[2 * n :]]
                 state = opensim.State(start)
                 for path, value in zip(paths, y, strict=True):
                     theirs.setStateVariableValue(state, path, value)
                 theirs.realizeAcceleration(state)
-                expected = np.array([theirs.getStateVariableDerivativeValue(state, path) for path in paths])
+                expected = np.array(
+                    [theirs.getStateVariableDerivativeValue(state, path) for path in paths]
+                )
                 scale = np.maximum(1.0, np.abs(expected[n : 2 * n]).max(initial=0.0))
                 assert np.abs(simulation.engine.derivative(0.0, y) - expected).max() < 1e-9 * scale
     manager = opensim.Manager(theirs)
@@ -225,7 +270,9 @@ def test_whole_models(name, corpus):
     for trajectory in trajectories:
         assert trajectory.summary["steps"] == manager.getStatesTable().getNumRows() - 1
         result = {path: values[-1] for path, values in trajectory.auxiliary.items()}
-        for info, value, speed in zip(mechanism.coordinates, trajectory.values[-1], trajectory.speeds[-1], strict=True):
+        for info, value, speed in zip(
+            mechanism.coordinates, trajectory.values[-1], trajectory.speeds[-1], strict=True
+        ):
             result |= {f"{info.path}/value": value, f"{info.path}/speed": speed}
         expected = {path: theirs.getStateVariableValue(end, path) for path in result}
         scale = max(1.0, *map(abs, expected.values()))

@@ -30,7 +30,11 @@ MORE = """<output_precision>16</output_precision><initial_time>0.1</initial_time
 STIFF = ("fiber_stiffness", "fiber_stiffness_along_tendon", "muscle_stiffness", "tendon_stiffness")
 NOT_YET = {*STIFF, "passive_force_multiplier"}
 """Outputs of muscles that are refused."""
-WITH_MASS = {"fiber_force_along_tendon", "tendon_force", *(name for name in LAWS if name.startswith("passive"))}
+WITH_MASS = {
+    "fiber_force_along_tendon",
+    "tendon_force",
+    *(name for name in LAWS if name.startswith("passive")),
+}
 """More of them for muscles with a mass."""
 NEVER = {"PathWrapPoint", "PathWrap", "MovingPathPoint"}
 """OpenSim's own analysis stops at the outputs of the first two, the last is refused here."""
@@ -50,22 +54,35 @@ def outputs(model: Model) -> list[str]:
             path = "" if component is model else tree.path_of(component)
             for output, kind in outputs_of(type(component)).items():  # type: ignore[arg-type]
                 plain = kind.type in ("double", "Vec3", "SpatialVec") and not kind.channels
-                if plain and output not in refused and name not in NEVER and not output.startswith("implicit"):
+                if (
+                    plain
+                    and output not in refused
+                    and name not in NEVER
+                    and not output.startswith("implicit")
+                ):
                     result.append(f"{path}|{output}")
     return result
 
 
 @pytest.mark.parametrize("name", ["m0001", "jumper", "m0013", "m0954", "with masses"])
-def test_every_output(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_every_output(
+    corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     """To parts of 1e-8 of the largest of a column; what is of another type is told."""
     monkeypatch.chdir(tmp_path)
-    model = jumper() if name == "jumper" else osimlite.read(real(corpus, "m0001" if name == "with masses" else name))
+    model = (
+        jumper()
+        if name == "jumper"
+        else osimlite.read(real(corpus, "m0001" if name == "with masses" else name))
+    )
     if name == "with masses":
         more = {"default_activation": 0.3, "fiber_damping": 0.2}
         model = with_muscles_of(model, Millard2012AccelerationMuscle, more)
     asked = " ".join(outputs(model))
     ours, theirs = both(tmp_path, model, "AnalyzeTool", MORE.format(asked))
-    assert sorted(path.name for path in ours.iterdir()) == sorted(path.name for path in theirs.iterdir())
+    assert sorted(path.name for path in ours.iterdir()) == sorted(
+        path.name for path in theirs.iterdir()
+    )
     for file in ours.iterdir():
         known = (theirs / file.name).read_text()
         head = re.sub("OpenSimVersion=.*\n", "", known).splitlines()[:4]
@@ -75,20 +92,29 @@ def test_every_output(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPat
         largest = np.nanmax(np.abs(wanted.rows), axis=0, initial=0.0)
         for index, column in enumerate(wanted.columns):
             apart = np.abs(mine.rows[:, index] - wanted.rows[:, index])
-            # What a stiff tendon stores is as exact as OpenSim's equilibrium, which ends at 1e-8 of a force; what
-            # fibers bear by their velocity as its search for that, which ends at 1e-10.
+            # What a stiff tendon stores is as exact as OpenSim's equilibrium, which ends at 1e-8 of
+            # a force; what fibers bear by their velocity as its search for that, which ends at
+            # 1e-10.
             near = 1e-6 if column.endswith("potential_energy") else 1e-8
             small = max(near, 1e-6 if "fiber" in column else 0.0)
             assert apart.max() <= near * largest[index] + small, column
 
 
-def test_what_is_no_number_is_left_out_and_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_no_number_is_left_out_and_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """OpenSim does so, too; an alias is the label of its column."""
     monkeypatch.chdir(tmp_path)
     asked = "/bodyset/pelvis|rotation bodyset/pelvis|position(here) |com_position"
     body = jumper().body_set.objects[0].name
-    ours, theirs = both(tmp_path, jumper(), "AnalyzeTool", MORE.format(asked.replace("pelvis", body)))
-    assert [path.name for path in ours.iterdir()] == [path.name for path in theirs.iterdir()] == ["it_OutputsVec3.sto"]
+    ours, theirs = both(
+        tmp_path, jumper(), "AnalyzeTool", MORE.format(asked.replace("pelvis", body))
+    )
+    assert (
+        [path.name for path in ours.iterdir()]
+        == [path.name for path in theirs.iterdir()]
+        == ["it_OutputsVec3.sto"]
+    )
     labels = read_sto(theirs / "it_OutputsVec3.sto").columns
     assert read_sto(ours / "it_OutputsVec3.sto").columns == labels and "here_x" in labels
     told = dict(osimlite.run(tmp_path / "ours.xml").told)["O"]
@@ -103,12 +129,17 @@ def test_what_is_no_number_is_left_out_and_told(tmp_path: Path, monkeypatch: pyt
         ("/forceset/{muscle}|tendon_stiffness", NotRunnable, "tendon_stiffness"),
     ],
 )
-def test_what_is_not_there_is_told(tmp_path: Path, asked: str, error: type[Exception], words: str) -> None:
+def test_what_is_not_there_is_told(
+    tmp_path: Path, asked: str, error: type[Exception], words: str
+) -> None:
     """Before anything is written."""
     from tests.tools.test_reporters import tables
 
     model = jumper()
-    names = {"body": model.body_set.objects[0].name, "muscle": next(iter(model.components(osimlite.Muscle))).name}
+    names = {
+        "body": model.body_set.objects[0].name,
+        "muscle": next(iter(model.components(osimlite.Muscle))).name,
+    }
     analysis = f'<OutputReporter name="O"><output_paths>{asked.format(**names)}</output_paths></OutputReporter>'
     with pytest.raises(error, match=words):
         tables(tmp_path, model, analysis)

@@ -24,7 +24,10 @@ POINT = """<PathPoint name="p{0}"><socket_parent_frame>{1}</socket_parent_frame>
 
 
 def model(forces: str, *, more: str = "", ground: str = "") -> str:
-    bodies, joints = BODY.format("a") + BODY.format("b"), SLIDER.format("a", 0.3, 0.2) + SLIDER.format("b", 0.1, -0.7)
+    bodies, joints = (
+        BODY.format("a") + BODY.format("b"),
+        SLIDER.format("a", 0.3, 0.2) + SLIDER.format("b", 0.1, -0.7),
+    )
     return (
         f'<OpenSimDocument Version="40600"><Model name="m">{ground}<BodySet><objects>{bodies}</objects></BodySet>'
         f"<JointSet><objects>{joints}</objects></JointSet>{more}<ForceSet><objects>{forces}</objects></ForceSet>"
@@ -34,9 +37,15 @@ def model(forces: str, *, more: str = "", ground: str = "") -> str:
 
 def answer(code: str, path: Path) -> list[list[float]] | None:
     """What a piece of code says of a model in OpenSim, None if it fails there."""
-    head = 'import json, sys, opensim as o\no.Logger.setLevelString("Off")\nm = o.Model(sys.argv[1])\n'
+    head = (
+        'import json, sys, opensim as o\no.Logger.setLevelString("Off")\nm = o.Model(sys.argv[1])\n'
+    )
     done = subprocess.run(
-        [sys.executable, "-c", head + code, path], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", head + code, path],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
     return json.loads(done.stdout.splitlines()[-1]) if done.returncode == 0 else None
 
@@ -75,7 +84,11 @@ print(json.dumps(rows))
 )
 def test_ranges_of_wraps(tmp_path: Path, ranges: list[str], count: int) -> None:
     points = "".join(
-        POINT.format(k, "/ground" if k < count - 1 else "/bodyset/a", f"{k / (count - 1) - 0.5} 0.0{k + 2} 0.01")
+        POINT.format(
+            k,
+            "/ground" if k < count - 1 else "/bodyset/a",
+            f"{k / (count - 1) - 0.5} 0.0{k + 2} 0.01",
+        )
         for k in range(count)
     )
     wraps = "".join(
@@ -101,7 +114,10 @@ def test_ranges_of_wraps(tmp_path: Path, ranges: list[str], count: int) -> None:
         return
     result = osimlite.paths(osimlite.read(path))
     for value, (length, arm) in zip((0.0, 0.05, 0.2), theirs, strict=True):
-        (ours,), (arms,) = result.lengths([value, 0.1]).values(), result.moment_arms([value, 0.1]).values()
+        (ours,), (arms,) = (
+            result.lengths([value, 0.1]).values(),
+            result.moment_arms([value, 0.1]).values(),
+        )
         assert ours == pytest.approx(length, rel=1e-14)
         assert next(iter(arms.values())) == pytest.approx(arm, abs=1e-9)
 
@@ -136,15 +152,18 @@ MUSCLE = """<Thelen2003Muscle name="f">{}<max_isometric_force>10</max_isometric_
     </optimal_fiber_length><tendon_slack_length>0.3</tendon_slack_length>{}</Thelen2003Muscle>"""
 ACTUATOR = '<PathActuator name="f">{}<optimal_force>5</optimal_force>{}</PathActuator>'
 OFF = "<appliesForce>false</appliesForce>"
-SPHERE, CYLINDER = ("Sphere", "<radius>0.1</radius>"), ("Cylinder", "<radius>0.05</radius><length>1</length>")
+SPHERE, CYLINDER = (
+    ("Sphere", "<radius>0.1</radius>"),
+    ("Cylinder", "<radius>0.05</radius><length>1</length>"),
+)
 ELLIPSOID, TORUS = (
     ("Ellipsoid", "<dimensions>0.1 0.07 0.09</dimensions>"),
     ("Torus", "<inner_radius>0.02</inner_radius><outer_radius>0.08</outer_radius>"),
 )
 
 
-# Of a point a pair of numbers is the range of /jointset/b/b_x in which it counts; of a wrap a missing surface is one
-# that is not active.
+# Of a point a pair of numbers is the range of /jointset/b/b_x in which it counts; of a wrap a
+# missing surface is one that is not active.
 @pytest.mark.parametrize(
     ("force", "off", "points", "wraps"),
     [
@@ -152,18 +171,48 @@ ELLIPSOID, TORUS = (
         pytest.param(MUSCLE, "", (0, 0, 0), [("1 4", ELLIPSOID)], id="end beyond"),
         pytest.param(ACTUATOR, "", (0, 0), [("5 -1", CYLINDER)], id="start beyond"),
         pytest.param(LIGAMENT, "", (0, 0, 0), [("5 0", TORUS)], id="start beyond and the last"),
-        pytest.param(MUSCLE, "", (0, 0), [("9 4", CYLINDER), ("1 9", SPHERE)], id="start behind end, both beyond"),
-        pytest.param(SPRING, "", (0, 0, 0), [("-7 -2", ELLIPSOID), ("-1 3", SPHERE)], id="negative"),
+        pytest.param(
+            MUSCLE,
+            "",
+            (0, 0),
+            [("9 4", CYLINDER), ("1 9", SPHERE)],
+            id="start behind end, both beyond",
+        ),
+        pytest.param(
+            SPRING, "", (0, 0, 0), [("-7 -2", ELLIPSOID), ("-1 3", SPHERE)], id="negative"
+        ),
         pytest.param(LIGAMENT, OFF, (0, 0), [("1 3", SPHERE)], id="a force that is off"),
         pytest.param(MUSCLE, OFF, (0, 0, 0), [("2 7", SPHERE)], id="a muscle that is off"),
-        pytest.param(ACTUATOR, "", (0, 0, 0), [("1 9", None), ("1 3", SPHERE)], id="a surface that is off"),
-        pytest.param(SPRING, "", (0, (0.15, 1), 0), [("2 2", SPHERE), ("1 4", SPHERE)], id="not in all poses"),
-        pytest.param(MUSCLE, "", (0, (-1, 0.05), (-1, 0.15), 0), [("2 3", TORUS), ("3 9", SPHERE)], id="two points"),
-        pytest.param(ACTUATOR, "", (0, (0.15, 1), 0), [("2 2", None), ("2 4", SPHERE)], id="by one that is off"),
         pytest.param(
-            SPRING, "", (0, 0, (0.15, 1), 0), [("-1 2", SPHERE), ("3 -1", TORUS), ("3 5", SPHERE)], id="three"
+            ACTUATOR, "", (0, 0, 0), [("1 9", None), ("1 3", SPHERE)], id="a surface that is off"
         ),
-        pytest.param(LIGAMENT, "", (0, (0.15, 1), 0), [("1 4", SPHERE), ("2 2", SPHERE)], id="before it"),
+        pytest.param(
+            SPRING, "", (0, (0.15, 1), 0), [("2 2", SPHERE), ("1 4", SPHERE)], id="not in all poses"
+        ),
+        pytest.param(
+            MUSCLE,
+            "",
+            (0, (-1, 0.05), (-1, 0.15), 0),
+            [("2 3", TORUS), ("3 9", SPHERE)],
+            id="two points",
+        ),
+        pytest.param(
+            ACTUATOR,
+            "",
+            (0, (0.15, 1), 0),
+            [("2 2", None), ("2 4", SPHERE)],
+            id="by one that is off",
+        ),
+        pytest.param(
+            SPRING,
+            "",
+            (0, 0, (0.15, 1), 0),
+            [("-1 2", SPHERE), ("3 -1", TORUS), ("3 5", SPHERE)],
+            id="three",
+        ),
+        pytest.param(
+            LIGAMENT, "", (0, (0.15, 1), 0), [("1 4", SPHERE), ("2 2", SPHERE)], id="before it"
+        ),
     ],
 )
 def test_models_whose_ranges_leave_their_paths(
@@ -171,14 +220,24 @@ def test_models_whose_ranges_leave_their_paths(
 ) -> None:
     placed = [
         POINT.format(
-            k, "/ground" if k < len(points) - 1 else "/bodyset/a", f"{k / (len(points) - 1) - 0.5} 0.0{k + 2} 0.01"
+            k,
+            "/ground" if k < len(points) - 1 else "/bodyset/a",
+            f"{k / (len(points) - 1) - 0.5} 0.0{k + 2} 0.01",
         )
         for k in range(len(points))
     ]
     for k, within in enumerate(points):
         if within:
-            more = "<socket_coordinate>/jointset/b/b_x</socket_coordinate><range>{} {}</range>".format(*within)
-            placed[k] = placed[k].replace("PathPoint", "ConditionalPathPoint").replace("</Cond", more + "</Cond")
+            more = (
+                "<socket_coordinate>/jointset/b/b_x</socket_coordinate><range>{} {}</range>".format(
+                    *within
+                )
+            )
+            placed[k] = (
+                placed[k]
+                .replace("PathPoint", "ConditionalPathPoint")
+                .replace("</Cond", more + "</Cond")
+            )
     bent = "".join(
         f'<PathWrap name="w{k}"><wrap_object>s{k}</wrap_object><range>{ends}</range></PathWrap>'
         for k, (ends, _) in enumerate(wraps)

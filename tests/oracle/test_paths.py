@@ -25,7 +25,15 @@ from tests.oracle.force_carrier import JOINTS, carrier, compare  # noqa: E402
 from tests.oracle.opensim_paths import compare_paths  # noqa: E402
 
 GROUND, B0, B1, B2, F1, F2, STUCK = (
-    *("/ground", "/bodyset/b0", "/bodyset/b1", "/bodyset/b2", "/bodyset/b1/f1", "/bodyset/b2/f2", "/bodyset/stuck"),
+    *(
+        "/ground",
+        "/bodyset/b0",
+        "/bodyset/b1",
+        "/bodyset/b2",
+        "/bodyset/b1/f1",
+        "/bodyset/b2/f2",
+        "/bodyset/stuck",
+    ),
 )
 
 
@@ -35,10 +43,16 @@ def model(request):
     model = carrier(request.param)
     b1, b2 = (body for body in model.components(Body) if body.name in ("b1", "b2"))
     stuck = model.add(Body(name="stuck", mass=0.5, inertia=(0.1, 0.1, 0.1, 0, 0, 0)))
-    model.add(osimlite.WeldJoint(name="weld").between(b1, stuck, at=(0.1, 0.3, 0.1), turned=(0.2, 0.1, -0.3)))
+    model.add(
+        osimlite.WeldJoint(name="weld").between(
+            b1, stuck, at=(0.1, 0.3, 0.1), turned=(0.2, 0.1, -0.3)
+        )
+    )
     held = model.add(Body(name="held", mass=0.5, inertia=(0.1, 0.1, 0.1, 0, 0, 0)))
     locked = Coordinate(name="locked", default_value=0.3, locked=True)
-    model.add(osimlite.PinJoint(name="lock", coordinates=[locked]).between(b2, held, at=(0.1, -0.2, 0)))
+    model.add(
+        osimlite.PinJoint(name="lock", coordinates=[locked]).between(b2, held, at=(0.1, -0.2, 0))
+    )
     for coordinate in model.components(Coordinate):
         coordinate.range = (-0.4, 0.5)
     return model
@@ -50,7 +64,10 @@ def at(frame, *location):
 
 def within(low, high, coordinate, frame, *location):
     return ConditionalPathPoint(
-        socket_parent_frame=frame, location=location, socket_coordinate=f"/jointset/{coordinate}", range=(low, high)
+        socket_parent_frame=frame,
+        location=location,
+        socket_coordinate=f"/jointset/{coordinate}",
+        range=(low, high),
     )
 
 
@@ -73,21 +90,41 @@ def shapes(size):
 
 
 PATHS = {
-    "a point that moves": (at(GROUND, 0.5, 0.1, 0.0), moving("j1/q1_0", F1, *shapes(1.0)), at(B2, 0.0, -0.3, 0.1)),
+    "a point that moves": (
+        at(GROUND, 0.5, 0.1, 0.0),
+        moving("j1/q1_0", F1, *shapes(1.0)),
+        at(B2, 0.0, -0.3, 0.1),
+    ),
     "moving ends": (moving("j1/q1_0", B0, *shapes(0.5)), moving("j1/q1_0", B2, *shapes(1.5))),
     "a point that moves with what it does not move": (
         *(at(GROUND, 0.3, 0.1, 0.0), moving("j2/q2_0", B0, *shapes(1.0)), at(B1, 0.1, 0.1, 0.1)),
     ),
     "neighbours on one body, and on welded ones": (
-        *(moving("j2/q2_0", B1, *shapes(1.0)), moving("j0/q0_0", F1, *shapes(0.7)), at(B1, 0.1, 0.2, 0.0)),
-        *(moving("j2/q2_0", STUCK, *shapes(0.4)), at(STUCK, 0.3, 0.1, 0.0), at(B1, 0.1, 0.0, 0.0), at(B0, 0.3, 0, 0)),
+        *(
+            moving("j2/q2_0", B1, *shapes(1.0)),
+            moving("j0/q0_0", F1, *shapes(0.7)),
+            at(B1, 0.1, 0.2, 0.0),
+        ),
+        *(
+            moving("j2/q2_0", STUCK, *shapes(0.4)),
+            at(STUCK, 0.3, 0.1, 0.0),
+            at(B1, 0.1, 0.0, 0.0),
+            at(B0, 0.3, 0, 0),
+        ),
     ),
     "a point that moves with a locked coordinate": (
-        *(at(GROUND, 0.3, 0.1, 0.0), moving("lock/locked", B2, *shapes(1.0)), at("/bodyset/held", 0.1, 0.2, 0.1)),
+        *(
+            at(GROUND, 0.3, 0.1, 0.0),
+            moving("lock/locked", B2, *shapes(1.0)),
+            at("/bodyset/held", 0.1, 0.2, 0.1),
+        ),
     ),
     "points that come and go": (
         *(at(GROUND, 0.3, 0.1, 0.0), within(-0.2, 0.5, "j0/q0_0", B0, 0.2, 0.1, 0.2)),
-        *(within(-0.5, 0.1, "j1/q1_0", F1, 0.2, 0.3, 0.1), within(0.0, 2.0, "j2/q2_0", F2, 0.1, 0.3, 0.0)),
+        *(
+            within(-0.5, 0.1, "j1/q1_0", F1, 0.2, 0.3, 0.1),
+            within(0.0, 2.0, "j2/q2_0", F2, 0.1, 0.3, 0.0),
+        ),
         *(moving("j2/q2_0", B2, *shapes(1.0)), at(B2, 0.4, 0.2, 0.0)),
     ),
     "points of a locked coordinate": (
@@ -103,7 +140,9 @@ def with_springs(model):
         path = GeometryPath(name="path")
         for index, point in enumerate(points):
             path.path_point_set.objects.append(point.model_copy(update={"name": f"p{index}"}))
-        spring = PathSpring(name=f"spring{number}", resting_length=0.2, stiffness=300.0, dissipation=0.4)
+        spring = PathSpring(
+            name=f"spring{number}", resting_length=0.2, stiffness=300.0, dissipation=0.4
+        )
         spring.geometry_path = path
         model.add(spring)
     return model
@@ -134,7 +173,8 @@ def test_lengths_speeds_and_moment_arms(model, coupled, tmp_path):
         )
         model.add(constraint)
     osimlite.write(model, tmp_path / "model.osim")
-    # Once it was asked for the moment arm of a locked coordinate, OpenSim forgets that this is locked.
+    # Once it was asked for the moment arm of a locked coordinate, OpenSim forgets that this is
+    # locked.
     compare_paths(tmp_path / "model.osim", poses=1 if "locked" in coupled.values() else 4)
 
 
@@ -144,17 +184,24 @@ def wrapped(draw):
     model, body = Model(name="wrapped"), None
     place = st.tuples(*[st.floats(-0.12, 0.12)] * 3)
     for number in range(3):
-        below, body = body or model.ground, model.add(Body(name=f"b{number}", mass=1.0, inertia=(1, 1, 1, 0, 0, 0)))
+        below, body = (
+            body or model.ground,
+            model.add(Body(name=f"b{number}", mass=1.0, inertia=(1, 1, 1, 0, 0, 0))),
+        )
         coordinate = Coordinate(name=f"q{number}", range=(-1.2, 1.2))
         joint = osimlite.PinJoint(name=f"j{number}", coordinates=[coordinate])
         model.add(joint.between(below, body, at=(0, 0.1, 0), turned=(0.2 - 0.1 * number, 0, 0)))
     spring = PathSpring(name="spring", resting_length=0.2, stiffness=300.0, dissipation=0.4)
     frames = (GROUND, B0, B1, B2)
-    route = sorted(draw(st.lists(st.sampled_from(frames), min_size=2, max_size=5)), key=frames.index)
+    route = sorted(
+        draw(st.lists(st.sampled_from(frames), min_size=2, max_size=5)), key=frames.index
+    )
     for number, frame in enumerate(route):
         # OpenSim crashes where all points are gone.
         if 0 < number < len(route) - 1 and draw(st.booleans()):
-            point = within(-0.5, 0.6, draw(st.sampled_from(("j0/q0", "j1/q1", "j2/q2"))), frame, *draw(place))
+            point = within(
+                -0.5, 0.6, draw(st.sampled_from(("j0/q0", "j1/q1", "j2/q2"))), frame, *draw(place)
+            )
         else:
             point = at(frame, *draw(place))
         point.name = f"p{number}"
@@ -162,7 +209,9 @@ def wrapped(draw):
     count = draw(st.integers(1, 3))
     for number in range(count):
         # The tangent points of a cylinder that is not alone slide away, and magnify rounding.
-        kinds = (WrapSphere, WrapEllipsoid) if count > 1 else (WrapCylinder, WrapEllipsoid, WrapTorus)
+        kinds = (
+            (WrapSphere, WrapEllipsoid) if count > 1 else (WrapCylinder, WrapEllipsoid, WrapTorus)
+        )
         kind, radius = draw(st.sampled_from(kinds)), draw(st.floats(0.02, 0.06))
         sizes = {
             WrapSphere: {"radius": radius},
@@ -183,7 +232,10 @@ def wrapped(draw):
             name=f"wrap{number}",
             wrap_object=surface.name,
             method=draw(st.sampled_from(("hybrid", "midpoint", "axial"))),
-            range=(draw(st.sampled_from((-1, 0, 1, 2))), draw(st.sampled_from((-1, len(route) - 1, len(route))))),
+            range=(
+                draw(st.sampled_from((-1, 0, 1, 2))),
+                draw(st.sampled_from((-1, len(route) - 1, len(route)))),
+            ),
         )
         spring.geometry_path.path_wrap_set.objects.append(wrap)
     model.add(spring)
@@ -207,19 +259,25 @@ def test_two_points_at_one_place_beside_a_torus(quadrant, tmp_path):
 
 
 @pytest.mark.parametrize("quadrant", ["all", "-x", "y", "-y"])
-@pytest.mark.parametrize("heights", [(0.11, 0.0), (0.02, 0.0), (0.02, 1e-16), (0.02, 1e-15), (0.0, 0.02), (0.0, 0.0)])
+@pytest.mark.parametrize(
+    "heights", [(0.11, 0.0), (0.02, 0.0), (0.02, 1e-16), (0.02, 1e-15), (0.0, 0.02), (0.0, 0.0)]
+)
 def test_an_end_beside_the_middle_of_a_cylinder(quadrant, heights, tmp_path):
     """OpenSim takes the foot of the second end on the axis for a direction: there it is none."""
     model = Model(name="level")
     first, second = heights
     cylinder = WrapCylinder(name="cylinder", quadrant=quadrant, radius=0.03, length=0.2)
     for number, (x, y) in enumerate([(-0.09, 0.04), (-0.09, -0.01), (0.1, 0.025), (0.05, -0.04)]):
-        spring = PathSpring(name=f"spring{number}", resting_length=0.2, stiffness=300.0, dissipation=0.4)
+        spring = PathSpring(
+            name=f"spring{number}", resting_length=0.2, stiffness=300.0, dissipation=0.4
+        )
         for name, place in (("p0", (x, y, first)), ("p1", (0.1, 0.012, second))):
             point = at(GROUND, *place)
             point.name = name
             spring.geometry_path.path_point_set.objects.append(point)
-        spring.geometry_path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="cylinder"))
+        spring.geometry_path.path_wrap_set.objects.append(
+            PathWrap(name="wrap", wrap_object="cylinder")
+        )
         model.add(spring)
     model.ground.wrap_object_set.objects.append(cylinder)
     osimlite.write(model, tmp_path / "model.osim")

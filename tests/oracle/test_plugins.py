@@ -29,9 +29,13 @@ def test_what_opensim_declares_is_what_the_classes_are(tmp_path):
     (script,) = re.findall(r'```python\n(""".*?)```', PAGE.read_text(encoding="utf-8"), re.DOTALL)
     (tmp_path / "declare.py").write_text(script)
     arguments = [sys.executable, "declare.py", "-", *CLASSES]
-    done = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(
+        arguments, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True
+    )
     told = json.loads(done.stdout[done.stdout.index("{\n") :])["classes"]
-    (tmp_path / "ours.json").write_text(json.dumps({"classes": {f"Our{name}": told[name] for name in told}}))
+    (tmp_path / "ours.json").write_text(
+        json.dumps({"classes": {f"Our{name}": told[name] for name in told}})
+    )
     ours = osimlite.classes_in(tmp_path / "ours.json")
     for name in CLASSES:
         theirs = getattr(osimlite, name)

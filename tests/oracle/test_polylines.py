@@ -14,10 +14,16 @@ from tests.simulation.test_path_wraps import PATH, SETUPS, wrapped
 
 pytestmark = pytest.mark.oracle
 
-FAR = {"cylinder_-y": 2e-3, "edge_far_cylinder_x": 2e-3, "torus_x": 2e-3, "ellipsoid_x_hybrid": 1e-5}
+FAR = {
+    "cylinder_-y": 2e-3,
+    "edge_far_cylinder_x": 2e-3,
+    "torus_x": 2e-3,
+    "ellipsoid_x_hybrid": 1e-5,
+}
 """How far our corners may be from the lines that OpenSim draws, m: it leaves out the last 2 mm of a helix.
 
-On spheres it draws hardly any of the way, since it takes radians for degrees."""
+On spheres it draws hardly any of the way, since it takes radians for degrees.
+"""
 NAMES = (*FAR, "sphere_x", "edge_far_cylinder_x", "cylinder_sphere_ellipsoid")
 
 
@@ -51,7 +57,9 @@ def distances(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 def places(path, state) -> np.ndarray:
     """Where the points (k, 3) are that a path runs through."""
     points = path.getCurrentPath(state)
-    return np.array([points.get(k).getLocationInGround(state).to_numpy() for k in range(points.getSize())])
+    return np.array(
+        [points.get(k).getLocationInGround(state).to_numpy() for k in range(points.getSize())]
+    )
 
 
 @pytest.mark.parametrize("name", dict.fromkeys(NAMES))
@@ -62,7 +70,10 @@ def test_paths_run_where_opensim_has_them(name, tmp_path):
     theirs = opensim.Model(str(tmp_path / "model.osim"))
     state, paths = theirs.initSystem(), osimlite.paths(model)
     path = opensim.GeometryPath.safeDownCast(theirs.getComponent(f"{PATH}/path"))
-    coordinates = [opensim.Coordinate.safeDownCast(theirs.getComponent(i.path)) for i in paths.mechanism.coordinates]
+    coordinates = [
+        opensim.Coordinate.safeDownCast(theirs.getComponent(i.path))
+        for i in paths.mechanism.coordinates
+    ]
     for case in SETUPS[name]["cases"][:8]:
         q = [0, 0, 0, *case["p_A"], 0, 0, 0, *case["p_B"], *case["q_W"]]
         for coordinate, value in zip(coordinates, q, strict=True):

@@ -16,7 +16,10 @@ from benchmarks.predicted_walk import forward
 from osimlite.io.tables.storage import read_sto
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytestmark = [pytest.mark.oracle, pytest.mark.skipif(find_spec("casadi") is None, reason="needs the casadi package")]
+pytestmark = [
+    pytest.mark.oracle,
+    pytest.mark.skipif(find_spec("casadi") is None, reason="needs the casadi package"),
+]
 
 
 MOCO = """
@@ -89,7 +92,8 @@ def test_opensim_walks_as_we_do(build):
         report_interval=step / 2000,
         initial={name: float(stride[name][0]) for name in stride.columns if name.count("/") > 2},
         controls={
-            name: (stride.times[np.isfinite(column)], column[np.isfinite(column)]) for name, column in controls.items()
+            name: (stride.times[np.isfinite(column)], column[np.isfinite(column)])
+            for name, column in controls.items()
         },
     )
     for k, info in enumerate(ours.mechanism.coordinates):

@@ -74,10 +74,18 @@ def compare(model, tmp_path, tolerance=1e-9):
             theirs.setStateVariableValue(state, path, value)
         state.setTime(TIME)
         theirs.realizeReport(state)
-        probes = [theirs.getProbeSet().get(number) for number in range(theirs.getProbeSet().getSize())]
-        expected = [probe.getProbeOutputs(state).to_numpy().tolist() for probe in probes if probe.isEnabled()]
+        probes = [
+            theirs.getProbeSet().get(number) for number in range(theirs.getProbeSet().getSize())
+        ]
+        expected = [
+            probe.getProbeOutputs(state).to_numpy().tolist()
+            for probe in probes
+            if probe.isEnabled()
+        ]
         result = system.probe_results(TIME, system.state.pack(q.tolist(), u.tolist(), z.tolist()))
-        result = [[probe.gain * x for x in row] for probe, row in zip(system.probes, result, strict=True)]
+        result = [
+            [probe.gain * x for x in row] for probe, row in zip(system.probes, result, strict=True)
+        ]
         assert [len(row) for row in result] == [len(row) for row in expected]
         for ours, row in zip(result, expected, strict=True):
             scale = max([1.0, *(abs(x) for x in row if np.isfinite(x))])
@@ -89,12 +97,24 @@ def add_actuators(model):
     bodies = {"bodyA": "b2", "bodyB": "b0"}
     for there in (False, True):
         model.add(
-            PointActuator(name=f"point{there:d}", body="b1", point=(0.1, 0.2, 0.3), point_is_global=there),
-            PointToPointActuator(name=f"points{there:d}", pointA=(0.1, 0.2, 0.3), points_are_global=there, **bodies),
-            TorqueActuator(name=f"torque{there:d}", axis=(1.0, 2.0, -0.5), torque_is_global=there, **bodies),
+            PointActuator(
+                name=f"point{there:d}", body="b1", point=(0.1, 0.2, 0.3), point_is_global=there
+            ),
+            PointToPointActuator(
+                name=f"points{there:d}", pointA=(0.1, 0.2, 0.3), points_are_global=there, **bodies
+            ),
+            TorqueActuator(
+                name=f"torque{there:d}", axis=(1.0, 2.0, -0.5), torque_is_global=there, **bodies
+            ),
         )
     model.add(
-        TorqueActuator(name="turned", bodyA="/bodyset/b2/f2", bodyB="b1", axis=(1.0, 0.0, 0.5), torque_is_global=False),
+        TorqueActuator(
+            name="turned",
+            bodyA="/bodyset/b2/f2",
+            bodyB="b1",
+            axis=(1.0, 0.0, 0.5),
+            torque_is_global=False,
+        ),
         CoordinateActuator(name="motor", coordinate="q1_0", optimal_force=7.0),
         CoordinateActuator(name="off", coordinate="q0_0", appliesForce=False),
         ActivationCoordinateActuator(name="slow", coordinate="q2_0"),
@@ -115,7 +135,13 @@ def test_forces_and_powers_of_actuators(model, exponent, tmp_path):
         kinds = {"sum_forces_together": is_sum}, {"sum_powers_together": is_sum}
         for kind, more in zip((ActuatorForceProbe, ActuatorPowerProbe), kinds, strict=True):
             model.add(
-                kind(name=f"{kind.__name__}{is_sum}", actuator_names=("all",), exponent=exponent, gain=3.0, **more)
+                kind(
+                    name=f"{kind.__name__}{is_sum}",
+                    actuator_names=("all",),
+                    exponent=exponent,
+                    gain=3.0,
+                    **more,
+                )
             )
     model.add(ActuatorPowerProbe(name="some", actuator_names=("slow", "motor"), exponent=exponent))
     model.add(ActuatorForceProbe(name="disabled", actuator_names=("slow",), enabled=False))
@@ -132,7 +158,11 @@ SWITCHES: tuple[dict[str, object], ...] = (
     {"report_total_metabolics_only": False},
     {"forbid_negative_total_power": False, "report_total_metabolics_only": False},
     {"forbid_negative_total_power": False, "include_negative_mechanical_work": False, "gain": 2.0},
-    {"forbid_negative_total_power": False, "enforce_minimum_heat_rate_per_muscle": False, "basal_rate_on": False},
+    {
+        "forbid_negative_total_power": False,
+        "enforce_minimum_heat_rate_per_muscle": False,
+        "basal_rate_on": False,
+    },
     {"shortening_rate_on": False, "muscle_effort_scaling_factor": 0.7, "basal_exponent": 0.5},
     {"mechanical_work_rate_on": False, "basal_coefficient": 2.0},
 )
@@ -153,12 +183,23 @@ SMOOTH: tuple[dict[str, object], ...] = (
     {"use_force_dependent_shortening_prop_constant": True, "forbid_negative_total_power": False},
     {"use_smoothing": True},
     {"use_smoothing": True, "smoothing_type": "huber", "include_negative_mechanical_work": False},
-    {"use_smoothing": True, "smoothing_type": "huber", "use_force_dependent_shortening_prop_constant": True},
-    {"use_smoothing": True, "velocity_smoothing": 3.0, "power_smoothing": 0.1, "heat_rate_smoothing": 0.2},
+    {
+        "use_smoothing": True,
+        "smoothing_type": "huber",
+        "use_force_dependent_shortening_prop_constant": True,
+    },
+    {
+        "use_smoothing": True,
+        "velocity_smoothing": 3.0,
+        "power_smoothing": 0.1,
+        "heat_rate_smoothing": 0.2,
+    },
 )
 
 
-def add_metabolics(model, names, kinds=(Umberger2010MuscleMetabolicsProbe, Bhargava2004MuscleMetabolicsProbe)):
+def add_metabolics(
+    model, names, kinds=(Umberger2010MuscleMetabolicsProbe, Bhargava2004MuscleMetabolicsProbe)
+):
     """Probes with all switches on and off, of some muscles that differ."""
     for kind in kinds:
         is_umberger = kind is Umberger2010MuscleMetabolicsProbe
@@ -167,16 +208,22 @@ def add_metabolics(model, names, kinds=(Umberger2010MuscleMetabolicsProbe, Bharg
             if is_umberger
             else Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter
         )
-        for number, switches in enumerate((*SWITCHES, *(OF_UMBERGER if is_umberger else OF_BHARGAVA))):
+        for number, switches in enumerate(
+            (*SWITCHES, *(OF_UMBERGER if is_umberger else OF_BHARGAVA))
+        ):
             probe = kind(name=f"{kind.__name__}{number}", **switches)
             if not is_umberger:
-                probe.normalized_fiber_length_dependence_on_maintenance_rate = PiecewiseLinearFunction(
-                    name="normalized_fiber_length_dependence_on_maintenance_rate",
-                    x=(0.0, 0.5, 1.0, 1.5, 10.0),
-                    y=(0.5, 0.5, 1.0, 0.1, 0.0),
+                probe.normalized_fiber_length_dependence_on_maintenance_rate = (
+                    PiecewiseLinearFunction(
+                        name="normalized_fiber_length_dependence_on_maintenance_rate",
+                        x=(0.0, 0.5, 1.0, 1.5, 10.0),
+                        y=(0.5, 0.5, 1.0, 0.1, 0.0),
+                    )
                 )
             for name, ratio, provided in zip(names, (0.5, 0.2), (False, True), strict=False):
-                of_muscle = parameter(name=name, ratio_slow_twitch_fibers=ratio, specific_tension=3e5, density=1100.0)
+                of_muscle = parameter(
+                    name=name, ratio_slow_twitch_fibers=ratio, specific_tension=3e5, density=1100.0
+                )
                 of_muscle.use_provided_muscle_mass, of_muscle.provided_muscle_mass = provided, 0.3
                 probe.metabolic_muscle_parameter_set.objects.append(of_muscle)
             model.add(probe)
@@ -200,9 +247,13 @@ def test_smooth_metabolic_powers(model, switches, tmp_path):
     muscles[0].optimal_fiber_length, muscles[1].optimal_fiber_length = 0.2, 2.0
     model.add(*muscles)
     drive(model, "along0", "along1")
-    metabolics = Bhargava2004SmoothedMuscleMetabolics(name="used", muscle_effort_scaling_factor=0.7, **switches)
+    metabolics = Bhargava2004SmoothedMuscleMetabolics(
+        name="used", muscle_effort_scaling_factor=0.7, **switches
+    )
     for muscle in muscles:
-        parameters = Bhargava2004SmoothedMuscleMetabolics_MuscleParameters(name=muscle.name, socket_muscle=muscle)
+        parameters = Bhargava2004SmoothedMuscleMetabolics_MuscleParameters(
+            name=muscle.name, socket_muscle=muscle
+        )
         metabolics.muscle_parameters.append(parameters)
     model.subcomponents.append(metabolics)
     theirs = opened(model, tmp_path)
@@ -218,7 +269,9 @@ def test_smooth_metabolic_powers(model, switches, tmp_path):
         state.setTime(TIME)
         theirs.realizeReport(state)
         expected = [getattr(outputs, f"getTotal{total}Rate")(state) for total in totals]
-        expected += [outputs.getMuscleMetabolicRate(state, f"/forceset/along{number}") for number in (0, 1)]
+        expected += [
+            outputs.getMuscleMetabolicRate(state, f"/forceset/along{number}") for number in (0, 1)
+        ]
         (result,) = system.probe_results(TIME, system.state.pack(q.tolist(), u.tolist()))
         assert result == pytest.approx(expected, rel=1e-9, abs=1e-9)
     ends = ["metabolic", "activation", "maintenance", "shortening", "mechanical_work"]
@@ -255,7 +308,10 @@ def compare_motion(model, tmp_path, to=0.3, accuracy=1e-5):
     with Simulation(model, "compiled") as ready:
         steps = []
         stepper = ready.engine.stepper(
-            0.0, ready.initial_state({}, {}), Settings(accuracy=accuracy), lambda t, y: steps.append((t, y))
+            0.0,
+            ready.initial_state({}, {}),
+            Settings(accuracy=accuracy),
+            lambda t, y: steps.append((t, y)),
         )
         steps.append((stepper.time, stepper.state))
         stepper.table([to])
@@ -275,22 +331,34 @@ def compare_motion(model, tmp_path, to=0.3, accuracy=1e-5):
 @pytest.mark.parametrize("operation", OPERATIONS)
 def test_operations_along_a_motion(model, operation, tmp_path):
     """The energy cannot be integrated here."""
-    model.add(*(CoordinateActuator(name=f"on_{name}", coordinate=name) for name in ("q0_0", "q1_0")))
+    model.add(
+        *(CoordinateActuator(name=f"on_{name}", coordinate=name) for name in ("q0_0", "q1_0"))
+    )
     drive(model, "on_q0_0", "on_q1_0")
     for number, start in enumerate(((3.0, 2.0), (), (1.0,))):
-        probe = ActuatorPowerProbe(name=f"p{number}", actuator_names=("all",), probe_operation=operation, gain=2.0)
+        probe = ActuatorPowerProbe(
+            name=f"p{number}", actuator_names=("all",), probe_operation=operation, gain=2.0
+        )
         probe.initial_conditions_for_integration = start
         model.add(probe)
     if operation != "integrate":
         model.add(SystemEnergyProbe(name="all", probe_operation=operation))
-        model.add(SystemEnergyProbe(name="kinetic", compute_potential_energy=False, probe_operation=operation))
+        model.add(
+            SystemEnergyProbe(
+                name="kinetic", compute_potential_energy=False, probe_operation=operation
+            )
+        )
     compare_motion(model, tmp_path)
 
 
 @pytest.mark.parametrize("operation", ["value", "integrate", "differentiate"])
 def test_metabolic_powers_along_a_motion(operation, tmp_path):
     """Integrals are states, whose errors take part in the control of the steps."""
-    numbers = {"max_isometric_force": 546.0, "optimal_fiber_length": 0.0535, "tendon_slack_length": 0.272}
+    numbers = {
+        "max_isometric_force": 546.0,
+        "optimal_fiber_length": 0.0535,
+        "tendon_slack_length": 0.272,
+    }
     more = {"default_activation": 0.4, "default_fiber_length": 0.05, "geometry_path": line()}
     model = hung(Thelen2003Muscle(name="mu", **numbers, **more), (0.4, 0.4), gravity=9.80665)
     model.find("/jointset/slide/x").default_value = 0.33
@@ -305,9 +373,14 @@ def test_powers_of_prescribed_motions(is_sum, tmp_path):
     model = carrier(JOINTS["pin, slider, universal"])
     for name, joint in (("q0_0", "j0"), ("q2_1", "j2")):
         coordinate = model.find(f"/jointset/{joint}/{name}")
-        coordinate.prescribed, coordinate.prescribed_function = True, Sine(amplitude=0.4, omega=3.0, phase=0.2)
+        coordinate.prescribed, coordinate.prescribed_function = (
+            True,
+            Sine(amplitude=0.4, omega=3.0, phase=0.2),
+        )
     model.add(CoordinateActuator(name="motor", coordinate="q0_0", optimal_force=7.0))
     drive(model, "motor")
-    probe = JointInternalPowerProbe(name="joints", joint_names=("all",), sum_powers_together=is_sum, exponent=2.0)
+    probe = JointInternalPowerProbe(
+        name="joints", joint_names=("all",), sum_powers_together=is_sum, exponent=2.0
+    )
     model.add(probe, JointInternalPowerProbe(name="last", joint_names=("j2", "j1")))
     compare_motion(model, tmp_path)

@@ -19,8 +19,18 @@ pytestmark = pytest.mark.oracle
 
 GAIT10, GAIT2354 = "gait10_subject01", "gait2354_subject01_simbody"
 CASES = {
-    "walk": ("InverseDynamicsTool", "id_gait10/walk_Setup_ID.xml", GAIT10, "ik_gait10/subject01_walk_IK.mot"),
-    "loads on bodies": ("InverseDynamicsTool", "id_gait10/noloads_id.xml", GAIT10, "id_gait10/noloads_coords.mot"),
+    "walk": (
+        "InverseDynamicsTool",
+        "id_gait10/walk_Setup_ID.xml",
+        GAIT10,
+        "ik_gait10/subject01_walk_IK.mot",
+    ),
+    "loads on bodies": (
+        "InverseDynamicsTool",
+        "id_gait10/noloads_id.xml",
+        GAIT10,
+        "id_gait10/noloads_coords.mot",
+    ),
     "gait2354": (
         "InverseDynamicsTool",
         "ik_id_gait2354/subject01_Setup_InverseDynamics.xml",
@@ -33,22 +43,41 @@ CASES = {
 
 @pytest.mark.parametrize(("tool", "setup", "model", "motion"), CASES.values(), ids=CASES)
 def test_numbers_of_opensim(
-    shared: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tool: str, setup: str, model: str, motion: str
+    shared: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    tool: str,
+    setup: str,
+    model: str,
+    motion: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     place = shared / "oracle" / "tools" / "reference"
-    for file in [*(place / setup).parent.iterdir(), place / "models" / f"{model}.osim.gz", place / motion]:
+    for file in [
+        *(place / setup).parent.iterdir(),
+        place / "models" / f"{model}.osim.gz",
+        place / motion,
+    ]:
         if file.suffix == ".gz" and file.name.count(".") > 1 and ".tar" not in file.name:
-            (tmp_path / file.name.removesuffix(".gz")).write_bytes(gzip.decompress(file.read_bytes()))
+            (tmp_path / file.name.removesuffix(".gz")).write_bytes(
+                gzip.decompress(file.read_bytes())
+            )
         else:
             shutil.copy(file, tmp_path)
     text = (place / setup).read_text()
-    named = {"model_file": f"{model}.osim", "coordinates_file": Path(motion).name.removesuffix(".gz")}
+    named = {
+        "model_file": f"{model}.osim",
+        "coordinates_file": Path(motion).name.removesuffix(".gz"),
+    }
     for tag, name in named.items():
         text = re.sub(f"<{tag}>[^<]*<", f"<{tag}>{name}<", text)
-    text = re.sub(r"\.\./\w+/", "", re.sub(r"<results_directory>[^<]*</results_directory>", "", text))
+    text = re.sub(
+        r"\.\./\w+/", "", re.sub(r"<results_directory>[^<]*</results_directory>", "", text)
+    )
     for results in ("ours", "theirs"):
-        own = re.sub(f"(<{tool} .*?>)", rf"\1<results_directory>{results}</results_directory>", text, count=1)
+        own = re.sub(
+            f"(<{tool} .*?>)", rf"\1<results_directory>{results}</results_directory>", text, count=1
+        )
         (tmp_path / f"{results}.xml").write_text(own)
     script = f"import opensim; opensim.Logger.setLevelString('Error'); assert opensim.{tool}('theirs.xml').run()"
     subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=100)

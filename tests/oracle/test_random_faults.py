@@ -1,7 +1,8 @@
 """Whole projects with one fault at random: OpenSim runs the tools, and osimlite says what it says.
 
-Twenty by default, ``OSIMLITE_FAULTS=1000 OSIMLITE_SEED=7`` asks for others. What OpenSim refuses, or crashes on, must
-have a finding where the fault is; what it takes, with results of the same numbers, must not be told to be refused.
+Twenty by default, ``OSIMLITE_FAULTS=1000 OSIMLITE_SEED=7`` asks for others. What OpenSim refuses,
+or crashes on, must have a finding where the fault is; what it takes, with results of the same
+numbers, must not be told to be refused.
 """
 
 from __future__ import annotations
@@ -57,12 +58,16 @@ Ask = Callable[[Path, str, str], dict[str, Any]]
 def opensim_runs() -> Iterator[Ask]:
     """Runs a tool in a folder, given its class and its setup."""
     command = [sys.executable, "-W", "ignore", "-m", "tests.oracle.opensim_tools"]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
         assert process.stdin is not None and process.stdout is not None
 
         def ask(folder: Path, kind: str, setup: str) -> dict[str, Any]:
             assert process.stdin is not None and process.stdout is not None
-            process.stdin.write(json.dumps({"folder": str(folder), "kind": kind, "setup": setup}) + "\n")
+            process.stdin.write(
+                json.dumps({"folder": str(folder), "kind": kind, "setup": setup}) + "\n"
+            )
             process.stdin.flush()
             answer: dict[str, Any] = json.loads(process.stdout.readline())
             return answer
@@ -85,7 +90,9 @@ class Tools:
         self.faultless = {name: self.run(name, project.texts) for name in self.kinds}
         assert all(answer["end"] == "done" for answer, _ in self.faultless.values()), self.faultless
 
-    def run(self, setup: str, texts: dict[str, str | None] | dict[str, str]) -> tuple[dict[str, Any], dict[str, str]]:
+    def run(
+        self, setup: str, texts: dict[str, str | None] | dict[str, str]
+    ) -> tuple[dict[str, Any], dict[str, str]]:
         """What OpenSim says, and the files that it writes."""
         for file in sorted(self.path.rglob("*"), reverse=True):
             file.rmdir() if file.is_dir() else file.unlink()
@@ -94,12 +101,18 @@ class Tools:
                 (self.path / name).write_bytes(text.encode())
         answer = self.ask(self.path, self.kinds[setup], setup)
         files = (file for file in self.path.rglob("*") if file.is_file() and file.name != LOG)
-        written = {str(file.relative_to(self.path)): file.read_text(errors="replace") for file in files}
+        written = {
+            str(file.relative_to(self.path)): file.read_text(errors="replace") for file in files
+        }
         return answer, {name: text for name, text in written.items() if texts.get(name) != text}
 
     def verdict(self, fault: Fault, draw: random.Random) -> tuple[str, str]:
         """The worst that OpenSim does with a fault, and what it says to it."""
-        asked = [name for name in self.kinds if name == fault.file or name in self.project.users(fault.file)]
+        asked = [
+            name
+            for name in self.kinds
+            if name == fault.file or name in self.project.users(fault.file)
+        ]
         ends = []
         for setup in draw.sample(asked, min(2, len(asked))):
             answer, written = self.run(setup, {**self.project.texts, **fault.texts})
@@ -107,10 +120,18 @@ class Tools:
             told = [line for line in answer["log"] if line not in before["log"]]
             end, said = answer["end"], answer["message"] or "; ".join(told)
             # A solver that goes on has taken the project.
-            if (end == "false" and UNSOLVED.search(said)) or (end == "hangs" and self.kinds[setup] == "MocoStudy"):
+            if (end == "false" and UNSOLVED.search(said)) or (
+                end == "hangs" and self.kinds[setup] == "MocoStudy"
+            ):
                 end = "changes"
             if end == "done":
-                end = "changes" if not same_results(results, written) else "tells" if told else "nothing"
+                end = (
+                    "changes"
+                    if not same_results(results, written)
+                    else "tells"
+                    if told
+                    else "nothing"
+                )
             ends.append((VERDICTS.index(end), f"{setup}: {said}"))
         if not ends:
             return "nothing", "no tool uses it"
@@ -120,7 +141,9 @@ class Tools:
 
 def same_results(before: dict[str, str], after: dict[str, str]) -> bool:
     """Whether files hold the same words and numbers, headers of tables left aside."""
-    return before.keys() == after.keys() and all(_same(before[name], after[name]) for name in before)
+    return before.keys() == after.keys() and all(
+        _same(before[name], after[name]) for name in before
+    )
 
 
 def _same(before: str, after: str) -> bool:
@@ -150,11 +173,21 @@ def test_what_opensim_refuses_is_found(project, opensim_runs, tmp_path):
         verdict, said = tools.verdict(fault, draw)
         findings = folder.found(fault)
         result = in_place(fault, findings)
-        worst = "error" if any(f.severity == "error" for f in result) else "finding" if result else "none"
+        worst = (
+            "error"
+            if any(f.severity == "error" for f in result)
+            else "finding"
+            if result
+            else "none"
+        )
         counts[fault.kind, verdict, worst] += 1
         refused = verdict in ("hangs", "crashes", "raises", "false")
-        if (refused or (verdict == "changes" and (fault.sure or fault.kind not in UNKNOWABLE))) and not result:
-            wrong.append(f"MISSED {verdict} {fault.kind} {fault.what}\n  {said[:300]}\n  {sorted(fault.places)}")
+        if (
+            refused or (verdict == "changes" and (fault.sure or fault.kind not in UNKNOWABLE))
+        ) and not result:
+            wrong.append(
+                f"MISSED {verdict} {fault.kind} {fault.what}\n  {said[:300]}\n  {sorted(fault.places)}"
+            )
             wrong += [f"  elsewhere: {f}" for f in findings[:2]]
         alarms = [f for f in result if f.severity == "error" and f.code not in LOST]
         if verdict == "nothing" and alarms:

@@ -15,7 +15,8 @@ pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 pytestmark = pytest.mark.oracle
 
 
-# The GimbalJoint of seed 20 runs into gimbal lock, where the steps shrink without end, OpenSim's too.
+# The GimbalJoint of seed 20 runs into gimbal lock, where the steps shrink without end, OpenSim's
+# too.
 @pytest.mark.parametrize("seed", [*range(20), *range(21, 25)])
 def test_states_and_steps(seed, tmp_path):
     path = tmp_path / "model.osim"

@@ -28,16 +28,22 @@ def recorded(corpus: Any, name: str, times: Any, noise: float = 0.0) -> Any:
     text = gzip.decompress(converted.read_bytes()).decode()
     Path("model.osim").write_text(text)
     mechanism = build_mechanism(read_text(text), opensim_derivatives=True)
-    values = np.array([0.2 * np.sin(3.0 * times + index) for index in range(len(mechanism.coordinates))]).T
+    values = np.array(
+        [0.2 * np.sin(3.0 * times + index) for index in range(len(mechanism.coordinates))]
+    ).T
     values += mechanism.values({}) + noise * np.random.default_rng(3).normal(size=values.shape)
     turned = [info.motion_type == "rotational" for info in mechanism.coordinates]
     degrees = np.where(turned, np.degrees(values), values)
-    write_sto("motion.mot", "motion", times, mechanism.coordinate_names, degrees.tolist(), in_degrees=True)
+    write_sto(
+        "motion.mot", "motion", times, mechanism.coordinate_names, degrees.tolist(), in_degrees=True
+    )
     return mechanism
 
 
 @pytest.mark.parametrize("name", ["m0005", "m0013", "m0954"])
-def test_inverse_dynamics_of_real_models(corpus: Any, name: str, tmp_path: Path, monkeypatch: Any, capfd: Any) -> None:
+def test_inverse_dynamics_of_real_models(
+    corpus: Any, name: str, tmp_path: Path, monkeypatch: Any, capfd: Any
+) -> None:
     monkeypatch.chdir(tmp_path)
     mechanism = recorded(corpus, name, np.linspace(0.0, 1.0, 250))
     theirs = inverse_dynamics("model.osim", "motion.mot")
@@ -51,11 +57,20 @@ def test_inverse_dynamics_of_real_models(corpus: Any, name: str, tmp_path: Path,
 def _pushed(model: Model) -> None:
     """Put springs and stops, off and on, beside the muscles; the motion leaves coordinates that were locked free."""
     for index, coordinate in enumerate(model.components(Coordinate)):
-        model.add(SpringGeneralizedForce(name=f"s{index}", coordinate=coordinate.name, stiffness=3.0, viscosity=0.5))
+        model.add(
+            SpringGeneralizedForce(
+                name=f"s{index}", coordinate=coordinate.name, stiffness=3.0, viscosity=0.5
+            )
+        )
         coordinate.locked = index % 3 == 1
     tips = list(model.components(Body))
-    ends = [osimlite.PathPoint(name=tip.name, socket_parent_frame=tip, location=(0.1, 0.0, 0.0)) for tip in tips[-2:]]
-    cord = model.add(osimlite.PathSpring(name="cord", resting_length=0.01, stiffness=100.0, dissipation=0.1))
+    ends = [
+        osimlite.PathPoint(name=tip.name, socket_parent_frame=tip, location=(0.1, 0.0, 0.0))
+        for tip in tips[-2:]
+    ]
+    cord = model.add(
+        osimlite.PathSpring(name="cord", resting_length=0.01, stiffness=100.0, dissipation=0.1)
+    )
     cord.geometry_path.path_point_set.objects[:] = ends
     model.find("/forceset/s2").appliesForce = False
 

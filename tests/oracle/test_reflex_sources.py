@@ -22,11 +22,15 @@ def thrown() -> Model:
     """A body that turns about all axes, and another that is fixed to it askew."""
     model = Model(name="thrown")
     whole, part = (
-        model.add(Body(name=name, mass=1.0, inertia=(0.02, 0.03, 0.05, 0, 0, 0))) for name in ("ball", "fin_l")
+        model.add(Body(name=name, mass=1.0, inertia=(0.02, 0.03, 0.05, 0, 0, 0)))
+        for name in ("ball", "fin_l")
     )
     joint = osimlite.FreeJoint(name="free")
     for coordinate, name, speed in zip(
-        joint.coordinates, ("rx", "ry", "rz", "tx", "ty", "tz"), (3.0, -2.0, 4.0, 1.0, 2.0, 0.5), strict=True
+        joint.coordinates,
+        ("rx", "ry", "rz", "tx", "ty", "tz"),
+        (3.0, -2.0, 4.0, 1.0, 2.0, 0.5),
+        strict=True,
     ):
         coordinate.name, coordinate.default_speed_value = name, speed
     model.add(joint.between(model.ground, whole))
@@ -64,7 +68,10 @@ def test_bodies_are_felt_as_they_are(tmp_path) -> None:
     ]
     reflexes = {
         "BodyPointReflex": [{"source": body, **along} for body in ("ball", "fin_l")],
-        "BodyOrientationReflex": [*turns, {"target": "motor", "source": "ball", "axis": (3, 0, 4), "KV": 0.1}],
+        "BodyOrientationReflex": [
+            *turns,
+            {"target": "motor", "source": "ball", "axis": (3, 0, 4), "KV": 0.1},
+        ],
     }
     told, model, states = followed(thrown(), reflexes, tmp_path)
     widest = 0.0
@@ -76,7 +83,10 @@ def test_bodies_are_felt_as_they_are(tmp_path) -> None:
             for what in ("Location", "Velocity"):
                 found = getattr(body, f"findStation{what}InGround")(state, opensim.Vec3(*OFFSET))
                 points.append(np.dot(direction, found.to_numpy()))
-            rotation, turn = body.getRotationInGround(state), body.getAngularVelocityInGround(state).to_numpy()
+            rotation, turn = (
+                body.getRotationInGround(state),
+                body.getAngularVelocityInGround(state).to_numpy(),
+            )
             y, z, x = rotation.convertThreeAxesRotationToThreeAngles(
                 opensim.BodyRotationSequence, *(opensim.CoordinateAxis(axis) for axis in (1, 2, 0))
             ).to_numpy()

@@ -19,14 +19,19 @@ def test_the_walk_is_opensim_s(tmp_path) -> None:
     opensim.Logger.setLevelString("error")
     model = opensim.Model(str(tmp_path / "human.osim"))
     state = model.initSystem()
-    names = [str(name) for name in (model.getStateVariableNames().get(k) for k in range(state.getNY()))]
+    names = [
+        str(name) for name in (model.getStateVariableNames().get(k) for k in range(state.getNY()))
+    ]
 
     def put(row: int) -> None:
         for name in names:
             model.setStateVariableValue(state, name, float(walked.states[name][row]))
 
     def off(row: int) -> float:
-        return max(abs(model.getStateVariableValue(state, name) - walked.states[name][row]) for name in names)
+        return max(
+            abs(model.getStateVariableValue(state, name) - walked.states[name][row])
+            for name in names
+        )
 
     brain = opensim.PrescribedController()
     model.addController(brain)

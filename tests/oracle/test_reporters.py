@@ -55,7 +55,9 @@ def add_probes(model: Model) -> None:
 
 
 @pytest.mark.parametrize("joints", JOINTS)
-def test_all_actuators_and_operations(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, joints: str) -> None:
+def test_all_actuators_and_operations(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, joints: str
+) -> None:
     """In a motion that is known, an extreme is that of the moment and of 0, and rates are 0."""
     monkeypatch.chdir(tmp_path)
     model = carrier(JOINTS[joints])
@@ -73,8 +75,8 @@ def test_real_models(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_along_a_forward_run(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Probes remember all steps, also those that have no row.
 
-    The length of a step follows from an error that is a difference of nearly equal numbers: rounding of 1e-16 in a
-    state is 1e-8 s in a time, on another processor.
+    The length of a step follows from an error that is a difference of nearly equal numbers:
+    rounding of 1e-16 in a state is 1e-8 s in a time, on another processor.
     """
     monkeypatch.chdir(tmp_path)
     model = osimlite.read(next(item.path for item in corpus if item.id == "m0001"))
@@ -92,7 +94,10 @@ def test_along_a_forward_run(corpus: Any, tmp_path: Path, monkeypatch: pytest.Mo
     names = sorted(path.name for path in (tmp_path / "theirs").iterdir())
     assert sorted(path.name for path in (tmp_path / "ours").iterdir()) == names
     for name in names:
-        heads = [(tmp_path / folder / name).read_text().partition("endheader\n")[0] for folder in ("ours", "theirs")]
+        heads = [
+            (tmp_path / folder / name).read_text().partition("endheader\n")[0]
+            for folder in ("ours", "theirs")
+        ]
         assert heads[0].partition("\nrange")[0] == heads[1].partition("\nrange")[0]
         mine, known = read_sto(tmp_path / "ours" / name), read_sto(tmp_path / "theirs" / name)
         assert mine.columns == known.columns and mine.times == pytest.approx(known.times, abs=1e-7)

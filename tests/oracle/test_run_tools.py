@@ -85,10 +85,14 @@ def both(
     times = np.linspace(0.0, 0.5, 26)
     infos = mechanism.coordinates
     rows = np.array(
-        [info.default_value + 0.15 * np.sin(5 * times + k) * (not info.locked) for k, info in enumerate(infos)]
+        [
+            info.default_value + 0.15 * np.sin(5 * times + k) * (not info.locked)
+            for k, info in enumerate(infos)
+        ]
     )
     if mechanism.constraints and tool != "InverseDynamicsTool":
-        # Where constraints are to be fulfilled, OpenSim moves coordinates by 1e-5 rad off the ends of their ranges.
+        # Where constraints are to be fulfilled, OpenSim moves coordinates by 1e-5 rad off the ends
+        # of their ranges.
         low, high = np.array([info.range for info in infos]).T[:, :, None]
         starts = np.clip(rows[:, :1], low + 0.2, high - 0.2)
         moved = np.clip(rows + starts - rows[:, :1], low + 0.1, high - 0.1)
@@ -102,26 +106,38 @@ def both(
     if change is not None:
         change(folder)
     for results in ("ours", "theirs"):
-        (folder / f"{results}.xml").write_text(SETUP.format(tool=tool, results=results, cutoff=cutoff, more=more))
+        (folder / f"{results}.xml").write_text(
+            SETUP.format(tool=tool, results=results, cutoff=cutoff, more=more)
+        )
     script = f"import opensim; opensim.Logger.setLevelString('Error'); assert opensim.{tool}('theirs.xml').run()"
-    subprocess.run([sys.executable, "-c", script], cwd=folder, check=True, capture_output=True, timeout=100)
+    subprocess.run(
+        [sys.executable, "-c", script], cwd=folder, check=True, capture_output=True, timeout=100
+    )
     osimlite.run(folder / "ours.xml")
     return folder / "ours", folder / "theirs"
 
 
 def compare(ours: Path, theirs: Path, tolerance: float, small: float = 1e-11) -> None:
     """All files are there, with the same words and numbers that differ by parts of the largest of their columns."""
-    assert sorted(path.name for path in ours.iterdir()) == sorted(path.name for path in theirs.iterdir())
+    assert sorted(path.name for path in ours.iterdir()) == sorted(
+        path.name for path in theirs.iterdir()
+    )
     for file in ours.iterdir():
-        one, two = (path.read_text().partition("endheader\n") for path in (file, theirs / file.name))
+        one, two = (
+            path.read_text().partition("endheader\n") for path in (file, theirs / file.name)
+        )
         assert (one[0], one[2].partition("\n")[0]) == (two[0], two[2].partition("\n")[0]), file.name
         mine, known = read_sto(file), read_sto(theirs / file.name)
         assert mine.times.tolist() == known.times.tolist()
         largest = np.abs(known.rows).max(axis=0)
-        assert (np.abs(mine.rows - known.rows).max(axis=0) <= tolerance * largest + small).all(), file.name
+        assert (np.abs(mine.rows - known.rows).max(axis=0) <= tolerance * largest + small).all(), (
+            file.name
+        )
 
 
-@pytest.mark.parametrize(("start", "cutoff", "equilibrium"), [(0.1, -1.0, "false"), (-0.05, 6.0, "true")])
+@pytest.mark.parametrize(
+    ("start", "cutoff", "equilibrium"), [(0.1, -1.0, "false"), (-0.05, 6.0, "true")]
+)
 @pytest.mark.parametrize("name", ["arm26", "jumper"])
 def test_analyses(
     corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, start: float, cutoff: float,
@@ -129,9 +145,13 @@ def test_analyses(
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     model = jumper() if name == "jumper" else osimlite.read(real(corpus, "m0001"))
-    body, frame = model.body_set.objects[-1].name, model.tree().path_of(model.joint_set.objects[-1].frames[0])
+    body, frame = (
+        model.body_set.objects[-1].name,
+        model.tree().path_of(model.joint_set.objects[-1].frames[0]),
+    )
     more = ANALYSES.format(start=start, equilibrium=equilibrium, body=body, frame=frame)
-    # Muscles in equilibrium hardly move their fibers: OpenSim's search for that leaves 1e-10 of a force.
+    # Muscles in equilibrium hardly move their fibers: OpenSim's search for that leaves 1e-10 of a
+    # force.
     compare(*both(tmp_path, model, "AnalyzeTool", more, cutoff), 1e-8, 1e-6)
 
 
@@ -141,9 +161,15 @@ def other_columns(folder: Path) -> None:
     first, second, *others = (
         info.path for info in osimlite.mechanism(osimlite.read(folder / "model.osim")).coordinates
     )
-    names = [f"{first}/value".removeprefix("/jointset/"), f"{second}/value", *(path.split("/")[-1] for path in others)]
+    names = [
+        f"{first}/value".removeprefix("/jointset/"),
+        f"{second}/value",
+        *(path.split("/")[-1] for path in others),
+    ]
     rows = table.rows[:, :-1].tolist()
-    write_sto(folder / "motion.mot", "motion", table.times, names[:-1], rows, in_degrees=table.in_degrees)
+    write_sto(
+        folder / "motion.mot", "motion", table.times, names[:-1], rows, in_degrees=table.in_degrees
+    )
 
 
 @pytest.mark.parametrize("held", ["free", "locked", "prescribed"])
@@ -155,8 +181,14 @@ def test_coordinates_that_a_motion_lacks_or_names_in_old_ways(
     first, *_, last = model.components(Coordinate)
     last.default_value, last.locked = 0.4, held == "locked"
     if held == "prescribed":
-        first.prescribed_function, first.prescribed = osimlite.LinearFunction(coefficients=(0.3, 0.2)), True
-    body, frame = model.body_set.objects[-1].name, model.tree().path_of(model.joint_set.objects[-1].frames[0])
+        first.prescribed_function, first.prescribed = (
+            osimlite.LinearFunction(coefficients=(0.3, 0.2)),
+            True,
+        )
+    body, frame = (
+        model.body_set.objects[-1].name,
+        model.tree().path_of(model.joint_set.objects[-1].frames[0]),
+    )
     more = ANALYSES.format(start=0.1, equilibrium="true", body=body, frame=frame)
     compare(*both(tmp_path, model, "AnalyzeTool", more, change=other_columns), 1e-8, 1e-6)
 
@@ -167,10 +199,16 @@ SPEEDS = """<initial_time>0.1</initial_time><final_time>0.2</final_time><output_
 
 
 @pytest.mark.parametrize(
-    ("label", "count", "in_degrees"), [("{}/speed", 2, False), ("{}_u", 2, True), ("{}_u", 1, False)]
+    ("label", "count", "in_degrees"),
+    [("{}/speed", 2, False), ("{}_u", 2, True), ("{}_u", 1, False)],
 )
 def test_speeds_of_a_file(
-    corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, label: str, count: int, in_degrees: bool
+    corpus: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    label: str,
+    count: int,
+    in_degrees: bool,
 ) -> None:
     """By new and old names, in rad/s whatever the file says; zero without a column."""
     monkeypatch.chdir(tmp_path)
@@ -179,18 +217,32 @@ def test_speeds_of_a_file(
     times = np.linspace(0.0, 0.5, 26)
     names = [label.format(info.path if "/" in label else info.name) for info in infos]
     rows = np.stack([np.cos(3.0 * times + k) for k in range(count)], axis=1)
-    write_sto(tmp_path / "speeds.sto", "speeds", times.tolist(), names, rows.tolist(), in_degrees=in_degrees)
+    write_sto(
+        tmp_path / "speeds.sto",
+        "speeds",
+        times.tolist(),
+        names,
+        rows.tolist(),
+        in_degrees=in_degrees,
+    )
     compare(*both(tmp_path, model, "AnalyzeTool", SPEEDS), 1e-8, 1e-8)
 
 
-def test_other_states_beside_speeds_count(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_states_beside_speeds_count(
+    corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Values do not, and a speed without a column is the default one."""
     monkeypatch.chdir(tmp_path)
     model = osimlite.read(real(corpus, "m0001"))
     first, second = model.components(Coordinate)
     first.default_speed_value = 0.5
     muscle = next(iter(model.components(Muscle))).name
-    labels = [f"{second.name}_u", first.name, f"{muscle}.activation", f"/forceset/{muscle}/fiber_length"]
+    labels = [
+        f"{second.name}_u",
+        first.name,
+        f"{muscle}.activation",
+        f"/forceset/{muscle}/fiber_length",
+    ]
     times = np.linspace(0.0, 0.5, 26)
     rows = np.array([0.1, 0.3, 0.4, 0.1]) + 0.05 * np.sin(7.0 * times[:, None] + np.arange(4))
     write_sto(tmp_path / "speeds.sto", "speeds", times.tolist(), labels, rows.tolist())
@@ -200,10 +252,14 @@ def test_other_states_beside_speeds_count(corpus: Any, tmp_path: Path, monkeypat
     assert read_sto(theirs / "it_S_states.sto")[f"/forceset/{muscle}/activation"].min() > 0.3
 
 
-def test_speeds_of_other_times_are_told(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_speeds_of_other_times_are_told(
+    corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """As OpenSim does."""
     monkeypatch.chdir(tmp_path)
-    write_sto(tmp_path / "speeds.sto", "speeds", [0.0, 0.11, 0.5], ["r_shoulder_elev_u"], [[1.0]] * 3)
+    write_sto(
+        tmp_path / "speeds.sto", "speeds", [0.0, 0.11, 0.5], ["r_shoulder_elev_u"], [[1.0]] * 3
+    )
     with pytest.raises(subprocess.CalledProcessError):
         both(tmp_path, osimlite.read(real(corpus, "m0001")), "AnalyzeTool", SPEEDS)
     with pytest.raises(osimlite.OsimliteError, match=r"no row at 0\.1 s"):
@@ -212,7 +268,9 @@ def test_speeds_of_other_times_are_told(corpus: Any, tmp_path: Path, monkeypatch
 
 
 @pytest.mark.parametrize("cutoff", [-1.0, 6.0, 30.0])
-def test_inverse_dynamics(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cutoff: float) -> None:
+def test_inverse_dynamics(
+    corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cutoff: float
+) -> None:
     monkeypatch.chdir(tmp_path)
     model = osimlite.read(real(corpus, "m0001"))
     more = "<forces_to_exclude>Muscles</forces_to_exclude>"
@@ -235,11 +293,14 @@ LOADS = """<forces_to_exclude>Muscles</forces_to_exclude>
         ("m0163", "ALL"),
     ],
 )
-def test_loads_at_joints(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, joints: str) -> None:
+def test_loads_at_joints(
+    corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, joints: str
+) -> None:
     monkeypatch.chdir(tmp_path)
     model = jumper() if name == "jumper" else osimlite.read(real(corpus, name))
     if any(isinstance(joint, ScapulothoracicJoint) for joint in model.joint_set.objects):
-        # At rest: OpenSim takes the rates of its angles for the speeds. What is locked does not move in these motions.
+        # At rest: OpenSim takes the rates of its angles for the speeds. What is locked does not
+        # move in these motions.
         for coordinate in model.components(Coordinate):
             coordinate.locked, coordinate.default_value = True, coordinate.default_value + 0.1
     ours, theirs = both(tmp_path, model, "InverseDynamicsTool", LOADS.format(joints=joints))
@@ -256,17 +317,30 @@ STARTED = ("arm_init.sto", "start/arm26_states.sto")
 CHANGES: dict[str, list[tuple[str, str]]] = {
     "longest step": [("size>       1.0", "size> 0.001")],
     "equilibrium": [("auxiliary_states> false", "auxiliary_states> true"), (" 0.02 ", " 0.1 ")],
-    "start beside the row": [("<initial_time>       0.0", "<initial_time> 0.013"), (" 0.02 ", " 0.1 ")],
+    "start beside the row": [
+        ("<initial_time>       0.0", "<initial_time> 0.013"),
+        (" 0.02 ", " 0.1 "),
+    ],
     "no states": [("arm_init.sto", ""), (" 0.02 ", " 0.1 ")],
-    "in the midst": [STARTED, ("<initial_time>       0.0", "<initial_time> 0.0052"), (" 0.02 ", " 0.1 ")],
+    "in the midst": [
+        STARTED,
+        ("<initial_time>       0.0", "<initial_time> 0.0052"),
+        (" 0.02 ", " 0.1 "),
+    ],
     "no controls": [],
     "analyses": [("<objects/>", f"<objects>{MORE}</objects>")],
-    "known states": [STARTED, ("ForwardTool", "AnalyzeTool"), ("<objects/>", f"<objects>{MORE}</objects>")],
+    "known states": [
+        STARTED,
+        ("ForwardTool", "AnalyzeTool"),
+        ("<objects/>", f"<objects>{MORE}</objects>"),
+    ],
 }
 
 
 @pytest.mark.parametrize("changes", CHANGES.values(), ids=CHANGES)
-def test_forward_with_opensims_steps(shared: Path, tmp_path: Path, changes: list[tuple[str, str]]) -> None:
+def test_forward_with_opensims_steps(
+    shared: Path, tmp_path: Path, changes: list[tuple[str, str]]
+) -> None:
     """As many steps, at the same times: rounding grows in steps of muscles out of equilibrium."""
     case = shared / "oracle" / "tools" / "reference" / "forward_arm26"
     (tmp_path / "start").mkdir()
@@ -284,15 +358,24 @@ def test_forward_with_opensims_steps(shared: Path, tmp_path: Path, changes: list
         (tmp_path / f"{results}.xml").write_text(text.replace(" Results ", results))
     tool = "AnalyzeTool" if "AnalyzeTool" in text else "ForwardTool"
     script = f"import opensim; opensim.Logger.setLevelString('Error'); assert opensim.{tool}('theirs.xml').run()"
-    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True, timeout=100)
+    subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True, timeout=100
+    )
     osimlite.run(tmp_path / "ours.xml")
     ours, theirs = tmp_path / "ours", tmp_path / "theirs"
-    assert sorted(path.name for path in ours.iterdir()) == sorted(path.name for path in theirs.iterdir())
+    assert sorted(path.name for path in ours.iterdir()) == sorted(
+        path.name for path in theirs.iterdir()
+    )
     for file in ours.iterdir():
-        heads = [(folder / file.name).read_text().partition("endheader\n")[0] for folder in (ours, theirs)]
+        heads = [
+            (folder / file.name).read_text().partition("endheader\n")[0]
+            for folder in (ours, theirs)
+        ]
         assert heads[0] == heads[1]
         mine, known = read_sto(file), read_sto(theirs / file.name)
         assert mine.columns == known.columns and mine.times == pytest.approx(known.times, abs=1e-6)
         largest = np.abs(known.rows).max(axis=0)
-        assert (np.abs(mine.rows - known.rows).max(axis=0) <= 2e-5 * largest + 1e-9).all(), file.name
+        assert (np.abs(mine.rows - known.rows).max(axis=0) <= 2e-5 * largest + 1e-9).all(), (
+            file.name
+        )
         assert (np.abs(mine.rows[0] - known.rows[0]) <= 1e-9 * largest + 1e-9).all(), file.name

@@ -22,7 +22,9 @@ opensim = pytest.importorskip("opensim")
 COMMENT_LINE = re.compile(r"[ \t]*<!--.*?-->\n", re.DOTALL)
 
 KNOWN = [(tag, class_for(tag) or Object) for tag in tags()]
-COMPONENTS = [tag for tag, cls in KNOWN if tag != "Model" and issubclass(cls, Component) and not cls.since]
+COMPONENTS = [
+    tag for tag, cls in KNOWN if tag != "Model" and issubclass(cls, Component) and not cls.since
+]
 OTHERS = [tag for tag, cls in KNOWN if not issubclass(cls, Component) and not cls.since]
 
 
@@ -34,7 +36,12 @@ def filled(cls: type[Object]) -> Object:
         if isinstance(kind, Reference):
             values[spec.name] = ("one", "two") if kind.shape == "list" else "one"
         elif isinstance(kind, Value):
-            scalars = {"double": 1 / (number + 3), "int": number + 2, "bool": True, "string": f"word{number}"}
+            scalars = {
+                "double": 1 / (number + 3),
+                "int": number + 2,
+                "bool": True,
+                "string": f"word{number}",
+            }
             word: Any = kind.choices[-1] if kind.choices else scalars[kind.scalar]
             if kind.legacy and kind.shape == "list" and kind.scalar == "double":
                 word = float(f"{word:g}")  # OpenSim prints six digits of these

@@ -50,13 +50,26 @@ def opensim_run(path: Path, to, accuracy, folder: Path, start=None):
 def tumbling():
     """A free body with three balls in one force, limits on what it carries, over a tilted floor."""
     model = Model(name="tumbling")
-    body = model.add(Body(name="dice", mass=2.0, mass_center=(0.02, 0.01, 0.0), inertia=(0.02, 0.03, 0.025, 0, 0, 0)))
+    body = model.add(
+        Body(
+            name="dice",
+            mass=2.0,
+            mass_center=(0.02, 0.01, 0.0),
+            inertia=(0.02, 0.03, 0.025, 0, 0, 0),
+        )
+    )
     free = osimlite.FreeJoint(name="free")
-    for name, coordinate in zip(("rx", "ry", "rz", "tx", "ty", "tz"), free.coordinates, strict=True):
+    for name, coordinate in zip(
+        ("rx", "ry", "rz", "tx", "ty", "tz"), free.coordinates, strict=True
+    ):
         coordinate.name = name
     free.coordinates[4].default_value = 0.25
     model.add(free.between(model.ground, body))
-    tail = model.add(Body(name="tail", mass=0.5, mass_center=(0.1, 0.0, 0.0), inertia=(0.01, 0.01, 0.01, 0, 0, 0)))
+    tail = model.add(
+        Body(
+            name="tail", mass=0.5, mass_center=(0.1, 0.0, 0.0), inertia=(0.01, 0.01, 0.01, 0, 0, 0)
+        )
+    )
     hinge = osimlite.UniversalJoint(name="hinge")
     for name, coordinate in zip(("bend", "swing"), hinge.coordinates, strict=True):
         coordinate.name = name
@@ -68,7 +81,11 @@ def tumbling():
     ]
     model.add(floor, *balls)
     material = HuntCrossleyForce.ContactParameters(
-        geometry=(*balls, floor), stiffness=2e5, dissipation=0.3, static_friction=0.8, dynamic_friction=0.4
+        geometry=(*balls, floor),
+        stiffness=2e5,
+        dissipation=0.3,
+        static_friction=0.8,
+        dynamic_friction=0.4,
     )
     contact = HuntCrossleyForce(name="contact", transition_velocity=0.1)
     contact.contact_parameters.objects.append(material)
@@ -76,16 +93,29 @@ def tumbling():
     for name in ("bend", "swing"):
         model.add(
             CoordinateLimitForce(
-                name=f"{name}_limit", coordinate=name, upper_limit=20.0, lower_limit=-20.0, transition=5.0, damping=0.01
+                name=f"{name}_limit",
+                coordinate=name,
+                upper_limit=20.0,
+                lower_limit=-20.0,
+                transition=5.0,
+                damping=0.01,
             )
         )
     return model
 
 
-START = {"rx": (0.2, 1.0), "rz": (0.3, -2.0), "tx": (0.0, 0.4), "ty": (0.3, -0.5), "swing": (0.1, 3.0)}
+START = {
+    "rx": (0.2, 1.0),
+    "rz": (0.3, -2.0),
+    "tx": (0.0, 0.4),
+    "ty": (0.3, -0.5),
+    "swing": (0.1, 3.0),
+}
 
 
-@pytest.mark.parametrize(("make", "start", "to"), [(dynamic_walker, {}, 1.0), (tumbling, START, 0.6)])
+@pytest.mark.parametrize(
+    ("make", "start", "to"), [(dynamic_walker, {}, 1.0), (tumbling, START, 0.6)]
+)
 @pytest.mark.parametrize("route", ["mass-matrix", "articulated-body"])
 def test_motion_forces_and_labels(make, start, to, route, tmp_path):
     model = make()
@@ -136,4 +166,7 @@ def test_same_steps_at_every_accuracy(tmp_path):
         folder.mkdir()
         states, _ = opensim_run(tmp_path / "model.osim", 1.0, accuracy, folder)
         # One row is the start.
-        assert osimlite.simulate(model, 1.0, accuracy=accuracy).summary["steps"] == len(states.times) - 1
+        assert (
+            osimlite.simulate(model, 1.0, accuracy=accuracy).summary["steps"]
+            == len(states.times) - 1
+        )

@@ -23,10 +23,14 @@ def model(request):
 @pytest.mark.parametrize("dissipation", [0.0, 0.4])
 @pytest.mark.parametrize("carried", ["/ground", "/bodyset/b0/f0"])
 def test_smooth_contact(model, dissipation, carried, tmp_path):
-    plane = ContactHalfSpace(name="plane", socket_frame=carried, location=(0, -0.1, 0.2), orientation=(0.1, 0.2, -1.4))
+    plane = ContactHalfSpace(
+        name="plane", socket_frame=carried, location=(0, -0.1, 0.2), orientation=(0.1, 0.2, -1.4)
+    )
     model.add(plane)
     for number, frame in enumerate(("/bodyset/b1/f1", "/bodyset/b2", "/bodyset/b2/f2")):
-        ball = ContactSphere(name=f"ball{number}", socket_frame=frame, location=(0.1, 0.0, -0.1), radius=0.3)
+        ball = ContactSphere(
+            name=f"ball{number}", socket_frame=frame, location=(0.1, 0.0, -0.1), radius=0.3
+        )
         model.add(ball)
         model.add(
             SmoothSphereHalfSpaceForce(
@@ -48,7 +52,9 @@ def test_smooth_contact(model, dissipation, carried, tmp_path):
 
 @pytest.mark.parametrize("carried", ["/ground", "/bodyset/b0/f0"])
 def test_ellipsoids_on_a_plane(model, carried, tmp_path):
-    plane = ContactHalfSpace(name="plane", socket_frame=carried, location=(0, -0.6, 0), orientation=(0.1, 0.2, -1.4))
+    plane = ContactHalfSpace(
+        name="plane", socket_frame=carried, location=(0, -0.6, 0), orientation=(0.1, 0.2, -1.4)
+    )
     model.add(plane)
     for number, (frame, hardness) in enumerate(
         (("/bodyset/b1/f1", 1e4), ("/bodyset/b2", 1e5), ("/bodyset/b2/f2", 1e3))
@@ -80,7 +86,9 @@ def test_ellipsoids_on_a_plane(model, carried, tmp_path):
 
 def test_stations_on_the_floor(model, tmp_path):
     for number, frame in enumerate(("/bodyset/b0", "/bodyset/b1/f1", "/bodyset/b2", "/ground")):
-        station = Station(name=f"s{number}", socket_parent_frame=frame, location=(0.1, -0.2 * number, 0.3))
+        station = Station(
+            name=f"s{number}", socket_parent_frame=frame, location=(0.1, -0.2 * number, 0.3)
+        )
         model.subcomponents.append(station)
         model.add(
             MeyerFregly2016Force(

@@ -28,7 +28,9 @@ def test_through_points(degree, count):
     places = np.array([*beyond, *x[:3], *x[-3:], *rng.uniform(x[0], x[-1], 30)])
     for order in range(3):
         expected = np.array([_derivative(theirs, place, order) for place in places.tolist()])
-        result = np.array([ours.evaluate(np.array((place,)))[order] for place in places], dtype=object)
+        result = np.array(
+            [ours.evaluate(np.array((place,)))[order] for place in places], dtype=object
+        )
         result = np.array([np.ravel(item)[0] for item in result])
         assert result == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(expected).max())
 

@@ -38,7 +38,11 @@ def model(request):
 
 def test_spring_on_a_coordinate(model, tmp_path):
     for name, k in (("q0_0", 30.0), ("q1_0", 20.0), ("q2_0", 10.0)):
-        model.add(SpringGeneralizedForce(name=f"on_{name}", coordinate=name, stiffness=k, rest_length=0.2, viscosity=3))
+        model.add(
+            SpringGeneralizedForce(
+                name=f"on_{name}", coordinate=name, stiffness=k, rest_length=0.2, viscosity=3
+            )
+        )
     # OpenSim counts no energy for this spring.
     compare(model, tmp_path, counted=0)
 
@@ -47,10 +51,20 @@ def test_spring_between_points(model, tmp_path):
     b0, b2 = (body for body in model.components(Body) if body.name in ("b0", "b2"))
     model.add(
         PointToPointSpring(
-            name="far", socket_body1=model.ground, socket_body2=b2, point1=(1, 2, 3), stiffness=40.0, rest_length=0.5
+            name="far",
+            socket_body1=model.ground,
+            socket_body2=b2,
+            point1=(1, 2, 3),
+            stiffness=40.0,
+            rest_length=0.5,
         ),
         PointToPointSpring(
-            name="near", socket_body1=b0, socket_body2=b2, point1=(0.1, 0.2, 0.3), point2=(0, -0.3, 0), stiffness=90.0
+            name="near",
+            socket_body1=b0,
+            socket_body2=b2,
+            point1=(0.1, 0.2, 0.3),
+            point2=(0, -0.3, 0),
+            stiffness=90.0,
         ),
     )
     compare(model, tmp_path)
@@ -84,7 +98,11 @@ def test_spring_between_points_of_frames(model, tmp_path):
 def test_formula_on_a_coordinate(expression, tmp_path):
     model = carrier(JOINTS["pin, slider, universal"])
     for name in ("q0_0", "q1_0", "q2_1"):
-        model.add(ExpressionBasedCoordinateForce(name=f"on_{name}", coordinate=name, expression=expression))
+        model.add(
+            ExpressionBasedCoordinateForce(
+                name=f"on_{name}", coordinate=name, expression=expression
+            )
+        )
     compare(model, tmp_path)
 
 
@@ -109,11 +127,17 @@ def test_forces_across_a_locked_coordinate(tmp_path):
     locked.default_value, locked.locked = 0.4, True
     model.add(
         SpringGeneralizedForce(name="held", coordinate="q1_0", stiffness=3.0, viscosity=2.0),
-        ExpressionBasedCoordinateForce(name="formula", coordinate="q1_0", expression="3*q + qdot/q"),
+        ExpressionBasedCoordinateForce(
+            name="formula", coordinate="q1_0", expression="3*q + qdot/q"
+        ),
         # OpenSim takes the defaults of a document for those of all that it reads later.
         CoordinateActuator(name="motor", coordinate="q1_0", optimal_force=1.0),
         PointToPointSpring(
-            name="within", socket_body1="/bodyset/b0", socket_body2="/bodyset/b1", point1=(1, 0, 0), stiffness=5.0
+            name="within",
+            socket_body1="/bodyset/b0",
+            socket_body2="/bodyset/b1",
+            point1=(1, 0, 0),
+            stiffness=5.0,
         ),
         *between(BushingForce, rotational_stiffness=(1.0, 2.0, 3.0), **DAMPING),
         *along(PathSpring, resting_length=0.1, stiffness=40.0, dissipation=0.3),
@@ -124,9 +148,13 @@ def test_forces_across_a_locked_coordinate(tmp_path):
 
 @pytest.mark.parametrize("damping", [DAMPING, {}], ids=["damped", "not damped"])
 def test_bushing(model, damping, tmp_path):
-    stiffness = {"rotational_stiffness": (5.0, 7.0, 9.0), "translational_stiffness": (50.0, 30.0, 20.0)}
+    stiffness = {
+        "rotational_stiffness": (5.0, 7.0, 9.0),
+        "translational_stiffness": (50.0, 30.0, 20.0),
+    }
     model.add(*between(BushingForce, **stiffness, **damping))
-    # Both OpenSim's component and Simbody's force behind it report the energy, and OpenSim adds them up.
+    # Both OpenSim's component and Simbody's force behind it report the energy, and OpenSim adds
+    # them up.
     compare(model, tmp_path, counted=2)
 
 
@@ -147,7 +175,9 @@ def test_bushing_by_functions(model, tmp_path):
     functions = {
         "m_x_theta_x_function": LinearFunction(coefficients=(4.0, 0.5)),
         "m_y_theta_y_function": PolynomialFunction(coefficients=(1.0, 0.0, 3.0, 0.0)),
-        "f_x_delta_x_function": SimmSpline(x=(-1.0, -0.3, 0.1, 0.4, 1.0), y=(-30.0, -3.0, 0.0, 6.0, 50.0)),
+        "f_x_delta_x_function": SimmSpline(
+            x=(-1.0, -0.3, 0.1, 0.4, 1.0), y=(-30.0, -3.0, 0.0, 6.0, 50.0)
+        ),
     }
     model.add(*between(FunctionBasedBushingForce, **functions, **DAMPING))
     # OpenSim counts no energy for this bushing.
@@ -165,7 +195,14 @@ def test_springs_along_paths(model, rest, tmp_path):
 @pytest.mark.parametrize("rest", [0.1, 2.0, 20.0])
 def test_formulas_along_paths(model, rest, clamped, tmp_path):
     expression = "3*s + s^2 + 0.1*ldot*(1+s)"
-    model.add(*along(ExpressionBasedPathForce, resting_length=rest, expression=expression, clamp_stretch=clamped))
+    model.add(
+        *along(
+            ExpressionBasedPathForce,
+            resting_length=rest,
+            expression=expression,
+            clamp_stretch=clamped,
+        )
+    )
     compare(model, tmp_path)
 
 

@@ -27,8 +27,12 @@ KEPT = ("max_isometric_force", "optimal_fiber_length", "tendon_slack_length", "p
 def arm(shared: Path, tmp_path: Path) -> Path:
     """An arm with six muscles, whose controls are bounded; OpenSim's own test."""
     place = shared / "oracle" / "tools" / "reference" / "so_arm26_bounds"
-    (tmp_path / "arm26_bounds.osim").write_bytes(gzip.decompress((place / "arm26_bounds.osim.gz").read_bytes()))
-    (tmp_path / "arm26_InverseKinematics.mot").write_bytes((place / "arm26_InverseKinematics.mot").read_bytes())
+    (tmp_path / "arm26_bounds.osim").write_bytes(
+        gzip.decompress((place / "arm26_bounds.osim.gz").read_bytes())
+    )
+    (tmp_path / "arm26_InverseKinematics.mot").write_bytes(
+        (place / "arm26_InverseKinematics.mot").read_bytes()
+    )
     text = (place / "arm26_bounds_Setup_StaticOptimization.xml").read_text()
     for results in ("ours", "theirs"):
         own = re.sub("<results_directory>[^<]*<", f"<results_directory>{results}<", text)
@@ -44,7 +48,11 @@ def with_muscles(file: Path, kind: str) -> None:
             other = getattr(osimlite, kind)(name=muscle.name)
             for name in KEPT:
                 setattr(
-                    other, name, getattr(muscle, name).copy_deep() if name == "geometry_path" else getattr(muscle, name)
+                    other,
+                    name,
+                    getattr(muscle, name).copy_deep()
+                    if name == "geometry_path"
+                    else getattr(muscle, name),
                 )
             model.force_set.objects[place] = other
     osimlite.write(model, file)
@@ -55,7 +63,10 @@ def moved(model: osimlite.Model, file: Path, forces: osimlite.simulation.StoTabl
     motion = osimlite.kinematics(model, file.parent / "arm26_InverseKinematics.mot", lowpass=6.0)
     theirs = opensim.Model(str(file))
     state = theirs.initSystem()
-    actuators = [opensim.ScalarActuator.safeDownCast(theirs.getForceSet().get(name)) for name in forces.columns]
+    actuators = [
+        opensim.ScalarActuator.safeDownCast(theirs.getForceSet().get(name))
+        for name in forces.columns
+    ]
     for actuator in actuators:
         actuator.overrideActuation(state, True)
     names = motion.mechanism.coordinate_names
@@ -69,7 +80,9 @@ def moved(model: osimlite.Model, file: Path, forces: osimlite.simulation.StoTabl
         for actuator, force in zip(actuators, row, strict=True):
             actuator.setOverrideActuation(state, float(force))
         theirs.realizeAcceleration(state)
-        result.append([theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names])
+        result.append(
+            [theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names]
+        )
     return np.array(result)
 
 
@@ -82,7 +95,9 @@ def test_an_arm_with_muscles_of_other_classes(
     with_muscles(arm / "arm26_bounds.osim", kind)
     for results in ("ours", "theirs"):
         text = (arm / f"{results}.xml").read_text()
-        (arm / f"{results}.xml").write_text(re.sub("(<activation_exponent>)[^<]*<", rf"\g<1>{exponent}<", text))
+        (arm / f"{results}.xml").write_text(
+            re.sub("(<activation_exponent>)[^<]*<", rf"\g<1>{exponent}<", text)
+        )
     done = osimlite.run(arm / "ours.xml", check=False)
     script = "import opensim; opensim.Logger.setLevelString('Error'); assert opensim.AnalyzeTool('theirs.xml').run()"
     subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=100)
@@ -94,11 +109,16 @@ def test_an_arm_with_muscles_of_other_classes(
     solved = ~np.isnan(ours.rows).any(axis=1)
     assert solved.any() and done.done == solved.all()
     x, other = ours.rows[solved], theirs.rows[solved]
-    assert (np.sum(abs(x) ** exponent, axis=1) <= (1.0 + 1e-7) * np.sum(abs(other) ** exponent, axis=1) + 1e-9).all()
+    assert (
+        np.sum(abs(x) ** exponent, axis=1)
+        <= (1.0 + 1e-7) * np.sum(abs(other) ** exponent, axis=1) + 1e-9
+    ).all()
     mine = our_forces.rows[solved][:, [our_forces.columns.index(name) for name in ours.columns]]
     yours = their_forces.rows[solved][:, [our_forces.columns.index(name) for name in ours.columns]]
     pulls = abs(x) > 1e-6
-    assert (mine[pulls] / x[pulls] * other[pulls]) == pytest.approx(yours[pulls], rel=1e-9, abs=1e-8)
+    assert (mine[pulls] / x[pulls] * other[pulls]) == pytest.approx(
+        yours[pulls], rel=1e-9, abs=1e-8
+    )
 
 
 def test_the_forces_give_the_accelerations_of_the_motion(arm: Path) -> None:
@@ -125,7 +145,9 @@ def test_actuators_in_the_place_of_muscles(arm: Path, monkeypatch: pytest.Monkey
     own = osimlite.ForceSet(name="own")
     sizes = ("a", "r_shoulder_elev", 10.0), ("b", "r_elbow_flex", 5.0), ("c", "r_elbow_flex", 2.0)
     for name, coordinate, force in sizes:
-        own.objects.append(osimlite.CoordinateActuator(name=name, coordinate=coordinate, optimal_force=force))
+        own.objects.append(
+            osimlite.CoordinateActuator(name=name, coordinate=coordinate, optimal_force=force)
+        )
     osimlite.write(own, arm / "own.xml")
     for results in ("ours", "theirs"):
         text = (arm / f"{results}.xml").read_text()
@@ -135,7 +157,9 @@ def test_actuators_in_the_place_of_muscles(arm: Path, monkeypatch: pytest.Monkey
     osimlite.run(arm / "ours.xml", check=False)
     script = "import opensim; opensim.Logger.setLevelString('Error'); assert opensim.AnalyzeTool('theirs.xml').run()"
     subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=100)
-    ours, theirs = (read_sto(next((arm / folder).glob("*_activation.sto"))) for folder in ("ours", "theirs"))
+    ours, theirs = (
+        read_sto(next((arm / folder).glob("*_activation.sto"))) for folder in ("ours", "theirs")
+    )
     assert ours.columns == theirs.columns == ("a", "b", "c")
     assert ours["b"] / ours["c"] == pytest.approx(np.full(len(ours.times), 2.5), rel=1e-9)
     assert ours.rows == pytest.approx(theirs.rows, abs=1e-2 * abs(theirs.rows).max())
@@ -156,6 +180,8 @@ def test_an_elbow_that_follows_the_shoulder(arm: Path, monkeypatch: pytest.Monke
     assert osimlite.run(arm / "ours.xml", check=False).done
     script = "import opensim; opensim.Logger.setLevelString('Error'); assert opensim.AnalyzeTool('theirs.xml').run()"
     subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=100)
-    ours, theirs = (read_sto(next((arm / folder).glob("*_activation.sto"))) for folder in ("ours", "theirs"))
+    ours, theirs = (
+        read_sto(next((arm / folder).glob("*_activation.sto"))) for folder in ("ours", "theirs")
+    )
     assert (np.sum(ours.rows**2, axis=1) <= np.sum(theirs.rows**2, axis=1)).all()
     assert ours.rows == pytest.approx(theirs.rows, abs=5e-3)

@@ -11,7 +11,12 @@ from osimlite.simulation import read_sto, write_sto
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
-KINDS = {"double": ("", 1), "Vec3": ("Vec3", 3), "Quaternion": ("Quaternion", 4), "SpatialVec": ("SpatialVec", 6)}
+KINDS = {
+    "double": ("", 1),
+    "Vec3": ("Vec3", 3),
+    "Quaternion": ("Quaternion", 4),
+    "SpatialVec": ("SpatialVec", 6),
+}
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
@@ -63,6 +68,12 @@ def test_opensim_reads_our_markers(tmp_path):
     table = opensim.TimeSeriesTableVec3(str(tmp_path / "markers.trc"))
     assert tuple(table.getColumnLabels()) == ("knee.med", "heel")
     assert list(table.getIndependentColumn()) == times
-    result = [[table.getRowAtIndex(row)[k][axis] for k in range(2) for axis in range(3)] for row in range(3)]
+    result = [
+        [table.getRowAtIndex(row)[k][axis] for k in range(2) for axis in range(3)]
+        for row in range(3)
+    ]
     assert np.array_equal(result, rows, equal_nan=True)
-    assert table.getTableMetaDataAsString("DataRate") == "100" and table.getTableMetaDataAsString("Units") == "m"
+    assert (
+        table.getTableMetaDataAsString("DataRate") == "100"
+        and table.getTableMetaDataAsString("Units") == "m"
+    )

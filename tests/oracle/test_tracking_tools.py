@@ -47,7 +47,9 @@ def walk(shared: Path, tmp_path: Path) -> Path:
     source = shared / "oracle" / "tools" / "reference"
     model = gzip.decompress((source / "models" / "gait10_subject01.osim.gz").read_bytes())
     (tmp_path / "model.osim").write_bytes(model)
-    (tmp_path / "walk.mot").write_bytes((source / "ik_gait10" / "subject01_walk_IK.mot").read_bytes())
+    (tmp_path / "walk.mot").write_bytes(
+        (source / "ik_gait10" / "subject01_walk_IK.mot").read_bytes()
+    )
     loads = source / "id_gait10"
     grf = gzip.decompress((loads / "subject01_walk_grf.mot.gz").read_bytes())
     (tmp_path / "subject01_walk_grf.mot").write_bytes(grf)
@@ -57,20 +59,30 @@ def walk(shared: Path, tmp_path: Path) -> Path:
     return tmp_path
 
 
-def tracked(folder: Path, tool: str, more: str, limits: str = "") -> tuple[dict[str, StoTable], dict[str, StoTable]]:
+def tracked(
+    folder: Path, tool: str, more: str, limits: str = ""
+) -> tuple[dict[str, StoTable], dict[str, StoTable]]:
     """The tables of both."""
     weights = {"pelvis_tilt": 700, "pelvis_tx": 500}
-    tasks = (TASK.format(name=name, weight=weights.get(name, 250), more=limits) for name in COORDINATES)
+    tasks = (
+        TASK.format(name=name, weight=weights.get(name, 250), more=limits) for name in COORDINATES
+    )
     text = f"<OpenSimDocument Version='40600'><CMC_TaskSet><objects>{''.join(tasks)}</objects></CMC_TaskSet>"
     (folder / "tasks.xml").write_text(f"{text}</OpenSimDocument>")
     for results in ("ours", "theirs"):
         (folder / f"{results}.xml").write_text(SETUP.format(tool=tool, results=results, more=more))
     script = f"import opensim; opensim.Logger.setLevelString('Off'); assert opensim.{tool}('theirs.xml').run()"
-    subprocess.run([sys.executable, "-c", script], cwd=folder, check=True, capture_output=True, timeout=100)
+    subprocess.run(
+        [sys.executable, "-c", script], cwd=folder, check=True, capture_output=True, timeout=100
+    )
     outcome = osimlite.run(folder / "ours.xml")
     assert outcome.done, outcome.told
     # OpenSim's table of states has two headers.
-    names = [path.name for path in (folder / "theirs").glob("*.sto") if not path.name.endswith("_states.sto")]
+    names = [
+        path.name
+        for path in (folder / "theirs").glob("*.sto")
+        if not path.name.endswith("_states.sto")
+    ]
     assert len(names) == 8 and {*names} <= {*outcome.tables}
     theirs = {name: read_sto(folder / "theirs" / name) for name in names}
     for name, table in theirs.items():
@@ -82,7 +94,9 @@ def apart(mine: StoTable, known: StoTable) -> float:
     """The largest difference of two tables, as part of the largest number of its column."""
     assert mine.times == pytest.approx(known.times, abs=1e-9)
     largest = np.abs(known.rows).max(axis=0)
-    return float((np.abs(mine.rows - known.rows).max(axis=0) / np.where(largest > 1e-9, largest, 1.0)).max())
+    return float(
+        (np.abs(mine.rows - known.rows).max(axis=0) / np.where(largest > 1e-9, largest, 1.0)).max()
+    )
 
 
 def test_residual_reduction(walk: Path) -> None:
@@ -101,11 +115,18 @@ def test_residual_reduction(walk: Path) -> None:
     assert words[0] == words[1]
     changed, known = osimlite.read(walk / "adjusted.osim"), osimlite.read(walk / "model.osim")
     moved = [
-        np.array(next(body for body in model.components(osimlite.Body) if body.name == "torso").mass_center)
+        np.array(
+            next(
+                body for body in model.components(osimlite.Body) if body.name == "torso"
+            ).mass_center
+        )
         for model in (changed, known)
     ]
     # Muscles are still there; OpenSim's run of the same name wrote the same model before.
-    assert 0.0 < np.abs(moved[0] - moved[1]).max() <= 0.1 and len([*changed.components(osimlite.Force)]) > 10
+    assert (
+        0.0 < np.abs(moved[0] - moved[1]).max() <= 0.1
+        and len([*changed.components(osimlite.Force)]) > 10
+    )
 
 
 def test_the_model_is_that_of_opensim(walk: Path) -> None:
@@ -135,7 +156,10 @@ def test_computed_muscle_control(walk: Path, fast: bool) -> None:
     # Steps depend on the last digits of forces; windows end at the same times.
     ends = 0.63 + 0.005 * np.arange(3)
     motions, controls = (
-        [[table.rows[np.abs(table.times - t).argmin()] for t in ends] for table in (ours[name], theirs[name])]
+        [
+            [table.rows[np.abs(table.times - t).argmin()] for t in ends]
+            for table in (ours[name], theirs[name])
+        ]
         for name in ("it_Kinematics_q.sto", "it_controls.sto")
     )
     assert ours["it_Kinematics_q.sto"].times[0] == pytest.approx(0.63, abs=1e-12)

@@ -23,7 +23,9 @@ REFUSED = {
 """Documents that OpenSim cannot read or connect, and how it says so."""
 
 
-@pytest.mark.parametrize("example", sorted((ROOT / "fixtures" / "versions").glob("*.osim")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "example", sorted((ROOT / "fixtures" / "versions").glob("*.osim")), ids=lambda path: path.stem
+)
 def test_opensim_upgrades_alike(example: Path, tmp_path: Path) -> None:
     opensim.Logger.setLevelString("off")
     target = tmp_path / "converted.osim"
@@ -40,16 +42,22 @@ def test_opensim_upgrades_alike(example: Path, tmp_path: Path) -> None:
         return
     convert()
     ours, theirs = read(example), read_text(target.read_bytes())
-    assert [component.path for component in ours.components()] == [component.path for component in theirs.components()]
+    assert [component.path for component in ours.components()] == [
+        component.path for component in theirs.components()
+    ]
     assert differences(ours, theirs) == []
 
 
 @pytest.mark.parametrize(
-    "example", sorted((ROOT / "fixtures" / "versions" / "upgraded").glob("*.osim")), ids=lambda path: path.stem
+    "example",
+    sorted((ROOT / "fixtures" / "versions" / "upgraded").glob("*.osim")),
+    ids=lambda path: path.stem,
 )
 def test_opensim_reads_what_we_upgraded(example: Path) -> None:
     opensim.Logger.setLevelString("off")
     model = opensim.Model(str(example))
     model.initSystem()
     ours = [component.path for component in read(example).components()]
-    assert [component.getAbsolutePathString() for component in model.getComponentsList()] == ours[1:]
+    assert [component.getAbsolutePathString() for component in model.getComponentsList()] == ours[
+        1:
+    ]

@@ -32,5 +32,11 @@ def test_states_and_motions_are_opensims(corpus, name):
     theirs.initSystem()
     names = theirs.getStateVariableNames()
     assert set(variables(tree, "state variable")) == {names.get(k) for k in range(names.getSize())}
-    motions = {name: motion for joint in tree.of_class("Joint").values() for name, motion in motions_of(joint).items()}
-    assert motions == {item.getName(): MOTIONS[item.getMotionType()] for item in theirs.getCoordinateSet()}
+    motions = {
+        name: motion
+        for joint in tree.of_class("Joint").values()
+        for name, motion in motions_of(joint).items()
+    }
+    assert motions == {
+        item.getName(): MOTIONS[item.getMotionType()] for item in theirs.getCoordinateSet()
+    }

@@ -28,7 +28,9 @@ def printed_whole(source: Path, target: Path) -> bytes:
 
 
 @pytest.mark.parametrize("numbers", ["shortest", "opensim"])
-def test_opensim_reads_the_same_model_from_our_file(fixtures: Path, tmp_path: Path, numbers: Numbers) -> None:
+def test_opensim_reads_the_same_model_from_our_file(
+    fixtures: Path, tmp_path: Path, numbers: Numbers
+) -> None:
     osimlite.write(dynamic_walker(), tmp_path / "ours.osim", numbers=numbers)
     ours = printed_whole(tmp_path / "ours.osim", tmp_path / "ours-printed.osim")
     reference = fixtures / "walker" / "DynamicWalkerModel.osim"
@@ -38,4 +40,6 @@ def test_opensim_reads_the_same_model_from_our_file(fixtures: Path, tmp_path: Pa
 def test_opensim_reads_the_same_model_after_our_round_trip(fixtures: Path, tmp_path: Path) -> None:
     reference = fixtures / "walker" / "DynamicWalkerModel.osim"
     osimlite.write(osimlite.read(reference), tmp_path / "again.osim")
-    assert printed_whole(tmp_path / "again.osim", tmp_path / "a") == printed_whole(reference, tmp_path / "b")
+    assert printed_whole(tmp_path / "again.osim", tmp_path / "a") == printed_whole(
+        reference, tmp_path / "b"
+    )

@@ -1,8 +1,8 @@
 """OpenSim 4.6 itself walks with the walkers that are shipped.
 
-Foot strikes are counted from OpenSim's own contact forces: a step is the other foot touching down at least 5 cm ahead
-along the slope after at least 0.05 s in the air, any other touch-down is a scuff, and a hip or a knee on the slope ends
-the walk.
+Foot strikes are counted from OpenSim's own contact forces: a step is the other foot touching down
+at least 5 cm ahead along the slope after at least 0.05 s in the air, any other touch-down is a
+scuff, and a hip or a knee on the slope ends the walk.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ ACCURACY = {"steady-walker": 1e-8, "human-walker": 1e-6, "furthest-walker": 1e-8
 def walks(fixtures):
     """By name, OpenSim's walk and ours, from the same file."""
     orders = {
-        name: Order(fixtures / "walkers" / f"{name}.osim", LONG[name], accuracy) for name, accuracy in ACCURACY.items()
+        name: Order(fixtures / "walkers" / f"{name}.osim", LONG[name], accuracy)
+        for name, accuracy in ACCURACY.items()
     }
     theirs = opensim_walks(orders)
     result = {}
@@ -62,10 +63,16 @@ def test_the_exercise_makes_four_steps(walks):
 def test_ours_is_the_same_walk(walks, name):
     """Steps at the same times, to what OpenSim's integrator goes on between the moments that it reports."""
     theirs, ours = walks[name]
-    assert (theirs.ending, theirs.fell_on, len(theirs.scuffs)) == (ours.ending, ours.fell_on, len(ours.scuffs))
+    assert (theirs.ending, theirs.fell_on, len(theirs.scuffs)) == (
+        ours.ending,
+        ours.fell_on,
+        len(ours.scuffs),
+    )
     assert theirs.end == pytest.approx(ours.end, abs=1e-3)
     assert [step.foot for step in theirs.steps] == [step.foot for step in ours.steps]
     for field in ("time", "air", "length"):
         result = [getattr(step, field) for step in theirs.steps]
-        assert result == pytest.approx([getattr(step, field) for step in ours.steps], abs=1e-3), field
+        assert result == pytest.approx([getattr(step, field) for step in ours.steps], abs=1e-3), (
+            field
+        )
     assert theirs.distance == pytest.approx(ours.distance, rel=5e-6, abs=1e-5)

@@ -107,7 +107,8 @@ def expected_default(prop: dict) -> str | None:
 
 
 def printed(kind: Any, value: Any) -> str:
-    if kind.legacy and kind.shape == "list" and kind.scalar == "double":  # of these OpenSim prints six digits
+    # of these OpenSim prints six digits
+    if kind.legacy and kind.shape == "list" and kind.scalar == "double":
         return " ".join(f"{number:g}" for number in value)
     text = formatter(kind, "opensim")(value)
     return text.strip() if kind.legacy else text
@@ -117,7 +118,9 @@ def same_default_object(made: Object, wanted: dict, where: str) -> None:
     """Compare a default object with the catalogue: its class, its name, and what differs from its class's defaults."""
     assert type(made).tag == wanted["class"], where
     assert made.name == wanted.get("name", ""), where
-    assert not made.model_fields_set, f"{where}: a default object is not printed unless something is set"
+    assert not made.model_fields_set, (
+        f"{where}: a default object is not printed unless something is set"
+    )
     overrides = wanted.get("overrides", {})
     plain = type(made)()
     for spec in field_specs(type(made)).values():
@@ -153,7 +156,9 @@ def test_class_equals_the_catalogue(name: str) -> None:
             assert isinstance(kind, Held), prop["name"]
             form = "unnamed" if prop["unnamed"] or "printed_as" in prop else prop["kind"]
             assert kind.form == form, prop["name"]
-            assert spec.accepts is not None and spec.accepts.tag == prop["accepts_base"], prop["name"]
+            assert spec.accepts is not None and spec.accepts.tag == prop["accepts_base"], prop[
+                "name"
+            ]
             default = prop["default"] or []
             if kind.form == "list":
                 assert len(value) == len(default), prop["name"]
@@ -169,7 +174,12 @@ def test_class_equals_the_catalogue(name: str) -> None:
         wanted_reference = expected_reference(prop)
         if wanted_reference is not None:
             assert isinstance(kind, Reference), f"{prop['name']} names another component"
-            assert (kind.rule, kind.target, kind.required, kind.shape == "list") == wanted_reference, prop["name"]
+            assert (
+                kind.rule,
+                kind.target,
+                kind.required,
+                kind.shape == "list",
+            ) == wanted_reference, prop["name"]
             assert kind.shape == prop["kind"], prop["name"]
             text = " ".join(value) if isinstance(value, tuple) else "" if value is None else value
             assert text == expected_default(prop), prop["name"]
@@ -177,13 +187,18 @@ def test_class_equals_the_catalogue(name: str) -> None:
             continue
         if isinstance(kind, Reference) and kind.target.endswith(("file", "folder")):
             assert FILES.fullmatch(prop["name"]), prop["name"]
-            assert (" ".join(value) if kind.shape == "list" else value) == expected_default(prop), prop["name"]
+            assert (" ".join(value) if kind.shape == "list" else value) == expected_default(prop), (
+                prop["name"]
+            )
             continue
         assert isinstance(kind, Value), f"{prop['name']} names nothing"
         assert not FILES.fullmatch(prop["name"]), f"{prop['name']} names a file"
         assert kind.unit == prop.get("unit"), prop["name"]
         if prop["type"] in ("Vec2", "Vec3", "Vec6", "Transform", "Vector"):
-            assert (kind.scalar, kind.shape) == ("double", prop["type"].replace("Vector", "vector")), prop["name"]
+            assert (kind.scalar, kind.shape) == (
+                "double",
+                prop["type"].replace("Vector", "vector"),
+            ), prop["name"]
             assert kind.optional == (prop["kind"] == "optional"), prop["name"]
         else:
             assert (kind.scalar, kind.shape) == (prop["type"], prop["kind"]), prop["name"]
@@ -199,7 +214,9 @@ def test_every_property_is_declared_where_opensim_declares_it(name: str) -> None
     cls = declared(entry["xml_tag"])
     for prop in entry["properties"]:
         if prop["declared_in"] in CATALOGUE and prop["name"] not in ("objects", "groups"):
-            assert field_specs(cls)[tag_of(prop)].declared_in.tag == prop["declared_in"], prop["name"]
+            assert field_specs(cls)[tag_of(prop)].declared_in.tag == prop["declared_in"], prop[
+                "name"
+            ]
 
 
 @of_each(CONCRETE)
@@ -211,18 +228,24 @@ def test_bases_are_opensims(name: str) -> None:
     assert cls().is_component == CATALOGUE[name]["is_component"]
 
 
-@pytest.mark.parametrize("name", [name for name in CONCRETE if "coordinate_count" in CATALOGUE[name]])
+@pytest.mark.parametrize(
+    "name", [name for name in CONCRETE if "coordinate_count" in CATALOGUE[name]]
+)
 def test_joints_have_opensims_coordinates(name: str) -> None:
     cls = declared(name)
     motions = CATALOGUE[name].get("coordinate_motion_types")
-    assert cls.motion_types == (None if motions is None else tuple(word.lower() for word in motions))
+    assert cls.motion_types == (
+        None if motions is None else tuple(word.lower() for word in motions)
+    )
     assert len(cls().coordinates) == (CATALOGUE[name]["coordinate_count"] or 0)
 
 
 @of_each(CONCRETE)
 def test_internal_parts_are_opensims(name: str) -> None:
     cls = declared(CATALOGUE[name]["xml_tag"])
-    wanted = [(part["name"], part["class"]) for part in CATALOGUE[name].get("internal_subcomponents", [])]
+    wanted = [
+        (part["name"], part["class"]) for part in CATALOGUE[name].get("internal_subcomponents", [])
+    ]
     assert [(part, kind.__name__) for part, kind in getattr(cls, "internal", ())] == wanted
 
 
@@ -240,7 +263,11 @@ def test_no_reference_is_forgotten() -> None:
         rule = declared(owner).name_reference
         entry = REFERENCE_OF[owner, "@name"]
         target = TARGETS.get(entry["target"], entry["target"])
-        assert (rule.rule, rule.target, rule.required) == (entry["resolution"], target, entry["required"])
+        assert (rule.rule, rule.target, rule.required) == (
+            entry["resolution"],
+            target,
+            entry["required"],
+        )
 
 
 def test_the_registry_knows_exactly_the_classes_of_model_documents() -> None:
@@ -248,7 +275,9 @@ def test_the_registry_knows_exactly_the_classes_of_model_documents() -> None:
     known = [tag for tag in tags() if not declared(tag).since]
     assert known == sorted({*(CATALOGUE[name]["xml_tag"] for name in CONCRETE), *UNREGISTERED})
     assert len(known) == 301
-    assert not {tag for tag in tags() if declared(tag).since} & {entry.get("xml_tag") for entry in CATALOGUE.values()}
+    assert not {tag for tag in tags() if declared(tag).since} & {
+        entry.get("xml_tag") for entry in CATALOGUE.values()
+    }
 
 
 def test_bases_without_a_file_form_are_opensims_too() -> None:
@@ -269,8 +298,14 @@ def test_bases_without_a_file_form_are_opensims_too() -> None:
     ids=lambda entry: f"{entry['cls']}.{entry['property']}",
 )
 def test_words_besides_names_and_the_fate_of_a_missing_name(entry: dict) -> None:
-    cls = next(base for tag in tags() for base in declared(tag).__mro__ if base.__name__ == entry["cls"])
-    kind = cls.name_reference if entry["property"] == "@name" else field_specs(cls)[entry["property"]].kind
+    cls = next(
+        base for tag in tags() for base in declared(tag).__mro__ if base.__name__ == entry["cls"]
+    )
+    kind = (
+        cls.name_reference
+        if entry["property"] == "@name"
+        else field_specs(cls)[entry["property"]].kind
+    )
     if isinstance(kind, Reference):
         # Of tasks without a body the catalogue does not speak.
         assert set(kind.words) - {"-1"} == {words.split()[0] for words in entry["wildcards"]}

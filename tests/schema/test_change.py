@@ -28,7 +28,9 @@ CHANGES = {
     "another object": lambda model: setattr(model, "ground", type(model.ground)(name="ground")),
     "a default that is asked for later": lambda model: setattr(model.marker_set, "name", "other"),
     "a list that is asked for later": lambda model: model.marker_set.objects.append(_marker()),
-    "a part of a default": lambda model: setattr(model.model_visual_preferences.ModelDisplayHints, "name", "x"),
+    "a part of a default": lambda model: setattr(
+        model.model_visual_preferences.ModelDisplayHints, "name", "x"
+    ),
     "the model": lambda model: setattr(model, "credits", "me"),
 }
 

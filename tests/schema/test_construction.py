@@ -81,7 +81,12 @@ def test_two_instances_share_no_part(cls: type[Object]) -> None:
 @every_class
 def test_copies_and_pickles_are_equal_and_keep_what_was_set(cls: type[Object]) -> None:
     full = filled(cls)
-    for clone in (copy.deepcopy(full), full.copy_deep(), pickle.loads(pickle.dumps(full)), copy.copy(full)):
+    for clone in (
+        copy.deepcopy(full),
+        full.copy_deep(),
+        pickle.loads(pickle.dumps(full)),
+        copy.copy(full),
+    ):
         assert clone == full
         assert clone is not full
         assert clone.model_fields_set == full.model_fields_set
@@ -93,7 +98,9 @@ def test_copies_and_pickles_are_equal_and_keep_what_was_set(cls: type[Object]) -
 @every_class
 def test_a_misspelt_property_is_told(cls: type[Object]) -> None:
     item = cls()
-    with pytest.raises(MissingNameError, match=f"{cls.__name__} has no property 'nmae'; did you mean 'name'"):
+    with pytest.raises(
+        MissingNameError, match=f"{cls.__name__} has no property 'nmae'; did you mean 'name'"
+    ):
         item.nmae = "x"
     with pytest.raises(MissingNameError, match="no property 'nmae'"):
         cls(nmae="x")
@@ -202,7 +209,9 @@ def test_a_socket_is_known_by_the_middle_of_its_name(cls, given, meant):
 def test_nearest_names_are_looked_for_only_if_the_message_is_read(monkeypatch):
     """`hasattr` and `getattr` with a default drop the error unread."""
     asked = []
-    monkeypatch.setattr("osimlite.schema.base.misspelt", lambda cls, name: asked.append(name) or f"no '{name}'")
+    monkeypatch.setattr(
+        "osimlite.schema.base.misspelt", lambda cls, name: asked.append(name) or f"no '{name}'"
+    )
     body = CLASSES["Body"](name="b")
     assert not hasattr(body, "geometry_path") and getattr(body, "masss", None) is None
     assert not asked
@@ -216,12 +225,20 @@ def test_a_missing_name_passes_to_other_processes():
         CLASSES["Body"](name="b").masss  # noqa: B018
     caught.value.file, caught.value.line = "a.osim", 3
     other = pickle.loads(pickle.dumps(caught.value))
-    assert str(other) == str(caught.value) == "a.osim:3: Body has no property 'masss'; did you mean 'mass'?"
+    assert (
+        str(other)
+        == str(caught.value)
+        == "a.osim:3: Body has no property 'masss'; did you mean 'mass'?"
+    )
 
 
 def test_a_list_where_a_set_belongs_is_told_how_to_make_the_set():
-    with pytest.raises(ModelError, match=r"write HuntCrossleyForce\.ContactParametersSet\(objects=\[\.\.\.\]\)"):
-        CLASSES["HuntCrossleyForce"](contact_parameters=[CLASSES["HuntCrossleyContactParameters"]()])
+    with pytest.raises(
+        ModelError, match=r"write HuntCrossleyForce\.ContactParametersSet\(objects=\[\.\.\.\]\)"
+    ):
+        CLASSES["HuntCrossleyForce"](
+            contact_parameters=[CLASSES["HuntCrossleyContactParameters"]()]
+        )
 
 
 @every_class
@@ -230,14 +247,19 @@ def test_the_docstring_has_every_property(cls):
     if own is None:
         return
     assert own.splitlines()[0] in cls.__doc__
-    section = pydoc.render_doc(cls, renderer=pydoc.plaintext).split("Properties, in the order of a file:")[1]
+    section = pydoc.render_doc(cls, renderer=pydoc.plaintext).split(
+        "Properties, in the order of a file:"
+    )[1]
     for spec in field_specs(cls).values():
         assert f" {spec.name}: " in section
 
 
 def test_the_docstring_says_units_and_defaults():
     assert "    mass_center: 3 numbers in m; 0 0 0 by default" in CLASSES["Body"].__doc__
-    assert "socket_frame: the name of a PhysicalFrame; nothing by default" in CLASSES["ContactSphere"].__doc__
+    assert (
+        "socket_frame: the name of a PhysicalFrame; nothing by default"
+        in CLASSES["ContactSphere"].__doc__
+    )
 
 
 def test_a_star_brings_the_component_classes():
@@ -250,4 +272,6 @@ def test_values_of_the_stored_form_are_assigned_without_validation() -> None:
     body = osimlite.Body(name="b")
     body.assign("mass", 2.5)
     assert body.mass == 2.5 and "mass" in body.model_fields_set
-    assert "<mass>2.5</mass>" in osimlite.to_text(osimlite.Model(name="m", body_set=osimlite.BodySet(objects=[body])))
+    assert "<mass>2.5</mass>" in osimlite.to_text(
+        osimlite.Model(name="m", body_set=osimlite.BodySet(objects=[body]))
+    )

@@ -21,10 +21,14 @@ from tests.cases import of_each
 LONGEST = 140
 
 CLASSES: list[type[Object]] = [
-    cls for name, module in MODULES.items() if not (cls := getattr(import_module(module), name)).abstract
+    cls
+    for name, module in MODULES.items()
+    if not (cls := getattr(import_module(module), name)).abstract
 ]
 SPECS: dict[str, FieldSpec] = {
-    f"{spec.declared_in.__name__}.{spec.name}": spec for cls in CLASSES for spec in cls.field_specs().values()
+    f"{spec.declared_in.__name__}.{spec.name}": spec
+    for cls in CLASSES
+    for spec in cls.field_specs().values()
 }
 
 
@@ -45,7 +49,12 @@ def test_every_property_has_a_meaning(key: str) -> None:
 @of_each(CLASSES, lambda cls: cls.tag)
 def test_what_is_written_in_ticks_exists(cls: type[Object]) -> None:
     """Names of other properties in a text are those of the same object, of a part of it, or of what owns it."""
-    known = {name for each in CLASSES for spec in each.field_specs().values() for name in (spec.tag, spec.name)}
+    known = {
+        name
+        for each in CLASSES
+        for spec in each.field_specs().values()
+        for name in (spec.tag, spec.name)
+    }
     variables = {
         "q",
         "qdot",
@@ -69,7 +78,11 @@ def test_what_is_written_in_ticks_exists(cls: type[Object]) -> None:
 def test_an_inherited_property_means_the_same() -> None:
     inherited = osimlite.PinJoint.field_specs()["socket_parent_frame"]
     assert inherited.declared_in is not osimlite.PinJoint
-    assert meaning_of(inherited) == meaning_of(osimlite.FreeJoint.field_specs()["socket_parent_frame"]) != ""
+    assert (
+        meaning_of(inherited)
+        == meaning_of(osimlite.FreeJoint.field_specs()["socket_parent_frame"])
+        != ""
+    )
 
 
 def test_help_says_it() -> None:
@@ -105,5 +118,9 @@ assert osimlite.__file__.startswith({str(archive)!r})
 assert "mass: one number in kg, >= 0" in osimlite.Body.__doc__
 print(meaning_of(osimlite.Body.field_specs()["mass"]))
 """
-    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == ("" if compiled else meaning_of(osimlite.Body.field_specs()["mass"]))
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == (
+        "" if compiled else meaning_of(osimlite.Body.field_specs()["mass"])
+    )

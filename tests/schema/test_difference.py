@@ -40,7 +40,12 @@ def test_every_kind_of_change(walker: Model) -> None:
         Difference("/forceset/RHipLimitTorque", "", "CoordinateLimitForce", None),
         Difference("/bodyset/Pelvis", "mass", 1.0, 2.0),
         Difference("/forceset/RFootForce", "contact_parameters.objects.stiffness", 1e6, 2e6),
-        Difference("/contactgeometryset/RFootContact", "socket_frame", "/bodyset/RightShank", "/bodyset/RightThigh"),
+        Difference(
+            "/contactgeometryset/RFootContact",
+            "socket_frame",
+            "/bodyset/RightShank",
+            "/bodyset/RightThigh",
+        ),
         Difference("/forceset/stop", "", None, "CoordinateLimitForce"),
     ]
 
@@ -59,4 +64,6 @@ def test_of_another_class_counts_what_both_have() -> None:
 def test_differences_are_symmetric(walker: Model) -> None:
     other = dynamic_walker(thigh_length=0.42)
     there, back = differences(walker, other), differences(other, walker)
-    assert there and {(d.path, d.what, d.old, d.new) for d in there} == {(d.path, d.what, d.new, d.old) for d in back}
+    assert there and {(d.path, d.what, d.old, d.new) for d in there} == {
+        (d.path, d.what, d.new, d.old) for d in back
+    }

@@ -25,7 +25,11 @@ def walker(fixtures: Path) -> Model:
 def targets(model: Model) -> list[str]:
     """What every reference leads to, as the place of the component in the tree."""
     place = {id(component): number for number, component in enumerate(model.components())}
-    return [f"{use.spec.tag} {place[id(model.tree().resolve(use).target)]}" for use in model.tree().uses() if use.value]
+    return [
+        f"{use.spec.tag} {place[id(model.tree().resolve(use).target)]}"
+        for use in model.tree().uses()
+        if use.value
+    ]
 
 
 @pytest.mark.parametrize(
@@ -119,7 +123,9 @@ def test_inputs_follow_a_name() -> None:
     model = dynamic_walker()
     knee = "/jointset/RightShankToThigh/RKnee_rz"
     assert isinstance(model[knee], Coordinate)
-    table = osimlite.TableReporter__double_(name="table", input_inputs=(f"{knee}|speed(flexion)", "/none|value"))
+    table = osimlite.TableReporter__double_(
+        name="table", input_inputs=(f"{knee}|speed(flexion)", "/none|value")
+    )
     model.subcomponents.append(table)
     model.rename(model["/jointset/RightShankToThigh"], "knee")
     assert table.input_inputs == ("/jointset/knee/RKnee_rz|speed(flexion)", "/none|value")
@@ -141,7 +147,8 @@ def test_a_model_takes_no_second_component_of_a_name(walker: Model) -> None:
 
 def test_a_name_alone_is_answered_with_its_path(walker: Model) -> None:
     with pytest.raises(
-        ModelError, match="no component at 'RHip_rz'; did you mean '/jointset/RightThighToPelvis/RHip_rz'"
+        ModelError,
+        match="no component at 'RHip_rz'; did you mean '/jointset/RightThighToPelvis/RHip_rz'",
     ):
         walker["RHip_rz"]
 
@@ -149,7 +156,8 @@ def test_a_name_alone_is_answered_with_its_path(walker: Model) -> None:
 @pytest.mark.parametrize("function", ["mechanism", "to_urdf", "to_text", "simulate"])
 def test_a_path_in_place_of_a_model_is_told_to_be_read(function: str) -> None:
     with pytest.raises(
-        osimlite.OsimliteError, match=r"a Model is wanted here, not a path; .* osimlite.read\('x.osim'\)"
+        osimlite.OsimliteError,
+        match=r"a Model is wanted here, not a path; .* osimlite.read\('x.osim'\)",
     ):
         getattr(osimlite, function)("x.osim")
     with pytest.raises(osimlite.OsimliteError, match="a Model is wanted here, not a NoneType"):
@@ -162,6 +170,8 @@ def test_a_class_that_is_not_there_is_answered_with_the_nearest() -> None:
     assert not hasattr(osimlite, "joints.PinJoint")
 
 
-def test_parts_of_the_package_are_there_without_being_imported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(osimlite, "gait", raising=False)
-    assert osimlite.studies.gait.__name__ == "osimlite.studies.gait"
+def test_parts_of_the_package_are_there_without_being_imported(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delattr(osimlite, "studies", raising=False)
+    assert osimlite.studies.__name__ == "osimlite.studies"

@@ -29,12 +29,21 @@ MUSCLES = (
     "Thelen2003Muscle",
     "Thelen2003Muscle_Deprecated",
 )
-SOLVER = ("num_mesh_intervals", "optim_constraint_tolerance", "optim_convergence_tolerance", "optim_max_iterations")
+SOLVER = (
+    "num_mesh_intervals",
+    "optim_constraint_tolerance",
+    "optim_convergence_tolerance",
+    "optim_max_iterations",
+)
 
 INHERITED = {
     **{("MocoCasADiSolver", name): HOLDS for name in SOLVER},
-    # With an optimal_force of 1, 0 and -1 OpenSim computes the same accelerations, or refuses all three.
-    **{(name, "optimal_force"): UNUSED for name in (*MUSCLES, "ClutchedPathSpring", "McKibbenActuator")},
+    # With an optimal_force of 1, 0 and -1 OpenSim computes the same accelerations, or refuses all
+    # three.
+    **{
+        (name, "optimal_force"): UNUSED
+        for name in (*MUSCLES, "ClutchedPathSpring", "McKibbenActuator")
+    },
 }
 """What of the facts about numbers outside their domain each class has from its base."""
 
@@ -83,13 +92,17 @@ def actuator_of(name: str, force: int) -> str:
         inside = path_of(("/ground", "0 0.5 0"), ("/bodyset/a", "0.1 0 0"))
     if name == "ClutchedPathSpring":
         inside += "<stiffness>100</stiffness><dissipation>0.1</dissipation>"
-    return small_model(forces=f'<{name} name="f"><optimal_force>{force}</optimal_force>{inside}</{name}>')
+    return small_model(
+        forces=f'<{name} name="f"><optimal_force>{force}</optimal_force>{inside}</{name}>'
+    )
 
 
 @pytest.mark.parametrize("name", [name for name, tag in INHERITED if tag == "optimal_force"])
 def test_the_linter_reports_an_inherited_fact_only_where_it_holds(name: str) -> None:
     report = validate(Source(actuator_of(name, 0).encode(), "m.osim"), ignore="OSIM63")
-    reported = [item for item in report if item.code == "OSIM207" and "optimal_force" in item.message]
+    reported = [
+        item for item in report if item.code == "OSIM207" and "optimal_force" in item.message
+    ]
     assert bool(reported) == (INHERITED[name, "optimal_force"] == HOLDS)
 
 

@@ -22,12 +22,16 @@ def model() -> Model:
     model = Model(name="arm")
     body = model.add(Body(name="upper", mass=1.0))
     muscle = model.add(Thelen2003Muscle(name="biceps"))
-    muscle.geometry_path.path_point_set.objects.append(PathPoint(name="origin", socket_parent_frame=body))
+    muscle.geometry_path.path_point_set.objects.append(
+        PathPoint(name="origin", socket_parent_frame=body)
+    )
     return model
 
 
 def test_they_come_before_what_the_file_holds(model: Model) -> None:
-    below = [c.path.removeprefix("/forceset/biceps") for c in model.components() if "biceps" in c.path]
+    below = [
+        c.path.removeprefix("/forceset/biceps") for c in model.components() if "biceps" in c.path
+    ]
     assert below == ["", "/pennMdl", "/actMdl", "/path", "/path/origin", "/path/origin/station"]
 
 

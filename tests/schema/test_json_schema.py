@@ -25,7 +25,9 @@ def validator() -> Any:
 
 def test_the_file_is_current(repo: Path) -> None:
     written = json.loads((repo / "schemas" / "osim-4.6.schema.json").read_text())
-    assert written == json.loads(json.dumps(json_schema())), "run: python -m osimlite.schema.json_schema > schemas/..."
+    assert written == json.loads(json.dumps(json_schema())), (
+        "run: python -m osimlite.schema.json_schema > schemas/..."
+    )
 
 
 def test_every_class_has_its_definition() -> None:
@@ -57,7 +59,9 @@ def test_a_model_is_valid(validator: Any) -> None:
         ({"class": "Body"}, "Body"),
     ],
 )
-def test_what_the_reader_refuses_the_schema_refuses(validator: Any, damage: dict[str, Any], word: str) -> None:
+def test_what_the_reader_refuses_the_schema_refuses(
+    validator: Any, damage: dict[str, Any], word: str
+) -> None:
     from osimlite.errors import ModelError
     from osimlite.io.document.data import from_data
 

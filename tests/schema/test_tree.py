@@ -59,7 +59,10 @@ def test_sockets_walk_exactly(walker: Model, text: str, expected: str | None) ->
 
 
 def test_a_bare_name_in_a_socket_is_a_child(walker: Model) -> None:
-    assert failure(walker, "/jointset/RightThighToPelvis", "socket_child_frame", "RightThigh_offset") is None
+    assert (
+        failure(walker, "/jointset/RightThighToPelvis", "socket_child_frame", "RightThigh_offset")
+        is None
+    )
 
 
 @pytest.mark.parametrize(
@@ -97,7 +100,16 @@ def test_contact_geometry_by_path_or_name(walker: Model, text: str, expected: st
 def test_spellings_are_what_would_be_right(walker: Model) -> None:
     use = next(use for use in walker.tree().uses() if use.spec.tag == "coordinate")
     assert walker.tree().spellings(use) == sorted(
-        ["platform_rz", "Pelvis_rz", "Pelvis_tx", "Pelvis_ty", "RHip_rz", "LHip_rz", "RKnee_rz", "LKnee_rz"]
+        [
+            "platform_rz",
+            "Pelvis_rz",
+            "Pelvis_tx",
+            "Pelvis_ty",
+            "RHip_rz",
+            "LHip_rz",
+            "RKnee_rz",
+            "LKnee_rz",
+        ]
     )
     for use in walker.tree().uses():
         assert all(
@@ -111,7 +123,11 @@ def test_duplicates_are_renamed_and_found_by_their_new_name() -> None:
     first, second, third = (Body(name="b", mass=float(n)) for n in (1, 2, 3))
     model.body_set.objects.extend((first, second, third))
     model.tree()
-    assert [b.path for b in (first, second, third)] == ["/bodyset/b", "/bodyset/b_0", "/bodyset/b_1"]
+    assert [b.path for b in (first, second, third)] == [
+        "/bodyset/b",
+        "/bodyset/b_0",
+        "/bodyset/b_1",
+    ]
     assert [(r.component, r.name, r.first) for r in model.tree().renamed] == [
         (second, "b_0", first),
         (third, "b_1", first),
@@ -140,7 +156,11 @@ def test_add_puts_a_component_in_its_set() -> None:
     body = Body(name="b", mass=1.0)
     knee = Coordinate(name="knee")
     model.add(body)
-    model.add(PinJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body, coordinates=[knee]))
+    model.add(
+        PinJoint(
+            name="j", socket_parent_frame=model.ground, socket_child_frame=body, coordinates=[knee]
+        )
+    )
     model.add(ContactSphere(name="s", socket_frame=body, radius=0.1))
     model.add(CoordinateLimitForce(name="f", coordinate=knee))
     paths = {component.path for component in model.components()}
@@ -170,7 +190,9 @@ def test_find_names_the_nearest_path(walker: Model) -> None:
         walker.find("/bodyset/Pelvs")
 
 
-@pytest.mark.parametrize(("path", "expected"), [("/a/../b", "/b"), ("/a/./b//c/", "/a/b/c"), ("/..", None), ("/", "/")])
+@pytest.mark.parametrize(
+    ("path", "expected"), [("/a/../b", "/b"), ("/a/./b//c/", "/a/b/c"), ("/..", None), ("/", "/")]
+)
 def test_paths_are_normalised(path: str, expected: str | None) -> None:
     assert normalised(path) == expected
 
@@ -178,10 +200,17 @@ def test_paths_are_normalised(path: str, expected: str | None) -> None:
 def test_a_frame_takes_over_only_the_geometry_it_draws():
     from osimlite import Brick, Ground, Model
 
-    drawn, held = Brick(name="drawn", socket_frame="/nowhere"), Brick(name="held", socket_frame="/nowhere")
-    model = Model(name="m", ground=Ground(name="ground", attached_geometry=[drawn], subcomponents=[held]))
+    drawn, held = (
+        Brick(name="drawn", socket_frame="/nowhere"),
+        Brick(name="held", socket_frame="/nowhere"),
+    )
+    model = Model(
+        name="m", ground=Ground(name="ground", attached_geometry=[drawn], subcomponents=[held])
+    )
     tree = model.tree()
-    failures = {use.owner.name: tree.resolve(use).failure for use in tree.uses() if use.value == "/nowhere"}
+    failures = {
+        use.owner.name: tree.resolve(use).failure for use in tree.uses() if use.value == "/nowhere"
+    }
     assert failures == {"drawn": None, "held": "missing"}
 
 

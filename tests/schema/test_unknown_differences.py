@@ -36,7 +36,9 @@ def test_layout_and_spelling_are_no_difference(old: str, new: str):
 def test_only_what_changed_is_named():
     assert compare(LIGAMENT.replace("0.1", "0.2")) == [("points.P[a].at", "0 0.1 0", "0 0.2 0")]
     assert compare(LIGAMENT.replace('unit="m"', 'unit="mm"')) == [("kind@unit", "m", "mm")]
-    assert compare(LIGAMENT.replace("<stiffness> 100 </stiffness>", "")) == [("stiffness", "100", None)]
+    assert compare(LIGAMENT.replace("<stiffness> 100 </stiffness>", "")) == [
+        ("stiffness", "100", None)
+    ]
 
 
 def test_a_format_of_a_real_case_is_no_difference(shared):

@@ -28,7 +28,9 @@ def reference(fixtures: Path) -> Callable[[str], Table]:
     """Columns of a reference table by their labels."""
 
     def table(name: str) -> Table:
-        text = gzip.decompress((fixtures / "walker" / f"{name}_reference.csv.gz").read_bytes()).decode()
+        text = gzip.decompress(
+            (fixtures / "walker" / f"{name}_reference.csv.gz").read_bytes()
+        ).decode()
         rows = list(csv.reader(line for line in text.splitlines() if not line.startswith("#")))
         numbers = np.array(rows[1:], dtype=float)
         return {label: numbers[:, index] for index, label in enumerate(rows[0])}

@@ -20,18 +20,31 @@ def damped() -> Model:
     below = model.ground
     for number, kind in enumerate((SliderJoint, PinJoint, PinJoint, PinJoint)):
         inertia = (0.02, 0.03, 0.02, 0, 0, 0)
-        body = model.add(Body(name=f"b{number}", mass=1.0, mass_center=(0.05, -0.2, 0), inertia=inertia))
-        start = Coordinate(name=f"q{number}", default_value=0.3, default_speed_value=1.0, locked=number == 2)
+        body = model.add(
+            Body(name=f"b{number}", mass=1.0, mass_center=(0.05, -0.2, 0), inertia=inertia)
+        )
+        start = Coordinate(
+            name=f"q{number}", default_value=0.3, default_speed_value=1.0, locked=number == 2
+        )
         joint = kind(name=f"j{number}", coordinates=[start])
-        model.add(joint.between(below, body, at=(0, -0.4 if number else 0, 0), turned=(0, 0.1, 0.2)))
+        model.add(
+            joint.between(below, body, at=(0, -0.4 if number else 0, 0), turned=(0, 0.1, 0.2))
+        )
         below = body
     limits = {"upper_limit": 5.0, "upper_stiffness": 0.5, "damping": 0.05, "transition": 10.0}
     model.add(
         BushingForce(
-            name="slack", socket_frame1="/ground", socket_frame2="/bodyset/b0", translational_stiffness=(9, 9, 9)
+            name="slack",
+            socket_frame1="/ground",
+            socket_frame2="/bodyset/b0",
+            translational_stiffness=(9, 9, 9),
         ),
-        CoordinateLimitForce(name="stop", coordinate="q1", compute_dissipation_energy=True, **limits),
-        CoordinateLimitForce(name="locked_stop", coordinate="q2", compute_dissipation_energy=True, **limits),
+        CoordinateLimitForce(
+            name="stop", coordinate="q1", compute_dissipation_energy=True, **limits
+        ),
+        CoordinateLimitForce(
+            name="locked_stop", coordinate="q2", compute_dissipation_energy=True, **limits
+        ),
         CoordinateLimitForce(name="quiet_stop", coordinate="q3", **limits),
         BushingForce(
             name="disc",

@@ -79,7 +79,9 @@ class Equations:
         pass
 
 
-def runge_kutta_merson(f, t: float, y: Any, n: int, *, observe: Any = None, accuracy: float = 1e-3, **options: Any):
+def runge_kutta_merson(
+    f, t: float, y: Any, n: int, *, observe: Any = None, accuracy: float = 1e-3, **options: Any
+):
     """Runge-Kutta-Merson on any equations."""
     engine: Any = Equations(f, len(y), n, **options)
     return ControlledSteps(engine, t, y, accuracy, observe)

@@ -79,11 +79,17 @@ def chain() -> Model:
     carrier = model.ground
     for number, kind in enumerate(joints):
         inertia = (0.2, 0.3, 0.25, 0.01, -0.02, 0.03)
-        body = model.add(Body(name=f"b{number}", mass=1.0 + number, mass_center=(0, -0.1, 0.05), inertia=inertia))
+        body = model.add(
+            Body(name=f"b{number}", mass=1.0 + number, mass_center=(0, -0.1, 0.05), inertia=inertia)
+        )
         joint = kind(name=f"j{number}")
         for index, coordinate in enumerate(joint.coordinates):
             coordinate.name = f"q{number}_{index}"
-        model.add(joint.between(carrier, body, at=(0.1, 0.2, -0.05), turned=(0.3, -0.2, 0.1), child_at=(0, 0.1, 0)))
+        model.add(
+            joint.between(
+                carrier, body, at=(0.1, 0.2, -0.05), turned=(0.3, -0.2, 0.1), child_at=(0, 0.1, 0)
+            )
+        )
         carrier = body
     b1 = next(item for item in model.components(Body) if item.name == "b1")
     b1.wrap_object_set.objects += (
@@ -115,7 +121,13 @@ def around(path, *surfaces) -> GeometryPath:
 OBSTACLES = (
     ContactSphere(name="o0", socket_frame="/bodyset/b0", radius=0.05, location=(0.1, -0.1, 0.1)),
     ContactCylinder(name="o1", socket_frame="/bodyset/b1", radius=0.02, location=(0.3, 0.0, 0.1)),
-    ContactTorus(name="o2", socket_frame="/bodyset/b1", torus_radius=0.05, tube_radius=0.02, location=(0, 0.1, -0.2)),
+    ContactTorus(
+        name="o2",
+        socket_frame="/bodyset/b1",
+        torus_radius=0.05,
+        tube_radius=0.02,
+        location=(0, 0.1, -0.2),
+    ),
     ContactEllipsoid(name="o3", socket_frame="/bodyset/b2", radii=(0.04, 0.03, 0.05)),
 )
 
@@ -124,9 +136,13 @@ def over(path, surfaces) -> Scholz2015GeometryPath:
     """The path over surfaces between its last two points."""
     result = Scholz2015GeometryPath(name="path")
     for point in path.path_point_set.objects:
-        result.path_elements.append(Scholz2015GeometryPathPoint(name=f"e_{point.name}", path_point=point))
+        result.path_elements.append(
+            Scholz2015GeometryPathPoint(name=f"e_{point.name}", path_point=point)
+        )
     for surface in surfaces:
-        obstacle = Scholz2015GeometryPathObstacle(name=f"over_{surface.name}", contact_hint=(0.0, 0.2, 0.0))
+        obstacle = Scholz2015GeometryPathObstacle(
+            name=f"over_{surface.name}", contact_hint=(0.0, 0.2, 0.0)
+        )
         obstacle.socket_contact_geometry = f"/contactgeometryset/{surface.name}"
         result.path_elements.insert(-1, obstacle)
     return result
@@ -153,7 +169,12 @@ def floor() -> ContactHalfSpace:
 
 
 def stone(number: int, radius: float = 0.4) -> ContactSphere:
-    return ContactSphere(name=f"s{number}", socket_frame=f"/bodyset/b{number}", radius=radius, location=(0.1, -0.2, 0))
+    return ContactSphere(
+        name=f"s{number}",
+        socket_frame=f"/bodyset/b{number}",
+        radius=radius,
+        location=(0.1, -0.2, 0),
+    )
 
 
 def contact(*surfaces):
@@ -185,7 +206,9 @@ def pushed(**more):
 
 
 SHAPES = {
-    "m_x_theta_x_function": SimmSpline(x=(-2.0, -0.5, 0.1, 0.6, 2.0), y=(-30.0, -3.0, 0.0, 6.0, 50.0)),
+    "m_x_theta_x_function": SimmSpline(
+        x=(-2.0, -0.5, 0.1, 0.6, 2.0), y=(-30.0, -3.0, 0.0, 6.0, 50.0)
+    ),
     "m_y_theta_y_function": PiecewiseLinearFunction(x=(-1.0, 0.0, 1.0), y=(-4.0, 0.0, 9.0)),
     "m_z_theta_z_function": MultiplierFunction(scale=2.0, function=Sine(amplitude=3.0, omega=2.0)),
     "f_x_delta_x_function": PolynomialFunction(coefficients=(20.0, 0.0, 5.0, 1.0)),
@@ -202,16 +225,29 @@ MORE = "atan(d) + sinh(d/4) + cosh(d/4) - tanh(d) + erf(d) + erfc(d) + delta(d) 
 
 FORCES = {
     "limit": lambda: CoordinateLimitForce(
-        name="a", coordinate="q1_1", upper_limit=10.0, lower_limit=-10.0, transition=15.0, damping=0.1
+        name="a",
+        coordinate="q1_1",
+        upper_limit=10.0,
+        lower_limit=-10.0,
+        transition=15.0,
+        damping=0.1,
     ),
-    "limit of a locked coordinate": lambda: CoordinateLimitForce(name="a", coordinate="q3_0", upper_limit=0.1),
+    "limit of a locked coordinate": lambda: CoordinateLimitForce(
+        name="a", coordinate="q3_0", upper_limit=0.1
+    ),
     "spring": lambda: SpringGeneralizedForce(
         name="a", coordinate="q2_0", stiffness=30.0, rest_length=-0.4, viscosity=0.3
     ),
     "spring on a ball": lambda: SpringGeneralizedForce(name="a", coordinate="q1_2", stiffness=30.0),
-    "spring on a locked coordinate": lambda: SpringGeneralizedForce(name="a", coordinate="q3_0", stiffness=30.0),
-    "formula": lambda: ExpressionBasedCoordinateForce(name="a", coordinate="q2_0", expression=FORMULA),
-    "formula of a variable": lambda: ExpressionBasedCoordinateForce(name="a", coordinate="q2_0", expression="qdot"),
+    "spring on a locked coordinate": lambda: SpringGeneralizedForce(
+        name="a", coordinate="q3_0", stiffness=30.0
+    ),
+    "formula": lambda: ExpressionBasedCoordinateForce(
+        name="a", coordinate="q2_0", expression=FORMULA
+    ),
+    "formula of a variable": lambda: ExpressionBasedCoordinateForce(
+        name="a", coordinate="q2_0", expression="qdot"
+    ),
     "line": lambda: PointToPointSpring(
         name="a",
         socket_body1="/ground",
@@ -222,16 +258,29 @@ FORCES = {
         rest_length=0.3,
     ),
     "line by a formula": lambda: ExpressionBasedPointToPointForce(
-        name="a", body1="b0", body2="b3", point1=(0.1, 0, 0), point2=(0, 0.2, 0.1), expression=f"{ALL} + ddot"
+        name="a",
+        body1="b0",
+        body2="b3",
+        point1=(0.1, 0, 0),
+        point2=(0, 0.2, 0.1),
+        expression=f"{ALL} + ddot",
     ),
     "line by another formula": lambda: ExpressionBasedPointToPointForce(
-        name="a", body1="ground", body2="b3", point1=(0.1, 0, 0), expression=f"{MORE} - min(d, ddot)^2 + 2^-d"
+        name="a",
+        body1="ground",
+        body2="b3",
+        point1=(0.1, 0, 0),
+        expression=f"{MORE} - min(d, ddot)^2 + 2^-d",
     ),
     "bushing": lambda: between(
         BushingForce, rotational_stiffness=(1, 2, 9), translational_stiffness=(50, 30, 10), **DAMPED
     ),
-    "bushing without damping": lambda: between(BushingForce, one="/ground", translational_stiffness=(50, 30, 10)),
-    "bushing by functions": lambda: between(FunctionBasedBushingForce, one="/ground", **SHAPES, **DAMPED),
+    "bushing without damping": lambda: between(
+        BushingForce, one="/ground", translational_stiffness=(50, 30, 10)
+    ),
+    "bushing by functions": lambda: between(
+        FunctionBasedBushingForce, one="/ground", **SHAPES, **DAMPED
+    ),
     "bushing by formulas": lambda: between(
         ExpressionBasedBushingForce,
         Mx_expression="2*theta_x + theta_y",
@@ -263,7 +312,9 @@ FORCES = {
             ),
         ),
     ),
-    "path around surfaces": lambda: PathSpring(name="a", **SPRING, geometry_path=around(straight(), "bar", "ball")),
+    "path around surfaces": lambda: PathSpring(
+        name="a", **SPRING, geometry_path=around(straight(), "bar", "ball")
+    ),
     "path of functions": lambda: (
         PathSpring(
             name="a",
@@ -271,7 +322,9 @@ FORCES = {
             geometry_path=FunctionBasedPath(
                 coordinate_paths=("/jointset/j2/q2_0", "/jointset/j3/q3_0", "/jointset/j0/q0_3"),
                 length_function=MultivariatePolynomialFunction(
-                    dimension=3, order=2, coefficients=(0.3, 0.2, -0.1, 0.4, 0.1, 0.2, 0.3, -0.2, 0.1, 0.5)
+                    dimension=3,
+                    order=2,
+                    coefficients=(0.3, 0.2, -0.1, 0.4, 0.1, 0.2, 0.3, -0.2, 0.1, 0.5),
                 ),
             ),
         ),
@@ -281,7 +334,9 @@ FORCES = {
             geometry_path=FunctionBasedPath(
                 coordinate_paths=("/jointset/j2/q2_0",),
                 length_function=Sine(amplitude=0.2, omega=2.0, phase=0.3, offset=0.6),
-                lengthening_speed_function=ExpressionBasedFunction(expression="q*v+1", variables=("q", "v")),
+                lengthening_speed_function=ExpressionBasedFunction(
+                    expression="q*v+1", variables=("q", "v")
+                ),
             ),
         ),
     ),
@@ -290,17 +345,29 @@ FORCES = {
         PathSpring(name="a", **SPRING, geometry_path=over(straight(), OBSTACLES)),
     ),
     "path by a formula": lambda: ExpressionBasedPathForce(
-        name="a", resting_length=0.4, clamp_stretch=True, expression="30*s^2 + ldot*s", geometry_path=straight()
+        name="a",
+        resting_length=0.4,
+        clamp_stretch=True,
+        expression="30*s^2 + ldot*s",
+        geometry_path=straight(),
     ),
-    "ligament": lambda: Ligament(name="a", resting_length=0.4, pcsa_force=100.0, geometry_path=straight()),
+    "ligament": lambda: Ligament(
+        name="a", resting_length=0.4, pcsa_force=100.0, geometry_path=straight()
+    ),
     "another ligament": lambda: Blankevoort1991Ligament(
-        name="a", slack_length=0.4, linear_stiffness=90.0, damping_coefficient=0.3, geometry_path=straight()
+        name="a",
+        slack_length=0.4,
+        linear_stiffness=90.0,
+        damping_coefficient=0.3,
+        geometry_path=straight(),
     ),
     "smooth contact": lambda: (
         floor(),
         stone(2),
         SmoothSphereHalfSpaceForce(
-            name="a", socket_half_space="/contactgeometryset/floor", socket_sphere="/contactgeometryset/s2"
+            name="a",
+            socket_half_space="/contactgeometryset/floor",
+            socket_sphere="/contactgeometryset/s2",
         ),
     ),
     "station": lambda: (
@@ -310,12 +377,20 @@ FORCES = {
     "contact": lambda: contact(floor(), *(stone(number) for number in range(4))),
     "ellipsoid": lambda: contact(
         floor(),
-        ContactEllipsoid(name="e", socket_frame="/bodyset/b1", radii=(0.5, 0.3, 0.4), orientation=(0.2, 0.4, 0.1)),
-        ContactHalfSpace(name="wall", socket_frame="/bodyset/b3", location=(0, -0.4, 0), orientation=(0, 0, 0.7)),
+        ContactEllipsoid(
+            name="e", socket_frame="/bodyset/b1", radii=(0.5, 0.3, 0.4), orientation=(0.2, 0.4, 0.1)
+        ),
+        ContactHalfSpace(
+            name="wall", socket_frame="/bodyset/b3", location=(0, -0.4, 0), orientation=(0, 0, 0.7)
+        ),
     ),
     "ellipsoids on each other and a sphere": lambda: contact(
-        ContactEllipsoid(name="e", socket_frame="/bodyset/b1", radii=(0.5, 0.7, 0.4), orientation=(0.2, 0.4, 0.1)),
-        ContactEllipsoid(name="g", socket_frame="/bodyset/b3", radii=(0.8, 0.6, 0.4), orientation=(0.1, 0.9, 0.3)),
+        ContactEllipsoid(
+            name="e", socket_frame="/bodyset/b1", radii=(0.5, 0.7, 0.4), orientation=(0.2, 0.4, 0.1)
+        ),
+        ContactEllipsoid(
+            name="g", socket_frame="/bodyset/b3", radii=(0.8, 0.6, 0.4), orientation=(0.1, 0.9, 0.3)
+        ),
         ContactSphere(name="s", socket_frame="/ground", location=(0.1, 0.2, 0.0), radius=0.6),
     ),
     "coordinate actuator": lambda: driven(
@@ -325,27 +400,39 @@ FORCES = {
     ),
     "actuator without controls": lambda: CoordinateActuator(name="a", coordinate="q1_0"),
     "torque actuator": lambda: driven(
-        TorqueActuator(name="a", bodyA="b2", bodyB="b0", axis=(1, 2, 3), torque_is_global=False), Constant(value=3.0)
+        TorqueActuator(name="a", bodyA="b2", bodyB="b0", axis=(1, 2, 3), torque_is_global=False),
+        Constant(value=3.0),
     ),
     "torque actuator along ground": lambda: driven(
         TorqueActuator(name="a", bodyA="b2", bodyB="ground", axis=(1, 2, 3), torque_is_global=True),
         Constant(value=3.0),
     ),
     "point actuator": lambda: driven(
-        PointActuator(name="a", body="b2", point=(0.1, 0.2, 0.3), direction=(1, -1, 0.5), force_is_global=True),
+        PointActuator(
+            name="a", body="b2", point=(0.1, 0.2, 0.3), direction=(1, -1, 0.5), force_is_global=True
+        ),
         Constant(value=3.0),
     ),
     "point actuator in ground": lambda: driven(
-        PointActuator(name="a", body="b2", point=(0.1, 0.2, 0.3), direction=(1, -1, 0.5), point_is_global=True),
+        PointActuator(
+            name="a", body="b2", point=(0.1, 0.2, 0.3), direction=(1, -1, 0.5), point_is_global=True
+        ),
         Constant(value=3.0),
     ),
     "points actuator": lambda: driven(
-        PointToPointActuator(name="a", bodyA="b3", bodyB="b0", pointA=(0.1, 0.2, 0.3), pointB=(0, 0.1, 0)),
+        PointToPointActuator(
+            name="a", bodyA="b3", bodyB="b0", pointA=(0.1, 0.2, 0.3), pointB=(0, 0.1, 0)
+        ),
         Constant(value=3.0),
     ),
     "points actuator in ground": lambda: driven(
         PointToPointActuator(
-            name="a", bodyA="b3", bodyB="b0", pointA=(0.1, 0.2, 0.3), pointB=(0, 0.1, 0), points_are_global=True
+            name="a",
+            bodyA="b3",
+            bodyB="b0",
+            pointA=(0.1, 0.2, 0.3),
+            pointB=(0, 0.1, 0),
+            points_are_global=True,
         ),
         Constant(value=3.0),
     ),
@@ -353,7 +440,13 @@ FORCES = {
         PathActuator(name="a", optimal_force=20.0, geometry_path=straight()), Constant(value=0.7)
     ),
     "pneumatic actuator": lambda: driven(
-        McKibbenActuator(name="a", thread_length=0.9, number_of_turns=3.0, cord_length=0.1, geometry_path=straight()),
+        McKibbenActuator(
+            name="a",
+            thread_length=0.9,
+            number_of_turns=3.0,
+            cord_length=0.1,
+            geometry_path=straight(),
+        ),
         Constant(value=5000.0),
     ),
     "idle": lambda: BodyActuator(name="a", socket_body="/bodyset/b0"),
@@ -362,8 +455,12 @@ FORCES = {
     "prescribed in the body": lambda: pushed(forceIsGlobal=False, pointIsGlobal=False),
 }
 
-# Its path is found on three surfaces at once, which takes half as long as all other forces together.
-FORCE_NAMES = [pytest.param(name, marks=pytest.mark.full) if name == "path over obstacles" else name for name in FORCES]
+# Its path is found on three surfaces at once, which takes half as long as all other forces
+# together.
+FORCE_NAMES = [
+    pytest.param(name, marks=pytest.mark.full) if name == "path over obstacles" else name
+    for name in FORCES
+]
 """The forces as parameters of a test."""
 
 

@@ -66,7 +66,10 @@ def write_vtp(path: Path, points: np.ndarray, faces: Faces) -> None:
 def write_stl(path: Path, points: np.ndarray, faces: Faces) -> None:
     corners = triangles(points, faces)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    rows = [struct.pack("<12fH", *normal, *corner.ravel(), 0) for normal, corner in zip(normals, corners, strict=True)]
+    rows = [
+        struct.pack("<12fH", *normal, *corner.ravel(), 0)
+        for normal, corner in zip(normals, corners, strict=True)
+    ]
     path.write_bytes(b"made for a test".ljust(80) + struct.pack("<I", len(rows)) + b"".join(rows))
 
 

@@ -32,7 +32,9 @@ def alone(engine):
     return engine
 
 
-@pytest.mark.parametrize("change", [lambda model: model, changed], ids=["as they are", "of all sorts"])
+@pytest.mark.parametrize(
+    "change", [lambda model: model, changed], ids=["as they are", "of all sorts"]
+)
 def test_muscles_abreast_are_those_by_themselves(change) -> None:
     together = Simulation(change(jumper(driven=False)), "compiled").engine
     single = alone(Simulation(change(jumper(driven=False)), "compiled").engine)
@@ -41,7 +43,11 @@ def test_muscles_abreast_are_those_by_themselves(change) -> None:
     found = 0
     for _ in range(200):
         y = start + np.concatenate(
-            [0.4 * rng.normal(size=size), 3.0 * rng.normal(size=size), np.zeros(len(start) - 2 * size)]
+            [
+                0.4 * rng.normal(size=size),
+                3.0 * rng.normal(size=size),
+                np.zeros(len(start) - 2 * size),
+            ]
         )
         y[2 * size :] *= rng.uniform(0.5, 1.6, len(start) - 2 * size)
         try:
@@ -60,7 +66,9 @@ def test_a_muscle_without_a_solution_is_told_by_its_name() -> None:
     engines = [Simulation(jumper(driven=False), "compiled").engine for _ in range(2)]
     alone(engines[1])
     y = engines[0].equilibrated(0.0, engines[0].state.default())
-    place = 2 * len(engines[0].order) + engines[0].state.paths.index("/forceset/vasti_l/fiber_length")
+    place = 2 * len(engines[0].order) + engines[0].state.paths.index(
+        "/forceset/vasti_l/fiber_length"
+    )
     y[place] = float("nan")
     told = []
     for engine in engines:

@@ -73,7 +73,9 @@ def test_walker_under_gravity_alone(fixtures, cases, route):
     for case in cases["cases"]:
         _, mechanism = walker_at(fixtures, case["q"][0], locked=False)
         with BulletEngine(mechanism, Forces(()), route=route) as engine:
-            assert within(engine.acceleration(0.0, case["q"], case["u"]), case["udot_unlocked_gravity_only"])
+            assert within(
+                engine.acceleration(0.0, case["q"], case["u"]), case["udot_unlocked_gravity_only"]
+            )
             kinetic, gravity, stored = engine.energies(0.0, engine.state.pack(case["q"], case["u"]))
         assert kinetic == pytest.approx(case["kinetic_energy"], rel=1e-12)
         assert gravity == pytest.approx(case["potential_energy_gravity"], rel=1e-12)
@@ -110,23 +112,44 @@ def chain(*joint_types, spheres=(), inertia=(0.02, 0.03, 0.025, 0.001, -0.002, 0
     model = Model(name="chain")
     carrier = model.ground
     for number, joint_type in enumerate(joint_types):
-        body = model.add(Body(name=f"b{number}", mass=1.0 + number, mass_center=(0.05, -0.1, 0.02), inertia=inertia))
+        body = model.add(
+            Body(
+                name=f"b{number}",
+                mass=1.0 + number,
+                mass_center=(0.05, -0.1, 0.02),
+                inertia=inertia,
+            )
+        )
         joint = getattr(osimlite, joint_type)(name=f"j{number}")
         for index, coordinate in enumerate(joint.coordinates):
             coordinate.name = f"q{number}_{index}"
         at, turned = (0.1, 0.2 * number, -0.05), (0.3, -0.2, 0.1)
         model.add(
-            joint.between(carrier, body, at=at, turned=turned, child_at=(0.0, 0.1, 0.03), child_turned=(0.1, 0, 1))
+            joint.between(
+                carrier,
+                body,
+                at=at,
+                turned=turned,
+                child_at=(0.0, 0.1, 0.03),
+                child_turned=(0.1, 0, 1),
+            )
         )
         carrier = body
     if spheres:
-        plane = ContactHalfSpace(name="plane", socket_frame=model.ground, orientation=(0.1, 0.2, -1.4))
+        plane = ContactHalfSpace(
+            name="plane", socket_frame=model.ground, orientation=(0.1, 0.2, -1.4)
+        )
         balls = [
-            ContactSphere(name=f"s{n}", socket_frame=carrier, location=at, radius=0.1) for n, at in enumerate(spheres)
+            ContactSphere(name=f"s{n}", socket_frame=carrier, location=at, radius=0.1)
+            for n, at in enumerate(spheres)
         ]
         model.add(plane, *balls)
         material = HuntCrossleyForce.ContactParameters(
-            geometry=(plane, *balls), stiffness=1e5, dissipation=1.5, static_friction=0.8, dynamic_friction=0.4
+            geometry=(plane, *balls),
+            stiffness=1e5,
+            dissipation=1.5,
+            static_friction=0.8,
+            dynamic_friction=0.4,
         )
         contact = HuntCrossleyForce(name="contact", transition_velocity=0.1)
         contact.contact_parameters.objects.append(material)
@@ -157,7 +180,9 @@ def test_every_joint_as_our_own_recursion_has_it(kinds, route, seed):
     mechanism = build_mechanism(chain(*kinds))
     q, u = state_of(mechanism, seed)
     with BulletEngine(mechanism, Forces(()), route=route) as engine:
-        assert within(engine.acceleration(0.0, q.tolist(), u.tolist()), mechanism.acceleration(q, u))
+        assert within(
+            engine.acceleration(0.0, q.tolist(), u.tolist()), mechanism.acceleration(q, u)
+        )
         kinetic, gravity, _ = engine.energies(0.0, engine.state.pack(q, u))
     assert kinetic == pytest.approx(mechanism.kinetic_energy(q, u), rel=1e-12)
     assert gravity == pytest.approx(mechanism.potential_energy(q), rel=1e-12, abs=1e-12)
@@ -175,8 +200,12 @@ def test_contact_pushes_as_a_wrench_on_the_body_does(kinds, route):
         q, u = state_of(mechanism, seed)
         with BulletEngine(mechanism, force_elements(model, mechanism), route=route) as engine:
             ours = engine.acceleration(0.0, q.tolist(), u.tolist())
-        row = dict(zip(engine.columns, engine.force_records(0.0, engine.state.pack(q, u)), strict=True))
-        force, torque = ([row[f"contact.b1.{what}.{axis}"] for axis in "XYZ"] for what in ("force", "torque"))
+        row = dict(
+            zip(engine.columns, engine.force_records(0.0, engine.state.pack(q, u)), strict=True)
+        )
+        force, torque = (
+            [row[f"contact.b1.{what}.{axis}"] for axis in "XYZ"] for what in ("force", "torque")
+        )
         assert within(ours, mechanism.acceleration(q, u, None, {"b1": (force, torque)}))
         touching += any(force)
     assert touching > 1
@@ -186,7 +215,9 @@ def test_contact_pushes_as_a_wrench_on_the_body_does(kinds, route):
 def test_limit_of_an_angle_of_a_ball_joint_acts_on_its_speed(route):
     model = chain("BallJoint")
     model.add(
-        CoordinateLimitForce(name="limit", coordinate="q0_1", upper_limit=10.0, lower_limit=-10.0, transition=1.0)
+        CoordinateLimitForce(
+            name="limit", coordinate="q0_1", upper_limit=10.0, lower_limit=-10.0, transition=1.0
+        )
     )
     mechanism = build_mechanism(model)
     q, u = np.array((0.4, 0.9, -0.3)), np.array((0.5, -1.0, 2.0))

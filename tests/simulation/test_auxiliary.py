@@ -34,7 +34,9 @@ def test_what_is_taken_up_is_lost(engine):
 
 def test_both_engines_take_the_same_steps():
     pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
-    ours, theirs = (osimlite.simulate(damped(), to=0.5, accuracy=1e-7, engine=engine) for engine in ENGINES)
+    ours, theirs = (
+        osimlite.simulate(damped(), to=0.5, accuracy=1e-7, engine=engine) for engine in ENGINES
+    )
     assert ours.summary["steps"] == theirs.summary["steps"]
     assert np.abs(ours.values - theirs.values).max() < 1e-11
     for path in STATES:
@@ -52,7 +54,9 @@ def test_files_and_fixed_steps(engine, tmp_path):
     assert np.array_equal(again.auxiliary[STATES[-1]], trajectory.auxiliary[STATES[-1]])
     stepped = osimlite.simulate(damped(), to=0.1, engine=engine, fixed_step=1e-5)
     for path in STATES:
-        assert stepped.auxiliary[path] == pytest.approx(trajectory.auxiliary[path], rel=1e-2, abs=1e-4)
+        assert stepped.auxiliary[path] == pytest.approx(
+            trajectory.auxiliary[path], rel=1e-2, abs=1e-4
+        )
 
 
 def test_many_runs_equal_single_ones():
@@ -61,10 +65,14 @@ def test_many_runs_equal_single_ones():
     times = [0.0, 0.07, 0.2, 0.3]
     with Simulation(damped(), "compiled") as simulation:
         starts = np.array([simulation.initial_state({"q1": q}, {}) for q in (0.1, 0.5, 0.9)])
-        runs = run_many(simulation.engine, starts, 0.3, accuracy=1e-6, report_times=times, event_states=True)
+        runs = run_many(
+            simulation.engine, starts, 0.3, accuracy=1e-6, report_times=times, event_states=True
+        )
         assert runs.states.shape == starts.shape and runs.reports.shape == (3, 4, starts.shape[1])
         for index, q in enumerate((0.1, 0.5, 0.9)):
             alone = simulation.run(0.3, accuracy=1e-6, initial={"q1": q}, report_interval=0.1)
             values, speeds = simulation.state.histories(runs.states[index][None])
-            assert np.array_equal(values[0], alone.values[-1]) and np.array_equal(speeds[0], alone.speeds[-1])
+            assert np.array_equal(values[0], alone.values[-1]) and np.array_equal(
+                speeds[0], alone.speeds[-1]
+            )
             assert runs.counts[index, 0] == alone.summary["steps"]

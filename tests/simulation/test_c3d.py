@@ -41,7 +41,9 @@ LOADS = """<OpenSimDocument Version="40600">
 def measured() -> Any:
     """What each channel of the plate of `force_plate.c3d` measured (6, 50), N and N·mm."""
     steps = np.arange(50)
-    return np.array([10.0 + steps, 20.0 - steps, -700.0 - steps, 1e3 + steps, 2e3 - steps, 3e3 + 2 * steps])
+    return np.array(
+        [10.0 + steps, 20.0 - steps, -700.0 - steps, 1e3 + steps, 2e3 - steps, 3e3 + 2 * steps]
+    )
 
 
 def test_forces_are_those_of_the_plate() -> None:
@@ -59,7 +61,9 @@ def test_forces_are_those_of_the_plate() -> None:
 def test_loads_of_a_c3d_file_are_those_of_a_table(tmp_path: Path) -> None:
     shutil.copy(TRIALS / "force_plate.c3d", tmp_path / "trial.c3d")
     table = read_c3d_forces(tmp_path / "trial.c3d")
-    write_sto(tmp_path / "trial.sto", "forces", table.times.tolist(), table.columns, table.rows.tolist())
+    write_sto(
+        tmp_path / "trial.sto", "forces", table.times.tolist(), table.columns, table.rows.tolist()
+    )
     mechanism, result = osimlite.mechanism(dynamic_walker()), []
     for file in ("trial.c3d", "trial.sto"):
         (tmp_path / "loads.xml").write_text(LOADS.format(file=file))

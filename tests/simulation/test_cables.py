@@ -25,7 +25,11 @@ def cable(*elements, surface=None, slides=0.0):
     model = osimlite.Model(name="cable")
     body = model.add(osimlite.Body(name="b", mass=1.0, inertia=(1, 1, 1, 0, 0, 0)))
     slide = osimlite.Coordinate(name="x", default_value=slides)
-    model.add(osimlite.SliderJoint(name="j", coordinates=[slide]).between(model.ground, body, at=(0.3, 0, 0)))
+    model.add(
+        osimlite.SliderJoint(name="j", coordinates=[slide]).between(
+            model.ground, body, at=(0.3, 0, 0)
+        )
+    )
     if surface is not None:
         surface.name, surface.socket_frame = "o", "/ground"
         model.add(surface)
@@ -37,11 +41,15 @@ def cable(*elements, surface=None, slides=0.0):
 
 
 def point(frame, *location):
-    return Scholz2015GeometryPathPoint(path_point=PathPoint(socket_parent_frame=frame, location=location))
+    return Scholz2015GeometryPathPoint(
+        path_point=PathPoint(socket_parent_frame=frame, location=location)
+    )
 
 
 def over(hint=(nan, nan, nan)):
-    return Scholz2015GeometryPathObstacle(socket_contact_geometry="/contactgeometryset/o", contact_hint=hint)
+    return Scholz2015GeometryPathObstacle(
+        socket_contact_geometry="/contactgeometryset/o", contact_hint=hint
+    )
 
 
 LEFT, RIGHT = point("/ground", -0.3, 0.01, 0), point("/bodyset/b", 0, 0.01, 0)
@@ -58,7 +66,11 @@ LEFT, RIGHT = point("/ground", -0.3, 0.01, 0), point("/bodyset/b", 0, 0.01, 0)
         ((LEFT, over(), RIGHT), ContactSphere(radius=0.0), "not positive"),
         ((LEFT, over(), RIGHT), ContactEllipsoid(radii=(0.1, 0.0, 0.1)), "not positive"),
         ((LEFT, over(), RIGHT), ContactTorus(torus_radius=0.1, tube_radius=-0.1), "not positive"),
-        ((LEFT, over(), RIGHT), ContactSphere(radius=0.4), "no way over its obstacles where the model starts"),
+        (
+            (LEFT, over(), RIGHT),
+            ContactSphere(radius=0.4),
+            "no way over its obstacles where the model starts",
+        ),
     ],
 )
 def test_impossible(elements, surface, says):
@@ -77,7 +89,9 @@ def test_shortest():
     paths = osimlite.paths(cable(up, over((0, 0.1, 0)), down, surface=ContactCylinder(radius=0.1)))
     shortest = 2 * sqrt(0.3**2 - 0.1**2) + 0.1 * (pi - 2 * acos(0.1 / 0.3))
     assert paths.lengths({}) == {"/forceset/s": pytest.approx(shortest, rel=0, abs=1e-10)}
-    beside = osimlite.paths(cable(up, over(), down, surface=ContactCylinder(radius=0.1, location=(0, -0.11, 0))))
+    beside = osimlite.paths(
+        cable(up, over(), down, surface=ContactCylinder(radius=0.1, location=(0, -0.11, 0)))
+    )
     assert beside.lengths({"x": 0.2}) == {"/forceset/s": pytest.approx(0.8)}
 
 

@@ -128,12 +128,17 @@ def tree(joints, *, parents=None, reversed=(), locked=()):
         count = 1 + max((place for motion in motions for place in motion.coordinates), default=-1)
         own = tuple(range(len(coordinates), len(coordinates) + count))
         coordinates += [
-            CoordinateInfo(f"q{k}", f"/q{k}", f"/j{number}", "coupled", default_value=0.4, locked=k in locked)
+            CoordinateInfo(
+                f"q{k}", f"/q{k}", f"/j{number}", "coupled", default_value=0.4, locked=k in locked
+            )
             for k in own
         ]
         inertia = np.array(((0.5, 0.03, -0.04), (0.03, 0.6, 0.02), (-0.04, 0.02, 0.7)))
         mass = MassProperties(1.0 + number, np.array((0.1, -0.2, 0.05 * number)), inertia)
-        ends = offset((0.1, 0.2, -0.3), (0.3, -0.2, 0.5)), offset((-0.2, 0.1, 0.1), (0.1, 0.6, -0.4))
+        ends = (
+            offset((0.1, 0.2, -0.3), (0.3, -0.2, 0.5)),
+            offset((-0.2, 0.1, 0.1), (0.1, 0.6, -0.4)),
+        )
         mobilizer = Mobilizer(f"/j{number}", name, motions, own, *ends, number in reversed)
         parent = number - 1 if parents is None else parents[number]
         bodies.append(MobileBody(f"b{number}", f"/b{number}", parent, mass, mobilizer))
@@ -195,16 +200,28 @@ def contact_chain():
     model = Model(name="chain")
     carrier, surfaces = model.ground, []
     for number, kind in enumerate((osimlite.FreeJoint, osimlite.BallJoint)):
-        body = model.add(Body(name=f"b{number}", mass=1.0 + number, inertia=(0.2, 0.3, 0.25, 0.01, -0.02, 0.03)))
+        body = model.add(
+            Body(name=f"b{number}", mass=1.0 + number, inertia=(0.2, 0.3, 0.25, 0.01, -0.02, 0.03))
+        )
         joint = kind(name=f"j{number}")
         for index, coordinate in enumerate(joint.coordinates):
             coordinate.name = f"q{number}_{index}"
-        model.add(joint.between(carrier, body, at=(0.1, 0.2, -0.05), turned=(0.3, -0.2, 0.1), child_at=(0, 0.1, 0)))
+        model.add(
+            joint.between(
+                carrier, body, at=(0.1, 0.2, -0.05), turned=(0.3, -0.2, 0.1), child_at=(0, 0.1, 0)
+            )
+        )
         for index in range(2):
-            sphere = ContactSphere(name=f"s{number}{index}", socket_frame=body, radius=0.3, location=(0.1, -0.2, index))
+            sphere = ContactSphere(
+                name=f"s{number}{index}", socket_frame=body, radius=0.3, location=(0.1, -0.2, index)
+            )
             surfaces.append(model.add(sphere))
         carrier = body
-    surfaces.append(model.add(ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0.1, 0.2, -1.4))))
+    surfaces.append(
+        model.add(
+            ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0.1, 0.2, -1.4))
+        )
+    )
     contact = HuntCrossleyForce(name="contact", transition_velocity=0.1)
     contact.contact_parameters.objects.append(
         HuntCrossleyForce.ContactParameters(
@@ -217,7 +234,12 @@ def contact_chain():
         )
     )
     limit = CoordinateLimitForce(
-        name="limit", coordinate="q1_1", upper_limit=10.0, lower_limit=-10.0, transition=1.0, damping=0.1
+        name="limit",
+        coordinate="q1_1",
+        upper_limit=10.0,
+        lower_limit=-10.0,
+        transition=1.0,
+        damping=0.1,
     )
     model.add(contact, limit)
     return model
@@ -243,13 +265,17 @@ def test_forces_are_those_of_the_bullet_engine():
                     touched |= 1 << number
             y, z = ours.state.pack(q, u), bullet.state.pack(q, u)
             assert within(ours.force_records(0.0, y), bullet.force_records(0.0, z))
-            assert ours.energies(0.0, y) == pytest.approx(bullet.energies(0.0, z), rel=1e-9, abs=1e-12)
+            assert ours.energies(0.0, y) == pytest.approx(
+                bullet.energies(0.0, z), rel=1e-9, abs=1e-12
+            )
     # With the floor and with one another.
     assert touched.bit_count() > 3
 
 
 def test_walker_with_all_forces(fixtures):
-    cases = json.loads(gzip.decompress((fixtures / "kinematics" / "walker_dynamics_cases.json.gz").read_bytes()))
+    cases = json.loads(
+        gzip.decompress((fixtures / "kinematics" / "walker_dynamics_cases.json.gz").read_bytes())
+    )
     touched = 0
     for case in cases["cases"]:
         model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
@@ -272,7 +298,8 @@ def fast(walker):
 
 def largest_error(trajectory, table):
     return max(
-        np.abs(trajectory.values[:, index] - table[name]).max() for index, name in enumerate(trajectory.coordinates)
+        np.abs(trajectory.values[:, index] - table[name]).max()
+        for index, name in enumerate(trajectory.coordinates)
     )
 
 
@@ -290,11 +317,15 @@ def test_same_motion_and_reports_as_with_bullet(fast, simulation):
     assert np.abs(ours.values - theirs.values).max() < 1e-8
     assert np.abs(ours.speeds - theirs.speeds).max() < 1e-6
     assert len(ours.summary["contact_events"]) == len(theirs.summary["contact_events"]) > 6
-    for one, other in zip(ours.summary["contact_events"], theirs.summary["contact_events"], strict=True):
+    for one, other in zip(
+        ours.summary["contact_events"], theirs.summary["contact_events"], strict=True
+    ):
         assert (one["contact"], one["event"]) == (other["contact"], other["event"])
         assert one["time_s"] == pytest.approx(other["time_s"], abs=1e-7)
     for name, largest in theirs.summary["largest_contact_forces"].items():
-        assert ours.summary["largest_contact_forces"][name]["force_N"] == pytest.approx(largest["force_N"], rel=1e-5)
+        assert ours.summary["largest_contact_forces"][name]["force_N"] == pytest.approx(
+            largest["force_N"], rel=1e-5
+        )
     for label, column in theirs.energy.items():
         assert ours.energy[label] == pytest.approx(column, rel=1e-6, abs=1e-8)
 
@@ -308,10 +339,16 @@ def test_steps_are_those_of_opensim(fast):
 def test_steps_one_by_one_are_those_of_a_whole_motion(fast):
     """To the last bit."""
     y = fast.initial_state({}, {})
-    ours, theirs = (fast.engine.stepper(0.0, y, Settings(accuracy=1e-5), lambda t, y: None) for _ in range(2))
+    ours, theirs = (
+        fast.engine.stepper(0.0, y, Settings(accuracy=1e-5), lambda t, y: None) for _ in range(2)
+    )
     (end,), steps = ours.table([2.0]).tolist(), list(theirs.steps(2.0))
     assert end == steps[-1][1]
-    assert (ours.taken, ours.attempted, ours.evaluations) == (theirs.taken, theirs.attempted, theirs.evaluations)
+    assert (ours.taken, ours.attempted, ours.evaluations) == (
+        theirs.taken,
+        theirs.attempted,
+        theirs.evaluations,
+    )
 
 
 def test_kernels_are_what_they_mean_in_python(fast, fixtures):
@@ -333,7 +370,9 @@ def test_log_in_pieces(fast, monkeypatch):
     assert len(seen) >= whole.summary["steps"] / 7 and seen == sorted(set(seen)) and seen[-1] == 2.0
     assert np.array_equal(whole.values, pieces.values)
     strip = ("wall_time_s",)
-    assert all(whole.summary[key] == pieces.summary[key] for key in whole.summary if key not in strip)
+    assert all(
+        whole.summary[key] == pieces.summary[key] for key in whole.summary if key not in strip
+    )
 
 
 def test_fixed_steps(fast, simulation):
@@ -360,10 +399,16 @@ def test_massless_motion_is_refused():
 @pytest.mark.parametrize("engine", ["bullet", "compiled"])
 def test_gimbal_lock_is_named(engine):
     model = Model(name="m")
-    turns = [Coordinate(name="a"), Coordinate(name="b", default_value=np.pi / 2), Coordinate(name="c")]
+    turns = [
+        Coordinate(name="a"),
+        Coordinate(name="b", default_value=np.pi / 2),
+        Coordinate(name="c"),
+    ]
     body = model.add(Body(name="body", mass=1.0, inertia=(1.0, 2.0, 3.0, 0.0, 0.0, 0.0)))
     model.add(osimlite.GimbalJoint(name="j", coordinates=turns).between(model.ground, body))
-    with pytest.raises(SimulationError, match=r"'a' moves no mass.*or its axis lies in this pose along another"):
+    with pytest.raises(
+        SimulationError, match=r"'a' moves no mass.*or its axis lies in this pose along another"
+    ):
         osimlite.simulate(model, to=0.1, engine=engine)
 
 
@@ -373,13 +418,16 @@ def test_why_there_is_no_step_is_told_late_too():
     coordinate = Coordinate(name="turn", prescribed=True)
     coordinate.prescribed_function = PiecewiseConstantFunction(x=(0.0, 5.5), y=(0.1, 0.4))
     pin = osimlite.PinJoint(name="j", coordinates=[coordinate])
-    body = model.add(Body(name="b", mass=1.0, mass_center=(0, -0.1, 0), inertia=(0.1, 0.1, 0.1, 0, 0, 0)))
+    body = model.add(
+        Body(name="b", mass=1.0, mass_center=(0, -0.1, 0), inertia=(0.1, 0.1, 0.1, 0, 0, 0))
+    )
     model.add(pin.between(model.ground, body))
     pytest.importorskip("pybullet", reason=NO_BULLET)
     messages = []
     for engine in ("compiled", "bullet"):
         with pytest.raises(
-            SimulationError, match=r"at t = 5\.5 s: even its shortest step of \d\.?\d*e-1[56] s ends too far from"
+            SimulationError,
+            match=r"at t = 5\.5 s: even its shortest step of \d\.?\d*e-1[56] s ends too far from",
         ) as error:
             osimlite.simulate(model, to=6.0, engine=engine)
         messages.append(str(error.value))

@@ -37,12 +37,20 @@ def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0) -> Any:
 
 # ------------------------------------------------------------------------------------ random trees and constraints
 @settings(max_examples=60)
-@given(cases(max_bodies=4), st.sampled_from([*KINDS, "none"]), st.integers(0, 2**32 - 1), st.integers(0, 3))
+@given(
+    cases(max_bodies=4),
+    st.sampled_from([*KINDS, "none"]),
+    st.integers(0, 2**32 - 1),
+    st.integers(0, 3),
+)
 def test_any_mechanism(case: Case, kind: str, seed: int, locks: int):
     assume(len(case.q))
     rng = np.random.default_rng(seed)
     held = () if kind == "none" else (constraint_of(kind, case.mechanism, rng),)
-    infos = [replace(info, default_value=float(x)) for info, x in zip(case.mechanism.coordinates, case.q, strict=True)]
+    infos = [
+        replace(info, default_value=float(x))
+        for info, x in zip(case.mechanism.coordinates, case.q, strict=True)
+    ]
     for place in rng.integers(0, len(infos), locks):
         infos[place] = replace(infos[place], locked=True)
     mechanism = replace(case.mechanism, coordinates=tuple(infos), constraints=held)
@@ -64,17 +72,26 @@ def test_any_mechanism(case: Case, kind: str, seed: int, locks: int):
 FREE_AND_BALL = ("FreeJoint", "BallJoint", "CustomJoint, spline")
 SEVERAL = {
     "one coordinate of several": Coupler(6, (0, 1, 9), f.WeightedSum((0.4, -0.3, 0.2), 0.1)),
-    "products": Coupler(9, (7, 8), f.MultivariatePolynomial.complete((0.1, 0.2, -0.3, 0.4, 0.5, -0.2), 2, 2)),
+    "products": Coupler(
+        9, (7, 8), f.MultivariatePolynomial.complete((0.1, 0.2, -0.3, 0.4, 0.5, -0.2), 2, 2)
+    ),
     "as OpenSim": Coupler(
         3,
         (6, 10),
-        f.MultivariatePolynomial.complete((0.1, 0.2, -0.3, 0.4, 0.5, -0.2), 2, 2, opensim_derivatives=True),
+        f.MultivariatePolynomial.complete(
+            (0.1, 0.2, -0.3, 0.4, 0.5, -0.2), 2, 2, opensim_derivatives=True
+        ),
     ),
-    "scaled spline": Coupler(0, (10,), f.Scaled(-1.5, f.SimmSpline((-1.5, -0.4, 0.3, 1.6), (0.1, 0.4, -0.2, 0.3)))),
+    "scaled spline": Coupler(
+        0, (10,), f.Scaled(-1.5, f.SimmSpline((-1.5, -0.4, 0.3, 1.6), (0.1, 0.4, -0.2, 0.3)))
+    ),
     "angle of a ball": Prescribed(7, f.Sine(0.4, 3.0, 0.2, 0.1)),
     "polynomial of time": Prescribed(3, f.MultivariatePolynomial.complete((0.1, 0.2, -0.3), 1, 2)),
     "polynomial of time as OpenSim": Prescribed(
-        3, f.Scaled(0.7, f.MultivariatePolynomial.complete((0.1, 0.2, -0.3), 1, 2, opensim_derivatives=True))
+        3,
+        f.Scaled(
+            0.7, f.MultivariatePolynomial.complete((0.1, 0.2, -0.3), 1, 2, opensim_derivatives=True)
+        ),
     ),
     "the same one twice": Coupler(6, (9, 9), f.WeightedSum((0.4, 0.3), 0.1)),
 }
@@ -89,7 +106,9 @@ def test_couplers_of_all_kinds(name: str):
     q = rng.uniform(-1.0, 1.0, len(mechanism.coordinates))
     u = mechanism.project_speeds(q, rng.uniform(-2.0, 2.0, len(q)), 0.7)
     expected = mechanism.acceleration(q, u, time=0.7)
-    assert np.abs(accelerations(mechanism, q, u, 0.7) - expected).max() < 1e-9 * np.abs(expected).max()
+    assert (
+        np.abs(accelerations(mechanism, q, u, 0.7) - expected).max() < 1e-9 * np.abs(expected).max()
+    )
 
 
 @pytest.mark.parametrize("opensim_derivatives", [False, True])
@@ -97,7 +116,9 @@ def test_the_derivatives_of_opensim(opensim_derivatives: bool):
     mechanism = knee(opensim_derivatives=opensim_derivatives)
     q, u = np.array((0.4, -0.3, 0.2, 0.5)), np.array((2.0, -1.0, 1.5, 0.7))
     assert accelerations(mechanism, q, u) == pytest.approx(mechanism.acceleration(q, u), rel=1e-11)
-    infos = tuple(replace(info, locked=index in (1, 2)) for index, info in enumerate(mechanism.coordinates))
+    infos = tuple(
+        replace(info, locked=index in (1, 2)) for index, info in enumerate(mechanism.coordinates)
+    )
     mechanism, still = replace(mechanism, coordinates=infos), np.array((1.0, 0.0, 0.0, 1.0))
     assert accelerations(mechanism, still * q, still * u) == pytest.approx(
         mechanism.acceleration(still * q, still * u), rel=1e-11
@@ -122,7 +143,9 @@ def test_same_motion_as_with_bullet(make: Any, accuracy: float):
     for engine in ("bullet", "compiled"):
         with Simulation(make(), engine) as simulation:
             names = [info.name for info in simulation.mechanism.coordinates if not info.locked]
-            trajectory = simulation.run(1.0, accuracy=accuracy, initial_speeds={names[-1]: 2.0}, report_interval=0.05)
+            trajectory = simulation.run(
+                1.0, accuracy=accuracy, initial_speeds={names[-1]: 2.0}, report_interval=0.05
+            )
             result.append(trajectory)
     theirs, ours = result
     assert ours.summary["constraints"] == theirs.summary["constraints"]
@@ -144,7 +167,9 @@ def test_reports_between_steps_fulfil_the_constraints(make: Any):
     errors, slips = [], []
     for t, q, u in zip(trajectory.times, trajectory.values, trajectory.speeds, strict=True):
         state = mechanism.at(q, u, float(t))
-        errors += [float(np.sum(item.position_errors(state) ** 2)) for item in mechanism.constraints]
+        errors += [
+            float(np.sum(item.position_errors(state) ** 2)) for item in mechanism.constraints
+        ]
         rows = [item.velocity_equations(state) for item in mechanism.constraints]
         slips += [float(np.sum((matrix @ u - wanted) ** 2)) for matrix, wanted in rows]
     # The root mean square of at most seven equations.
@@ -153,7 +178,9 @@ def test_reports_between_steps_fulfil_the_constraints(make: Any):
 
 @pytest.mark.parametrize("make", ALL.values(), ids=ALL)
 def test_fixed_steps(make: Any):
-    ours, theirs = (simulate(make(), 0.2, engine, fixed_step=1e-3) for engine in ("compiled", "bullet"))
+    ours, theirs = (
+        simulate(make(), 0.2, engine, fixed_step=1e-3) for engine in ("compiled", "bullet")
+    )
     assert np.abs(ours.values - theirs.values).max() < 1e-9
 
 
@@ -170,7 +197,10 @@ def test_kernels_are_what_they_mean_in_python(make: Any):
     ends = run_many(engine, [y], 1e-30, accuracy=1e-8)
     room, result = np.zeros(engine.structure[MODEL.WORK_SIZE]), np.zeros(len(y))
     room[WORK.SCRATCH : WORK.SCRATCH + 2] = 1e-9, np.inf
-    assert law_function("project")(python.program.ints, engine.numbers, room, y, result, 0) == OUTCOME.OK
+    assert (
+        law_function("project")(python.program.ints, engine.numbers, room, y, result, 0)
+        == OUTCOME.OK
+    )
     assert y[: len(y) // 2].tolist() == ends.states[0][: len(y) // 2].tolist()
 
 
@@ -180,7 +210,12 @@ def loop() -> Any:
     """Four bars with a stop on the first joint."""
     model = four_bars()
     stop = CoordinateLimitForce(
-        name="stop", coordinate="p0", upper_limit=60.0, upper_stiffness=5.0, lower_limit=-60.0, lower_stiffness=5.0
+        name="stop",
+        coordinate="p0",
+        upper_limit=60.0,
+        upper_stiffness=5.0,
+        lower_limit=-60.0,
+        lower_stiffness=5.0,
     )
     model.add(stop)
     with Simulation(model, "compiled") as simulation:
@@ -194,8 +229,13 @@ def nearest(engine: Any, y: Any) -> Any:
     for _ in range(10):
         state = mechanism.at(engine.state.values([*x, *u]), engine.state.speeds([*x, *u]))
         equations = [item.velocity_equations(state) for item in mechanism.constraints]
-        rows, wanted = np.concatenate([g[:, order] for g, _ in equations]), np.concatenate([b for _, b in equations])
-        x -= np.linalg.pinv(rows) @ np.concatenate([item.position_errors(state) for item in mechanism.constraints])
+        rows, wanted = (
+            np.concatenate([g[:, order] for g, _ in equations]),
+            np.concatenate([b for _, b in equations]),
+        )
+        x -= np.linalg.pinv(rows) @ np.concatenate(
+            [item.position_errors(state) for item in mechanism.constraints]
+        )
     scales = np.maximum(np.abs(u), 1.0)
     return [*x, *(u - scales * (np.linalg.pinv(rows * scales) @ (rows @ u - wanted)))]
 
@@ -214,7 +254,9 @@ def test_runs_start_where_the_constraints_hold(loop: Any):
     for row, report in zip(starts, runs.reports, strict=True):
         assert report[0] == pytest.approx(nearest(engine, row), abs=1e-8)
     trajectory = loop.run(1.0, accuracy=1e-7, report_interval=0.1, initial_speeds={"p0": 1.0})
-    assert np.array_equal(runs.reports[0][:, : len(start) // 2], trajectory.values[:, list(engine.order)])
+    assert np.array_equal(
+        runs.reports[0][:, : len(start) // 2], trajectory.values[:, list(engine.order)]
+    )
     one, two = (run_many(engine, starts, 1.0, threads=threads) for threads in (1, 2))
     assert np.array_equal(one.states, two.states)
 
@@ -225,7 +267,9 @@ def test_watches_see_states_where_the_constraints_hold(loop: Any):
     level = start[engine.order.index(1)] - 0.05
     low = Watch("low", coordinate="p1", level=float(level), stops=-1)
     high = Watch("end", body="p2", station=(0.0, -0.4, 0.0), direction=(1.0, 0.0, 0.0), level=0.5)
-    runs = run_many(engine, [start], 5.0, accuracy=1e-5, watches=[low, high], most_events=90, event_states=True)
+    runs = run_many(
+        engine, [start], 5.0, accuracy=1e-5, watches=[low, high], most_events=90, event_states=True
+    )
     assert ENDINGS[int(runs.endings[0])] == "stopped"
     state = runs.states[0].tolist()
     assert state[engine.order.index(1)] == pytest.approx(level, abs=1e-7)
@@ -248,7 +292,9 @@ def test_a_massless_body_may_hang_on_a_constraint():
     model = patella()
     cap = next(body for body in model.components(Body) if body.name == "cap")
     cap.mass, cap.inertia = 0.0, (0.0,) * 6
-    ours, theirs = (simulate(model, 0.3, engine, accuracy=1e-8) for engine in ("compiled", "bullet"))
+    ours, theirs = (
+        simulate(model, 0.3, engine, accuracy=1e-8) for engine in ("compiled", "bullet")
+    )
     assert np.abs(ours.values - theirs.values).max() < 1e-9
     model.constraint_set.objects[0].isEnforced = False
     with pytest.raises(SimulationError, match="'cap' moves no mass"):
@@ -284,7 +330,9 @@ def test_an_unknown_constraint_is_refused_by_name():
         bodies = ()
         name = "/constraintset/strange"
 
-    with pytest.raises(UnsupportedError, match=r"'/constraintset/strange' \(Strange\) cannot be kept up"):
+    with pytest.raises(
+        UnsupportedError, match=r"'/constraintset/strange' \(Strange\) cannot be kept up"
+    ):
         CompiledEngine(replace(mechanism, constraints=(Strange(),)), Forces(()))
 
 
@@ -295,14 +343,19 @@ def test_a_function_that_is_unknown_is_refused_by_name():
 
     mechanism = build_mechanism(four_bars())
     with pytest.raises(UnsupportedError, match="the function of '/constraintset/odd' is a Odd"):
-        CompiledEngine(replace(mechanism, constraints=(Coupler(0, (1,), Odd(), "/constraintset/odd"),)), Forces(()))
+        CompiledEngine(
+            replace(mechanism, constraints=(Coupler(0, (1,), Odd(), "/constraintset/odd"),)),
+            Forces(()),
+        )
     assert Settings().route == "auto"
 
 
 # ------------------------------------------------------------------------------------------- linear equations
 @settings(max_examples=60)
 @given(st.integers(1, 7), st.integers(1, 7), st.integers(0, 5), st.integers(0, 2**32 - 1))
-def test_equations_that_repeat_or_contradict_each_other(count: int, size: int, rank: int, seed: int):
+def test_equations_that_repeat_or_contradict_each_other(
+    count: int, size: int, rank: int, seed: int
+):
     rng = np.random.default_rng(seed)
     rank = min(count, size, rank)
     rows = rng.normal(size=(count, rank)) @ rng.normal(size=(rank, size))
@@ -318,7 +371,9 @@ def test_equations_that_repeat_or_contradict_each_other(count: int, size: int, r
         if rank == min(rows.shape)
         else np.linalg.norm(rows) * np.linalg.norm(np.linalg.pinv(rows, 1e-9))
     )
-    assert np.abs(x - expected).max() < 1e-13 * max(1.0, condition) ** 2 * max(1.0, float(np.abs(expected).max()))
+    assert np.abs(x - expected).max() < 1e-13 * max(1.0, condition) ** 2 * max(
+        1.0, float(np.abs(expected).max())
+    )
     for index in range(rank, size):
         free = np.zeros(size)
         free[index] = 1.0

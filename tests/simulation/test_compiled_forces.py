@@ -102,10 +102,18 @@ def test_force_does_something():
     mechanism, plain, _ = engines(chain())
     t, q, u = next(states(mechanism, 1))
     without = plain.acceleration(t, q, u)
-    idle = {"limit of a locked coordinate", "spring on a locked coordinate", "actuator without controls", "idle"}
+    idle = {
+        "limit of a locked coordinate",
+        "spring on a locked coordinate",
+        "actuator without controls",
+        "idle",
+    }
     for name in FORCES.keys() - idle:
         _, ours, _ = engines(with_force(FORCES[name]))
-        changes = [ours.acceleration(*state) != plain.acceleration(*state) for state in states(mechanism, choose(3, 8))]
+        changes = [
+            ours.acceleration(*state) != plain.acceleration(*state)
+            for state in states(mechanism, choose(3, 8))
+        ]
         assert any(changes), name
     assert all(math.isfinite(value) for value in without)
 
@@ -138,9 +146,18 @@ def test_every_class_of_force_is_here():
     made = {"ElasticFoundationForce", "ExternalForce"}
     for make in FORCES.values():
         result = make()
-        made |= {type(item).__name__ for item in (result if isinstance(result, tuple | list) else (result,))}
-    kinds = [kind for kind in declared_kinds() if not (getattr(kind, "states", ()) or kind.component.since)]
-    assert {kind.component.__name__ for kind in kinds if not issubclass(kind.component, Muscle)} <= made
+        made |= {
+            type(item).__name__
+            for item in (result if isinstance(result, tuple | list) else (result,))
+        }
+    kinds = [
+        kind
+        for kind in declared_kinds()
+        if not (getattr(kind, "states", ()) or kind.component.since)
+    ]
+    assert {
+        kind.component.__name__ for kind in kinds if not issubclass(kind.component, Muscle)
+    } <= made
 
 
 def test_measured_load():
@@ -148,10 +165,14 @@ def test_measured_load():
     mechanism = build_mechanism(chain())
     cubic = smoothing_spline((0.0, 0.5, 1.0, 1.5, 2.0), (0.3, -1.0, 2.0, 0.5, 0.1), 2, 0.0)
     functions = cubic, NumericLinear(2.0, -0.3), NumericConstant(0.4)
-    frames = [FramePlacement(body, offset((0.1, 0.2, -0.3), (0.3, -0.2, 0.5))) for body in (2, 0, 3)]
+    frames = [
+        FramePlacement(body, offset((0.1, 0.2, -0.3), (0.3, -0.2, 0.5))) for body in (2, 0, 3)
+    ]
     for given in ((1, 1, 1), (1, 0, 0), (0, 0, 1), (1, 1, 0)):
         kinds = [functions if wanted else () for wanted in given]
-        forces = Forces((external_load("/a", "a", Load(("b2_a_F", "b2_a_p", "b2_a_T"), *frames, *kinds)),))
+        forces = Forces(
+            (external_load("/a", "a", Load(("b2_a_F", "b2_a_p", "b2_a_T"), *frames, *kinds)),)
+        )
         with BulletEngine(mechanism, forces) as theirs:
             assert_same(mechanism, CompiledEngine(mechanism, forces), theirs)
 
@@ -171,6 +192,8 @@ def test_early_return():
 def test_motion_of_a_driven_chain():
     """The time goes into the steps."""
     model = with_force(FORCES["coordinate actuator"])
-    ours, theirs = (osimlite.simulate(model, 0.5, engine, accuracy=1e-9) for engine in ("compiled", "bullet"))
+    ours, theirs = (
+        osimlite.simulate(model, 0.5, engine, accuracy=1e-9) for engine in ("compiled", "bullet")
+    )
     assert ours.summary["steps"] == theirs.summary["steps"]
     assert np.abs(ours.values - theirs.values).max() < 1e-9

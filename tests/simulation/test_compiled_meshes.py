@@ -46,10 +46,16 @@ def meshes(folder):
 def test_on_a_plane_and_a_sphere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     model, (one, two) = chain(), meshes(tmp_path)
-    stone = ContactSphere(name="stone", socket_frame="/bodyset/b0", location=(0.2, 0.3, 0.1), radius=0.7)
+    stone = ContactSphere(
+        name="stone", socket_frame="/bodyset/b0", location=(0.2, 0.3, 0.1), radius=0.7
+    )
     plane = floor()
     model.add(plane, stone, one, two)
-    for name, surfaces in (("first", (one, plane, stone)), ("second", (stone, two)), ("third", (plane, two))):
+    for name, surfaces in (
+        ("first", (one, plane, stone)),
+        ("second", (stone, two)),
+        ("third", (plane, two)),
+    ):
         force = touching(surfaces)
         force.name = name
         model.add(force)
@@ -84,7 +90,8 @@ def test_a_motion(tmp_path):
     model = thrown(tmp_path, dissipation=0.5, friction=0.5)
     model.force_set.objects[0].contact_parameters.objects[0].geometry = ("floor", "shell")
     theirs, ours = (
-        osimlite.simulate(model, 0.4, engine, accuracy=1e-8, folder=tmp_path) for engine in ("bullet", "compiled")
+        osimlite.simulate(model, 0.4, engine, accuracy=1e-8, folder=tmp_path)
+        for engine in ("bullet", "compiled")
     )
     assert ours.values[-1] == pytest.approx(theirs.values[-1], abs=1e-6)
     result, expected = (item.summary["contact_events"] for item in (ours, theirs))

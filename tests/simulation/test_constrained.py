@@ -43,12 +43,22 @@ def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0, route: s
 
 # ------------------------------------------------------------------------------------ random trees and constraints
 @settings(max_examples=60)
-@given(cases(max_bodies=4), st.sampled_from([*KINDS, "none"]), st.integers(0, 2**32 - 1), st.integers(0, 3))
-def test_bullet_and_our_recursion_agree_on_any_mechanism(case: Case, kind: str, seed: int, locks: int):
+@given(
+    cases(max_bodies=4),
+    st.sampled_from([*KINDS, "none"]),
+    st.integers(0, 2**32 - 1),
+    st.integers(0, 3),
+)
+def test_bullet_and_our_recursion_agree_on_any_mechanism(
+    case: Case, kind: str, seed: int, locks: int
+):
     assume(len(case.q))
     rng = np.random.default_rng(seed)
     held = () if kind == "none" else (constraint_of(kind, case.mechanism, rng),)
-    infos = [replace(info, default_value=float(x)) for info, x in zip(case.mechanism.coordinates, case.q, strict=True)]
+    infos = [
+        replace(info, default_value=float(x))
+        for info, x in zip(case.mechanism.coordinates, case.q, strict=True)
+    ]
     for place in rng.integers(0, len(infos), locks):
         infos[place] = replace(infos[place], locked=True)
     mechanism = replace(case.mechanism, coordinates=tuple(infos), constraints=held)
@@ -80,7 +90,9 @@ def knee(*, opensim_derivatives: bool, inertia: Any = None) -> Mechanism:
     ]
     motions = custom(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
     properties = MassProperties(
-        2.0, np.array((0.1, -0.3, 0.05)), np.diag((0.03, 0.02, 0.04)) if inertia is None else inertia
+        2.0,
+        np.array((0.1, -0.3, 0.05)),
+        np.diag((0.03, 0.02, 0.04)) if inertia is None else inertia,
     )
     bodies = tuple(
         MobileBody(name, f"/bodyset/{name}", parent, properties, Mobilizer(f"/j/{name}", "CustomJoint", motions, own,
@@ -107,12 +119,16 @@ def test_an_inertia_that_bullet_refuses_takes_no_other_route():
     with BulletEngine(mechanism, Forces(())) as engine:
         assert engine.world.impossible
         assert engine.route == "mass-matrix"
-        assert engine.acceleration(0.0, q, u) == pytest.approx(mechanism.acceleration(q, u).tolist(), rel=1e-10)
+        assert engine.acceleration(0.0, q, u) == pytest.approx(
+            mechanism.acceleration(q, u).tolist(), rel=1e-10
+        )
 
 
 def test_routes_that_are_none_are_refused():
     mechanism = knee(opensim_derivatives=False)
-    with pytest.raises(UnsupportedError, match=r"articulated-body is for models .* take mass-matrix for 'knee'"):
+    with pytest.raises(
+        UnsupportedError, match=r"articulated-body is for models .* take mass-matrix for 'knee'"
+    ):
         accelerations(mechanism, np.zeros(4), np.zeros(4), route="articulated-body")
 
 
@@ -133,7 +149,9 @@ def pins(count: int, length: float = 0.4) -> tuple[Model, list[Body]]:
         carrier = bodies[-1] if bodies else model.ground
         at = (0.0, -length, 0.0) if bodies else (0.0, 0.0, 0.0)
         bodies.append(add(model, f"p{number}", osimlite.PinJoint(name=f"j{number}"), carrier, at))
-        next(item for item in model.components(Coordinate) if item.name == f"p{number}").default_value = 0.7 - number
+        next(
+            item for item in model.components(Coordinate) if item.name == f"p{number}"
+        ).default_value = 0.7 - number
     return model, bodies
 
 
@@ -162,7 +180,10 @@ def patella() -> Model:
     transform = joint.spatial_transform
     transform.rotation1.axis, transform.rotation1.coordinates = (0, 0, 1), ("flexion",)
     transform.rotation1.function = LinearFunction(coefficients=(1.0, 0.0))
-    for axis, y in ((transform.translation1, (0.03, -0.01, 0.02)), (transform.translation2, (-0.4, -0.41, -0.39))):
+    for axis, y in (
+        (transform.translation1, (0.03, -0.01, 0.02)),
+        (transform.translation2, (-0.4, -0.41, -0.39)),
+    ):
         axis.coordinates, axis.function = ("flexion",), SimmSpline(x=(-2.0, -0.7, 0.2), y=y)
     shank = model.add(Body(name="shank", mass=3.0, mass_center=(0.0, -0.2, 0.0), inertia=INERTIA))
     model.add(joint.between(thigh, shank))
@@ -205,7 +226,9 @@ def welded() -> Model:
     """A loop of four bars whose end is welded to a block that slides: most of the six equations say it twice."""
     model, bodies = pins(3)
     slider = add(model, "block", osimlite.PlanarJoint(name="plane"), model.ground)
-    return constrain(model, kinds.WeldConstraint(name="weld", socket_frame1=bodies[-1], socket_frame2=slider))
+    return constrain(
+        model, kinds.WeldConstraint(name="weld", socket_frame1=bodies[-1], socket_frame2=slider)
+    )
 
 
 def half_locked() -> Model:
@@ -225,7 +248,9 @@ def test_energy_is_kept_and_so_are_the_constraints(make: Any):
     with Simulation(model) as simulation:
         names = [info.name for info in simulation.mechanism.coordinates if not info.locked]
         last = names[-1] if make is half_locked else names[0]
-        trajectory = simulation.run(1.0, accuracy=1e-9, initial_speeds={last: 2.0}, report_interval=0.05)
+        trajectory = simulation.run(
+            1.0, accuracy=1e-9, initial_speeds={last: 2.0}, report_interval=0.05
+        )
         mechanism = simulation.mechanism
     assert trajectory.summary["constraints"]
     energy = trajectory.energy["total"]
@@ -245,7 +270,10 @@ def test_energy_is_kept_and_so_are_the_constraints(make: Any):
 def test_fixed_steps_converge_at_first_order(make: Any):
     with Simulation(make()) as simulation:
         exact = simulation.run(0.3, accuracy=1e-9).values[-1]
-        errors = [np.abs(simulation.run(0.3, fixed_step=h).values[-1] - exact).max() for h in (2e-3, 1e-3, 5e-4)]
+        errors = [
+            np.abs(simulation.run(0.3, fixed_step=h).values[-1] - exact).max()
+            for h in (2e-3, 1e-3, 5e-4)
+        ]
     assert errors[0] < 0.02
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)
     assert errors[1] / errors[2] == pytest.approx(2.0, rel=0.1)
@@ -253,7 +281,9 @@ def test_fixed_steps_converge_at_first_order(make: Any):
 
 @pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
 def test_both_engines_take_the_same_motion(make: Any):
-    ends = [simulate(make(), 0.3, engine, accuracy=1e-8).values[-1] for engine in ("bullet", "compiled")]
+    ends = [
+        simulate(make(), 0.3, engine, accuracy=1e-8).values[-1] for engine in ("bullet", "compiled")
+    ]
     assert ends[0] == pytest.approx(ends[1], abs=1e-8)
 
 
@@ -262,7 +292,9 @@ def test_a_prescribed_coordinate_does_what_it_is_told():
     first = next(iter(model.components(Coordinate)))
     first.prescribed, first.prescribed_function = True, Sine(amplitude=0.5, omega=3.0, offset=0.2)
     trajectory = simulate(model, 1.0, accuracy=1e-8, report_interval=0.1)
-    assert trajectory.values[:, 0] == pytest.approx(0.2 + 0.5 * np.sin(3.0 * trajectory.times), abs=1e-8)
+    assert trajectory.values[:, 0] == pytest.approx(
+        0.2 + 0.5 * np.sin(3.0 * trajectory.times), abs=1e-8
+    )
     assert trajectory.speeds[:, 0] == pytest.approx(1.5 * np.cos(3.0 * trajectory.times), abs=1e-8)
     assert np.ptp(trajectory.values[:, 1]) > 0.3
     with pytest.raises(SimulationError, match="'p0' is prescribed"):
@@ -276,7 +308,9 @@ def test_a_ball_rolls_down_a_slope_as_it_should(slope: float):
     model = Model(name="ball", gravity=(9.81 * math.sin(slope), -9.81 * math.cos(slope), 0.0))
     body = model.add(Body(name="ball", mass=mass, inertia=(moment, moment, moment, 0, 0, 0)))
     joint = osimlite.FreeJoint(name="free")
-    for name, coordinate in zip(("rx", "ry", "rz", "tx", "ty", "tz"), joint.coordinates, strict=True):
+    for name, coordinate in zip(
+        ("rx", "ry", "rz", "tx", "ty", "tz"), joint.coordinates, strict=True
+    ):
         coordinate.name = name
     joint.coordinates[4].default_value = radius
     model.add(joint.between(model.ground, body))
@@ -306,7 +340,9 @@ def test_what_is_set_stays_and_the_rest_follows():
 
 
 def test_starts_that_contradict_the_constraints_are_refused():
-    with pytest.raises(SimulationError, match="no pose of 'pins' near the given one fulfils /constraintset/loop"):
+    with pytest.raises(
+        SimulationError, match="no pose of 'pins' near the given one fulfils /constraintset/loop"
+    ):
         simulate(four_bars(), 0.01, initial={"p0": 1.5, "p1": 1.5, "p2": 1.5})
     with pytest.raises(SimulationError, match="do not allow the speeds given for p0 and p1"):
         simulate(four_bars(), 0.01, initial_speeds={"p0": 1.0, "p1": 5.0})
@@ -340,7 +376,13 @@ def test_the_energy_of_a_real_model_with_patellas_is_kept(corpus: Any):
     speeds = {f"knee_angle_{side}": 3.0 for side in "rl"}
     energies = []
     for opensim_derivatives in (False, True):
-        trajectory = simulate(model, 0.2, accuracy=1e-9, initial_speeds=speeds, opensim_derivatives=opensim_derivatives)
+        trajectory = simulate(
+            model,
+            0.2,
+            accuracy=1e-9,
+            initial_speeds=speeds,
+            opensim_derivatives=opensim_derivatives,
+        )
         energies.append(np.ptp(trajectory.energy["total"]) / trajectory.energy["kinetic"].max())
     assert energies[0] < 1e-8
     assert energies[1] > 1e-6

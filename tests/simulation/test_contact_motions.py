@@ -32,12 +32,16 @@ def on_floor(*, gravity=GRAVITY, height=RADIUS, slope=0.0, **material) -> Model:
         Coordinate(name="height", default_value=height),
     ]
     model.add(joint.between(model.ground, body, turned=(0, 0, -slope)))
-    floor = ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0, 0, -0.5 * pi - slope))
+    floor = ContactHalfSpace(
+        name="floor", socket_frame=model.ground, orientation=(0, 0, -0.5 * pi - slope)
+    )
     sphere = ContactSphere(name="sphere", socket_frame=body, radius=RADIUS)
     model.add(floor, sphere)
     contact = HuntCrossleyForce(name="contact", transition_velocity=0.05)
     contact.contact_parameters.objects.append(
-        HuntCrossleyForce.ContactParameters(geometry=(floor, sphere), stiffness=STIFFNESS, **material)
+        HuntCrossleyForce.ContactParameters(
+            geometry=(floor, sphere), stiffness=STIFFNESS, **material
+        )
     )
     model.add(contact)
     return model
@@ -63,7 +67,9 @@ def test_bounce(engine, dissipation):
     speed = 2.0
     model = on_floor(gravity=0.0, height=RADIUS + 0.1, dissipation=dissipation)
     with Simulation(model, engine) as simulation:
-        trajectory = simulation.run(0.2, accuracy=1e-10, initial_speeds={"height": -speed}, report_interval=1e-4)
+        trajectory = simulation.run(
+            0.2, accuracy=1e-10, initial_speeds={"height": -speed}, report_interval=1e-4
+        )
     begin, end = (event["time_s"] for event in trajectory.summary["contact_events"])
     assert begin == pytest.approx(0.1 / speed, abs=1e-8)
     out = trajectory.speeds[-1][trajectory.coordinates.index("height")]
@@ -111,7 +117,9 @@ def test_sliding(engine):
 def test_sticking_on_a_slope(engine):
     """Friction of this kind does not hold: the ball creeps by the fraction of the transition velocity that it needs."""
     u, slope, vt = 0.6, radians(20.0), 0.05
-    model = on_floor(height=rest(slope), slope=slope, dissipation=1.0, static_friction=u, dynamic_friction=u)
+    model = on_floor(
+        height=rest(slope), slope=slope, dissipation=1.0, static_friction=u, dynamic_friction=u
+    )
     with Simulation(model, engine) as simulation:
         trajectory = simulation.run(1.0, accuracy=1e-9)
     speed = trajectory.speeds[-1][trajectory.coordinates.index("along")]

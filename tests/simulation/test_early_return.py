@@ -22,16 +22,26 @@ from osimlite.simulation.engines.bullet.engine import BulletEngine
 def sled(positions, *, early_return):
     """Two balls on sliders above a floor, all in one force."""
     model = Model(name="sled")
-    floor = ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0.0, 0.0, -math.pi / 2))
+    floor = ContactHalfSpace(
+        name="floor", socket_frame=model.ground, orientation=(0.0, 0.0, -math.pi / 2)
+    )
     balls = []
     for name, x in zip("AB", positions, strict=True):
         body = model.add(Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-        joint = osimlite.SliderJoint(name=f"slider{name}", coordinates=[Coordinate(name=f"y{name}")])
+        joint = osimlite.SliderJoint(
+            name=f"slider{name}", coordinates=[Coordinate(name=f"y{name}")]
+        )
         upright = (0.0, 0.0, math.pi / 2)
-        model.add(joint.between(model.ground, body, at=(x, 0.0, 0.0), turned=upright, child_turned=upright))
+        model.add(
+            joint.between(
+                model.ground, body, at=(x, 0.0, 0.0), turned=upright, child_turned=upright
+            )
+        )
         balls.append(ContactSphere(name=f"ball{name}", socket_frame=body, radius=0.05))
     model.add(floor, *balls)
-    material = HuntCrossleyForce.ContactParameters(geometry=(*balls, floor), stiffness=1e6, dissipation=2.0)
+    material = HuntCrossleyForce.ContactParameters(
+        geometry=(*balls, floor), stiffness=1e6, dissipation=2.0
+    )
     force = HuntCrossleyForce(name="f", transition_velocity=0.2)
     force.contact_parameters.objects.append(material)
     model.add(force)
@@ -57,7 +67,9 @@ def test_simbodys_early_return_behind_its_switch(positions, speeds, early_return
             [(positions[0], 0.04, 0), (positions[1], 0.04, 0), (0, 0, 0)], [0.05, 0.05, math.inf]
         )
     ]
-    result, energy = contact_forces([contacts[n] for n in order], 0.2, simbody_early_return=early_return)
+    result, energy = contact_forces(
+        [contacts[n] for n in order], 0.2, simbody_early_return=early_return
+    )
     expected = dict(zip(order, (force[1] - 9.80665 for force in result), strict=True))
     assert udot == pytest.approx([expected[0], expected[1]], rel=1e-9)
     assert stored == pytest.approx(energy, rel=1e-9)
@@ -72,7 +84,11 @@ def test_spheres_of_one_force_push_each_other():
     assert len(element.pairs) == 3
     with BulletEngine(mechanism, forces) as engine:
         row = dict(
-            zip(engine.columns, engine.force_records(0.0, engine.state.pack([1.0, 1.01], [0.0, 0.0])), strict=True)
+            zip(
+                engine.columns,
+                engine.force_records(0.0, engine.state.pack([1.0, 1.01], [0.0, 0.0])),
+                strict=True,
+            )
         )
         assert engine.touching(0.0, engine.state.pack([1.0, 1.01], [0.0, 0.0])).bit_count() == 1
     push = np.array([row[f"f.B.force.{axis}"] for axis in "XYZ"])

@@ -17,7 +17,12 @@ optimize: Any = pytest.importorskip("scipy.optimize", reason="needs scipy (extra
 
 
 def solved(
-    columns: Array, wanted: Array, low: Array, high: Array, power: float = 2.0, code: Code | None = None
+    columns: Array,
+    wanted: Array,
+    low: Array,
+    high: Array,
+    power: float = 2.0,
+    code: Code | None = None,
 ) -> tuple[Array, Array, Array]:
     """Unknowns, what is missing, and whether nothing is; for columns (t, n, m)."""
     frames, n, m = columns.shape
@@ -31,7 +36,9 @@ def solved(
     return result[:, :n], result[:, n:-1], result[:, -1]
 
 
-def problem(random: Generator, m: int, n: int, frames: int = 1) -> tuple[Array, Array, Array, Array]:
+def problem(
+    random: Generator, m: int, n: int, frames: int = 1
+) -> tuple[Array, Array, Array, Array]:
     """Columns, right sides that some unknowns give, and bounds of which some are infinite."""
     columns = random.normal(size=(frames, n, m)) * (random.random((frames, n, m)) < 0.6)
     low, high = -random.random(n), random.random(n)
@@ -49,7 +56,8 @@ def test_weak_ones_give_what_full_ones_leave() -> None:
     (x,), _, (is_solved,) = solved(columns[None], wanted[None], low, high)
     assert is_solved
     assert np.max(np.abs(x @ columns - wanted) / (np.abs(x) @ np.abs(columns))) < 1e-10
-    assert x @ x == pytest.approx(648.4029065353637, rel=1e-9)  # found in a prototype by another search
+    # found in a prototype by another search
+    assert x @ x == pytest.approx(648.4029065353637, rel=1e-9)
 
 
 def test_the_quadratic_problem() -> None:
@@ -64,7 +72,8 @@ def test_the_quadratic_problem() -> None:
         assert missing == pytest.approx(0.0, abs=1e-11)
         assert (low <= x).all()
         assert (x <= high).all()
-        # At the least one, x plus what the multipliers of bounds push is in the range of the equations.
+        # At the least one, x plus what the multipliers of bounds push is in the range of the
+        # equations.
         free = (low < x) & (x < high)
         push, *_ = np.linalg.lstsq(columns[0][free], x[free], rcond=None)
         pulled = columns[0] @ push
@@ -72,18 +81,28 @@ def test_the_quadratic_problem() -> None:
         rest = ~free
         if np.linalg.matrix_rank(columns[0][free]) == m:
             assert (
-                np.where(x[rest] == low[rest], pulled[rest] <= low[rest] + 1e-8, pulled[rest] >= high[rest] - 1e-8)
+                np.where(
+                    x[rest] == low[rest],
+                    pulled[rest] <= low[rest] + 1e-8,
+                    pulled[rest] >= high[rest] - 1e-8,
+                )
             ).all()
 
 
-def by_others(columns: Array, wanted: Array, low: Array, high: Array, power: float, start: Array) -> float:
+def by_others(
+    columns: Array, wanted: Array, low: Array, high: Array, power: float, start: Array
+) -> float:
     """The least sum that SciPy finds."""
     result = optimize.minimize(
         lambda x: np.sum(np.abs(x) ** power),
         start,
         jac=lambda x: power * np.sign(x) * np.abs(x) ** (power - 1.0),
         bounds=list(zip(low, high, strict=True)),
-        constraints={"type": "eq", "fun": lambda x: x @ columns - wanted, "jac": lambda x: columns.T},
+        constraints={
+            "type": "eq",
+            "fun": lambda x: x @ columns - wanted,
+            "jac": lambda x: columns.T,
+        },
         method="SLSQP",
         options={"maxiter": 500, "ftol": 1e-14},
     )
@@ -130,7 +149,9 @@ def test_what_is_missing_where_there_is_no_solution() -> None:
         _, (missing,), (is_solved,) = solved(columns, wanted, low, high)
         assert not is_solved
         scale = np.linalg.norm(columns[0], axis=0)
-        nearest = optimize.lsq_linear(columns[0].T / scale[:, None], wanted[0] / scale, (low, high), tol=1e-12)
+        nearest = optimize.lsq_linear(
+            columns[0].T / scale[:, None], wanted[0] / scale, (low, high), tol=1e-12
+        )
         assert missing / scale == pytest.approx(-nearest.fun, abs=1e-4 * np.abs(nearest.fun).max())
 
 

@@ -71,9 +71,16 @@ def test_euler_interpolates_on_a_line():
 
 def test_euler_names_what_is_no_number():
     stepper = SemiImplicitEuler(
-        lambda t, y: [0.0, math.nan if t > 0.5 else 0.0], 0.0, [0.0, 1.0], 1, 0.1, names=["hip", "hip_speed"]
+        lambda t, y: [0.0, math.nan if t > 0.5 else 0.0],
+        0.0,
+        [0.0, 1.0],
+        1,
+        0.1,
+        names=["hip", "hip_speed"],
     )
-    with pytest.raises(IntegrationError, match=r"derivative of hip_speed is nan.*control is above 0") as caught:
+    with pytest.raises(
+        IntegrationError, match=r"derivative of hip_speed is nan.*control is above 0"
+    ) as caught:
         list(stepper.steps(1.0))
     assert caught.value.time == pytest.approx(0.6)
 

@@ -39,7 +39,12 @@ def document(folder: Path, body: str, datafile: str = "grf.mot", version: int = 
 
 
 def force(**tags: str) -> str:
-    given = {"applied_to_body": "block", "force_identifier": "grf_v", "point_identifier": "grf_p", **tags}
+    given = {
+        "applied_to_body": "block",
+        "force_identifier": "grf_v",
+        "point_identifier": "grf_p",
+        **tags,
+    }
     return "".join(f"<{tag}>{value}</{tag}>" for tag, value in given.items() if value)
 
 
@@ -55,7 +60,9 @@ def test_the_same_as_a_prescribed_force(model, tmp_path):
     assert loaded.summary["settings"]["external_loads"] == str(path)
     parts = [[Constant(value=value) for value in row[start : start + 3]] for start in (0, 3, 6)]
     names = ("forceFunctions", "pointFunctions", "torqueFunctions")
-    sets = {name: FunctionSet(name=name, objects=part) for name, part in zip(names, parts, strict=True)}
+    sets = {
+        name: FunctionSet(name=name, objects=part) for name, part in zip(names, parts, strict=True)
+    }
     model.add(PrescribedForce(name="same", socket_frame="/bodyset/block", **sets))
     same = simulate(model, 0.3, accuracy=1e-8)
     assert loaded.values[-1] == pytest.approx(same.values[-1], abs=1e-12)
@@ -68,8 +75,14 @@ def test_the_same_as_a_prescribed_force(model, tmp_path):
     [
         ({"applied_to_body": "blok"}, r"the applied_to_body of 'plate' is 'blok', .*mean 'block'"),
         ({"force_expressed_in_body": "/bodyset/blocks"}, "did you mean '/bodyset/block'"),
-        ({"force_identifier": "gfr_v"}, "the force_identifier of 'plate' is 'gfr_v'; .* mean 'grf_v'"),
-        ({"force_identifier": "grf_"}, "exactly three columns must begin so, and .* has grf_vx, grf_vy"),
+        (
+            {"force_identifier": "gfr_v"},
+            "the force_identifier of 'plate' is 'gfr_v'; .* mean 'grf_v'",
+        ),
+        (
+            {"force_identifier": "grf_"},
+            "exactly three columns must begin so, and .* has grf_vx, grf_vy",
+        ),
         ({"force_identifier": ""}, "has no force_identifier and no torque_identifier"),
         ({"force_identifier": "", "torque_identifier": "grf_m"}, "leave it out"),
         ({"force_identifer": "grf_v"}, "<force_identifer> means nothing"),
@@ -102,7 +115,9 @@ def test_data_that_cannot_be_used(model, tmp_path):
         read_external_loads(mechanism, path)
     with pytest.raises(DocumentError, match="names no data file"):
         read_external_loads(mechanism, document(tmp_path, force(), datafile=""))
-    (tmp_path / "model.xml").write_text('<OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>')
+    (tmp_path / "model.xml").write_text(
+        '<OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>'
+    )
     with pytest.raises(DocumentError, match="holds a <Model>, not a <ExternalLoads>"):
         read_external_loads(mechanism, tmp_path / "model.xml")
 
@@ -114,8 +129,12 @@ def test_older_documents(model, tmp_path):
 
 
 def test_a_measured_force_without_data_is_refused(model):
-    model.force_set.objects.append(ExternalForce(name="lost", applied_to_body="block", force_identifier="f"))
-    with pytest.raises(UnsupportedError, match=r"'/forceset/lost' \(ExternalForce outside of ExternalLoads"):
+    model.force_set.objects.append(
+        ExternalForce(name="lost", applied_to_body="block", force_identifier="f")
+    )
+    with pytest.raises(
+        UnsupportedError, match=r"'/forceset/lost' \(ExternalForce outside of ExternalLoads"
+    ):
         simulate(model, 0.01)
 
 
@@ -128,5 +147,7 @@ def test_what_older_versions_asked_for_is_ignored_and_what_is_misspelt_refused(m
     path.write_text(path.read_text().replace("<datafile>", f"{old}<datafile>"))
     assert len(read_external_loads(build_mechanism(model), path)) == 1
     path.write_text(path.read_text().replace("force_identifier", "force_identifer"))
-    with pytest.raises(DocumentError, match=r"<force_identifer> means nothing .* mean <force_identifier>"):
+    with pytest.raises(
+        DocumentError, match=r"<force_identifer> means nothing .* mean <force_identifier>"
+    ):
         read_external_loads(build_mechanism(model), path)

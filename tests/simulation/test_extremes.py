@@ -75,8 +75,18 @@ def test_both_engines_refuse_an_inertia_that_no_body_has(joint, body, words):
 @pytest.mark.parametrize(
     ("field", "value", "kind", "words"),
     [
-        ("translation", (float("inf"), 0, 0), ModelError, "has a place or turning that is not finite"),
-        ("orientation", (0, float("nan"), 0), ModelError, "has a place or turning that is not finite"),
+        (
+            "translation",
+            (float("inf"), 0, 0),
+            ModelError,
+            "has a place or turning that is not finite",
+        ),
+        (
+            "orientation",
+            (0, float("nan"), 0),
+            ModelError,
+            "has a place or turning that is not finite",
+        ),
         ("translation", (1e308, 1e308, 0), SimulationError, "the places of the frames"),
     ],
 )
@@ -84,7 +94,9 @@ def test_both_engines_refuse_an_inertia_that_no_body_has(joint, body, words):
 def test_a_frame_that_is_nowhere_is_refused(engine, field, value, kind, words):
     model = pendulum(osimlite.PinJoint)
     (joint,) = model.joint_set.objects
-    frame = osimlite.PhysicalOffsetFrame(name="there", socket_parent="/bodyset/bob", **{field: value})
+    frame = osimlite.PhysicalOffsetFrame(
+        name="there", socket_parent="/bodyset/bob", **{field: value}
+    )
     joint.frames.append(frame)
     joint.socket_child_frame = "/jointset/joint/there"
     with pytest.raises(kind, match=words):
@@ -105,9 +117,12 @@ def test_any_number_gets_one_verdict(data):
     text = to_text(with_force(FORCES[name]))
     leaf = data.draw(st.sampled_from(list(NUMBERS.finditer(text))))
     words, extreme = leaf[2].split(), data.draw(st.sampled_from(EXTREMES))
-    # Next to the inertia about a joint at 1e16 m, that of the body is rounding, and so is whether the sum is positive.
+    # Next to the inertia about a joint at 1e16 m, that of the body is rounding, and so is whether
+    # the sum is positive.
     assume(not (extreme == "1e16" and leaf[0].startswith("<mass_center>")))
-    places = data.draw(st.sampled_from([[place] for place in range(len(words))] + [list(range(len(words)))]))
+    places = data.draw(
+        st.sampled_from([[place] for place in range(len(words))] + [list(range(len(words)))])
+    )
     for place in places:
         words[place] = extreme
     try:
@@ -122,7 +137,11 @@ def test_any_number_gets_one_verdict(data):
 
 def test_a_station_that_is_nowhere_is_no_matter():
     model = pendulum(osimlite.PinJoint)
-    model.add(osimlite.Station(name="toe", location=(float("inf"), 0.0, 0.0), socket_parent_frame=model.ground))
+    model.add(
+        osimlite.Station(
+            name="toe", location=(float("inf"), 0.0, 0.0), socket_parent_frame=model.ground
+        )
+    )
     assert osimlite.simulate(model, 0.01, "compiled").times[-1] == 0.01
 
 
@@ -131,6 +150,10 @@ def test_steps_that_lead_nowhere_come_to_an_end():
     model = pendulum(osimlite.PinJoint)
     coordinate = next(iter(model.components(osimlite.Coordinate)))
     words = "1e40*sin(1e30*q)"
-    model.add(osimlite.ExpressionBasedCoordinateForce(name="drive", coordinate=coordinate, expression=words))
+    model.add(
+        osimlite.ExpressionBasedCoordinateForce(
+            name="drive", coordinate=coordinate, expression=words
+        )
+    )
     with pytest.raises(SimulationError, match="cannot go on at t = "):
         osimlite.simulate(model, 1e-6, "compiled", initial={coordinate.name: 1.0})

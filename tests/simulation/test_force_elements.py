@@ -58,8 +58,12 @@ def arm() -> Model:
     below = model.ground
     for number, kind in enumerate((SliderJoint, PinJoint, PinJoint)):
         inertia = (0.02, 0.02, 0.02, 0, 0, 0)
-        body = model.add(Body(name=f"b{number}", mass=1.0, mass_center=(0, -0.2, 0), inertia=inertia))
-        joint = kind(name=f"j{number}", coordinates=[Coordinate(name=f"q{number}", default_value=0.3)])
+        body = model.add(
+            Body(name=f"b{number}", mass=1.0, mass_center=(0, -0.2, 0), inertia=inertia)
+        )
+        joint = kind(
+            name=f"j{number}", coordinates=[Coordinate(name=f"q{number}", default_value=0.3)]
+        )
         model.add(joint.between(below, body, at=(0, -0.4 if number else 0, 0), turned=(0, 0, 0.2)))
         below = body
     below.wrap_object_set.objects.append(WrapSphere(name="ball", radius=0.05))
@@ -90,12 +94,20 @@ def prescribed(function: Function, **more) -> PrescribedController:
 
 
 def through(*points) -> PathSpring:
-    return PathSpring(name="a", resting_length=0.1, stiffness=1.0, dissipation=0.0, geometry_path=straight(*points))
+    return PathSpring(
+        name="a",
+        resting_length=0.1,
+        stiffness=1.0,
+        dissipation=0.0,
+        geometry_path=straight(*points),
+    )
 
 
 def around(**more) -> PathSpring:
     force = through()
-    force.geometry_path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="ball", **more))
+    force.geometry_path.path_wrap_set.objects.append(
+        PathWrap(name="wrap", wrap_object="ball", **more)
+    )
     return force
 
 
@@ -112,7 +124,9 @@ SPRING: dict[str, Any] = {"resting_length": 0.1, "stiffness": 1.0, "dissipation"
     ("make", "message"),
     [
         (
-            lambda: ExponentialContactForce(name="a", station=osimlite.Station(socket_parent_frame="/ground")),
+            lambda: ExponentialContactForce(
+                name="a", station=osimlite.Station(socket_parent_frame="/ground")
+            ),
             r"'/forceset/a' \(ExponentialContactForce\)",
         ),
         (
@@ -140,8 +154,14 @@ def test_what_cannot_be_computed_is_named(make, message):
     [
         (lambda: SpringGeneralizedForce(name="a"), "'/forceset/a' names no coordinate"),
         (lambda: SpringGeneralizedForce(name="a", coordinate="q9"), "names 'q9'"),
-        (lambda: SpringGeneralizedForce(name="a", coordinate="q0", stiffness=math.nan), "not a finite number"),
-        (lambda: PointToPointSpring(name="a", socket_body1="/ground"), "'socket_body2' of '/forceset/a' is empty"),
+        (
+            lambda: SpringGeneralizedForce(name="a", coordinate="q0", stiffness=math.nan),
+            "not a finite number",
+        ),
+        (
+            lambda: PointToPointSpring(name="a", socket_body1="/ground"),
+            "'socket_body2' of '/forceset/a' is empty",
+        ),
         (lambda: PathSpring(name="a", **SPRING), "has 0 points"),
         (
             lambda: through(ConditionalPathPoint(name="c", socket_parent_frame="/ground")),
@@ -159,10 +179,19 @@ def test_what_cannot_be_computed_is_named(make, message):
             ),
             "three coordinates of '/forceset/a/path/m' differ",
         ),
-        (lambda: around(range=(1, 3)), "range of '/forceset/a/path/wrap' ends at point 3; the path has 2"),
-        (lambda: around(method="spiral"), "method of '/forceset/a/path/wrap' is 'spiral'; take hybrid"),
+        (
+            lambda: around(range=(1, 3)),
+            "range of '/forceset/a/path/wrap' ends at point 3; the path has 2",
+        ),
+        (
+            lambda: around(method="spiral"),
+            "method of '/forceset/a/path/wrap' is 'spiral'; take hybrid",
+        ),
         (lambda: PathSpring(name="a", geometry_path=straight()), "not a finite number"),
-        (lambda: Ligament(name="a", geometry_path=straight()), "resting_length of '/forceset/a' is not positive"),
+        (
+            lambda: Ligament(name="a", geometry_path=straight()),
+            "resting_length of '/forceset/a' is not positive",
+        ),
         (
             lambda: Blankevoort1991Ligament(name="a", geometry_path=straight()),
             "slack_length of '/forceset/a' is not positive",
@@ -188,7 +217,11 @@ def test_what_has_no_meaning_is_said(make, message):
     [
         SpringGeneralizedForce(name="a", coordinate="q1", stiffness=30.0, rest_length=-0.4),
         PointToPointSpring(
-            name="a", socket_body1="/ground", socket_body2="/bodyset/b2", point1=(1, 0, 0), stiffness=30.0
+            name="a",
+            socket_body1="/ground",
+            socket_body2="/bodyset/b2",
+            point1=(1, 0, 0),
+            stiffness=30.0,
         ),
         BushingForce(
             name="a",
@@ -201,14 +234,22 @@ def test_what_has_no_meaning_is_said(make, message):
             name="a",
             socket_frame1="/ground",
             socket_frame2="/bodyset/b2",
-            m_z_theta_z_function=SimmSpline(x=(-2.0, -0.5, 0.1, 0.6, 2.0), y=(-30.0, -3.0, 0.0, 6.0, 50.0)),
+            m_z_theta_z_function=SimmSpline(
+                x=(-2.0, -0.5, 0.1, 0.6, 2.0), y=(-30.0, -3.0, 0.0, 6.0, 50.0)
+            ),
             f_x_delta_x_function=PolynomialFunction(coefficients=(20.0, 0.0, 5.0, 1.0)),
             f_y_delta_y_function=LinearFunction(coefficients=(10.0, 1.0)),
         ),
-        PathSpring(name="a", resting_length=0.9, stiffness=50.0, dissipation=0.0, geometry_path=straight()),
+        PathSpring(
+            name="a", resting_length=0.9, stiffness=50.0, dissipation=0.0, geometry_path=straight()
+        ),
         Ligament(name="a", resting_length=0.9, pcsa_force=100.0, geometry_path=straight()),
         Blankevoort1991Ligament(
-            name="a", slack_length=0.9, linear_stiffness=90.0, damping_coefficient=0.0, geometry_path=straight()
+            name="a",
+            slack_length=0.9,
+            linear_stiffness=90.0,
+            damping_coefficient=0.0,
+            geometry_path=straight(),
         ),
     ],
     ids=lambda force: type(force).__name__,
@@ -227,7 +268,9 @@ def test_a_control_follows_the_time(how):
     """A mass pushed by A sin(w t) alone moves as A/(m w) (t - sin(w t)/w)."""
     model = Model(name="push", gravity=(0, 0, 0))
     body = model.add(Body(name="mass", mass=2.0, inertia=(1, 1, 1, 0, 0, 0)))
-    model.add(SliderJoint(name="slide", coordinates=[Coordinate(name="x")]).between(model.ground, body))
+    model.add(
+        SliderJoint(name="slide", coordinates=[Coordinate(name="x")]).between(model.ground, body)
+    )
     model.add(CoordinateActuator(name="a", coordinate="x", optimal_force=3.0))
     controller = prescribed(Sine(amplitude=1.0, omega=4.0, phase=0.0, offset=0.0))
     controller.socket_actuators = ("/forceset/a",)
@@ -235,7 +278,9 @@ def test_a_control_follows_the_time(how):
     trajectory = osimlite.simulate(model, 0.5, **how)
     t = np.array(trajectory.times)
     expected = 3.0 / (2.0 * 4.0) * (t - np.sin(4.0 * t) / 4.0)
-    assert np.abs(trajectory.values[:, 0] - expected).max() < 2e-5 * (1.0 if "fixed_step" in how else 1e-4)
+    assert np.abs(trajectory.values[:, 0] - expected).max() < 2e-5 * (
+        1.0 if "fixed_step" in how else 1e-4
+    )
 
 
 def egg_over_floor(*more) -> Model:
@@ -246,14 +291,18 @@ def egg_over_floor(*more) -> Model:
         model.ground, body, turned=(0, 0, 0.5 * math.pi), child_turned=(0, 0, 0.5 * math.pi)
     ))  # fmt: skip
     surfaces = [
-        ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0, 0, -0.5 * math.pi)),
+        ContactHalfSpace(
+            name="floor", socket_frame=model.ground, orientation=(0, 0, -0.5 * math.pi)
+        ),
         ContactEllipsoid(name="shell", socket_frame=body, radii=(0.2, 0.1, 0.15)),
         *more,
     ]
     model.add(*surfaces)
     contact = HuntCrossleyForce(name="contact")
     contact.contact_parameters.objects.append(
-        HuntCrossleyForce.ContactParameters(geometry=tuple(surfaces), stiffness=1e5, dissipation=1.0)
+        HuntCrossleyForce.ContactParameters(
+            geometry=tuple(surfaces), stiffness=1e5, dissipation=1.0
+        )
     )
     model.add(contact)
     return model
@@ -268,7 +317,9 @@ def test_an_ellipsoid_lands_when_its_lowest_point_is_down():
 
 
 def test_an_ellipsoid_lands_on_a_stone():
-    stone = ContactSphere(name="stone", socket_frame="/ground", location=(0.0, 0.05, 0.0), radius=0.1)
+    stone = ContactSphere(
+        name="stone", socket_frame="/ground", location=(0.0, 0.05, 0.0), radius=0.1
+    )
     trajectory = osimlite.simulate(egg_over_floor(stone), 0.5, accuracy=1e-8)
     first = trajectory.summary["contact_events"][0]
     assert first["contact"] == "contact (stone, shell)"

@@ -35,25 +35,44 @@ def spring(moment_arm_functions=(), **properties):
     [
         ({"coordinate_paths": ONE}, "'length_function' of '/forceset/a/path' is missing"),
         ({"length_function": Sine()}, "name at least one coordinate"),
-        ({"coordinate_paths": ("/jointset/j2/q",), "length_function": Sine()}, "names '/jointset/j2/q'"),
-        ({"coordinate_paths": TWO, "length_function": Sine()}, "function of 1 variables and gets 2"),
+        (
+            {"coordinate_paths": ("/jointset/j2/q",), "length_function": Sine()},
+            "names '/jointset/j2/q'",
+        ),
+        (
+            {"coordinate_paths": TWO, "length_function": Sine()},
+            "function of 1 variables and gets 2",
+        ),
         (TWICE, "name each once"),
         ({"coordinate_paths": ONE, "length_function": Constant(value=1.0)}, "no arguments"),
-        ({"coordinate_paths": ONE, "length_function": MultiplierFunction(function=Constant())}, "no arguments"),
+        (
+            {"coordinate_paths": ONE, "length_function": MultiplierFunction(function=Constant())},
+            "no arguments",
+        ),
         (
             {"coordinate_paths": TWO, "length_function": PLANE, "moment_arm_functions": [PLANE]},
             "1 moment_arm_functions for 2 coordinates",
         ),
         (
-            {"coordinate_paths": TWO, "length_function": PLANE, "lengthening_speed_function": PLANE},
+            {
+                "coordinate_paths": TWO,
+                "length_function": PLANE,
+                "lengthening_speed_function": PLANE,
+            },
             "'lengthening_speed_function' of .* gets 4",
         ),
         (
-            {"coordinate_paths": TWO, "length_function": ExpressionBasedFunction(expression="q", variables=("q",))},
+            {
+                "coordinate_paths": TWO,
+                "length_function": ExpressionBasedFunction(expression="q", variables=("q",)),
+            },
             "has 1 variables and gets 2",
         ),
         (
-            {"coordinate_paths": ONE, "length_function": ExpressionBasedFunction(expression="p", variables=("q",))},
+            {
+                "coordinate_paths": ONE,
+                "length_function": ExpressionBasedFunction(expression="p", variables=("q",)),
+            },
             "there is no 'p'",
         ),
     ],
@@ -70,7 +89,8 @@ def test_an_unknown_function_is_named():
 
 def test_a_constant_polynomial():
     model = spring(
-        coordinate_paths=TWO, length_function=MultivariatePolynomialFunction(dimension=2, order=0, coefficients=(0.7,))
+        coordinate_paths=TWO,
+        length_function=MultivariatePolynomialFunction(dimension=2, order=0, coefficients=(0.7,)),
     )
     paths = osimlite.paths(model)
     assert paths.lengths({}) == {"/forceset/a": 0.7}
@@ -79,7 +99,11 @@ def test_a_constant_polynomial():
 
 def test_moment_arm_functions_are_taken_as_they_are():
     paths = osimlite.paths(
-        spring([PolynomialFunction(coefficients=(2.0, 0.5))], coordinate_paths=ONE, length_function=Sine())
+        spring(
+            [PolynomialFunction(coefficients=(2.0, 0.5))],
+            coordinate_paths=ONE,
+            length_function=Sine(),
+        )
     )
     pose = {"q2_0": 0.3}
     assert paths.moment_arms(pose) == {"/forceset/a": {ONE[0]: pytest.approx(1.1)}}

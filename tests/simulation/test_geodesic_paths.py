@@ -16,7 +16,12 @@ integrate = pytest.importorskip("scipy.integrate")
 
 
 def surface(kind, sizes, quadrant="all"):
-    still = {"xyz_body_rotation": (0, 0, 0), "translation": (0, 0, 0), "method": "hybrid", "range": None}
+    still = {
+        "xyz_body_rotation": (0, 0, 0),
+        "translation": (0, 0, 0),
+        "method": "hybrid",
+        "range": None,
+    }
     return {"kind": kind, "dimensions": sizes, "quadrant": quadrant, **still}
 
 
@@ -38,14 +43,18 @@ def over_circle(first, second, radius):
 def test_helix_on_a_cylinder():
     paths = around(surface("Cylinder", [0.03, 1.0]))
     flat = over_circle((-0.1, 0.01), (0.12, 0.005), 0.03)
-    assert length(paths, (-0.1, 0.01, 0.0), (0.12, 0.005, 0.07)) == pytest.approx(hypot(flat, 0.07), rel=1e-14)
+    assert length(paths, (-0.1, 0.01, 0.0), (0.12, 0.005, 0.07)) == pytest.approx(
+        hypot(flat, 0.07), rel=1e-14
+    )
 
 
 def test_great_circle_on_a_sphere():
     paths = around(surface("Sphere", [0.03]))
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     first, second = turn[:, :2] @ (-0.1, 0.01), turn[:, :2] @ (0.12, 0.005)
-    assert length(paths, first, second) == pytest.approx(over_circle((-0.1, 0.01), (0.12, 0.005), 0.03), rel=1e-14)
+    assert length(paths, first, second) == pytest.approx(
+        over_circle((-0.1, 0.01), (0.12, 0.005), 0.03), rel=1e-14
+    )
 
 
 def test_meridian_of_a_torus():
@@ -63,7 +72,9 @@ def test_ellipse_of_an_ellipsoid():
     t = acos(-a / 0.1)
     line = hypot(0.1 + a * np.cos(t), b * np.sin(t))
     arc, _ = integrate.quad(lambda t: hypot(a * np.sin(t), b * np.cos(t)), pi - t, t, epsabs=1e-14)
-    assert length(paths, (-0.1, 1e-13, 0.0), (0.1, 1e-13, 0.0)) == pytest.approx(2 * line + arc, rel=1e-11)
+    assert length(paths, (-0.1, 1e-13, 0.0), (0.1, 1e-13, 0.0)) == pytest.approx(
+        2 * line + arc, rel=1e-11
+    )
 
 
 def test_ellipsoid_against_another_integrator():
@@ -80,7 +91,9 @@ def test_ellipsoid_against_another_integrator():
     before, after = start - first, second - end
     arc = length(paths, first, second) - np.linalg.norm(before) - np.linalg.norm(after)
     y = [*start, *(before / np.linalg.norm(before))]
-    result = integrate.solve_ivp(rates, (0.0, arc), y, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+    result = integrate.solve_ivp(rates, (0.0, arc), y, method="DOP853", rtol=1e-12, atol=1e-14).y[
+        :, -1
+    ]
     assert weights @ start**2 == pytest.approx(1.0, abs=1e-10)
     assert (weights * start) @ before == pytest.approx(0.0, abs=1e-9)
     assert result == pytest.approx([*end, *(after / np.linalg.norm(after))], abs=1e-9)
@@ -115,9 +128,9 @@ def test_speeds_and_moment_arms_are_derivatives(name):
         expected = derivative(lambda h, q=q, way=way: paths.lengths(q + h * way)[PATH])
         arms = paths.moment_arms(q)[PATH]
         assert paths.speeds(q, u)[PATH] == pytest.approx(expected, rel=0, abs=1e-9)
-        assert -sum(arms.get(info.path, 0.0) * u[k] for k, info in enumerate(infos)) == pytest.approx(
-            expected, abs=1e-9
-        )
+        assert -sum(
+            arms.get(info.path, 0.0) * u[k] for k, info in enumerate(infos)
+        ) == pytest.approx(expected, abs=1e-9)
 
 
 ALL = {"Cylinder": [0.03, 9.0], "Sphere": [0.04], "Ellipsoid": [0.03, 0.05, 0.04]}
@@ -126,7 +139,12 @@ ALL = {"Cylinder": [0.03, 9.0], "Sphere": [0.04], "Ellipsoid": [0.03, 0.05, 0.04
 @pytest.mark.parametrize(
     "kinds",
     [
-        *(("Cylinder", "Cylinder"), ("Cylinder", "Ellipsoid"), ("Ellipsoid", "Ellipsoid"), ("Sphere", "Sphere")),
+        *(
+            ("Cylinder", "Cylinder"),
+            ("Cylinder", "Ellipsoid"),
+            ("Ellipsoid", "Ellipsoid"),
+            ("Sphere", "Sphere"),
+        ),
         *(("Sphere", "Ellipsoid"), ("Sphere", "Cylinder"), ("Cylinder", "Sphere")),
     ],
     ids=" and ".join,
@@ -134,10 +152,14 @@ ALL = {"Cylinder": [0.03, 9.0], "Sphere": [0.04], "Ellipsoid": [0.03, 0.05, 0.04
 def test_lengths_around_two_surfaces_do_not_jump(kinds):
     """On either side of both, and between them: where another way gets shorter its length is that of the one before."""
     one, two = (surface(kind, ALL[kind]) for kind in kinds)
-    paths = around(one, {**two, "translation": (0.09, 0.01, 0.02), "xyz_body_rotation": (0.4, -0.3, 0.2)})
+    paths = around(
+        one, {**two, "translation": (0.09, 0.01, 0.02), "xyz_body_rotation": (0.4, -0.3, 0.2)}
+    )
     rng, steps = np.random.default_rng(6), np.linspace(0.0, 1.0, 61)[:, None]
     for _ in range(30):
-        begin, end = rng.uniform((-0.2, -0.06, -0.06, 0.15, -0.06, -0.06), (-0.08, 0.06, 0.06, 0.3, 0.06, 0.06), (2, 6))
+        begin, end = rng.uniform(
+            (-0.2, -0.06, -0.06, 0.15, -0.06, -0.06), (-0.08, 0.06, 0.06, 0.3, 0.06, 0.06), (2, 6)
+        )
         lengths = [length(paths, ends[:3], ends[3:]) for ends in begin + steps * (end - begin)]
         way = (end - begin) / (len(steps) - 1)
         assert np.max(np.abs(np.diff(lengths))) < np.linalg.norm(way[:3]) + np.linalg.norm(way[3:])
@@ -145,10 +167,15 @@ def test_lengths_around_two_surfaces_do_not_jump(kinds):
 
 def test_surfaces_that_intersect():
     """In the notch between them the path bends around the one with a side alone, and does not go straight on."""
-    held, other = surface("Sphere", [0.04], "y"), {**surface("Sphere", [0.03]), "translation": (0.04, 0.03, 0.0)}
+    held, other = (
+        surface("Sphere", [0.04], "y"),
+        {**surface("Sphere", [0.03]), "translation": (0.04, 0.03, 0.0)},
+    )
     for height in (-0.02, 0.0, 0.02, 0.04, 0.06):
         ends = (-0.1, height, 0.0), (0.12, 0.0, 0.001)
-        assert length(around(held, other), *ends) == pytest.approx(length(around(held), *ends), rel=1e-12)
+        assert length(around(held, other), *ends) == pytest.approx(
+            length(around(held), *ends), rel=1e-12
+        )
 
 
 def test_nothing_outside_of_a_path_is_touched(monkeypatch):
@@ -183,9 +210,15 @@ def test_sides():
     first, second = (-0.1, -0.05, 0.0), (0.1, -0.05, 0.02)
     flat = 2 * sqrt(0.1**2 + 0.05**2 - 0.03**2)
     angle = 2 * (pi - acos(0.05 / hypot(0.1, 0.05)) - acos(0.03 / hypot(0.1, 0.05)))
-    expected = {"all": hypot(0.2, 0.02), "-y": hypot(0.2, 0.02), "y": hypot(flat + 0.03 * angle, 0.02)}
+    expected = {
+        "all": hypot(0.2, 0.02),
+        "-y": hypot(0.2, 0.02),
+        "y": hypot(flat + 0.03 * angle, 0.02),
+    }
     for side, value in expected.items():
-        assert length(around(surface("Cylinder", [0.03, 1.0], side)), first, second) == pytest.approx(value, rel=1e-14)
+        assert length(
+            around(surface("Cylinder", [0.03, 1.0], side)), first, second
+        ) == pytest.approx(value, rel=1e-14)
 
 
 @pytest.mark.parametrize("mirrored", [1.0, -1.0])
@@ -195,7 +228,10 @@ def test_a_knee_winds_on(mirrored):
     paths, usual = osimlite.paths(knee, wrapping="geodesic"), osimlite.paths(knee)
     for flexion in np.linspace(0.0, 2.6, 27):
         angle = -1.2 - flexion
-        ends = (0.05, mirrored * 0.3, 0.0), (0.06 * np.cos(angle), mirrored * 0.06 * np.sin(angle), 0.0)
+        ends = (
+            (0.05, mirrored * 0.3, 0.0),
+            (0.06 * np.cos(angle), mirrored * 0.06 * np.sin(angle), 0.0),
+        )
         assert length(paths, *ends) == pytest.approx(length(usual, *ends), rel=0.0, abs=1e-12)
     assert length(paths, *ends) > 0.35
 
@@ -210,12 +246,16 @@ def test_only_the_piece_nearest_to_the_axis_is_held_on_a_side():
     bent, behind = length(around(cylinder), first, via), length(around(cylinder), via, second)
     straight = np.linalg.norm(np.subtract(via, second))
     assert behind > straight + 0.05
-    assert length(around(cylinder, via=[via]), first, second) == pytest.approx(bent + straight, rel=1e-14)
+    assert length(around(cylinder, via=[via]), first, second) == pytest.approx(
+        bent + straight, rel=1e-14
+    )
 
 
 def test_far_side_of_a_sphere():
     """Where OpenSim's length is negative."""
-    result = length(around(surface("Sphere", [0.04], "x")), (-0.039, 0.02, 0.0), (-0.039, -0.02, 0.001))
+    result = length(
+        around(surface("Sphere", [0.04], "x")), (-0.039, 0.02, 0.0), (-0.039, -0.02, 0.001)
+    )
     assert 0.18 < result < 0.25
 
 
@@ -227,10 +267,19 @@ def test_unknown_wrapping():
 def test_a_simulation_runs_along_geodesics():
     """Its first acceleration is that of the moment arms."""
     model = wrapped({"via": (), "objects": (surface("Cylinder", [0.03, 1.0]),)})
-    paths, ends = osimlite.paths(model, wrapping="geodesic"), {"A3": -0.1, "A4": 0.01, "B3": 0.12, "B5": 0.08}
+    paths, ends = (
+        osimlite.paths(model, wrapping="geodesic"),
+        {"A3": -0.1, "A4": 0.01, "B3": 0.12, "B5": 0.08},
+    )
     pulled = {
         wrapping: osimlite.simulate(
-            model, 1e-6, "compiled", wrapping=wrapping, initial=ends, controls={"p": 1.0}, accuracy=1e-9
+            model,
+            1e-6,
+            "compiled",
+            wrapping=wrapping,
+            initial=ends,
+            controls={"p": 1.0},
+            accuracy=1e-9,
         )
         for wrapping in ("geodesic", "opensim")
     }

@@ -26,7 +26,10 @@ TIMES, VALUES = (0.0, 0.1, 0.3), (1.0, 3.0, -1.0)
 def model() -> Model:
     """The first actuator is driven by the model itself too."""
     made = arm()
-    made.add(CoordinateActuator(name="first", coordinate="q0"), CoordinateActuator(name="second", coordinate="q1"))
+    made.add(
+        CoordinateActuator(name="first", coordinate="q0"),
+        CoordinateActuator(name="second", coordinate="q1"),
+    )
     made.add(BodyActuator(name="push", socket_body="/bodyset/b2"))
     brain = PrescribedController(name="brain", socket_actuators=("/forceset/first",))
     brain.ControlFunctions.objects.append(Constant(value=0.5))
@@ -73,12 +76,18 @@ def test_what_a_control_may_be(ready, given, expected):
 
 def test_a_motion_is_that_of_a_controller_more(model, tmp_path):
     rows = np.column_stack((VALUES, [0.1, 0.2, -0.3]))
-    write_sto(tmp_path / "controls.sto", "controls", TIMES, ["first", "/forceset/second"], rows.tolist())
+    write_sto(
+        tmp_path / "controls.sto", "controls", TIMES, ["first", "/forceset/second"], rows.tolist()
+    )
     with_controller = model.model_copy(deep=True)
     with_controller.add(PrescribedController(name="more", controls_file="controls.sto"))
     expected = osimlite.simulate(with_controller, to=0.3, engine="compiled", folder=tmp_path)
     with Simulation(model, "compiled") as ready:
-        for given in (tmp_path / "controls.sto", str(tmp_path / "controls.sto"), read_sto(tmp_path / "controls.sto")):
+        for given in (
+            tmp_path / "controls.sto",
+            str(tmp_path / "controls.sto"),
+            read_sto(tmp_path / "controls.sto"),
+        ):
             assert (ready.run(0.3, controls=given).values == expected.values).all()
     assert (expected.values != osimlite.simulate(model, to=0.3, engine="compiled").values).any()
 
@@ -98,7 +107,9 @@ def test_a_control_set_can_be_given(model, tmp_path):
         "<ControlLinearNode><value>7</value></ControlLinearNode></x_nodes></ControlLinear></objects></ControlSet>"
         "</OpenSimDocument>"
     )
-    forces = osimlite.simulate(model, to=0.1, engine="compiled", controls=tmp_path / "set.xml").forces
+    forces = osimlite.simulate(
+        model, to=0.1, engine="compiled", controls=tmp_path / "set.xml"
+    ).forces
     assert (forces["second"] == 7.0).all()
 
 
@@ -107,10 +118,17 @@ def test_the_kernel_alone(model, code):
     mechanism = osimlite.mechanism(model)
     forces = osimlite.simulation.elements.force_elements(model, mechanism)
     system = System(mechanism, forces, code=code)
-    for given in ({"first": Sine(2.0, 3.0, 0.1, 0.2)}, {"first": lambda t: 2.0}, {"second": 1.0, "push_0": 3.0}, {}):
+    for given in (
+        {"first": Sine(2.0, 3.0, 0.1, 0.2)},
+        {"first": lambda t: 2.0},
+        {"second": 1.0, "push_0": 3.0},
+        {},
+    ):
         system.drive(driven(forces.controls, given, 1.0))
         functions = driven(forces.controls, given, 1.0).functions
-        expected = [sum(float(item.evaluate(np.array((0.7,)))[0]) for item in row) for row in functions]
+        expected = [
+            sum(float(item.evaluate(np.array((0.7,)))[0]) for item in row) for row in functions
+        ]
         system.applied(0.7, system.state.default())
         assert system.controls() == pytest.approx(expected, abs=1e-15)
 
@@ -132,9 +150,18 @@ def test_the_kernel_alone(model, code):
             {"second": "much"},
             "the control of 'second' is 'much'; give a number, a function of time or (times, values)",
         ),
-        ({"second": [1.0]}, "the control of 'second' is [1.0]; give a number, a function of time or (times, values)"),
-        ({"second": ([0.0, 1.0], [1.0])}, "the control of 'second' has 2 times and 1 values; give as many of both"),
-        ({"second": ([], [])}, "the control of 'second' has 0 times and 0 values; give as many of both"),
+        (
+            {"second": [1.0]},
+            "the control of 'second' is [1.0]; give a number, a function of time or (times, values)",
+        ),
+        (
+            {"second": ([0.0, 1.0], [1.0])},
+            "the control of 'second' has 2 times and 1 values; give as many of both",
+        ),
+        (
+            {"second": ([], [])},
+            "the control of 'second' has 0 times and 0 values; give as many of both",
+        ),
         (
             {"second": ([0.0, 0.0], [1.0, 2.0])},
             "the control of 'second' has times that do not increase, or what is no number; mend it",
@@ -143,7 +170,10 @@ def test_the_kernel_alone(model, code):
             {"second": ([0.0, 1.0], [1.0, float("inf")])},
             "the control of 'second' has times that do not increase, or what is no number; mend it",
         ),
-        ({"second": lambda t: float("nan")}, "the control of 'second' is nan at 0 s; give a number"),
+        (
+            {"second": lambda t: float("nan")},
+            "the control of 'second' is nan at 0 s; give a number",
+        ),
         ("gone.sto", "cannot read the file: no such file"),
         (0.5, "controls are a mapping of names, a table or a file, not 0.5"),
     ],
@@ -166,7 +196,9 @@ def test_names_that_two_actuators_share(model):
 def test_tables_that_do_not_cover_the_motion(ready):
     message = "the controls are given from 0.1 to 0.2 s of a motion from 0 to 0.3 s; their first and last values hold"
     with pytest.warns(DoubtfulWarning, match=message):
-        times, result = controls_of(ready, {"second": ((0.1, 0.2), (1.0, 2.0)), "first": ((0.0, 0.3), (0.0, 0.0))})
+        times, result = controls_of(
+            ready, {"second": ((0.1, 0.2), (1.0, 2.0)), "first": ((0.0, 0.3), (0.0, 0.0))}
+        )
     assert result[1] == pytest.approx(np.interp(times, (0.1, 0.2), (1.0, 2.0)), abs=1e-12)
 
 

@@ -37,7 +37,9 @@ from tests.simulation.test_constrained import MODELS
 METHODS = "adams", "bdf", "rosenbrock"
 
 
-def steps_of(f: Any, y: list[float], accuracy: float, method: str, to: float = 3.0) -> tuple[list[float], Any]:
+def steps_of(
+    f: Any, y: list[float], accuracy: float, method: str, to: float = 3.0
+) -> tuple[list[float], Any]:
     """The end of a motion of auxiliary states only, and its stepper."""
     stepper = ControlledSteps(Equations(f, len(y), 0), 0.0, y, accuracy, None, method)  # type: ignore[arg-type]
     return last(stepper.steps(to))[1], stepper
@@ -53,7 +55,9 @@ def hanging(case: str, excitation: float = 0.5, gravity: float = 9.80665) -> Any
 
 
 # -------------------------------------------------------------------------------------------------- linear equations
-@pytest.mark.parametrize("case", ["thelen_default", "millard_damped", "millard_rigid", "dgf_default"])
+@pytest.mark.parametrize(
+    "case", ["thelen_default", "millard_damped", "millard_rigid", "dgf_default"]
+)
 def test_condensed_equations_are_those_of_all_states(case):
     """On a slider nothing but the muscle has derivatives: J is that of the engine."""
     model = hanging(case)
@@ -69,7 +73,9 @@ def rolling(is_smooth: bool = False, **material: float) -> Any:
     joint = PlanarJoint(name="plane")
     joint.coordinates = [Coordinate(name=name) for name in ("turn", "along", "height")]
     model.add(joint.between(model.ground, body))
-    floor = ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0, 0, -0.5 * math.pi))
+    floor = ContactHalfSpace(
+        name="floor", socket_frame=model.ground, orientation=(0, 0, -0.5 * math.pi)
+    )
     ball = ContactSphere(name="ball", socket_frame=body, radius=0.1, location=(0.3, -0.1, 0.0))
     if is_smooth:
         model.add(floor, ball)
@@ -94,7 +100,9 @@ def test_equations_of_a_contact_are_those_of_all_coordinates(is_smooth):
     material = {"dissipation": 0.0} if is_smooth else {}
     model = rolling(is_smooth, static_friction=0.8, dynamic_friction=0.8, **material)
     # How coordinates turn the lever of a smooth contact is left out, too.
-    assert_condensed(model, np.array([0.3, 0.0, 0.095, 3.0, -0.2, -0.9]), rel=0.02 if is_smooth else 0.01)
+    assert_condensed(
+        model, np.array([0.3, 0.0, 0.095, 3.0, -0.2, -0.9]), rel=0.02 if is_smooth else 0.01
+    )
 
 
 def assert_condensed(model, y, rel=1e-4):
@@ -106,13 +114,20 @@ def assert_condensed(model, y, rel=1e-4):
     size, c = int(s[MODEL.DOFS]), 2e-3
     room, f = np.zeros(condensation_room(size, int(s[MODEL.RESPONSES]))), np.zeros(len(y))
     rates = partial(rates_at, system)
-    jacobian = np.column_stack([(rates(y + h) - rates(y - h)) / 2e-6 for h in 1e-6 * np.eye(len(y))])
-    assert linearise(system.program.ints, system.numbers, system.work_vector, y, f, room, 0.0) == OUTCOME.OK
+    jacobian = np.column_stack(
+        [(rates(y + h) - rates(y - h)) / 2e-6 for h in 1e-6 * np.eye(len(y))]
+    )
+    assert (
+        linearise(system.program.ints, system.numbers, system.work_vector, y, f, room, 0.0)
+        == OUTCOME.OK
+    )
     assert condense(system.program.ints, c, room)
     right = np.random.default_rng(1).uniform(-1.0, 1.0, len(y))
     result = right.copy()
     correct(system.program.ints, c, room, result)
-    assert result == pytest.approx(np.linalg.solve(np.eye(len(y)) - c * jacobian, right), rel=rel, abs=1e-6)
+    assert result == pytest.approx(
+        np.linalg.solve(np.eye(len(y)) - c * jacobian, right), rel=rel, abs=1e-6
+    )
 
 
 def rates_at(system: System, y: Any) -> Any:
@@ -128,7 +143,9 @@ def test_steps_grow_with_the_accuracy_as_the_order_says(method, order):
     These equations have no J, so that Rosenbrock's method has the order that it has whatever J is.
     """
     power = order if method == "rosenbrock" else order + 1
-    loose, tight = (steps_of(oscillator, [1.0, 0.0], accuracy, method)[1].taken for accuracy in (1e-5, 1e-8))
+    loose, tight = (
+        steps_of(oscillator, [1.0, 0.0], accuracy, method)[1].taken for accuracy in (1e-5, 1e-8)
+    )
     assert tight / loose == pytest.approx(1e3 ** (1.0 / power), rel=0.25)
 
 
@@ -137,7 +154,10 @@ def test_rosenbrock_has_order_3():
     alpha, weights, embedded = (np.array(part) for part in (ALPHA, WEIGHTS, EMBEDDED))
     beta, ones = alpha + np.array(GAMMA), np.ones(4)
     c = alpha @ ones
-    conditions = [weights @ v for v in (ones, beta @ ones, c, c * c, beta @ beta @ ones, np.linalg.solve(beta, ones))]
+    conditions = [
+        weights @ v
+        for v in (ones, beta @ ones, c, c * c, beta @ beta @ ones, np.linalg.solve(beta, ones))
+    ]
     assert conditions == pytest.approx([1.0, 1 / 2, 1 / 2, 1 / 3, 1 / 6, 1.0], abs=1e-14)
     assert [embedded @ v for v in (ones, beta @ ones)] == pytest.approx([1.0, 0.5], abs=1e-14)
 
@@ -168,20 +188,26 @@ def test_a_motion_that_explodes_is_an_error(method, accuracy, advice):
 
 # ----------------------------------------------------------------------------------------------------------- motions
 @pytest.mark.parametrize(
-    ("case", "method"), [("thelen_default", "bdf"), ("millard_damped", "rosenbrock"), ("dgf_default", "adams")]
+    ("case", "method"),
+    [("thelen_default", "bdf"), ("millard_damped", "rosenbrock"), ("dgf_default", "adams")],
 )
 def test_a_block_hangs_on_a_muscle(case, method):
     with Simulation(hanging(case), "compiled", equilibrate=True) as simulation:
         exact = simulation.run(0.3, accuracy=1e-9)
         result = simulation.run(0.3, accuracy=1e-6, integrator=method)
-    assert result.summary["integrator"] == {"adams": "Adams", "bdf": "BDF", "rosenbrock": "Rosenbrock"}[method]
+    assert (
+        result.summary["integrator"]
+        == {"adams": "Adams", "bdf": "BDF", "rosenbrock": "Rosenbrock"}[method]
+    )
     # At every report: the interpolated motion too.
     assert np.abs(result.values - exact.values).max() < 2e-5
     for path, values in exact.auxiliary.items():
         assert np.abs(result.auxiliary[path] - values).max() < 2e-5, path
 
 
-@pytest.mark.parametrize(("number", "method"), [("m0001", "bdf"), ("m0001", "rosenbrock"), ("m0005", "adams")])
+@pytest.mark.parametrize(
+    ("number", "method"), [("m0001", "bdf"), ("m0001", "rosenbrock"), ("m0005", "adams")]
+)
 def test_real_models_move(number, method, corpus):
     """An arm and a gait model."""
     (path,) = (model.path for model in corpus if model.id == number)
@@ -217,7 +243,9 @@ def test_contacts_begin_and_end(walker, method):
         exact = simulation.run(0.6, accuracy=1e-7).summary["contact_events"]
         result = simulation.run(0.6, accuracy=1e-4, integrator=method).summary["contact_events"]
     assert [event["contact"] for event in result] == [event["contact"] for event in exact]
-    assert [event["time_s"] for event in result] == pytest.approx([event["time_s"] for event in exact], abs=1e-4)
+    assert [event["time_s"] for event in result] == pytest.approx(
+        [event["time_s"] for event in exact], abs=1e-4
+    )
 
 
 # ------------------------------------------------------------------------------------------------------- many in a call
@@ -235,7 +263,9 @@ def test_many_runs_are_as_one(walker, method):
         start = simulation.initial_state({}, {})
         rows = np.array([start, start]) + 1e-3 * np.arange(2)[:, None]
         both = run_many(simulation.engine, rows, 0.2, integrator=method, threads=1)
-        alone = [run_many(simulation.engine, row[None], 0.2, integrator=method).states[0] for row in rows]
+        alone = [
+            run_many(simulation.engine, row[None], 0.2, integrator=method).states[0] for row in rows
+        ]
     assert np.array_equal(both.states, alone)
 
 
@@ -250,11 +280,14 @@ def test_an_unknown_integrator_is_refused(walker):
 @pytest.mark.parametrize(("method", "accuracy"), [("adams", 1e-3), ("bdf", 1e-2)])
 def test_derivatives_that_became_too_large_end_no_iteration(method, accuracy):
     model = hung(muscle("thelen_default"))
-    # The fiber pulls with e^40 of its force, and with less after each step: by as much derivatives become too large.
+    # The fiber pulls with e^40 of its force, and with less after each step: by as much derivatives
+    # become too large.
     model.find("/forceset/mu").default_fiber_length = 0.16
     with Simulation(model, "compiled") as simulation:
         result, exact = (
-            simulation.run(0.1, accuracy=least, integrator=by).auxiliary["/forceset/mu/fiber_length"][-1]
+            simulation.run(0.1, accuracy=least, integrator=by).auxiliary[
+                "/forceset/mu/fiber_length"
+            ][-1]
             for least, by in ((accuracy, method), (1e-7, "rosenbrock"))
         )
     assert result == pytest.approx(exact, abs=accuracy)

@@ -43,7 +43,11 @@ def test_fourth_order(f):
         assert math.log2(coarse / fine) == pytest.approx(4.0, abs=0.35)
 
 
-@given(st.lists(st.floats(-3.0, 3.0), min_size=4, max_size=4), st.floats(0.1, 2.0), st.floats(-1.0, 1.0))
+@given(
+    st.lists(st.floats(-3.0, 3.0), min_size=4, max_size=4),
+    st.floats(0.1, 2.0),
+    st.floats(-1.0, 1.0),
+)
 def test_exact_for_cubic_derivatives(coefficients, h, t0):
     """Quadrature of order four, at the solution's weights and at the nodes of the method."""
     a, b, c, d = coefficients
@@ -70,7 +74,8 @@ def test_error_follows_the_accuracy(accuracy):
     t, y = last(integrator.steps(10.0))
     assert t == 10.0
     error = max(abs(y[0] - math.cos(10.0)), abs(y[1] + math.sin(10.0)))
-    # No step may err by more than the accuracy; an oscillator does not amplify what was erred before.
+    # No step may err by more than the accuracy; an oscillator does not amplify what was erred
+    # before.
     assert error < 2.0 * accuracy * integrator.taken
     assert error > 1e-3 * accuracy
 
@@ -93,7 +98,9 @@ def test_default_accuracy_and_first_step_are_opensims():
     first.step()
     assert first.time == pytest.approx(0.06)  # ... and followed by one five times as large
     by_default = list(runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1).steps(2.0))
-    assert by_default == list(runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1, accuracy=1e-3).steps(2.0))
+    assert by_default == list(
+        runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1, accuracy=1e-3).steps(2.0)
+    )
 
 
 def test_speeds_count_relative_to_their_size_and_coordinates_do_not():
@@ -108,7 +115,9 @@ def test_speeds_count_relative_to_their_size_and_coordinates_do_not():
     assert count([0.0, 1e3], 1) == count([0.0, 1e6], 1)
     assert count([1e6, 0.0], 1) > 1.5 * count([1e3, 0.0], 1)
     # Below 1, speeds count as they are.
-    assert count([0.0, 1e-9], 1) < count([0.0, 1e-3], 1) < count([0.0, 1.0], 1) == count([0.0, 1e3], 1)
+    assert (
+        count([0.0, 1e-9], 1) < count([0.0, 1e-3], 1) < count([0.0, 1.0], 1) == count([0.0, 1e3], 1)
+    )
     # Auxiliary states count as speeds do.
     assert count([1e6], 0) == count([0.0, 1e6], 1)
 
@@ -155,11 +164,22 @@ def test_next_step(h, error, accuracy, cut):
 
 @pytest.mark.parametrize(
     ("wanted", "chosen"),
-    [(20.0, 5.0), (4.0, 4.0), (1.21, 1.21), (1.19, 1.0), (0.91, 1.0), (0.895, 0.895), (0.5, 0.5), (0.05, 0.1)],
+    [
+        (20.0, 5.0),
+        (4.0, 4.0),
+        (1.21, 1.21),
+        (1.19, 1.0),
+        (0.91, 1.0),
+        (0.895, 0.895),
+        (0.5, 0.5),
+        (0.05, 0.1),
+    ],
 )
 def test_next_step_where_a_given_one_is_wanted(wanted, chosen):
     """Factors of the present step; just below 0.9 the error exceeds the accuracy."""
-    assert next_step_size(1.0, 1e-3 * (0.9 / wanted) ** 4, 1e-3, False, 4.0) == pytest.approx(chosen)
+    assert next_step_size(1.0, 1e-3 * (0.9 / wanted) ** 4, 1e-3, False, 4.0) == pytest.approx(
+        chosen
+    )
 
 
 @pytest.mark.parametrize("error", [math.nan, math.inf])
@@ -185,8 +205,12 @@ def test_counts():
 
 
 def test_a_derivative_that_is_no_number_at_the_start():
-    with pytest.raises(IntegrationError, match=r"derivative of knee_speed is nan at t = 2\.5 s") as caught:
-        runge_kutta_merson(lambda t, y: [0.0, math.nan], 2.5, [0.0, 1.0], 1, names=["knee", "knee_speed"])
+    with pytest.raises(
+        IntegrationError, match=r"derivative of knee_speed is nan at t = 2\.5 s"
+    ) as caught:
+        runge_kutta_merson(
+            lambda t, y: [0.0, math.nan], 2.5, [0.0, 1.0], 1, names=["knee", "knee_speed"]
+        )
     assert (caught.value.time, caught.value.index) == (2.5, 1)
     assert isinstance(caught.value, SimulationError) and isinstance(caught.value, OsimliteError)
 
@@ -239,7 +263,9 @@ def test_overflow_for_good():
     def f(t, y):
         return [1.0 if t < 0.5 else math.exp(1e3)]
 
-    with pytest.raises(IntegrationError, match=r"cannot be computed at t = 0\.5 s: math range error") as caught:
+    with pytest.raises(
+        IntegrationError, match=r"cannot be computed at t = 0\.5 s: math range error"
+    ) as caught:
         list(runge_kutta_merson(f, 0.0, [0.0], 0).steps(1.0))
     assert isinstance(caught.value.__cause__, OverflowError)
     assert caught.value.time == pytest.approx(0.5)
@@ -262,7 +288,9 @@ def test_failing_at_the_first_state():
 
 def test_no_step_small_enough():
     """y' = y^2 leaves every bound at t = 1."""
-    integrator = runge_kutta_merson(lambda t, y: [0.0, y[1] * y[1]], 0.0, [0.0, 1.0], 1, names=["q", "speed of q"])
+    integrator = runge_kutta_merson(
+        lambda t, y: [0.0, y[1] * y[1]], 0.0, [0.0, 1.0], 1, names=["q", "speed of q"]
+    )
     with pytest.raises(IntegrationError) as caught:
         list(integrator.steps(2.0))
     assert caught.value.time == pytest.approx(1.0, abs=1e-3)
@@ -271,7 +299,9 @@ def test_no_step_small_enough():
 
 
 def test_a_jump_is_passed():
-    _, y = last(runge_kutta_merson(lambda t, y: [0.0 if t < 0.5 else 1e6], 0.0, [0.0], 0).steps(0.6))
+    _, y = last(
+        runge_kutta_merson(lambda t, y: [0.0 if t < 0.5 else 1e6], 0.0, [0.0], 0).steps(0.6)
+    )
     assert y[0] == pytest.approx(1e5, rel=1e-6)
 
 

@@ -87,7 +87,9 @@ def test_after_any_edit_a_motion_is_that_of_a_model_just_read(repo, edits):
 def test_what_is_ready_is_used_again_and_goes_with_the_model(repo, monkeypatch):
     made = []
     start = run.Simulation.__init__
-    monkeypatch.setattr(run.Simulation, "__init__", lambda self, *a, **k: (made.append(1), start(self, *a, **k))[1])
+    monkeypatch.setattr(
+        run.Simulation, "__init__", lambda self, *a, **k: (made.append(1), start(self, *a, **k))[1]
+    )
     model = osimlite.read(repo / WALKER)
     name = next(each.name for each in model.components(osimlite.Coordinate) if not each.locked)
     one = osimlite.simulate(model, to=0.1, engine="compiled")
@@ -130,7 +132,9 @@ def test_files_are_read_every_time(repo, tmp_path):
     """A table of controls beside a model may change without a word."""
     model = osimlite.read(repo / WALKER)
     coordinate = list(model.components(osimlite.Coordinate))[-1]
-    model.add(osimlite.CoordinateActuator(name="motor", coordinate=coordinate.name, optimal_force=1.0))
+    model.add(
+        osimlite.CoordinateActuator(name="motor", coordinate=coordinate.name, optimal_force=1.0)
+    )
     table = "controls\nversion=1\nnRows=2\nnColumns=2\ninDegrees=no\nendheader\ntime\tmotor\n0\t{0}\n1\t{0}\n"
     model.add(osimlite.PrescribedController(name="drive", controls_file="controls.sto"))
     result = []
@@ -155,7 +159,9 @@ def test_threads_do_not_meet_in_one_model(repo):
             assert np.array_equal(values, mine) and np.array_equal(energy, own)
 
 
-@pytest.mark.skipif(not has_machine_code(), reason="as Python the kernels take the time of many calls")
+@pytest.mark.skipif(
+    not has_machine_code(), reason="as Python the kernels take the time of many calls"
+)
 def test_a_model_that_has_moved_moves_in_one_call(repo, monkeypatch):
     calls = []
     whole = Batch.run
@@ -166,7 +172,8 @@ def test_a_model_that_has_moved_moves_in_one_call(repo, monkeypatch):
     osimlite.simulate(model, to=1.0, engine="compiled")
     calls.clear()
     last = osimlite.simulate(model, to=1.0, engine="compiled")
-    # Unless the machine stood still for a moment, one; in any case fewer than before anything was known.
+    # Unless the machine stood still for a moment, one; in any case fewer than before anything was
+    # known.
     assert len(calls) < at_first
     assert np.array_equal(first.values, last.values)
     assert first.summary["contact_events"] == last.summary["contact_events"]

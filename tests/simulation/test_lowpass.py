@@ -35,17 +35,27 @@ def test_a_slow_filter_keeps_its_digits() -> None:
     """Of what forty digits give, ten are kept, though the factors of a slow filter nearly cancel."""
     values = np.random.default_rng(5).normal(size=400).cumsum()
     _, result = lowpassed(np.arange(400) / 600.0, values[:, None], 2.5)
-    continued = [*(2.0 * values[0] - values[200:0:-1]), *values, *(2.0 * values[-1] - values[-2:-202:-1])]
+    continued = [
+        *(2.0 * values[0] - values[200:0:-1]),
+        *values,
+        *(2.0 * values[-1] - values[-2:-202:-1]),
+    ]
     with localcontext(prec=40):
         w = Decimal(np.tan(np.pi * 2.5 / 600.0))
         scale = (w + 1) * (w * w + w + 1)
-        back = 3 * w**3 + 2 * w * w - 2 * w - 3, 3 * w**3 - 2 * w * w - 2 * w + 3, (w - 1) * (w * w - w + 1)
+        back = (
+            3 * w**3 + 2 * w * w - 2 * w - 3,
+            3 * w**3 - 2 * w * w - 2 * w + 3,
+            (w - 1) * (w * w - w + 1),
+        )
         rows = [Decimal(value) for value in continued]
         for _ in range(2):
             run = rows[:3]
             for k in range(3, len(rows)):
                 taken = w**3 * (rows[k] + 3 * (rows[k - 1] + rows[k - 2]) + rows[k - 3])
-                run.append((taken - sum(one * run[k - 1 - j] for j, one in enumerate(back))) / scale)
+                run.append(
+                    (taken - sum(one * run[k - 1 - j] for j, one in enumerate(back))) / scale
+                )
             rows = run[::-1]
     expected = np.array([float(row) for row in rows])
     assert result[:, 0] == pytest.approx(expected, abs=1e-10 * np.abs(expected).max())

@@ -22,7 +22,9 @@ def engine(walker):
 @pytest.fixture(scope="module")
 def starts(engine):
     infos = engine.mechanism.coordinates
-    row = engine.state.pack([info.default_value for info in infos], [info.default_speed for info in infos])
+    row = engine.state.pack(
+        [info.default_value for info in infos], [info.default_speed for info in infos]
+    )
     rows = np.tile(row, (20, 1))
     rows[1:] += np.random.default_rng(1).uniform(-0.1, 0.1, (19, len(row)))
     return rows
@@ -39,14 +41,20 @@ def test_default_start_is_the_simulation(engine, starts, walker):
     assert ENDINGS[int(runs.endings[0])] == "done"
     result = [event for event in trajectory.summary["contact_events"] if event["time_s"] > 0.0]
     assert [name for _, name, _ in runs.events[0]] == [event["contact"] for event in result]
-    assert [t for t, _, _ in runs.events[0]] == pytest.approx([event["time_s"] for event in result], abs=1e-9)
+    assert [t for t, _, _ in runs.events[0]] == pytest.approx(
+        [event["time_s"] for event in result], abs=1e-9
+    )
     for name, (force, t) in zip(engine.contacts, runs.peaks[0].tolist(), strict=True):
-        largest = trajectory.summary["largest_contact_forces"].get(name, {"force_N": 0.0, "time_s": 0.0})
+        largest = trajectory.summary["largest_contact_forces"].get(
+            name, {"force_N": 0.0, "time_s": 0.0}
+        )
         assert (force, t) == pytest.approx((largest["force_N"], largest["time_s"]))
 
 
 def test_threads_do_not_matter(engine, starts):
-    one, two = (run_many(engine, starts, 1.0, most_events=30, threads=threads) for threads in (1, 2))
+    one, two = (
+        run_many(engine, starts, 1.0, most_events=30, threads=threads) for threads in (1, 2)
+    )
     assert np.array_equal(one.states, two.states)
     assert np.array_equal(one.counts, two.counts)
     assert one.events == two.events
@@ -56,7 +64,9 @@ def test_threads_do_not_matter(engine, starts):
 
 def test_an_engine_goes_to_another_process(engine, starts):
     other = pickle.loads(pickle.dumps(engine))
-    assert np.array_equal(run_many(other, starts[:2], 1.0).states, run_many(engine, starts[:2], 1.0).states)
+    assert np.array_equal(
+        run_many(other, starts[:2], 1.0).states, run_many(engine, starts[:2], 1.0).states
+    )
 
 
 def test_other_numbers_need_no_other_code(engine, starts, walker, fixtures):
@@ -76,7 +86,9 @@ def test_a_fall_ends_a_run(engine, starts):
     place = engine.order.index(pelvis)
     level = starts[0, place] - 0.1
     by_value = Watch("low", coordinate="Pelvis_ty", level=level, stops=-1)
-    runs = run_many(engine, starts, 3.0, watches=[by_value], most_events=40, report_times=[0.0, 3.0])
+    runs = run_many(
+        engine, starts, 3.0, watches=[by_value], most_events=40, report_times=[0.0, 3.0]
+    )
     ends = [ENDINGS[int(ending)] for ending in runs.endings]
     assert "stopped" in ends
     for ending, t, state, events in zip(ends, runs.times, runs.states, runs.events, strict=True):
@@ -93,7 +105,9 @@ def test_height_of_a_point(engine, starts):
     runs = run_many(engine, starts[:1], 5.0, watches=[watch], most_events=40)
     assert ENDINGS[int(runs.endings[0])] == "stopped"
     q = engine.state.values(runs.states[0].tolist())
-    assert engine.mechanism.station_position("Pelvis", (0.0, 0.1, 0.0), q)[1] == pytest.approx(0.6, abs=1e-7)
+    assert engine.mechanism.station_position("Pelvis", (0.0, 0.1, 0.0), q)[1] == pytest.approx(
+        0.6, abs=1e-7
+    )
 
 
 def test_a_run_that_fails_does_not_harm_the_others(engine, starts):
@@ -141,7 +155,9 @@ def test_a_touch_ends_a_run(engine, starts):
     for end, t, events in zip(ends, runs.times, runs.events, strict=True):
         begins = [moment for moment, name, _ in events if name == "RHipForce"]
         assert begins == (pytest.approx([t], abs=2e-9) if end == "stopped" else [])
-        assert [event for event in events if event[1] == "down"] == ([(t, "down", True)] if begins else [])
+        assert [event for event in events if event[1] == "down"] == (
+            [(t, "down", True)] if begins else []
+        )
 
 
 @pytest.mark.parametrize(
@@ -169,5 +185,10 @@ def test_settings_without_meaning_are_refused(engine, starts, settings, why):
 def test_endings_are_those_of_the_machine_code():
     from osimlite.mechanics.kernels import record
 
-    words = {record.DONE: "done", record.FAILED: "failed", record.STOPPED: "stopped", record.TOO_MANY: "too many steps"}
+    words = {
+        record.DONE: "done",
+        record.FAILED: "failed",
+        record.STOPPED: "stopped",
+        record.TOO_MANY: "too many steps",
+    }
     assert words == ENDINGS

@@ -26,7 +26,9 @@ def thrown(folder, *, dissipation=0.0, friction=0.0) -> Model:
     for index, (name, value) in enumerate((("turn", 0.3), ("along", 0.15), ("height", 0.33))):
         joint.coordinates[index].name, joint.coordinates[index].default_value = name, value
     model.add(joint.between(model.ground, body))
-    floor = ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0, 0, -np.pi / 2))
+    floor = ContactHalfSpace(
+        name="floor", socket_frame=model.ground, orientation=(0, 0, -np.pi / 2)
+    )
     stone = ContactMesh(name="stone", socket_frame=model.ground, filename="stone.obj")
     shell = ContactMesh(name="shell", socket_frame=body, filename="egg.obj")
     model.add(floor, stone, shell)
@@ -66,7 +68,10 @@ def test_fixed_steps_converge_at_first_order(tmp_path):
     first = best.summary["contact_events"][0]
     assert first["contact"] == "contact (shell, stone)" and first["time_s"] < 0.15
     coarse, fine = (
-        np.abs(osimlite.simulate(model, 0.2, fixed_step=step, folder=tmp_path).values[-1] - best.values[-1]).max()
+        np.abs(
+            osimlite.simulate(model, 0.2, fixed_step=step, folder=tmp_path).values[-1]
+            - best.values[-1]
+        ).max()
         for step in (4e-4, 2e-4)
     )
     assert coarse / fine == pytest.approx(2.0, rel=0.2)
@@ -75,7 +80,9 @@ def test_fixed_steps_converge_at_first_order(tmp_path):
 
 def test_where_mesh_files_are(tmp_path, monkeypatch):
     model = thrown(tmp_path)
-    with pytest.raises(ModelError, match=r"the mesh file 'stone\.obj' is not there; put it beside the model's file"):
+    with pytest.raises(
+        ModelError, match=r"the mesh file 'stone\.obj' is not there; put it beside the model's file"
+    ):
         osimlite.simulate(model, 0.01)
     monkeypatch.chdir(tmp_path)
     osimlite.simulate(model, 0.01)
@@ -85,7 +92,17 @@ def test_where_mesh_files_are(tmp_path, monkeypatch):
     (inner / "Geometry").mkdir()
     for name in ("egg.obj", "stone.obj"):
         (tmp_path / name).rename(inner / "Geometry" / name)
-    words = [sys.executable, "-m", "osimlite", "simulate", "models/thrown.osim", "--to", "0.02", "-o", "out"]
+    words = [
+        sys.executable,
+        "-m",
+        "osimlite",
+        "simulate",
+        "models/thrown.osim",
+        "--to",
+        "0.02",
+        "-o",
+        "out",
+    ]
     done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 

@@ -13,7 +13,10 @@ from tests.simulation.elements.muscle_rows import hung, muscle
 CURVES = MuscleCurves(
     ("/forceset/<b>", "/forceset/c"),
     {"knee": (0.0, 0.5), "hip": (0.1, 0.2, 0.3)},
-    {"length": np.arange(12.0).reshape(6, 2), "tendon_force": np.array([[np.nan, k] for k in range(6)])},
+    {
+        "length": np.arange(12.0).reshape(6, 2),
+        "tendon_force": np.array([[np.nan, k] for k in range(6)]),
+    },
 )
 
 
@@ -33,7 +36,9 @@ def test_tables_have_a_row_for_each_muscle_in_each_pose():
     ]
     assert float(data.length.sel(muscle="/forceset/c", knee=0.5, hip=0.2)) == 9.0
     alone = MuscleCurves(("/forceset/c",), {}, {"length": np.array([[0.3]])})
-    assert alone.to_frame()["length"]["/forceset/c"] == 0.3 and alone.to_xarray().length.shape == (1,)
+    assert alone.to_frame()["length"]["/forceset/c"] == 0.3 and alone.to_xarray().length.shape == (
+        1,
+    )
 
 
 def test_notebooks_show_what_is_least_and_greatest():
@@ -46,7 +51,11 @@ def test_notebooks_show_what_is_least_and_greatest():
 @pytest.mark.parametrize(
     ("values", "muscles", "said"),
     [
-        ({"x": [0.3], "/jointset/slide/x": [0.3]}, (), "x and /jointset/slide/x are one coordinate"),
+        (
+            {"x": [0.3], "/jointset/slide/x": [0.3]},
+            (),
+            "x and /jointset/slide/x are one coordinate",
+        ),
         ({"x": [0.3]}, ("/forceset/mo",), "did you mean '/forceset/mu'"),
     ],
 )

@@ -26,7 +26,11 @@ MUSCLES = {
     "hanging_dgf": "dgf_default",
     "hanging_rigidtendon": "rigidtendon",
 }
-KNOWN = [case for case, name in MUSCLES.items() if kind_of_class(class_for(CONFIGURATIONS[name]["cls"])) is not None]
+KNOWN = [
+    case
+    for case, name in MUSCLES.items()
+    if kind_of_class(class_for(CONFIGURATIONS[name]["cls"])) is not None
+]
 
 
 NAMES = "TRIlong", "TRIlat", "TRImed", "BIClong", "BICshort", "BRA"
@@ -34,7 +38,10 @@ REAL = {
     "arm26_constant": ("m0001", dict(zip(NAMES, (0.05, 0.1, 0.2, 0.3, 0.4, 0.15), strict=True))),
     "arm26_sine": (
         "m0001",
-        {name: Sine(amplitude=0.2, omega=4.0 * pi, phase=0.3 * k, offset=0.3) for k, name in enumerate(NAMES)},
+        {
+            name: Sine(amplitude=0.2, omega=4.0 * pi, phase=0.3 * k, offset=0.3)
+            for k, name in enumerate(NAMES)
+        },
     ),
     "gait10dof18musc_default": ("m0005", None),
 }
@@ -55,7 +62,10 @@ def assert_moves_as(case, model, **choices):
     ):
         ours |= {f"{info.path}/value": values, f"{info.path}/speed": speeds}
     for path, column, digits in zip(
-        motion["states"], expected[:, 1:].T, motion["max_difference_per_state"]["1e-09-1e-10"], strict=True
+        motion["states"],
+        expected[:, 1:].T,
+        motion["max_difference_per_state"]["1e-09-1e-10"],
+        strict=True,
     ):
         assert np.abs(ours[path] - column).max() < 2.0 * digits + 1e-10, path
 
@@ -77,6 +87,8 @@ def test_real_models_move(case, engine, corpus):
     (path,) = (model.path for model in corpus if model.id == number)
     model = osimlite.read(path)
     if case.startswith("arm26"):
-        for coordinate, value in zip(model.components(osimlite.Coordinate), (0.2, 0.7), strict=True):
+        for coordinate, value in zip(
+            model.components(osimlite.Coordinate), (0.2, 0.7), strict=True
+        ):
             coordinate.default_value = value
     assert_moves_as(case, model, engine=engine, controls=controls)

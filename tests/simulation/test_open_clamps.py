@@ -11,14 +11,20 @@ from osimlite.io.document.reader import read_text
 from tests.lint.verdict_cases import CASES
 
 
-def test_a_clamped_coordinate_that_a_constraint_carries_beyond_its_range_moves_as_in_opensim(shared):
-    model = osimlite.read(shared / "cases" / "model-21-clamped-refusal" / "c08c_coupler_beyond_clamp.osim")
+def test_a_clamped_coordinate_that_a_constraint_carries_beyond_its_range_moves_as_in_opensim(
+    shared,
+):
+    model = osimlite.read(
+        shared / "cases" / "model-21-clamped-refusal" / "c08c_coupler_beyond_clamp.osim"
+    )
     trajectory = osimlite.simulate(model, to=0.05, engine="compiled")
     assert trajectory.values[-1].tolist() == pytest.approx([0.28254625717212184, 3.0], abs=1e-9)
 
 
 def test_a_prescribed_coordinate_follows_its_function_beyond_a_clamp(shared):
-    model = osimlite.read(shared / "cases" / "model-21-clamped-refusal" / "d03e_prescribed_beyond_clamp.osim")
+    model = osimlite.read(
+        shared / "cases" / "model-21-clamped-refusal" / "d03e_prescribed_beyond_clamp.osim"
+    )
     assert osimlite.simulate(model, to=0.05, engine="compiled").values[-1].tolist() == [5.0]
 
 

@@ -20,7 +20,9 @@ def test_what_does_not_exist_is_named():
     with Simulation(damped(), "compiled") as simulation:
         with pytest.raises(SettingError, match="there is no option 'to_time'"):
             simulation.run(0.1, to_time=3)
-        with pytest.raises(SettingError, match=r"'rolling' is chosen when a model is made ready: .*rolling="):
+        with pytest.raises(
+            SettingError, match=r"'rolling' is chosen when a model is made ready: .*rolling="
+        ):
             simulation.run(0.1, rolling=True)
 
 
@@ -43,6 +45,8 @@ def test_every_option_is_described():
 @pytest.mark.parametrize("integrator", ["merson", "rosenbrock"])
 def test_an_accuracy_that_promises_nothing_is_told(integrator):
     simulation = Simulation(damped(), "compiled")
-    with pytest.warns(DoubtfulWarning, match=r"an accuracy of 0\.1 is so loose .* take 0\.01 or less"):
+    with pytest.warns(
+        DoubtfulWarning, match=r"an accuracy of 0\.1 is so loose .* take 0\.01 or less"
+    ):
         simulation.run(0.1, accuracy=0.1, integrator=integrator)
     simulation.run(0.1, accuracy=0.01, integrator=integrator)

@@ -13,7 +13,10 @@ from osimlite.simulation.paths import Paths
 CODES = [
     PYTHON,
     AT_HAND,
-    pytest.param(COMPILED, marks=pytest.mark.skipif(not has_machine_code(), reason="there is no machine code")),
+    pytest.param(
+        COMPILED,
+        marks=pytest.mark.skipif(not has_machine_code(), reason="there is no machine code"),
+    ),
 ]
 
 
@@ -46,19 +49,31 @@ def test_lengths_are_those_of_each_pose(paths, poses):
 def test_one_path_is_measured_alone(paths, poses):
     places = [k % len(paths.names) for k in range(len(poses))]
     every = paths.system.lengths(poses)
-    assert paths.system.lengths_of(places, poses).tolist() == every[range(len(poses)), places].tolist()
+    assert (
+        paths.system.lengths_of(places, poses).tolist() == every[range(len(poses)), places].tolist()
+    )
 
 
 def test_lengths_on_surfaces_are_those_of_each_pose(paths, poses):
-    every = {(name, surface): lengths for name, surface, lengths in paths.system.all_on_surfaces(poses, paths.routes)}
+    every = {
+        (name, surface): lengths
+        for name, surface, lengths in paths.system.all_on_surfaces(poses, paths.routes)
+    }
     for k, q in enumerate(poses):
         for name, own in paths.lengths_on_surfaces(q).items():
-            assert [every[name, surface][k] for surface in own] == pytest.approx([*own.values()], nan_ok=True, abs=0.0)
+            assert [every[name, surface][k] for surface in own] == pytest.approx(
+                [*own.values()], nan_ok=True, abs=0.0
+            )
 
 
 def test_the_length_on_the_far_side_of_a_sphere_is_negative(fixtures, code):
-    paths = Paths(read(fixtures / "lint" / "OSIM633" / "fail-02-far-side-and-middle.osim"), code=code)
-    every = {name: lengths for name, _, lengths in paths.system.all_on_surfaces(np.zeros((2, 5)), paths.routes)}
+    paths = Paths(
+        read(fixtures / "lint" / "OSIM633" / "fail-02-far-side-and-middle.osim"), code=code
+    )
+    every = {
+        name: lengths
+        for name, _, lengths in paths.system.all_on_surfaces(np.zeros((2, 5)), paths.routes)
+    }
     assert every["/forceset/far"].tolist() == pytest.approx([-0.18, -0.18], abs=5e-4)
     assert np.isnan(every["/forceset/middle"]).all()
 

@@ -18,14 +18,20 @@ from tests.simulation.checked import Checked
 SIZES = {kind.__name__.removeprefix("Wrap"): names for kind, (*_, names) in LAWS.items()}
 with gzip.open(ROOT / "fixtures" / "forces" / "wrap_cases.json.gz") as file:
     SETUPS = {setup["name"]: setup for setup in json.load(file)}
-SETUPS = {name: setup for name, setup in SETUPS.items() if {item["kind"] for item in setup["objects"]} <= SIZES.keys()}
+SETUPS = {
+    name: setup
+    for name, setup in SETUPS.items()
+    if {item["kind"] for item in setup["objects"]} <= SIZES.keys()
+}
 PATH = "/forceset/p"
 
 
 def wrapped(setup) -> Model:
     """A path from body A over points and surfaces of body W to body B; each body is free."""
     model = Model(name="wraps")
-    bodies = {name: model.add(Body(name=name, mass=1.0, inertia=(1, 1, 1, 0, 0, 0))) for name in "ABW"}
+    bodies = {
+        name: model.add(Body(name=name, mass=1.0, inertia=(1, 1, 1, 0, 0, 0))) for name in "ABW"
+    }
     for name, body in bodies.items():
         joint = osimlite.FreeJoint(name=f"j{name}")
         for number, coordinate in enumerate(joint.coordinates):
@@ -34,7 +40,9 @@ def wrapped(setup) -> Model:
     force = PathActuator(name="p", optimal_force=1.0)
     stations = [("A", (0, 0, 0)), *(("W", station) for station in setup["via"]), ("B", (0, 0, 0))]
     for number, (body, station) in enumerate(stations):
-        point = PathPoint(name=f"p{number}", socket_parent_frame=f"/bodyset/{body}", location=station)
+        point = PathPoint(
+            name=f"p{number}", socket_parent_frame=f"/bodyset/{body}", location=station
+        )
         force.geometry_path.path_point_set.objects.append(point)
     for number, surface in enumerate(setup["objects"]):
         sizes = surface["dimensions"]
@@ -74,7 +82,9 @@ def test_wrapped(name):
         compare(paths, case)
 
 
-@pytest.mark.parametrize("name", [name for name, setup in SETUPS.items() if len(setup["objects"]) > 1])
+@pytest.mark.parametrize(
+    "name", [name for name, setup in SETUPS.items() if len(setup["objects"]) > 1]
+)
 def test_several_as_python(name, monkeypatch):
     """Nothing is read or written outside of what belongs to a path."""
     monkeypatch.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))

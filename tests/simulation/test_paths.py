@@ -39,7 +39,10 @@ def test_muscles(name, shared):
         for path, muscle in muscles.items():
             assert lengths[path] == pytest.approx(pose["length"][muscle], rel=0, abs=1e-12)
             assert speeds[path] == pytest.approx(pose["speed"][muscle], rel=0, abs=1e-10)
-            expected = [pose["moment_arms"][muscle].get(of.rpartition("/")[2], 0.0) for of in table["coordinates"]]
+            expected = [
+                pose["moment_arms"][muscle].get(of.rpartition("/")[2], 0.0)
+                for of in table["coordinates"]
+            ]
             result = [arms[path].get(of, 0.0) for of in table["coordinates"]]
             assert result == pytest.approx(expected, rel=0, abs=1e-10)
 
@@ -82,10 +85,20 @@ def test_points_in_one_place_pull_nothing():
     """What is left then are the pieces between the bodies, which move nothing in ground."""
     model = with_force(FORCES["path"])
     points = model["/forceset/a"].geometry_path.path_point_set.objects
-    place = inverse(osimlite.mechanism(model).body_transforms({})["b0"]) @ (*points[0].location, 1.0)
-    points.insert(1, PathPoint(name="same", socket_parent_frame="/bodyset/b0", location=tuple(place[:3])))
+    place = inverse(osimlite.mechanism(model).body_transforms({})["b0"]) @ (
+        *points[0].location,
+        1.0,
+    )
+    points.insert(
+        1, PathPoint(name="same", socket_parent_frame="/bodyset/b0", location=tuple(place[:3]))
+    )
     arms = osimlite.paths(model).moment_arms({})["/forceset/a"]
-    assert list(arms) == ["/jointset/j1/q1_0", "/jointset/j1/q1_1", "/jointset/j1/q1_2", "/jointset/j2/q2_0"]
+    assert list(arms) == [
+        "/jointset/j1/q1_0",
+        "/jointset/j1/q1_1",
+        "/jointset/j1/q1_2",
+        "/jointset/j2/q2_0",
+    ]
     assert all(map(isfinite, arms.values()))
 
 
@@ -96,5 +109,8 @@ def test_a_point_whose_place_is_no_number_is_refused():
     point = MovingPathPoint(name="a", socket_parent_frame="/ground", **sockets, **axes)
     point.x_location = Sine(amplitude=0.1, omega=1.0, phase=float("inf"), offset=0.0)
     model.find("/forceset/mu").geometry_path.path_point_set.objects[0] = point
-    with pytest.raises(ModelError, match=r"the place of a point of '/forceset/mu.*' has a number that is not finite"):
+    with pytest.raises(
+        ModelError,
+        match=r"the place of a point of '/forceset/mu.*' has a number that is not finite",
+    ):
         osimlite.simulate(model, 0.1)

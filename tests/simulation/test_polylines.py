@@ -34,7 +34,10 @@ def code(request, monkeypatch):
 
 
 SURFACES = {
-    "cylinder": (osimlite.WrapCylinder(radius=0.05, length=1.0), lambda p: np.hypot(p[:, 0], p[:, 1]) / 0.05),
+    "cylinder": (
+        osimlite.WrapCylinder(radius=0.05, length=1.0),
+        lambda p: np.hypot(p[:, 0], p[:, 1]) / 0.05,
+    ),
     "sphere": (osimlite.WrapSphere(radius=0.05), lambda p: np.linalg.norm(p, axis=1) / 0.05),
     "ellipsoid": (
         osimlite.WrapEllipsoid(dimensions=(0.05, 0.06, 0.04)),
@@ -57,18 +60,25 @@ def test_corners_on_a_surface_are_on_it(name, wrapping):
     paths = paths_over(surface.model_copy(deep=True), *ends, wrapping=wrapping)
     corners = paths.polylines({})["/forceset/p"]
     assert len(corners) > 6 and corners[[0, -1]].tolist() == [list(end) for end in ends]
-    # As in OpenSim, tangent points of the ellipsoid are near it, and the tube of the torus is straight there.
+    # As in OpenSim, tangent points of the ellipsoid are near it, and the tube of the torus is
+    # straight there.
     near = {"ellipsoid": 1e-4, "torus": 1e-3}.get(name, 1e-12) if wrapping == "opensim" else 1e-9
     assert level(corners[1:-1]) == pytest.approx(1.0, abs=near)
     length = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()
     assert length == pytest.approx(paths.lengths({})["/forceset/p"], rel=1e-3)
 
 
-@pytest.mark.parametrize("surface", [ContactSphere(radius=0.1), ContactEllipsoid(radii=(0.1, 0.1, 0.1))])
+@pytest.mark.parametrize(
+    "surface", [ContactSphere(radius=0.1), ContactEllipsoid(radii=(0.1, 0.1, 0.1))]
+)
 def test_a_cable_runs_over_what_it_touches(surface):
-    paths = osimlite.paths(cable(LEFT, over((0.0, 0.1, 0.0)), RIGHT, surface=surface.model_copy(deep=True)))
+    paths = osimlite.paths(
+        cable(LEFT, over((0.0, 0.1, 0.0)), RIGHT, surface=surface.model_copy(deep=True))
+    )
     corners = paths.polylines({})["/forceset/s"]
-    assert len(corners) > 6 and corners[[0, -1]] == pytest.approx(np.array([(-0.3, 0.01, 0), (0.3, 0.01, 0)]))
+    assert len(corners) > 6 and corners[[0, -1]] == pytest.approx(
+        np.array([(-0.3, 0.01, 0), (0.3, 0.01, 0)])
+    )
     assert np.linalg.norm(corners[1:-1], axis=1) == pytest.approx(0.1, abs=1e-9)
     length = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()
     assert length == pytest.approx(paths.lengths({})["/forceset/s"], rel=1e-3)

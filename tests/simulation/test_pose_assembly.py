@@ -31,7 +31,9 @@ def change_of(mechanism: Mechanism, poses: np.ndarray, wanted: np.ndarray) -> np
     return ((poses - wanted) ** 2 * counted).sum(axis=1)
 
 
-def compare(mechanism: Mechanism, wanted: np.ndarray, code: Code = COMPILED, accuracy: float = 1e-9) -> None:
+def compare(
+    mechanism: Mechanism, wanted: np.ndarray, code: Code = COMPILED, accuracy: float = 1e-9
+) -> None:
     """Compare assembled poses with those of the search in Python, at a time of 0.7 s."""
     known = np.array([mechanism.assemble(q, 0.7) for q in wanted])
     result = assemble_motion(mechanism, np.full(len(wanted), 0.7), wanted, code)
@@ -40,7 +42,8 @@ def compare(mechanism: Mechanism, wanted: np.ndarray, code: Code = COMPILED, acc
         errors = np.concatenate([item.position_errors(state) for item in mechanism.constraints])
         assert np.abs(errors).max(initial=0.0) <= tolerance_of(mechanism)
     least, change = change_of(mechanism, known, wanted), change_of(mechanism, result, wanted)
-    # A pose that is off by `accuracy` across the equations changes the squared distance to first order.
+    # A pose that is off by `accuracy` across the equations changes the squared distance to first
+    # order.
     assert (np.abs(change - least) <= 1e-12 + 2.0 * np.sqrt(least) * accuracy).all()
     assert np.abs(result - known).max() < accuracy
 
@@ -93,16 +96,27 @@ def build_tree() -> Mechanism:
     infos = list(mechanism.coordinates)
     infos[6] = replace(infos[6], yielding=True)
     infos[9] = replace(infos[9], clamped=True, range=(-0.05, 0.05))
-    couplers = (Coupler(6, (0, 1, 9), f.WeightedSum((0.4, -0.3, 0.2), 0.1)), Prescribed(3, f.Sine(0.4, 3.0, 0.2, 0.1)))
+    couplers = (
+        Coupler(6, (0, 1, 9), f.WeightedSum((0.4, -0.3, 0.2), 0.1)),
+        Prescribed(3, f.Sine(0.4, 3.0, 0.2, 0.1)),
+    )
     return replace(mechanism, coordinates=tuple(infos), constraints=couplers)
 
 
-@pytest.mark.parametrize("code", [COMPILED, PYTHON, Checked("Python")], ids=["compiled", "Python", "bounded"])
-def test_couplers_prescribed_and_clamped_coordinates(code: Code, monkeypatch: pytest.MonkeyPatch, fixtures) -> None:
+@pytest.mark.parametrize(
+    "code", [COMPILED, PYTHON, Checked("Python")], ids=["compiled", "Python", "bounded"]
+)
+def test_couplers_prescribed_and_clamped_coordinates(
+    code: Code, monkeypatch: pytest.MonkeyPatch, fixtures
+) -> None:
     monkeypatch.chdir(fixtures.parent)
     mechanism = build_tree()
     rng = np.random.default_rng(1)
-    compare(mechanism, mechanism.values({}) + 0.3 * rng.normal(size=(3, len(mechanism.coordinates))), code)
+    compare(
+        mechanism,
+        mechanism.values({}) + 0.3 * rng.normal(size=(3, len(mechanism.coordinates))),
+        code,
+    )
 
 
 def test_loops(fixtures) -> None:
@@ -110,7 +124,9 @@ def test_loops(fixtures) -> None:
     model = osimlite.Model(name="loop")
     last = model.ground
     for number in range(4):
-        body = model.add(osimlite.Body(name=f"b{number}", mass=1.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0)))
+        body = model.add(
+            osimlite.Body(name=f"b{number}", mass=1.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0))
+        )
         joint = osimlite.PinJoint(name=f"j{number}")
         model.add(joint.between(last, body, at=(0.0, -0.4 if number else 0.0, 0.0)))
         last = body
@@ -128,7 +144,9 @@ def test_loops(fixtures) -> None:
     motion = RecordedMotion(mechanism, np.linspace(0.0, 1.0, 20), wanted).assembled()
     assert np.abs(motion.values - [mechanism.assemble(q) for q in wanted]).max() < 1e-8
     model["/constraintset/end"].location_body_1 = (9.0, 0.0, 0.0)
-    with pytest.raises(SimulationError, match="no pose of 'loop' near the given one fulfils /constraintset/end"):
+    with pytest.raises(
+        SimulationError, match="no pose of 'loop' near the given one fulfils /constraintset/end"
+    ):
         assemble_motion(build_mechanism(model), np.zeros(20), wanted)
 
 

@@ -11,7 +11,9 @@ import pytest
 from osimlite.errors import OsimliteError
 from osimlite.simulation.engines.private_files import others_in, read_private, write_private
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="who may write is not told by bits there")
+pytestmark = pytest.mark.skipif(
+    sys.platform == "win32", reason="who may write is not told by bits there"
+)
 
 
 @pytest.fixture

@@ -14,7 +14,11 @@ from tests.simulation.checked import Checked, bounded
 from tests.simulation.force_cases import FORCE_NAMES, FORCES, with_force
 from tests.simulation.test_compiled_forces import states
 
-FILES = ("walker/DynamicWalkerModel.osim", "walkers/steady-walker.osim", "kinematics/mixed_joint_tree.osim")
+FILES = (
+    "walker/DynamicWalkerModel.osim",
+    "walkers/steady-walker.osim",
+    "kinematics/mixed_joint_tree.osim",
+)
 
 
 def compare(model: osimlite.Model, monkeypatch: pytest.MonkeyPatch, count: int = 2) -> None:

@@ -43,10 +43,18 @@ def test_motions_in_every_form_are_the_same(tmp_path: Path) -> None:
     labels = [f"m{number}" for number in range(3)]
     write_trc(tmp_path / "up.trc", TIMES.tolist(), labels, places.rows.tolist())
     fitted = osimlite.inverse_kinematics(model, tmp_path / "up.trc")
-    for form, times in (({"y": up}, TIMES), ({"/jointset/j/y": up}, TIMES), (followed, None), (fitted, None)):
+    for form, times in (
+        ({"y": up}, TIMES),
+        ({"/jointset/j/y": up}, TIMES),
+        (followed, None),
+        (fitted, None),
+    ):
         same = osimlite.inverse_dynamics(model, form, times=times)
         assert same.columns == table.columns and same.rows == pytest.approx(table.rows, abs=1e-5)
-    assert osimlite.inverse_dynamics(model, {"y": up}, times=TIMES).rows.tolist() == table.rows.tolist()
+    assert (
+        osimlite.inverse_dynamics(model, {"y": up}, times=TIMES).rows.tolist()
+        == table.rows.tolist()
+    )
     with pytest.raises(SettingError, match="arrays of coordinates have no times of their own"):
         osimlite.inverse_dynamics(model, {"y": up})
     with pytest.raises(SettingError, match="'y' has 50 values for 51 times"):
@@ -63,7 +71,9 @@ def test_results_are_tables_of_other_libraries() -> None:
     table = osimlite.inverse_dynamics(model, {"y": TIMES}, times=TIMES)
     frame, data = table.to_frame(), table.to_xarray()
     assert frame.index.name == "time" and frame["y_force"].iloc[3] == table["y_force"][3]
-    assert [*frame.columns] == [*table.columns] and data["y_force"].sel(time=1.0) == table["y_force"][-1]
+    assert [*frame.columns] == [*table.columns] and data["y_force"].sel(time=1.0) == table[
+        "y_force"
+    ][-1]
     assert table.motion is not None and table.motion.values[:, 4].tolist() == TIMES.tolist()
     followed: Any = osimlite.kinematics(model, {"y": TIMES}, times=TIMES)
     assert followed.to_frame()["y"].tolist() == TIMES.tolist()
@@ -81,7 +91,9 @@ def test_only_a_part_of_the_motion() -> None:
     assert part.times == pytest.approx(TIMES[10:26])
     assert part.rows == pytest.approx(whole.rows[10:26], abs=1e-9)
     for what in (osimlite.kinematics, osimlite.inverse_dynamics):
-        with pytest.raises(SettingError, match="no time of the motion lies between 3 and 4 s; it is from 0 to 1 s"):
+        with pytest.raises(
+            SettingError, match="no time of the motion lies between 3 and 4 s; it is from 0 to 1 s"
+        ):
             what(model, {"y": up}, times=TIMES, start=3.0, end=4.0)
 
 
@@ -90,7 +102,9 @@ def test_loads_without_a_document(tmp_path: Path) -> None:
     pytest.importorskip("ezc3d")
     model, plate = box(), TRIALS / "force_plate.c3d"
     measured = read_c3d_forces(plate)
-    write_sto(tmp_path / "plate.mot", "plate", measured.times, measured.columns, measured.rows.tolist())
+    write_sto(
+        tmp_path / "plate.mot", "plate", measured.times, measured.columns, measured.rows.tolist()
+    )
     (tmp_path / "loads.xml").write_text(
         f"""<OpenSimDocument Version="40600"><ExternalLoads name="loads"><objects><ExternalForce name="push">
 <applied_to_body>box</applied_to_body><force_identifier>f1_</force_identifier><point_identifier>p1_</point_identifier>
@@ -106,8 +120,12 @@ def test_loads_without_a_document(tmp_path: Path) -> None:
     for file in (tmp_path / "plate.mot", plate):
         result = osimlite.inverse_dynamics(model, motion, file, times=times, applied_to=columns)
         assert result.rows == pytest.approx(wanted.rows, rel=1e-12, abs=1e-12)
-    one = osimlite.inverse_dynamics(model, motion, plate, times=times, applied_to={"/bodyset/box": [("f1_",)]})
-    two = osimlite.inverse_dynamics(model, motion, plate, times=times, applied_to={"box": [("f1_",), ("f1_",)]})
+    one = osimlite.inverse_dynamics(
+        model, motion, plate, times=times, applied_to={"/bodyset/box": [("f1_",)]}
+    )
+    two = osimlite.inverse_dynamics(
+        model, motion, plate, times=times, applied_to={"box": [("f1_",), ("f1_",)]}
+    )
     assert two.rows - plain.rows == pytest.approx(2.0 * (one.rows - plain.rows), abs=1e-9)
     wrong: list[Any] = [
         (plate, None, "a table, which does not say what its forces push"),
@@ -116,7 +134,11 @@ def test_loads_without_a_document(tmp_path: Path) -> None:
         (plate, {"bok": [("f1_",)]}, "did you mean 'box'"),
         (plate, {"box": [("g1_",)]}, "the force_identifier of 'box' is 'g1_'"),
         (plate, {"box": [()]}, "name what the labels of its force begin with"),
-        (plate, {"box": [("f1_", "p1_", "m1_", "q1_")]}, "name what the labels of its force begin with"),
+        (
+            plate,
+            {"box": [("f1_", "p1_", "m1_", "q1_")]},
+            "name what the labels of its force begin with",
+        ),
     ]
     for file, applied, said in wrong:
         with pytest.raises((DocumentError, SettingError), match=said):
@@ -130,5 +152,7 @@ def test_the_model_stays_as_it_is() -> None:
     up = {"y": 1.0 + 0.0 * TIMES}
     with_spring = osimlite.inverse_dynamics(model, up, times=TIMES)
     without = osimlite.inverse_dynamics(model, up, times=TIMES, exclude=["s"])
-    assert with_spring["y_force"] - without["y_force"] == pytest.approx(np.full(51, 100.0), abs=1e-7)
+    assert with_spring["y_force"] - without["y_force"] == pytest.approx(
+        np.full(51, 100.0), abs=1e-7
+    )
     assert spring.appliesForce

@@ -45,7 +45,9 @@ def pendulum():
 
 # ---------------------------------------------------------------------------------------------- the start
 def test_defaults_and_what_is_set(walker):
-    trajectory = osimlite.simulate(walker, to=0.01, initial={"RHip_rz": 0.1}, initial_speeds={"LKnee_rz": -2.0})
+    trajectory = osimlite.simulate(
+        walker, to=0.01, initial={"RHip_rz": 0.1}, initial_speeds={"LKnee_rz": -2.0}
+    )
     start = dict(zip(trajectory.coordinates, trajectory.values[0], strict=True))
     assert start["RHip_rz"] == 0.1 and start["Pelvis_ty"] == 0.835
     speeds = dict(zip(trajectory.coordinates, trajectory.speeds[0], strict=True))
@@ -53,10 +55,15 @@ def test_defaults_and_what_is_set(walker):
 
 
 def test_what_is_set_may_carry_a_unit(walker):
-    trajectory = osimlite.simulate(walker, to=0.01, initial={"RHip_rz": "40deg", "Pelvis_ty": "90 cm"})
+    trajectory = osimlite.simulate(
+        walker, to=0.01, initial={"RHip_rz": "40deg", "Pelvis_ty": "90 cm"}
+    )
     start = dict(zip(trajectory.coordinates, trajectory.values[0], strict=True))
     assert start["RHip_rz"] == np.radians(40) and start["Pelvis_ty"] == 0.9
-    assert trajectory.summary["settings"]["initial"] == {"RHip_rz": np.radians(40), "Pelvis_ty": 0.9}
+    assert trajectory.summary["settings"]["initial"] == {
+        "RHip_rz": np.radians(40),
+        "Pelvis_ty": 0.9,
+    }
     for given, words in (
         ({"RHip_rz": "4 cm"}, "give '4 cm' in deg or rad"),
         ({"RHip_rz": "far"}, "such as 0.5 or 30deg"),
@@ -67,16 +74,26 @@ def test_what_is_set_may_carry_a_unit(walker):
 
 def test_degrees_taken_for_radians_are_warned_of(walker):
     for given, asked in ((40, "40deg"), ("-40", "-40deg")):
-        with pytest.warns(DoubtfulWarning, match=rf"RHip_rz = {given} is in rad, .* did you mean {asked}\?") as told:
+        with pytest.warns(
+            DoubtfulWarning, match=rf"RHip_rz = {given} is in rad, .* did you mean {asked}\?"
+        ) as told:
             osimlite.simulate(walker, to=0.01, initial={"RHip_rz": given})
         assert [each.filename for each in told] == [__file__]
-    osimlite.simulate(walker, to=0.01, initial={"RHip_rz": "500deg", "Pelvis_tx": 9}, initial_speeds={"RHip_rz": 40})
+    osimlite.simulate(
+        walker,
+        to=0.01,
+        initial={"RHip_rz": "500deg", "Pelvis_tx": 9},
+        initial_speeds={"RHip_rz": 40},
+    )
 
 
 def test_locked_coordinate_keeps_its_value(walker):
     trajectory = osimlite.simulate(walker, to=0.2)
     place = trajectory.coordinates.index("platform_rz")
-    assert set(trajectory.values[:, place]) == {np.radians(-10)} and not trajectory.speeds[:, place].any()
+    assert (
+        set(trajectory.values[:, place]) == {np.radians(-10)}
+        and not trajectory.speeds[:, place].any()
+    )
 
 
 @pytest.mark.parametrize("what", ["initial", "initial_speeds"])
@@ -100,9 +117,15 @@ def test_unknown_coordinate_names_the_nearest(walker):
         ({"accuracy": 0.0}, "between 0 and 1"),
         ({"fixed_step": -1e-3}, "positive and finite"),
         ({"fixed_step": 5.0}, "5 s is too long"),
-        ({"fixed_step": 1e-3, "integrator": "merson"}, "the integrator means nothing for a fixed step"),
+        (
+            {"fixed_step": 1e-3, "integrator": "merson"},
+            "the integrator means nothing for a fixed step",
+        ),
         ({"fixed_step": 1e-3, "accuracy": 1e-3}, "the accuracy means nothing for a fixed step"),
-        ({"initial": {"swing": 0.1, "/jointset/hinge/swing": 0.2}}, "set twice, by its name and by its path"),
+        (
+            {"initial": {"swing": 0.1, "/jointset/hinge/swing": 0.2}},
+            "set twice, by its name and by its path",
+        ),
         ({"to": "2"}, "number of seconds, not '2'"),
         ({"initial": {"swing": float("inf")}}, "give a number"),
         ({"engine": "bulet"}, r"did you mean 'bullet'\?$"),
@@ -117,7 +140,12 @@ def test_settings_without_meaning(pendulum, setting, words):
 
 @pytest.mark.parametrize(
     ("to", "interval", "times"),
-    [(0.3, 0.1, [0, 0.1, 0.2, 0.3]), (0.25, 0.1, [0, 0.1, 0.2, 0.25]), (0.05, 0.1, [0, 0.05]), (2.0, 2.0, [0, 2])],
+    [
+        (0.3, 0.1, [0, 0.1, 0.2, 0.3]),
+        (0.25, 0.1, [0, 0.1, 0.2, 0.25]),
+        (0.05, 0.1, [0, 0.05]),
+        (2.0, 2.0, [0, 2]),
+    ],
 )
 def test_report_times(to, interval, times):
     assert report_times(to, interval) == pytest.approx(times, abs=1e-15)
@@ -130,12 +158,19 @@ def test_progress_needs_no_recorded_row(pendulum, engine, fixed_step):
     seen = []
     choices = {} if fixed_step is None else {"fixed_step": fixed_step}
     motion = osimlite.simulate(
-        pendulum, 30.0, engine, report_interval=30.0, progress=lambda *told: seen.append(told), **choices
+        pendulum,
+        30.0,
+        engine,
+        report_interval=30.0,
+        progress=lambda *told: seen.append(told),
+        **choices,
     )
     times, steps = zip(*seen, strict=True)
     assert len(motion.times) == 2 and len(times) > 2
     assert list(times) == sorted(set(times)) and times[-1] == 30.0
-    assert min(steps) > 0.0 and (fixed_step is None or steps == pytest.approx([fixed_step] * len(steps)))
+    assert min(steps) > 0.0 and (
+        fixed_step is None or steps == pytest.approx([fixed_step] * len(steps))
+    )
 
 
 def interrupting(after: int):
@@ -168,7 +203,10 @@ def test_what_was_recorded_before_ctrl_c_is_kept(pendulum, engine, choices, afte
         assert np.array_equal(part.values[:rows], whole.values[:rows])
         assert np.array_equal(part.speeds[:rows], whole.speeds[:rows])
         assert part.summary["interrupted"] is True and part.summary["time_reached_s"] == end
-        assert part.summary["settings"]["to"] == 30.0 and 0 < part.summary["steps"] < whole.summary["steps"]
+        assert (
+            part.summary["settings"]["to"] == 30.0
+            and 0 < part.summary["steps"] < whole.summary["steps"]
+        )
         assert whole.summary["interrupted"] is False and whole.summary["time_reached_s"] == 30.0
         assert part.summary["energy_J"]["end"]["total"] == part.energy["total"][-1]
 
@@ -178,14 +216,20 @@ def test_what_was_recorded_before_ctrl_c_is_kept(pendulum, engine, choices, afte
 def test_what_was_recorded_before_a_failure_is_kept(pendulum, engine, choices):
     """A force that is no number beyond half a radian."""
     (angle,) = pendulum.components(Coordinate)
-    pendulum.add(osimlite.ExpressionBasedCoordinateForce(coordinate=angle.name, expression="sqrt(0.5-q)"))
+    pendulum.add(
+        osimlite.ExpressionBasedCoordinateForce(coordinate=angle.name, expression="sqrt(0.5-q)")
+    )
     with Simulation(pendulum, engine) as simulation:
         with pytest.raises(SimulationError) as failed:
-            simulation.run(2.0, initial={angle.name: 0.0}, initial_speeds={angle.name: 3.0}, **choices)
+            simulation.run(
+                2.0, initial={angle.name: 0.0}, initial_speeds={angle.name: 3.0}, **choices
+            )
         part = failed.value.trajectory
         assert 0.0 < part.times[-1] < 2.0 and len(part.times) == len(part.values) > 3
         assert 0.4 < part.values[-1, 0] < 0.52
-        assert part.summary["interrupted"] is True and part.summary["time_reached_s"] == part.times[-1]
+        assert (
+            part.summary["interrupted"] is True and part.summary["time_reached_s"] == part.times[-1]
+        )
         with pytest.raises(SimulationError) as failed:
             simulation.run(2.0, initial={angle.name: 0.6}, **choices)
         assert failed.value.trajectory is None
@@ -198,7 +242,11 @@ def test_ctrl_c_before_the_first_step(pendulum, monkeypatch):
         with pytest.raises(Interrupted) as stopped:
             simulation.run(1.0)
         part = stopped.value.trajectory
-        assert part.times.tolist() == [0.0] and np.isfinite(part.values).all() and part.summary["steps"] == 0
+        assert (
+            part.times.tolist() == [0.0]
+            and np.isfinite(part.values).all()
+            and part.summary["steps"] == 0
+        )
 
 
 def test_one_simulation_runs_many_times(pendulum):
@@ -223,7 +271,9 @@ def test_free_fall():
         coordinate.name = name
     model.add(joint.between(model.ground, stone))
     for setting in ({}, {"fixed_step": 1e-4}):
-        end = osimlite.simulate(model, to=1.0, initial_speeds={"x": 1.0, "y": 2.0, "rx": 0.5}, **setting)
+        end = osimlite.simulate(
+            model, to=1.0, initial_speeds={"x": 1.0, "y": 2.0, "rx": 0.5}, **setting
+        )
         expected = (0.5, 0.0, 0.0, 1.0, 2.0 - 9.80665 / 2, 0.0)
         assert end.values[-1] == pytest.approx(expected, abs=1e-3 if setting else 1e-9)
 
@@ -236,9 +286,12 @@ def test_spinning_top_keeps_its_momentum():
     for index, coordinate in enumerate(joint.coordinates):
         coordinate.name = f"q{index}"
     model.add(joint.between(model.ground, top))
-    trajectory = osimlite.simulate(model, to=1.0, accuracy=1e-9, initial_speeds={"q0": 1.0, "q1": 0.1, "q2": 0.2})
+    trajectory = osimlite.simulate(
+        model, to=1.0, accuracy=1e-9, initial_speeds={"q0": 1.0, "q1": 0.1, "q2": 0.2}
+    )
     momenta = [
-        trajectory.mechanism.momentum(q, u)[1] for q, u in zip(trajectory.values, trajectory.speeds, strict=True)
+        trajectory.mechanism.momentum(q, u)[1]
+        for q, u in zip(trajectory.values, trajectory.speeds, strict=True)
     ]
     assert np.array(momenta) == pytest.approx(np.tile(momenta[0], (101, 1)), abs=1e-7)
     assert np.ptp(trajectory.speeds[:, 1]) > 0.1
@@ -247,7 +300,11 @@ def test_spinning_top_keeps_its_momentum():
 # ------------------------------------------------------------------------------------------------ failures
 def test_unsupported_force_is_named(walker, fixtures):
     model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
-    model.add(ExponentialContactForce(name="sole", station=osimlite.Station(socket_parent_frame="/ground")))
+    model.add(
+        ExponentialContactForce(
+            name="sole", station=osimlite.Station(socket_parent_frame="/ground")
+        )
+    )
     with pytest.raises(UnsupportedError, match=r"'/forceset/sole' \(ExponentialContactForce\)"):
         osimlite.simulate(model)
     without = osimlite.simulate(model, to=0.1, skip_unsupported=True)
@@ -269,7 +326,9 @@ def test_force_that_is_switched_off_does_nothing(fixtures):
 def test_contact_on_a_mesh_is_refused(fixtures):
     model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
     mesh = model.add(osimlite.ContactMesh(name="foot", socket_frame="/bodyset/RightShank"))
-    parameters = HuntCrossleyForce.ContactParameters(geometry=(mesh, "PlatformContact"), stiffness=1.0)
+    parameters = HuntCrossleyForce.ContactParameters(
+        geometry=(mesh, "PlatformContact"), stiffness=1.0
+    )
     force = HuntCrossleyForce(name="meshy")
     force.contact_parameters.objects.append(parameters)
     model.add(force)
@@ -292,12 +351,17 @@ def test_a_parameter_that_is_no_number(fixtures):
         osimlite.simulate(model)
 
 
-@pytest.mark.parametrize(("field", "what"), [("default_value", "value"), ("default_speed_value", "speed")])
+@pytest.mark.parametrize(
+    ("field", "what"), [("default_value", "value"), ("default_speed_value", "speed")]
+)
 def test_a_start_that_is_no_number(pendulum, field, what):
-    coordinate = next(item for item in pendulum.components(osimlite.Coordinate) if item.name == "swing")
+    coordinate = next(
+        item for item in pendulum.components(osimlite.Coordinate) if item.name == "swing"
+    )
     setattr(coordinate, field, float("nan"))
     with pytest.raises(
-        SimulationError, match=f"default {what} of coordinate '/jointset/.*/swing' is nan; give a number"
+        SimulationError,
+        match=f"default {what} of coordinate '/jointset/.*/swing' is nan; give a number",
     ):
         osimlite.simulate(pendulum)
 
@@ -358,7 +422,10 @@ def test_files(walker, tmp_path):
     assert np.array_equal(forces[column], trajectory.forces[column]) and forces[column][0] > 300.0
     summary = json.loads((tmp_path / "results" / "summary.json").read_text())
     assert summary == trajectory.summary
-    assert summary["settings"]["accuracy"] == 1e-3 and summary["versions"]["osimlite"] == osimlite.__version__
+    assert (
+        summary["settings"]["accuracy"] == 1e-3
+        and summary["versions"]["osimlite"] == osimlite.__version__
+    )
 
 
 def test_states_alone(walker, tmp_path):

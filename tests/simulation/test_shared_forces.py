@@ -21,7 +21,10 @@ def lift(*strengths: float) -> osimlite.Model:
     model = osimlite.Model(name="lift")
     body = model.add(osimlite.Body(name="body", mass=2.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
     joint = osimlite.SliderJoint(
-        name="j", socket_parent_frame=model.ground, socket_child_frame=body, coordinates=[osimlite.Coordinate(name="y")]
+        name="j",
+        socket_parent_frame=model.ground,
+        socket_child_frame=body,
+        coordinates=[osimlite.Coordinate(name="y")],
     )
     # The slider runs along x.
     joint.socket_parent_frame = osimlite.PhysicalOffsetFrame(
@@ -47,12 +50,16 @@ def actuator(name: str, strength: float, **more: float) -> osimlite.CoordinateAc
 @pytest.mark.parametrize("exponent", [1.5, 2.0, 3.0, 10.0])
 def test_the_shares_are_those_of_the_strengths(exponent: float) -> None:
     """Where nothing bounds them, x is in proportion to the strengths to the power of 1 / (p - 1)."""
-    found = osimlite.static_optimization(lift(30.0, 10.0), {"y": UP}, times=TIMES, exponent=exponent)
+    found = osimlite.static_optimization(
+        lift(30.0, 10.0), {"y": UP}, times=TIMES, exponent=exponent
+    )
     shares = np.array([30.0, 10.0]) ** (1.0 / (exponent - 1.0))
     expected = NEEDED * shares / (shares @ [30.0, 10.0])
     assert found.solved.all() and found.unsolved() == ""
     assert found.rows == pytest.approx(np.tile(expected, (51, 1)), rel=1e-6)
-    assert found.forces is not None and found.forces.rows.sum(axis=1) == pytest.approx(np.full(51, NEEDED), rel=1e-9)
+    assert found.forces is not None and found.forces.rows.sum(axis=1) == pytest.approx(
+        np.full(51, NEEDED), rel=1e-9
+    )
     assert found.columns == found.forces.columns == ("a0", "a1")
     assert list(found.to_frame()) == ["a0", "a1"]
 
@@ -63,7 +70,9 @@ def test_one_actuator_bounds_and_forces_from_files(tmp_path: Path) -> None:
     reserves = osimlite.ForceSet(name="reserves")
     reserves.objects.append(actuator("reserve", 1.0, min_control=0.0, max_control=2.0))
     osimlite.write(reserves, tmp_path / "reserves.xml")
-    found = osimlite.static_optimization(lift(30.0), {"y": UP}, times=TIMES, forces=[tmp_path / "reserves.xml"])
+    found = osimlite.static_optimization(
+        lift(30.0), {"y": UP}, times=TIMES, forces=[tmp_path / "reserves.xml"]
+    )
     assert found.columns == ("a0", "reserve")
     other = osimlite.static_optimization(
         lift(30.0), {"y": UP}, times=TIMES, forces=reserves.objects, replace_forces=True
@@ -80,7 +89,11 @@ def test_one_actuator_bounds_and_forces_from_files(tmp_path: Path) -> None:
 
 def test_files_have_the_names_of_the_analysis(tmp_path: Path) -> None:
     found = osimlite.static_optimization(lift(30.0, 10.0), {"y": UP}, times=TIMES)
-    names = ["StaticOptimization_activation.sto", "StaticOptimization_force.sto", "StaticOptimization_controls.xml"]
+    names = [
+        "StaticOptimization_activation.sto",
+        "StaticOptimization_force.sto",
+        "StaticOptimization_controls.xml",
+    ]
     assert [path.name for path in found.write(tmp_path / "out")] == names
     assert read_sto(tmp_path / "out" / names[0]).rows.tolist() == found.rows.tolist()
     controls = osimlite.read_document(tmp_path / "out" / names[2])
@@ -101,7 +114,9 @@ def test_files_have_the_names_of_the_analysis(tmp_path: Path) -> None:
         (lift(1.0), {"applied_to": {"body": [["f_"]]}}, SettingError, "name the table"),
     ],
 )
-def test_what_cannot_be_asked(model: osimlite.Model, more: dict, error: type[Exception], said: str) -> None:
+def test_what_cannot_be_asked(
+    model: osimlite.Model, more: dict, error: type[Exception], said: str
+) -> None:
     with pytest.raises(error, match=said):
         osimlite.static_optimization(model, {"y": UP}, times=TIMES, **more)
 
@@ -109,7 +124,9 @@ def test_what_cannot_be_asked(model: osimlite.Model, more: dict, error: type[Exc
 def test_what_has_no_single_control_is_refused() -> None:
     model = lift(1.0)
     model.add(osimlite.BodyActuator(name="push", socket_body=model.body_set.objects[0]))
-    with pytest.raises(UnsupportedError, match="'push' is a BodyActuator, which has no single control"):
+    with pytest.raises(
+        UnsupportedError, match="'push' is a BodyActuator, which has no single control"
+    ):
         osimlite.static_optimization(model, {"y": UP}, times=TIMES)
 
 
@@ -121,13 +138,17 @@ def test_random_bounds_never_end_in_a_traceback() -> None:
         strengths = rng.choice([0.0, 1e-6, 1.0, 30.0, -5.0], size=rng.integers(1, 4)).tolist()
         model = lift(*strengths)
         for item in model.force_set.objects:
-            item.min_control, item.max_control = np.sort(rng.choice([-np.inf, -3.0, 0.0, 1.0, np.inf], size=2)).tolist()
+            item.min_control, item.max_control = np.sort(
+                rng.choice([-np.inf, -3.0, 0.0, 1.0, np.inf], size=2)
+            ).tolist()
             if item.min_control == item.max_control and not np.isfinite(item.min_control):
                 item.min_control, item.max_control = -np.inf, np.inf
         model.body_set.objects[0].mass = mass = float(rng.choice([0.0, 1e-3, 2.0]))
         power = float(rng.choice([1.2, 2.0, 3.0]))
         found = osimlite.static_optimization(model, {"y": UP}, times=TIMES, exponent=power, end=0.0)
-        low, high = np.array([(item.min_control, item.max_control) for item in model.force_set.objects]).T
+        low, high = np.array(
+            [(item.min_control, item.max_control) for item in model.force_set.objects]
+        ).T
         if found.solved[0]:
             solved += 1
             assert (low <= found.rows[0]).all() and (found.rows[0] <= high).all(), number
@@ -147,7 +168,12 @@ def test_a_locked_coordinate_stays_where_it_is() -> None:
     other = model.add(osimlite.Body(name="other", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
     still = osimlite.Coordinate(name="still", locked=True)
     model.add(
-        osimlite.PinJoint(name="k", socket_parent_frame=model.ground, socket_child_frame=other, coordinates=[still])
+        osimlite.PinJoint(
+            name="k",
+            socket_parent_frame=model.ground,
+            socket_child_frame=other,
+            coordinates=[still],
+        )
     )
     found = osimlite.static_optimization(model, {"y": UP, "still": np.sin(TIMES)}, times=TIMES)
     assert found.solved.all() and found.rows == pytest.approx(free.rows, rel=1e-12)
@@ -159,5 +185,7 @@ def test_loads_of_another_class_are_named(tmp_path: Path) -> None:
         '<OpenSimDocument Version="20302"><ExternalLoads name=""><objects><PrescribedForce name="push"/></objects>'
         "</ExternalLoads></OpenSimDocument>"
     )
-    with pytest.raises(OsimliteError, match="'push' is a PrescribedForce, which OpenSim refuses here"):
+    with pytest.raises(
+        OsimliteError, match="'push' is a PrescribedForce, which OpenSim refuses here"
+    ):
         osimlite.static_optimization(lift(30.0), {"y": UP}, tmp_path / "loads.xml", times=TIMES)

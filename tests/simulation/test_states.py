@@ -73,7 +73,9 @@ def test_a_batch_refuses_states_of_another_length(simulations, rows, columns):
         if columns == engine.state.size:
             ask()
         else:
-            with pytest.raises(OsimliteError, match=rf"{engine.state.size} numbers .* got \({rows}, {columns}\)"):
+            with pytest.raises(
+                OsimliteError, match=rf"{engine.state.size} numbers .* got \({rows}, {columns}\)"
+            ):
                 ask()
 
 
@@ -86,11 +88,16 @@ def test_states_have_the_order_and_the_starts_of_their_owners():
     """Simbody's own come last; the states of one element stay together."""
     mechanism = build_mechanism(damped())
     muscle = Element(
-        StateVariable("/m/activation", 0.05), StateVariable("/m/fiber_length", lambda q, u: 0.1 + q[1] + u[3])
+        StateVariable("/m/activation", 0.05),
+        StateVariable("/m/fiber_length", lambda q, u: 0.1 + q[1] + u[3]),
     )
     spring, bushing = Element(), Element(StateVariable("/b/dissipated_energy", is_simbody=True))
     layout = StateLayout(mechanism, (3, 0, 1), [bushing, spring, muscle])
-    assert layout.size == 9 and layout.paths == ["/m/activation", "/m/fiber_length", "/b/dissipated_energy"]
+    assert layout.size == 9 and layout.paths == [
+        "/m/activation",
+        "/m/fiber_length",
+        "/b/dissipated_energy",
+    ]
     assert [layout.first_of(element) for element in (bushing, spring, muscle)] == [8, -1, 6]
     assert layout.names[2:4] == ["q1", "the speed of q3"] and layout.names[6:] == layout.paths
     y = layout.default()
@@ -128,28 +135,48 @@ def test_random_models_keep_their_states(seed, tmp_path_factory):
                 assert {path: rows[0] for path, rows in trajectory.auxiliary.items()} == z
                 ends[engine, *step] = [rows[-1] for rows in trajectory.auxiliary.values()]
                 # What the dampers take up is counted on from there.
-                assert (np.array(ends[engine, *step]) >= np.array([z[path] for path in trajectory.auxiliary])).all()
+                assert (
+                    np.array(ends[engine, *step])
+                    >= np.array([z[path] for path in trajectory.auxiliary])
+                ).all()
             trajectory.to_sto(file)
             assert tuple(read_sto(file).columns) == tuple(simulation.paths)
             last = simulation.initial_state(simulation.state_in(file), {})
-            history = simulation.state.rows(trajectory.values, trajectory.speeds, trajectory.auxiliary)
+            history = simulation.state.rows(
+                trajectory.values, trajectory.speeds, trajectory.auxiliary
+            )
             # Constraints hold a little better at a start.
-            assert last == pytest.approx(history[-1].tolist(), abs=1e-7 if simulation.constraints else 0.0, rel=0.0)
+            assert last == pytest.approx(
+                history[-1].tolist(), abs=1e-7 if simulation.constraints else 0.0, rel=0.0
+            )
             again = simulation.run(0.01, initial=str(file))
             assert [rows[0] for rows in again.auxiliary.values()] == ends[engine, "fixed_step"]
             middle = simulation.initial_state(simulation.state_in(file, 0.0101), {})
-            assert middle == pytest.approx(history[1].tolist(), abs=1e-7 if simulation.constraints else 0.0, rel=0.0)
+            assert middle == pytest.approx(
+                history[1].tolist(), abs=1e-7 if simulation.constraints else 0.0, rel=0.0
+            )
             if engine == "compiled":
                 starts = np.array([simulation.initial_state(z, {}), last])
-                runs = run_many(simulation.engine, starts, 0.02, accuracy=1e-8, report_times=[0.0, 0.01])
-                assert np.allclose(runs.reports[:, 0], starts, rtol=0.0, atol=1e-8 if simulation.constraints else 0.0)
+                runs = run_many(
+                    simulation.engine, starts, 0.02, accuracy=1e-8, report_times=[0.0, 0.01]
+                )
+                assert np.allclose(
+                    runs.reports[:, 0],
+                    starts,
+                    rtol=0.0,
+                    atol=1e-8 if simulation.constraints else 0.0,
+                )
                 alone = simulation.run(0.02, accuracy=1e-8, initial=z)
                 ending = simulation.state.rows(alone.values, alone.speeds, alone.auxiliary)
                 assert np.array_equal(runs.states[0], ending[-1])
-    assert ends["bullet", "accuracy"] == pytest.approx(ends["compiled", "accuracy"], rel=1e-7, abs=1e-9)
+    assert ends["bullet", "accuracy"] == pytest.approx(
+        ends["compiled", "accuracy"], rel=1e-7, abs=1e-9
+    )
     # Bullet steps the rates of its joints, which not all are the generalized speeds.
     for engine in ("bullet", "compiled"):
-        assert ends[engine, "fixed_step"] == pytest.approx(ends["compiled", "accuracy"], rel=0.1, abs=0.1)
+        assert ends[engine, "fixed_step"] == pytest.approx(
+            ends["compiled", "accuracy"], rel=0.1, abs=0.1
+        )
 
 
 def test_what_a_file_says_gives_way_to_what_holds(tmp_path):
@@ -161,11 +188,24 @@ def test_what_a_file_says_gives_way_to_what_holds(tmp_path):
         state["/jointset/j2/q2/value"] = 7.0
         y = simulation.initial_state({**state, "q1": 0.25}, {})
         assert simulation.state.values(y)[2] == 0.3 and simulation.state.values(y)[1] == 0.25
-        for state, error in (({"/forceset/disc/dissipated_energy": np.nan}, "starts at nan"), ({"q9": 1.0}, "q9")):
+        for state, error in (
+            ({"/forceset/disc/dissipated_energy": np.nan}, "starts at nan"),
+            ({"q9": 1.0}, "q9"),
+        ):
             with pytest.raises(OsimliteError, match=error):
                 simulation.initial_state(state, {})
         write_sto(tmp_path / "other.sto", "x", [0.0], ["/jointset/k/r/value"], [[1.0]])
-        with pytest.raises(OsimliteError, match=r"no column is a state of 'damped', such as '/jointset/j0/q0/value'"):
+        with pytest.raises(
+            OsimliteError,
+            match=r"no column is a state of 'damped', such as '/jointset/j0/q0/value'",
+        ):
             simulation.run(0.1, initial=tmp_path / "other.sto")
-        write_sto(tmp_path / "degrees.sto", "x", [0.0], ["/jointset/j1/q1/value"], [[90.0]], in_degrees=True)
+        write_sto(
+            tmp_path / "degrees.sto",
+            "x",
+            [0.0],
+            ["/jointset/j1/q1/value"],
+            [[90.0]],
+            in_degrees=True,
+        )
         assert simulation.state_in(tmp_path / "degrees.sto") == {"/jointset/j1/q1/value": np.pi / 2}

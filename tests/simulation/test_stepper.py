@@ -58,7 +58,11 @@ def test_reports_do_not_change_the_steps(which):
     list(alone.steps(1.0))
     seen = [list(row) for row in reporting.table([0.0, 0.0, 1e-4, 0.25, 0.2503, 1.0])]
     assert len(seen) == 6
-    assert (reporting.taken, reporting.time, reporting.state) == (alone.taken, alone.time, alone.state)
+    assert (reporting.taken, reporting.time, reporting.state) == (
+        alone.taken,
+        alone.time,
+        alone.state,
+    )
     assert seen[0] == seen[1] == [1.0, 0.0]
     assert seen[-1] == alone.state
 

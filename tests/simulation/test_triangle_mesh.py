@@ -23,11 +23,18 @@ def test_files_of_all_kinds(kind, shape, tmp_path):
     WRITERS[kind](tmp_path / f"mesh{kind}", points, [face[::-1] for face in faces])
     mesh = TriangleMesh.read(f"mesh{kind}", MeshFolders(tmp_path))
     corners = triangles(points, faces)
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    area = (
+        0.5
+        * np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        ).sum()
+    )
     assert mesh.areas.sum() == pytest.approx(area, rel=1e-6)
     assert np.einsum("ij,ij->i", mesh.normals, mesh.centroids).min() > 0.0
     assert mesh.is_one_piece
-    assert mesh.radius == pytest.approx(np.linalg.norm(points - mesh.center, axis=1).max(), rel=1e-6)
+    assert mesh.radius == pytest.approx(
+        np.linalg.norm(points - mesh.center, axis=1).max(), rel=1e-6
+    )
 
 
 def test_corners_of_stl_files_that_are_nearly_in_one_place(tmp_path):
@@ -70,18 +77,24 @@ def test_surfaces_that_cross():
     frame = np.eye(4)
     for shift, crossing in ((0.1, False), (0.6, True), (1.2, False)):
         frame[0, 3] = shift
-        small = TriangleMesh.of_corners(triangles(*block((0.2, 0.2, 0.2))), "block.stl").moved(frame)
+        small = TriangleMesh.of_corners(triangles(*block((0.2, 0.2, 0.2))), "block.stl").moved(
+            frame
+        )
         assert one.crosses(small) is small.crosses(one) is crossing
     both = np.concatenate([triangles(*ball((0.5, 0.5, 0.5))), small.corners])
     assert not TriangleMesh.of_corners(both, "both.stl").is_one_piece
 
 
 def test_what_is_refused(tmp_path):
-    with pytest.raises(ModelError, match=r"the mesh file 'none.obj' is not there; put it beside the model's file"):
+    with pytest.raises(
+        ModelError, match=r"the mesh file 'none.obj' is not there; put it beside the model's file"
+    ):
         TriangleMesh.read("none.obj", MeshFolders(tmp_path))
     (tmp_path / "inner").mkdir()
     WRITERS[".obj"](tmp_path / "block.obj", *block((1.0, 1.0, 1.0)))
-    with pytest.raises(OsimliteError, match=r"'\.\./block\.obj' is in .* outside the model's folder"):
+    with pytest.raises(
+        OsimliteError, match=r"'\.\./block\.obj' is in .* outside the model's folder"
+    ):
         TriangleMesh.read("../block.obj", MeshFolders(tmp_path / "inner"))
     (tmp_path / "mesh.ply").write_text("ply\n")
     with pytest.raises(ModelError, match=r"does not read \.ply files"):

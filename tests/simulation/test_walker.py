@@ -16,7 +16,8 @@ def largest_error(trajectory, reference):
     table = reference("trajectory")
     assert trajectory.times == pytest.approx(table["time"], abs=1e-12)
     return max(
-        np.abs(trajectory.values[:, index] - table[name]).max() for index, name in enumerate(trajectory.coordinates)
+        np.abs(trajectory.values[:, index] - table[name]).max()
+        for index, name in enumerate(trajectory.coordinates)
     )
 
 
@@ -46,7 +47,8 @@ def test_articulated_body_route_moves_alike(walker, reference):
 
 def test_fixed_steps_converge_at_first_order(simulation, reference):
     errors = [
-        largest_error(simulation.run(2.0, fixed_step=h, report_interval=1e-3), reference) for h in (1e-3, 5e-4, 2.5e-4)
+        largest_error(simulation.run(2.0, fixed_step=h, report_interval=1e-3), reference)
+        for h in (1e-3, 5e-4, 2.5e-4)
     ]
     assert errors[0] < 2e-2
     for whole, half in pairwise(errors):
@@ -63,7 +65,9 @@ def test_contact_forces(precise, reference):
         (ours,) = (
             column[::10]
             for name, column in precise.forces.items()
-            if name.startswith(f"{element}.") and name.endswith(f"{kind}.{axis}") and ".Platform." not in name
+            if name.startswith(f"{element}.")
+            and name.endswith(f"{kind}.{axis}")
+            and ".Platform." not in name
         )
         size = max(np.abs(table[f"{element}.{kind}.{other}"]).max() for other in "XYZ")
         assert np.abs(ours - expected).max() <= 1e-5 * size
@@ -84,7 +88,9 @@ def test_limit_forces(precise, reference):
         if label == "time":
             continue
         element, what = label.split(".")
-        ours = precise.forces[element if what == "torque_Nm" else f"{element}.PotentialEnergy"][::10]
+        ours = precise.forces[element if what == "torque_Nm" else f"{element}.PotentialEnergy"][
+            ::10
+        ]
         assert ours == pytest.approx(expected, abs=1e-5 * max(1.0, np.abs(expected).max()))
 
 
@@ -119,13 +125,22 @@ def test_events_do_not_depend_on_accuracy_more_than_the_motion_does(precise, sim
     coarse = simulation.run(2.0, accuracy=1e-6).summary["contact_events"]
     fine = precise.summary["contact_events"]
     assert [event["contact"] for event in coarse] == [event["contact"] for event in fine]
-    assert [event["time_s"] for event in coarse] == pytest.approx([event["time_s"] for event in fine], abs=2e-5)
+    assert [event["time_s"] for event in coarse] == pytest.approx(
+        [event["time_s"] for event in fine], abs=2e-5
+    )
 
 
 def test_largest_forces(precise):
-    result = {name: entry["force_N"] for name, entry in precise.summary["largest_contact_forces"].items()}
+    result = {
+        name: entry["force_N"] for name, entry in precise.summary["largest_contact_forces"].items()
+    }
     # OpenSim's largest at full milliseconds.
-    sampled = {"RFootForce": 333.916, "LFootForce": 180.838, "LKneeForce": 508.834, "RKneeForce": 443.186}
+    sampled = {
+        "RFootForce": 333.916,
+        "LFootForce": 180.838,
+        "LKneeForce": 508.834,
+        "RKneeForce": 443.186,
+    }
     assert result.keys() == sampled.keys()
     for name, size in sampled.items():
         assert size - 0.1 < result[name] < size + 4.0

@@ -17,7 +17,15 @@ from osimlite.simulation.engines.linking import COMPILED
 from tests.conftest import ROOT
 from tests.simulation.checked import Checked
 
-SIDES = {"all": (0, 0), "x": (0, 1), "-x": (0, -1), "y": (1, 1), "-y": (1, -1), "z": (2, 1), "-z": (2, -1)}
+SIDES = {
+    "all": (0, 0),
+    "x": (0, 1),
+    "-x": (0, -1),
+    "y": (1, 1),
+    "-y": (1, -1),
+    "z": (2, 1),
+    "-z": (2, -1),
+}
 METHODS = {"hybrid": wrapping.HYBRID, "midpoint": wrapping.MIDPOINT, "axial": wrapping.AXIAL}
 
 with gzip.open(ROOT / "fixtures" / "forces" / "wrap_cases.json.gz") as file:
@@ -28,7 +36,9 @@ SETUPS = {setup["name"]: setup for setup in TABLE if len(setup["objects"]) == 1}
 def numbers(surface, *, alone):
     """The numbers of a surface."""
     axis, side = SIDES[surface["quadrant"]]
-    return np.array([axis, side, METHODS[surface["method"]], alone, *surface["dimensions"]], dtype=float)
+    return np.array(
+        [axis, side, METHODS[surface["method"]], alone, *surface["dimensions"]], dtype=float
+    )
 
 
 def bent(law, p, first, second):
@@ -37,7 +47,11 @@ def bent(law, p, first, second):
     e[wrapping.FIRST_END : wrapping.FIRST_TANGENT] = *first, *second
     item, state = np.zeros(ITEM.OWN, dtype=np.int64), np.zeros(1)
     says = law(item, p, e, state, state, 0)
-    return says, e[wrapping.FIRST_TANGENT : wrapping.SURFACE_LENGTH].reshape(2, 3), e[wrapping.SURFACE_LENGTH]
+    return (
+        says,
+        e[wrapping.FIRST_TANGENT : wrapping.SURFACE_LENGTH].reshape(2, 3),
+        e[wrapping.SURFACE_LENGTH],
+    )
 
 
 @pytest.mark.parametrize("code", [Checked("Python"), COMPILED], ids=lambda code: code.name)
@@ -56,12 +70,22 @@ def test_surface(name, code):
             assert np.linalg.norm(ends[0] - ends[1]) == pytest.approx(case["length"], abs=1e-15)
             continue
         expected = [point[1:4] for point in case["points"][1:3]]
-        assert points @ frame[:3, :3].T + frame[:3, 3] == pytest.approx(np.array(expected), abs=1e-14)
-        whole = length + sum(np.linalg.norm(end - point) for end, point in zip(ends, points, strict=True))
-        assert isnan(whole) if isnan(case["length"]) else whole == pytest.approx(case["length"], abs=2e-15)
+        assert points @ frame[:3, :3].T + frame[:3, 3] == pytest.approx(
+            np.array(expected), abs=1e-14
+        )
+        whole = length + sum(
+            np.linalg.norm(end - point) for end, point in zip(ends, points, strict=True)
+        )
+        assert (
+            isnan(whole)
+            if isnan(case["length"])
+            else whole == pytest.approx(case["length"], abs=2e-15)
+        )
 
 
 @pytest.mark.parametrize("height", [1e200, np.nan])
 def test_a_helix_beyond_all_numbers_stays(height):
-    result = settled((1.0, 1.0, 0.0), (-1.0, 1.0, height), (1.0, 0.0, 0.0), (-1.0, 0.0, height), 3.0, 3.0)
+    result = settled(
+        (1.0, 1.0, 0.0), (-1.0, 1.0, height), (1.0, 0.0, 0.0), (-1.0, 0.0, height), 3.0, 3.0
+    )
     assert result == pytest.approx((0.0, height), nan_ok=True)

@@ -52,8 +52,36 @@ SCALE = """<OpenSimDocument Version="40600"><ScaleTool name="sc"><mass>70</mass>
 </ScaleTool></OpenSimDocument>
 """
 SETUPS = "z_ik.xml", "id.xml", "analyze.xml", "forward.xml", "scale.xml"
-WORDS = ("nan", "inf", "-inf", "1e308", "-1e308", "1e-320", "0", "-1", "abc", "", "1e999", "0.1.2", "1,5", "²", "0x10")
-LOST = ("no.xml", "../", "/", "trial.trc", "a b.mot", "nowhere/deep/er", "model.osim", "\x01", "ü.mot", ".", "id.xml")
+WORDS = (
+    "nan",
+    "inf",
+    "-inf",
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "0",
+    "-1",
+    "abc",
+    "",
+    "1e999",
+    "0.1.2",
+    "1,5",
+    "²",
+    "0x10",
+)
+LOST = (
+    "no.xml",
+    "../",
+    "/",
+    "trial.trc",
+    "a b.mot",
+    "nowhere/deep/er",
+    "model.osim",
+    "\x01",
+    "ü.mot",
+    ".",
+    "id.xml",
+)
 
 
 def laid_out(folder: Path) -> Path:
@@ -66,7 +94,9 @@ def laid_out(folder: Path) -> Path:
     osimlite.run(trial / "z_ik.xml")
     for name in ("motion.mot", "ik.mot"):
         (trial / name).write_bytes((trial / "ik.mot").read_bytes())
-    osimlite.simulate(osimlite.read(folder / "model.osim"), to=0.4, report_interval=0.1).write(trial)
+    osimlite.simulate(osimlite.read(folder / "model.osim"), to=0.4, report_interval=0.1).write(
+        trial
+    )
     return trial
 
 
@@ -147,7 +177,9 @@ def name_lost(text: str, random: random.Random) -> str:
     if not result:
         return text
     one = random.choice(result)
-    return text[: one.start(1)] + random.choice((*LOST, one[1] + "x", one[1][1:])) + text[one.end(1) :]
+    return (
+        text[: one.start(1)] + random.choice((*LOST, one[1] + "x", one[1][1:])) + text[one.end(1) :]
+    )
 
 
 def tag_lost(text: str, random: random.Random) -> str:
@@ -165,7 +197,11 @@ DAMAGES: tuple[Callable[[str, random.Random], str], ...] = (
 
 
 def state(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -184,15 +220,24 @@ def test_a_clear_error_or_an_answer(seed: int, whole: dict[str, bytes], tmp_path
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(content)
     trial, setup = tmp_path / "trial", chance.choice(SETUPS)
-    data = {"z_ik.xml": "trial.trc", "scale.xml": "trial.trc", "forward.xml": "states.sto", "id.xml": "ik.mot"}
-    target = trial / chance.choice((setup, data.get(setup, "motion.mot"), data.get(setup, "motion.mot")))
+    data = {
+        "z_ik.xml": "trial.trc",
+        "scale.xml": "trial.trc",
+        "forward.xml": "states.sto",
+        "id.xml": "ik.mot",
+    }
+    target = trial / chance.choice(
+        (setup, data.get(setup, "motion.mot"), data.get(setup, "motion.mot"))
+    )
     text = target.read_text()
     told = []
     for _ in range(chance.choice((1, 1, 2, 3))):
         damage = chance.choice(DAMAGES)
         told.append(damage.__name__)
         text = damage(text, chance) or text
-    target.write_bytes(text.encode("utf-8", "surrogateescape" if chance.random() < 0.9 else "replace"))
+    target.write_bytes(
+        text.encode("utf-8", "surrogateescape" if chance.random() < 0.9 else "replace")
+    )
     before = state(tmp_path)
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
@@ -203,6 +248,11 @@ def test_a_clear_error_or_an_answer(seed: int, whole: dict[str, bytes], tmp_path
             assert state(tmp_path) == before, f"{told} of {target.name}: {error}"
             return
     for name, table in outcome.tables.items():
-        assert table.times.shape == (len(table.rows),) and np.isfinite(table.times).all(), (told, name)
+        assert table.times.shape == (len(table.rows),) and np.isfinite(table.times).all(), (
+            told,
+            name,
+        )
         if "marker" not in name:
-            assert np.isfinite(table.rows).all(), f"{told} of {target.name} gave no numbers in {name}"
+            assert np.isfinite(table.rows).all(), (
+                f"{told} of {target.name} gave no numbers in {name}"
+            )

@@ -18,21 +18,29 @@ REFERENCE = "oracle/tools/reference"
 def unpacked(source: Path, to: Path, name: str) -> None:
     """A file, out of its .gz if it has one."""
     packed = source.with_name(f"{source.name}.gz")
-    (to / name).write_bytes(gzip.decompress(packed.read_bytes()) if packed.exists() else source.read_bytes())
+    (to / name).write_bytes(
+        gzip.decompress(packed.read_bytes()) if packed.exists() else source.read_bytes()
+    )
 
 
 def test_inverse_kinematics_writes_opensims_files(shared: Path, tmp_path: Path) -> None:
     """Headers, columns and digits; values near OpenSim's at its default accuracy, the errors no larger."""
     case = shared / REFERENCE / "ik_gait10"
     setup = osimlite.read_document(case / "walk_Setup_IK.xml")
-    setup.model_file, setup.marker_file, setup.output_motion_file = "model.osim", "walk.trc", "walk_IK.mot"
+    setup.model_file, setup.marker_file, setup.output_motion_file = (
+        "model.osim",
+        "walk.trc",
+        "walk_IK.mot",
+    )
     setup.results_directory, setup.report_marker_locations = "results", True
     osimlite.write(setup, tmp_path / "setup.xml")
     unpacked(shared / REFERENCE / "models" / "gait10_subject01.osim", tmp_path, "model.osim")
     unpacked(case / "subject01_walk.trc", tmp_path, "walk.trc")
     outcome = run(tmp_path / "setup.xml", check=False)
     theirs = (case / "subject01_walk_IK.mot").read_text()
-    assert (tmp_path / "walk_IK.mot").read_text().split("endheader")[0] == theirs.split("endheader")[0]
+    assert (tmp_path / "walk_IK.mot").read_text().split("endheader")[0] == theirs.split(
+        "endheader"
+    )[0]
     ours, known = read_sto(tmp_path / "walk_IK.mot"), read_sto(case / "subject01_walk_IK.mot")
     assert ours.columns == known.columns and ours.rows == pytest.approx(known.rows, abs=0.1)
     errors = read_sto(next((tmp_path / "results").glob("*_ik_marker_errors.sto")))

@@ -54,10 +54,15 @@ def test_a_motion_goes_on_from_the_row_before(setup: Path) -> None:
     assert states.rows[-1] == pytest.approx(before.rows[3], abs=1e-4)
     degrees = outcome.tables["fall_states_degrees.mot"]
     turning = [name for name in states.columns if "knee" in name.lower()]
-    assert turning and all(np.allclose(np.radians(degrees[name]), states[name], rtol=1e-14) for name in turning)
+    assert turning and all(
+        np.allclose(np.radians(degrees[name]), states[name], rtol=1e-14) for name in turning
+    )
     # A model without actuators has a table of controls without rows, as OpenSim writes it.
     (empty,) = [path for path in outcome.files if path.name == "fall_controls.sto"]
-    assert empty.read_text() == "controls\nversion=1\nnRows=0\nnColumns=1\ninDegrees=no\nendheader\ntime\n"
+    assert (
+        empty.read_text()
+        == "controls\nversion=1\nnRows=0\nnColumns=1\ninDegrees=no\nendheader\ntime\n"
+    )
     every, some = (outcome.tables[f"fall_{name}_q.sto"] for name in ("all", "some"))
     assert every.times.tolist() == states.times.tolist()
     numbers = sorted({*range(0, len(every.times), 3), len(every.times) - 1})
@@ -88,7 +93,11 @@ def test_steps_keep_their_bounds(setup: Path) -> None:
         ),
         ("states.sto", "degrees.sto", "in degrees, which OpenSim refuses"),
         ("states.sto", "others.sto", "no column with a state of the model"),
-        ("</objects></AnalysisSet>", "<StaticOptimization name='so'/></objects></AnalysisSet>", "cannot be computed"),
+        (
+            "</objects></AnalysisSet>",
+            "<StaticOptimization name='so'/></objects></AnalysisSet>",
+            "cannot be computed",
+        ),
         (
             "<states_file>",
             "<ControllerSet><objects><CorrectionController name='cc'/></objects></ControllerSet><states_file>",
@@ -96,7 +105,9 @@ def test_steps_keep_their_bounds(setup: Path) -> None:
         ),
     ],
 )
-def test_what_means_nothing_is_refused_and_nothing_is_written(setup: Path, old: str, new: str, said: str) -> None:
+def test_what_means_nothing_is_refused_and_nothing_is_written(
+    setup: Path, old: str, new: str, said: str
+) -> None:
     text = (setup.parent / "states.sto").read_text()
     (setup.parent / "degrees.sto").write_text(text.replace("inDegrees=no", "inDegrees=yes"))
     (setup.parent / "others.sto").write_text(re.sub(r"/\S+/(\S+)", r"other_\1", text))
@@ -120,7 +131,9 @@ def test_what_a_setup_adds_may_be_old(setup: Path, tmp_path: Path) -> None:
     )
     text = SETUP.replace("40600", "20302").replace("<states_file>", f"{controllers}<states_file>")
     setup.write_text(
-        text.replace("<output_precision>", "<force_set_files>forces.xml</force_set_files><output_precision>")
+        text.replace(
+            "<output_precision>", "<force_set_files>forces.xml</force_set_files><output_precision>"
+        )
     )
     table = osimlite.run(setup, check=False).tables["fall_controls.sto"]
     assert table.columns == ("push",) and len(table.times) > 1 and (table.rows == 0.5).all()
@@ -134,7 +147,9 @@ def test_labels_of_all_ages_are_states() -> None:
         ["angle", "angle_u", "m.activation"],
         ["angle/value", "angle/speed", "activation"],
     ):
-        assert columns_of_states(["other", *labels], paths) == {path: k + 1 for k, path in enumerate(paths)}
+        assert columns_of_states(["other", *labels], paths) == {
+            path: k + 1 for k, path in enumerate(paths)
+        }
     assert columns_of_states(["x", "angle_v"], paths) == {}
 
 

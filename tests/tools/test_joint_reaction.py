@@ -27,7 +27,9 @@ def reactions(folder: Path, model: Model, elbow: float, side: str) -> Any:
     osimlite.write(model, folder / "model.osim")
     times = np.linspace(0.0, 1.0, 11)
     values = np.column_stack([0.3 * np.sin(3.0 * times), elbow * (0.5 + np.sin(2.0 * times))])
-    write_sto(folder / "motion.sto", "motion", times, ["r_shoulder_elev", "r_elbow_flex"], values.tolist())
+    write_sto(
+        folder / "motion.sto", "motion", times, ["r_shoulder_elev", "r_elbow_flex"], values.tolist()
+    )
     (folder / "it.xml").write_text(SETUP.format(side))
     osimlite.run(folder / "it.xml", check=False)
     return read_sto(folder / "it_J_ReactionLoads.sto").rows

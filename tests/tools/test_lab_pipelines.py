@@ -24,7 +24,12 @@ def test_the_moments_without_equilibrium_are_named(tmp_path: Path) -> None:
     done = run("run", "ma.xml", "-o", "out", folder=folder)
     assert done.code == 0
     assert "at 17 of 51 moments, from 0.62 s to 0.94 s" in " ".join(done.out.split())
-    assert "calf" in (folder / "out" / "ma_MuscleAnalysis_FiberLength.sto").read_text().partition("endheader")[0]
+    assert (
+        "calf"
+        in (folder / "out" / "ma_MuscleAnalysis_FiberLength.sto")
+        .read_text()
+        .partition("endheader")[0]
+    )
     assert "NaN" not in (folder / "out" / "ma_MuscleAnalysis_Length.sto").read_text()
     summary = osimlite.run(folder / "ma.xml", folder / "again").summary
     assert len(summary["without_equilibrium"]["/forceset/calf"]) == 17
@@ -37,7 +42,9 @@ def test_states_of_a_file_without_equilibrium(tmp_path: Path) -> None:
     change(folder / "kin.xml", ("</objects>", kinematics))
     states = osimlite.run(folder / "kin.xml", folder / "one").tables["kin_S_states.sto"]
     assert np.isnan(states.rows).any()
-    (folder / "states.sto").write_bytes((folder / "one" / "kin_S_states.sto").read_bytes().replace(b"nan", b"0.5"))
+    (folder / "states.sto").write_bytes(
+        (folder / "one" / "kin_S_states.sto").read_bytes().replace(b"nan", b"0.5")
+    )
     change(
         folder / "kin.xml",
         ("<coordinates_file>walk.mot", "<coordinates_file>"),
@@ -50,7 +57,10 @@ def test_states_of_a_file_without_equilibrium(tmp_path: Path) -> None:
 def test_a_muscle_that_never_has_an_equilibrium(tmp_path: Path) -> None:
     folder = copy_lab("unbalanced", tmp_path)
     change(folder / "leg.osim", ("<tendon_slack_length>0.40<", "<tendon_slack_length>0.60<"))
-    change(folder / "ma.xml", ("</objects>", '<ForceReporter name="F"/><JointReaction name="J"/></objects>'))
+    change(
+        folder / "ma.xml",
+        ("</objects>", '<ForceReporter name="F"/><JointReaction name="J"/></objects>'),
+    )
     tables = osimlite.run(folder / "ma.xml", folder / "out").tables
     assert np.isnan(tables["ma_MuscleAnalysis_FiberLength.sto"].rows).all()
     assert np.isfinite(tables["ma_MuscleAnalysis_MomentArm_knee_angle.sto"].rows).all()
@@ -61,7 +71,9 @@ def test_a_muscle_that_never_has_an_equilibrium(tmp_path: Path) -> None:
     assert np.isnan(loads.rows[:, ~np.array(points)]).all()
 
 
-@pytest.mark.parametrize("probe", ["Umberger2010MuscleMetabolicsProbe", "Bhargava2004MuscleMetabolicsProbe"])
+@pytest.mark.parametrize(
+    "probe", ["Umberger2010MuscleMetabolicsProbe", "Bhargava2004MuscleMetabolicsProbe"]
+)
 @pytest.mark.parametrize("start", ["0.2", "0.25", "0"])
 def test_given_forces_are_not_doubted(tmp_path: Path, probe: str, start: str) -> None:
     """Probes of muscles, and forces that cover the analysis but not the time from 0 on, are no reason to warn."""
@@ -82,7 +94,9 @@ def test_given_forces_that_end_early_are_told(tmp_path: Path) -> None:
     folder = copy_lab("probe", tmp_path)
     osimlite.run(folder / "so.xml")
     change(folder / "jr.xml", ("<final_time>0.4<", "<final_time>0.5<"))
-    with pytest.warns(DoubtfulWarning, match=r"forces of 'so_StaticOptimization_force.sto' .* from 0.2 to 0.4 s"):
+    with pytest.warns(
+        DoubtfulWarning, match=r"forces of 'so_StaticOptimization_force.sto' .* from 0.2 to 0.4 s"
+    ):
         osimlite.run(folder / "jr.xml")
 
 
@@ -91,7 +105,9 @@ def test_energy_of_limits_has_one_label(tmp_path: Path, name: str) -> None:
     """StaticOptimization calls it as ForceReporter and OpenSim do, whatever the force is called."""
     folder = copy_lab("energy", tmp_path)
     change(folder / "leg.osim", ('name="lim"', f'name="{name}"'))
-    forces = osimlite.run(folder / "so.xml", folder / "out").tables["so_StaticOptimization_force.sto"]
+    forces = osimlite.run(folder / "so.xml", folder / "out").tables[
+        "so_StaticOptimization_force.sto"
+    ]
     reported = osimlite.run(folder / "fr.xml", folder / "out").tables
     (reporter,) = (table for label, table in reported.items() if label.endswith("_forces.sto"))
     assert "PotentialEnergy" in forces.columns
@@ -186,7 +202,9 @@ def test_what_opensim_refuses_is_refused(tmp_path: Path, tag: str) -> None:
     folder = copy_lab("energy", tmp_path)
     text = (folder / "so.xml").read_text()
     text = text.replace("<initial_time>0</initial_time>", "") if tag == "initial_time" else text
-    (folder / "so.xml").write_text(text.replace('<AnalyzeTool name="so">', f'<AnalyzeTool name="so"><{tag}/>'))
+    (folder / "so.xml").write_text(
+        text.replace('<AnalyzeTool name="so">', f'<AnalyzeTool name="so"><{tag}/>')
+    )
     done = run("run", "so.xml", folder=folder)
     assert done.code == 2
     assert "OpenSim refuses to load the file" in done.err
@@ -194,10 +212,20 @@ def test_what_opensim_refuses_is_refused(tmp_path: Path, tag: str) -> None:
 
 def test_an_empty_switch_of_an_older_class_is_off(tmp_path: Path) -> None:
     folder = copy_lab("energy", tmp_path)
-    change(folder / "so.xml", ("<use_muscle_physiology>true</use_muscle_physiology>", "<use_muscle_physiology/>"))
-    first = osimlite.run(folder / "so.xml", folder / "one").tables["so_StaticOptimization_activation.sto"]
-    change(folder / "so.xml", ("<use_muscle_physiology/>", "<use_muscle_physiology>false</use_muscle_physiology>"))
-    second = osimlite.run(folder / "so.xml", folder / "two").tables["so_StaticOptimization_activation.sto"]
+    change(
+        folder / "so.xml",
+        ("<use_muscle_physiology>true</use_muscle_physiology>", "<use_muscle_physiology/>"),
+    )
+    first = osimlite.run(folder / "so.xml", folder / "one").tables[
+        "so_StaticOptimization_activation.sto"
+    ]
+    change(
+        folder / "so.xml",
+        ("<use_muscle_physiology/>", "<use_muscle_physiology>false</use_muscle_physiology>"),
+    )
+    second = osimlite.run(folder / "so.xml", folder / "two").tables[
+        "so_StaticOptimization_activation.sto"
+    ]
     assert (first.rows == second.rows).all()
 
 
@@ -228,10 +256,15 @@ CHAINED = """<OpenSimDocument Version="40600"><InverseDynamicsTool name="id"><re
 @pytest.mark.parametrize("stale", [False, True])
 @pytest.mark.parametrize("folder_name", ["", "results/"])
 @pytest.mark.parametrize("workers", ["1", "2"])
-def test_results_put_elsewhere_are_found(tmp_path: Path, stale: bool, folder_name: str, workers: str) -> None:
+def test_results_put_elsewhere_are_found(
+    tmp_path: Path, stale: bool, folder_name: str, workers: str
+) -> None:
     """A setup reads what another has made into the folder of -o, also where an old file is in the usual place."""
     folder = copy_lab("unseen", tmp_path)
-    change(folder / "ik.xml", ("<output_motion_file>ik.mot<", f"<output_motion_file>{folder_name}ik.mot<"))
+    change(
+        folder / "ik.xml",
+        ("<output_motion_file>ik.mot<", f"<output_motion_file>{folder_name}ik.mot<"),
+    )
     (folder / "results").mkdir()
     (folder / "id.xml").write_text(CHAINED.format(folder=folder_name))
     expected = osimlite.run(folder / "ik.xml", tmp_path / "one").tables["ik.mot"]

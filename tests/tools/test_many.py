@@ -27,7 +27,12 @@ def make_trial(folder: Path, seed: int, frames: int = 60) -> None:
     folder.mkdir(parents=True)
     times = np.linspace(0.0, 1.0, frames)
     values = 0.3 * np.sin(3.0 * times[:, None] + np.arange(6.0) + seed)
-    write_trc(folder / "trial.trc", times.tolist(), MARKERS, positions(values).reshape(frames, -1).tolist())
+    write_trc(
+        folder / "trial.trc",
+        times.tolist(),
+        MARKERS,
+        positions(values).reshape(frames, -1).tolist(),
+    )
     osimlite.write(
         osimlite.InverseKinematicsTool(
             name="ik",
@@ -80,14 +85,18 @@ def test_each_waits_for_what_it_needs_and_workers_change_no_byte(trials: Path) -
     assert done.code == 0 and results(trials) == alone
     told = json.loads(done.out)
     assert [item["setup"] for item in told][:2] == ["trial0/id.xml", "trial1/id.xml"]
-    assert {item["status"] for item in told} == {"done"} and told[3]["summary"]["rms_marker_error"] < 1e-8
+    assert {item["status"] for item in told} == {"done"} and told[3]["summary"][
+        "rms_marker_error"
+    ] < 1e-8
 
 
 @pytest.mark.full
 def test_a_failure_stops_only_what_needs_it_and_is_mended_by_resuming(trials: Path) -> None:
     file = trials / "trial1" / "trial.trc"
     whole = file.read_text()
-    file.write_text(whole.replace("one", "eno").replace("two", "owt").replace("three", "x").replace("four", "y"))
+    file.write_text(
+        whole.replace("one", "eno").replace("two", "owt").replace("three", "x").replace("four", "y")
+    )
     done = run("run", "trial*/*.xml", folder=trials)
     assert done.code == 2 and "6 setups: 4 done, 1 failed, 1 not run" in done.out
     assert "needs what trial1/z_ik.xml should have made" in " ".join(done.out.split())
@@ -127,9 +136,13 @@ def test_warnings_of_each_are_told_in_the_table(trials: Path) -> None:
 def test_what_another_program_made_is_taken(trials: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A setup that cannot be run here keeps none waiting for what it made elsewhere."""
     monkeypatch.chdir(trials)
-    monkeypatch.setattr("osimlite.tools.many.runnable", lambda: [tag for tag in runnable() if tag != "RRATool"])
+    monkeypatch.setattr(
+        "osimlite.tools.many.runnable", lambda: [tag for tag in runnable() if tag != "RRATool"]
+    )
     osimlite.run(trials / "trial0" / "z_ik.xml")
-    other = osimlite.RRATool(name="rra", output_model_file="../model.osim", model_file="../first.osim")
+    other = osimlite.RRATool(
+        name="rra", output_model_file="../model.osim", model_file="../first.osim"
+    )
     osimlite.write(other, trials / "trial0" / "rra.xml")
     refused, done = run_many([trials / "trial0" / "rra.xml", trials / "trial0" / "id.xml"])
     assert (refused.status, done.status) == ("failed", "done")
@@ -138,7 +151,9 @@ def test_what_another_program_made_is_taken(trials: Path, monkeypatch: pytest.Mo
 def test_what_is_read_makes_the_digest(trials: Path) -> None:
     setup = trials / "trial0" / "z_ik.xml"
     before = digest_of(setup)
-    (trials / "model.osim").write_text((trials / "model.osim").read_text().replace('"one"', '"other"', 1))
+    (trials / "model.osim").write_text(
+        (trials / "model.osim").read_text().replace('"one"', '"other"', 1)
+    )
     changed = digest_of(setup)
     (trials / "trial0" / "trial.trc").unlink()
     assert len({before, changed, digest_of(setup)}) == 3
@@ -158,7 +173,11 @@ def test_two_that_write_one_file_are_told(trials: Path, monkeypatch: pytest.Monk
     (trials / "trial0" / "again.xml").write_bytes(setup.read_bytes())
     one, two = run_many([setup, setup.with_name("again.xml")])
     for trial, other in ((one, two), (two, one)):
-        assert trial.status == "failed" and f"'{other.setup}' writes" in trial.message and "-o FOLDER" in trial.message
+        assert (
+            trial.status == "failed"
+            and f"'{other.setup}' writes" in trial.message
+            and "-o FOLDER" in trial.message
+        )
 
 
 def test_names_and_patterns(trials: Path) -> None:
@@ -168,7 +187,9 @@ def test_names_and_patterns(trials: Path) -> None:
     osimlite.write(osimlite.IKTaskSet(name="tasks"), trials / "trial0" / "tasks.xml")
     (trials / "trial0" / "broken.xml").write_text("<OpenSimDocument")
     names = [path.name for path in found([f"{trials}/**/*"]) if path.suffix in (".xml", ".osim")]
-    assert sorted(names) == ["broken.xml", *["id.xml"] * 3, *["z_ik.xml"] * 3], "models and sets are no setups"
+    assert sorted(names) == ["broken.xml", *["id.xml"] * 3, *["z_ik.xml"] * 3], (
+        "models and sets are no setups"
+    )
     assert found([trials / "model.osim"]) == [trials / "model.osim"], "what is named is meant"
     with pytest.raises(OsimliteError, match=r"no setup matches '.*/grf\*\.xml'"):
         found([f"{trials}/trial0/grf*.xml"])
@@ -194,7 +215,9 @@ def await_results(folder: Path, least: int, process: subprocess.Popen[str]) -> N
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("how", ["keyboard", "all killed", "worker killed"])
 @pytest.mark.full
-def test_what_is_there_is_whole_and_resuming_ends_with_the_same_bytes(trials: Path, how: str) -> None:
+def test_what_is_there_is_whole_and_resuming_ends_with_the_same_bytes(
+    trials: Path, how: str
+) -> None:
     for seed in range(3, 12):
         make_trial(trials / f"trial{seed}", seed, 400)
     run_many(found([f"{trials}/trial*/*.xml"]))
@@ -208,7 +231,9 @@ def test_what_is_there_is_whole_and_resuming_ends_with_the_same_bytes(trials: Pa
             process.kill()
             pytest.skip("no list of processes")
         workers = [
-            pid for pid in children.read_text().split() if "spawn_main" in Path(f"/proc/{pid}/cmdline").read_text()
+            pid
+            for pid in children.read_text().split()
+            if "spawn_main" in Path(f"/proc/{pid}/cmdline").read_text()
         ]
         os.kill(int(workers[0]), signal.SIGKILL)
         out, err = process.communicate(timeout=100)
@@ -216,7 +241,10 @@ def test_what_is_there_is_whole_and_resuming_ends_with_the_same_bytes(trials: Pa
     else:
         os.killpg(process.pid, signal.SIGINT if how == "keyboard" else signal.SIGKILL)
         _, err = process.communicate(timeout=100)
-        assert process.returncode == (130 if how == "keyboard" else -signal.SIGKILL) and "Traceback" not in err
+        assert (
+            process.returncode == (130 if how == "keyboard" else -signal.SIGKILL)
+            and "Traceback" not in err
+        )
         assert how != "keyboard" or ("interrupted after" in err and "go on with --resume" in err)
         there = results(trials)
         assert there.items() <= whole.items()
@@ -242,7 +270,11 @@ def test_a_full_disk_is_told_and_leaves_no_part(trials: Path) -> None:
         cwd=trials, env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}, preexec_fn=full,
         capture_output=True, text=True, check=False, timeout=100,
     )  # fmt: skip
-    assert done.returncode == 2 and "cannot write the file" in done.stderr and "Traceback" not in done.stderr
+    assert (
+        done.returncode == 2
+        and "cannot write the file" in done.stderr
+        and "Traceback" not in done.stderr
+    )
     assert not list((trials / "trial0").glob(".osimlite*"))
     for name, content in results(trials).items():
         assert content.endswith(b"\n") and len(content) <= limit, name

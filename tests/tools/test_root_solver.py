@@ -12,7 +12,9 @@ def test_each_function_has_its_zero() -> None:
     wanted = np.array([0.3, 0.01, 0.7, 0.999])
 
     def function(x: np.ndarray) -> np.ndarray:
-        return np.array([x[0] - 0.3, np.tanh(40.0 * (x[1] - 0.01)), x[2] ** 3 - 0.343, np.expm1(x[3] - 0.999)])
+        return np.array(
+            [x[0] - 0.3, np.tanh(40.0 * (x[1] - 0.01)), x[2] ** 3 - 0.343, np.expm1(x[3] - 0.999)]
+        )
 
     found = roots(function, np.zeros(4), np.ones(4), 1e-10)
     assert found == pytest.approx(wanted, abs=1e-10)

@@ -33,9 +33,17 @@ SETUP = """<?xml version="1.0" encoding="UTF-8" ?>
 @pytest.fixture
 def setup(fixtures: Path, tmp_path: Path) -> Path:
     """The setup of a tool that can be run, with its model and its motion."""
-    (tmp_path / "walker.osim").write_bytes((fixtures / "walker" / "DynamicWalkerModel.osim").read_bytes())
+    (tmp_path / "walker.osim").write_bytes(
+        (fixtures / "walker" / "DynamicWalkerModel.osim").read_bytes()
+    )
     times = [0.01 * k for k in range(20)]
-    write_sto(tmp_path / "walk.mot", "walk", times, ("Pelvis_tx", "RKnee_rz"), [[t, 9 * t * t] for t in times])
+    write_sto(
+        tmp_path / "walk.mot",
+        "walk",
+        times,
+        ("Pelvis_tx", "RKnee_rz"),
+        [[t, 9 * t * t] for t in times],
+    )
     (tmp_path / "setup.xml").write_text(SETUP)
     return tmp_path / "setup.xml"
 
@@ -63,7 +71,9 @@ def test_a_file_of_the_current_folder_is_told(setup: Path, monkeypatch: pytest.M
     for name in ("setup.xml", "walker.osim"):
         (trial / name).write_bytes((setup.parent / name).read_bytes())
     monkeypatch.chdir(setup.parent)
-    assert ("taken from here", "walk.mot, not beside the setup") in osimlite.run("trial/setup.xml").told
+    assert ("taken from here", "walk.mot, not beside the setup") in osimlite.run(
+        "trial/setup.xml"
+    ).told
     done = run("run", "trial/setup.xml", "setup.xml", "-o", "out", folder=setup.parent)
     assert done.out.count("taken from here walk.mot, not beside") == 1
 
@@ -71,19 +81,28 @@ def test_a_file_of_the_current_folder_is_told(setup: Path, monkeypatch: pytest.M
 def test_the_setup_that_makes_what_is_missing_is_told(setup: Path) -> None:
     """Whoever runs inverse dynamics first forgot inverse kinematics."""
     (setup.parent / "walk.mot").unlink()
-    fit = osimlite.InverseKinematicsTool(name="ik", model_file="walker.osim", output_motion_file="walk.mot")
+    fit = osimlite.InverseKinematicsTool(
+        name="ik", model_file="walker.osim", output_motion_file="walk.mot"
+    )
     osimlite.write(fit, setup.with_name("fit.xml"))
     done = run("run", "setup.xml", folder=setup.parent)
-    assert done.code == 2 and "walk.mot: cannot read the file: no such file; run 'fit.xml' first, which" in done.err
+    assert (
+        done.code == 2
+        and "walk.mot: cannot read the file: no such file; run 'fit.xml' first, which" in done.err
+    )
 
 
-def test_the_command_runs_from_anywhere_and_writes_where_it_is_told(setup: Path, tmp_path: Path) -> None:
+def test_the_command_runs_from_anywhere_and_writes_where_it_is_told(
+    setup: Path, tmp_path: Path
+) -> None:
     away = tmp_path / "away"
     away.mkdir()
     for word in ("run", "run-tool"):
         done = run(word, "../setup.xml", "-o", word, folder=away)
         assert (done.code, done.err) == (0, "") and f"{word}/forces.sto" in done.out
-        assert "check ../setup.xml:7:27: warning OSIM842 'walk.mot' has no column" in " ".join(done.out.split())
+        assert "check ../setup.xml:7:27: warning OSIM842 'walk.mot' has no column" in " ".join(
+            done.out.split()
+        )
         assert [path.name for path in (away / word).iterdir()] == ["forces.sto"]
     assert not (tmp_path / "results").exists()
 
@@ -110,7 +129,10 @@ def test_what_a_setup_names_is_checked_too(setup: Path) -> None:
 def test_only_files_are_run(setup: Path) -> None:
     """Neither a list, nor an object, nor a folder, for which the command shows how to write its setups."""
     for wrong in ([setup], osimlite.read_document(setup)):
-        with pytest.raises(OsimliteError, match=rf"the file of a setup is wanted here, not a {type(wrong).__name__}"):
+        with pytest.raises(
+            OsimliteError,
+            match=rf"the file of a setup is wanted here, not a {type(wrong).__name__}",
+        ):
             osimlite.run(wrong)  # type: ignore[arg-type]
     done = run("run", ".", folder=setup.parent)
     assert done.code == 2 and ".: this is a folder; name the setups in it, as './*.xml'" in done.err
@@ -119,12 +141,16 @@ def test_only_files_are_run(setup: Path) -> None:
 @pytest.mark.parametrize("tag", ["IKTaskSet", "Model"])
 def test_what_cannot_be_run_is_refused_by_name(setup: Path, tag: str) -> None:
     setup.write_text(f'<OpenSimDocument Version="40600"><{tag} name="it"/></OpenSimDocument>')
-    with pytest.raises(NotRunnable, match=f"setups of {tag} cannot be run; those of .*InverseDynamicsTool"):
+    with pytest.raises(
+        NotRunnable, match=f"setups of {tag} cannot be run; those of .*InverseDynamicsTool"
+    ):
         osimlite.run(setup)
     assert run("run", "setup.xml", folder=setup.parent).code == 2
 
 
-def test_an_analysis_that_cannot_be_computed_is_refused_before_anything_is_written(setup: Path) -> None:
+def test_an_analysis_that_cannot_be_computed_is_refused_before_anything_is_written(
+    setup: Path,
+) -> None:
     analyses = "<AnalysisSet><objects><Kinematics name='K'/><InducedAccelerations name='IA'/></objects></AnalysisSet>"
     text = SETUP.replace("InverseDynamicsTool", "AnalyzeTool")
     setup.write_text(text.replace("</coordinates_file>", f"</coordinates_file>{analyses}"))
@@ -146,7 +172,11 @@ def test_times_and_files_that_mean_nothing(setup: Path) -> None:
 def test_a_study_with_a_property_that_nothing_knows_is_not_searched_for(repo, tmp_path):
     for name in ("slide.osim", "slide_guess.sto", "slide_states.sto"):
         (tmp_path / name).write_bytes((repo / "fixtures/setups" / name).read_bytes())
-    text = (repo / "fixtures/setups/slide.omoco").read_text().replace("<bounds>0 5</bounds>", "<bound>0 5</bound>")
+    text = (
+        (repo / "fixtures/setups/slide.omoco")
+        .read_text()
+        .replace("<bounds>0 5</bounds>", "<bound>0 5</bound>")
+    )
     (tmp_path / "slide.omoco").write_text(text)
     with pytest.raises(FaultySetup, match=r"slide\.omoco:13:.*has no property <bound>"):
         osimlite.run(tmp_path / "slide.omoco")

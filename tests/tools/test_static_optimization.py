@@ -34,7 +34,9 @@ def walk(reference: Path, tmp_path: Path) -> Path:
     }.items():
         content = (reference / source).read_bytes()
         (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_bytes(gzip.decompress(content) if source.endswith(".gz") else content)
+        (tmp_path / name).write_bytes(
+            gzip.decompress(content) if source.endswith(".gz") else content
+        )
     return tmp_path / "SO" / "walk_Setup_SO.xml"
 
 
@@ -65,15 +67,23 @@ def test_a_walk_is_solved_exactly(walk: Path, reference: Path, tmp_path: Path) -
     ours = result.tables[FORCE]
     assert (walk.parent / "Results" / FORCE).read_text().splitlines()[: len(head)] == head
     # Each force for the activation that OpenSim found.
-    assert ours.rows[:, :18] / x[:, :18] * theirs.rows[:, :18] == pytest.approx(forces.rows[:, :18], abs=1e-8)
-    assert ours.rows[:, 18:28] / x[:, 18:] * theirs.rows[:, 18:] == pytest.approx(forces.rows[:, 18:28], abs=1e-8)
+    assert ours.rows[:, :18] / x[:, :18] * theirs.rows[:, :18] == pytest.approx(
+        forces.rows[:, :18], abs=1e-8
+    )
+    assert ours.rows[:, 18:28] / x[:, 18:] * theirs.rows[:, 18:] == pytest.approx(
+        forces.rows[:, 18:28], abs=1e-8
+    )
     assert ours.rows[:, 28:] == pytest.approx(forces.rows[:, 28:], abs=1e-9)
 
 
 def test_controls_are_those_that_a_controller_reads(walk: Path) -> None:
     result = osimlite.run(walk)
-    document = osimlite.read_document(walk.parent / "Results" / "walk_StaticOptimization_controls.xml")
-    curves = {curve.name: [(node.t, node.value) for node in curve.x_nodes] for curve in document.objects}
+    document = osimlite.read_document(
+        walk.parent / "Results" / "walk_StaticOptimization_controls.xml"
+    )
+    curves = {
+        curve.name: [(node.t, node.value) for node in curve.x_nodes] for curve in document.objects
+    }
     table = result.tables[ACTIVATION]
     assert list(curves) == list(table.columns)
     for name, nodes in curves.items():
@@ -102,7 +112,9 @@ def test_what_has_no_solution_is_told_and_not_written(walk: Path) -> None:
     assert np.isnan(forces.rows[failed, :28]).all()
     assert "lack" in (said := dict(result.told)["StaticOptimization"])
     assert "knee_angle_r" in said
-    document = osimlite.read_document(walk.parent / "Results" / "walk_StaticOptimization_controls.xml")
+    document = osimlite.read_document(
+        walk.parent / "Results" / "walk_StaticOptimization_controls.xml"
+    )
     assert {len(curve.x_nodes) for curve in document.objects} == {np.count_nonzero(~failed)}
 
 

@@ -36,12 +36,18 @@ TASKS = """<OpenSimDocument Version="40600">
 def pendulum(strength: float = 100.0, **bounds: float) -> osimlite.Model:
     """A rod on a motor."""
     model = osimlite.Model(name="pendulum")
-    rod = osimlite.Body(name="rod", mass=1.0, mass_center=(0.0, -0.5, 0.0), inertia=(0.1, 0.01, 0.1, 0.0, 0.0, 0.0))
+    rod = osimlite.Body(
+        name="rod", mass=1.0, mass_center=(0.0, -0.5, 0.0), inertia=(0.1, 0.01, 0.1, 0.0, 0.0, 0.0)
+    )
     model.add(rod)
     pin = osimlite.PinJoint(name="pin", socket_parent_frame=model.ground, socket_child_frame=rod)
     pin.coordinates[0].name = "angle"
     model.add(pin)
-    model.add(osimlite.CoordinateActuator(name="motor", coordinate="angle", optimal_force=strength, **bounds))
+    model.add(
+        osimlite.CoordinateActuator(
+            name="motor", coordinate="angle", optimal_force=strength, **bounds
+        )
+    )
     return model
 
 
@@ -62,7 +68,9 @@ def written(
 ) -> Path:
     model = pendulum() if model is None else model
     # RRA has no forces but those that its setup names.
-    motor = osimlite.to_text(osimlite.schema.forces.ForceSet(objects=[model.force_set.objects[0].copy_deep()]))
+    motor = osimlite.to_text(
+        osimlite.schema.forces.ForceSet(objects=[model.force_set.objects[0].copy_deep()])
+    )
     (folder / "motor.xml").write_text(motor)
     model.force_set.objects.clear()
     osimlite.write(model, folder / "model.osim")
@@ -88,7 +96,11 @@ def test_a_pendulum_follows(folder: Path, tool: str) -> None:
     assert outcome.tables["it_controls.sto"]["motor"] * 100.0 == pytest.approx(force, rel=1e-12)
     read = osimlite.read_document(folder / "results" / "it_controls.xml")
     (control,) = read.objects
-    assert control.name == "motor.excitation" and control.default_max == 10_000.0 and len(control.x_nodes) > 15
+    assert (
+        control.name == "motor.excitation"
+        and control.default_max == 10_000.0
+        and len(control.x_nodes) > 15
+    )
     for name in ("Kinematics_q", "Kinematics_u", "Kinematics_dudt", "pErr"):
         assert (folder / "results" / f"it_{name}.sto").exists()
 
@@ -98,7 +110,9 @@ def test_who_is_too_weak_is_told(folder: Path) -> None:
     bounds = {"min_control": -0.001, "max_control": 0.001}
     written(folder, pendulum(1.0, **bounds))
     outcome = osimlite.run(folder / "setup.xml")
-    assert outcome.done and np.abs(outcome.tables["it_controls.sto"].rows).max() == pytest.approx(0.001)
+    assert outcome.done and np.abs(outcome.tables["it_controls.sto"].rows).max() == pytest.approx(
+        0.001
+    )
     written(folder, pendulum(1.0, **bounds), "CMCTool")
     outcome = osimlite.run(folder / "setup.xml")
     told = dict(outcome.told)
@@ -112,8 +126,14 @@ def test_who_is_too_weak_is_told(folder: Path) -> None:
         ({"active": "false true true"}, "no task of .* is active"),
         ({"active": ""}, "has an empty 'active'"),
         ({"final": 0.0005}, "give a later final_time"),
-        ({"more": "<adjust_com_to_reduce_residuals>true</adjust_com_to_reduce_residuals>"}, "adjusted_com_body"),
-        ({"tool": "CMCTool", "more": "<actuators_to_exclude>motor</actuators_to_exclude>"}, "actuators_to_exclude"),
+        (
+            {"more": "<adjust_com_to_reduce_residuals>true</adjust_com_to_reduce_residuals>"},
+            "adjusted_com_body",
+        ),
+        (
+            {"tool": "CMCTool", "more": "<actuators_to_exclude>motor</actuators_to_exclude>"},
+            "actuators_to_exclude",
+        ),
         ({"model": 0.0}, "optimal force"),
     ],
 )

@@ -49,7 +49,9 @@ def test_no_result_replaces_an_input(trial: Path, setup: str, result: str, into:
     change(trial / "forward.xml", ">states.sto<", ">fw_states.sto<")
     change(trial / setup, result, into)
     before = state(trial.parent)
-    with pytest.raises(OsimliteError, match=rf"{setup}: a result would replace .*, which it is computed from"):
+    with pytest.raises(
+        OsimliteError, match=rf"{setup}: a result would replace .*, which it is computed from"
+    ):
         osimlite.run(trial / setup)
     assert state(trial.parent) == before
 
@@ -73,14 +75,18 @@ def test_no_report_replaces_an_input(trial: Path) -> None:
 def test_of_several_results_all_are_written_or_none(trial: Path) -> None:
     (trial / "analyzed" / "an_K_dudt.sto").mkdir(parents=True)
     before = state(trial)
-    with pytest.raises(OsimliteError, match=r"an_K_dudt\.sto: cannot write the file: this is a folder"):
+    with pytest.raises(
+        OsimliteError, match=r"an_K_dudt\.sto: cannot write the file: this is a folder"
+    ):
         osimlite.run(trial / "analyze.xml")
     assert state(trial) == before
 
 
 def test_an_error_of_a_tool_names_its_setup(trial: Path) -> None:
     change(trial / "analyze.xml", "_coordinates>6<", "_coordinates>0<")
-    with pytest.raises(OsimliteError, match=r"analyze\.xml: a low-pass frequency is a positive number"):
+    with pytest.raises(
+        OsimliteError, match=r"analyze\.xml: a low-pass frequency is a positive number"
+    ):
         osimlite.run(trial / "analyze.xml")
 
 
@@ -119,23 +125,35 @@ def test_names_that_are_too_long_are_told(trial: Path, place: str) -> None:
 @pytest.mark.parametrize("workers", [1, 2])
 def test_nothing_is_computed_from_what_an_earlier_run_has_left(trial: Path, workers: int) -> None:
     """With -o the motion goes elsewhere, and the forces are computed from it, not from the old one."""
-    done = run("run", "id.xml", "z_ik.xml", "-o", "new", "--workers", workers, "--json", folder=trial)
+    done = run(
+        "run", "id.xml", "z_ik.xml", "-o", "new", "--workers", workers, "--json", folder=trial
+    )
     result = {item["setup"]: item["status"] for item in json.loads(done.out)}
     assert (done.code, result) == (0, {"z_ik.xml": "done", "id.xml": "done"})
     assert (trial / "new" / "id").is_dir() and (trial / "new" / "z_ik" / "ik.mot").is_file()
 
 
-@pytest.mark.parametrize(("precision", "time"), [(-3, "       0"), (0, "       0"), (12, "      0.200000000000")])
+@pytest.mark.parametrize(
+    ("precision", "time"), [(-3, "       0"), (0, "       0"), (12, "      0.200000000000")]
+)
 def test_digits_behind_the_point(trial: Path, precision: int, time: str) -> None:
     """As OpenSim 4.6 prints them."""
-    change(trial / "forward.xml", "<initial_time>", f"<output_precision>{precision}</output_precision><initial_time>")
+    change(
+        trial / "forward.xml",
+        "<initial_time>",
+        f"<output_precision>{precision}</output_precision><initial_time>",
+    )
     osimlite.run(trial / "forward.xml")
     rows = (trial / "moved" / "fw_states.sto").read_text().partition("endheader\n")[2].splitlines()
     assert rows[1].split("\t")[0] == time
 
 
 def test_more_digits_than_there_are(trial: Path) -> None:
-    change(trial / "forward.xml", "<initial_time>", "<output_precision>3000000000</output_precision><initial_time>")
+    change(
+        trial / "forward.xml",
+        "<initial_time>",
+        "<output_precision>3000000000</output_precision><initial_time>",
+    )
     with pytest.raises(OsimliteError, match="output_precision"):
         osimlite.run(trial / "forward.xml")
 

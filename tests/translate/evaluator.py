@@ -20,7 +20,10 @@ def evaluate(law: Mapping[str, Any], x: Sequence[float]) -> float:
         case "linear":
             return law["slope"] * x[0] + law["start"]
         case "weighted-sum":
-            return sum(weight * value for weight, value in zip(law["weights"], x, strict=True)) + law["start"]
+            return (
+                sum(weight * value for weight, value in zip(law["weights"], x, strict=True))
+                + law["start"]
+            )
         case "polynomial":
             return _polynomial(law["coefficients"], x[0])
         case "sine":
@@ -31,7 +34,9 @@ def evaluate(law: Mapping[str, Any], x: Sequence[float]) -> float:
             return first + (last - first) * (10.0 * t**3 - 15.0 * t**4 + 6.0 * t**5)
         case "multivariate-polynomial":
             terms = zip(law["coefficients"], law["powers"], strict=True)
-            return sum(c * math.prod(v**p for v, p in zip(x, powers, strict=True)) for c, powers in terms)
+            return sum(
+                c * math.prod(v**p for v, p in zip(x, powers, strict=True)) for c, powers in terms
+            )
         case "scaled":
             return law["scale"] * evaluate(law["function"], x)
         case "piecewise-linear":
@@ -49,7 +54,12 @@ def evaluate(law: Mapping[str, Any], x: Sequence[float]) -> float:
             a, b = (angle + start for angle, start in zip(x, law["neutral"], strict=True))
             t = math.acos(math.cos(a) * math.cos(b))
             s = (1.0 - math.cos(t)) / (t * math.sin(t))
-            return law["length"] * (-s * math.sin(b), math.sin(t) / t, s * math.sin(a) * math.cos(b))[law["component"]]
+            return (
+                law["length"]
+                * (-s * math.sin(b), math.sin(t) / t, s * math.sin(a) * math.cos(b))[
+                    law["component"]
+                ]
+            )
     raise ValueError(law["type"])
 
 

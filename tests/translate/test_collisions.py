@@ -32,11 +32,20 @@ from tests.translate.test_export import kinds, one_body, unaccounted
 def with_surfaces():
     """A block on a slider along X, with surfaces on it, over a half space that ground's Y axis leaves."""
     model = one_body(joint=SliderJoint(name="slide", coordinates=[Coordinate(name="x")]))
-    frame = model.add(PhysicalOffsetFrame(name="side", socket_parent="/bodyset/block", translation=(0.0, 0.0, 0.5)))
+    frame = model.add(
+        PhysicalOffsetFrame(
+            name="side", socket_parent="/bodyset/block", translation=(0.0, 0.0, 0.5)
+        )
+    )
     model.add(
         ContactHalfSpace(name="floor", socket_frame="/ground", orientation=(0.0, 0.0, -np.pi / 2)),
         ContactSphere(name="foot", socket_frame=frame, radius=0.1, location=(0.0, -0.2, 0.0)),
-        ContactEllipsoid(name="egg", socket_frame="/bodyset/block", radii=(0.1, 0.2, 0.3), orientation=(0.1, 0.2, 0.3)),
+        ContactEllipsoid(
+            name="egg",
+            socket_frame="/bodyset/block",
+            radii=(0.1, 0.2, 0.3),
+            orientation=(0.1, 0.2, 0.3),
+        ),
         ContactMesh(name="bone", socket_frame="/bodyset/block", filename="bone.vtp"),
         ContactMesh(name="lost", socket_frame="/bodyset/block", filename="lost.obj"),
         ContactCylinder(name="roll", socket_frame="/bodyset/block", radius=0.1),
@@ -56,7 +65,9 @@ def test_contact_geometry_becomes_collision_shapes_where_it_is(surfaces):
     (floor,) = root.findall("link[@name='world']/collision")
     assert floor.get("name") == "floor" and floor.find("geometry/box").get("size") == "1 200 200"
     # Half the thickness below ground; the box's X axis points down.
-    assert [float(x) for x in floor.find("origin").get("xyz").split()] == pytest.approx([0.0, -0.5, 0.0], abs=1e-15)
+    assert [float(x) for x in floor.find("origin").get("xyz").split()] == pytest.approx(
+        [0.0, -0.5, 0.0], abs=1e-15
+    )
     by_name = {item.get("name"): item for item in root.findall("link[@name='block']/collision")}
     assert sorted(by_name) == ["bone", "egg", "foot"]
     assert by_name["foot"].find("origin").attrib == {"xyz": "0 -0.2 0.5", "rpy": "0 0 0"}
@@ -69,7 +80,10 @@ def test_contact_geometry_becomes_collision_shapes_where_it_is(surfaces):
 def test_what_collision_shapes_do_not_say_is_told(surfaces):
     result = {(record.kind, record.component): record for record in surfaces.fidelity}
     place = "/contactgeometryset"
-    done = {name: result["contact-geometry", f"{place}/{name}"].done for name in ("floor", "roll", "bone", "loose")}
+    done = {
+        name: result["contact-geometry", f"{place}/{name}"].done
+        for name in ("floor", "roll", "bone", "loose")
+    }
     assert "box of 1 x 200 x 200 m" in done["floor"] and done["roll"] == "left out" == done["loose"]
     assert "convex hull" in done["bone"]
     assert "neither beside the model" in result["mesh", f"{place}/lost"].done
@@ -80,7 +94,10 @@ def test_what_collision_shapes_do_not_say_is_told(surfaces):
 def test_other_programs_touch_where_opensim_does(surfaces):
     """The foot is 0.1 m under the block's -0.2 m, which the weld lifts by 1 m: it hangs 0.7 m over the floor."""
     with in_bullet(surfaces.text, surfaces.files) as bullet:
-        assert len(bullet.pb.getCollisionShapeData(bullet.body, bullet.links["block"], bullet.client)) == 3
+        assert (
+            len(bullet.pb.getCollisionShapeData(bullet.body, bullet.links["block"], bullet.client))
+            == 3
+        )
         ray = bullet.pb.rayTest((0.0, 5.0, 0.5), (0.0, -5.0, 0.5), physicsClientId=bullet.client)
         assert ray[0][0] == bullet.body
         up = bullet.pb.rayTest((0.0, 0.1, 0.5), (0.0, 5.0, 0.5), physicsClientId=bullet.client)
@@ -98,7 +115,9 @@ def test_every_surface_of_the_walker_becomes_a_shape_and_merging_keeps_them():
     wanted = [c.path for c in model.components() if isinstance(c, ContactGeometry)]
     for merge in (False, True):
         urdf = to_urdf(model, collision=True, merge=merge)
-        shapes = {shape.source: (link, shape) for link in urdf.robot.links for shape in link.collisions}
+        shapes = {
+            shape.source: (link, shape) for link in urdf.robot.links for shape in link.collisions
+        }
         assert sorted(shapes) == sorted(wanted) and kinds(urdf)["contact-geometry"] == wanted
         assert urdf.text.count("<collision ") == len(wanted)
         placed = urdf.robot.link_transforms({})
@@ -124,14 +143,20 @@ def test_collision_names_are_legal_and_unique():
         ContactSphere(name="a b", socket_frame="/bodyset/block", radius=0.1),
         ContactSphere(name="a_b", socket_frame="/ground", radius=0.1),
     )
-    names = [item.get("name") for item in ElementTree.fromstring(to_urdf(model, collision=True).text).iter("collision")]
+    names = [
+        item.get("name")
+        for item in ElementTree.fromstring(to_urdf(model, collision=True).text).iter("collision")
+    ]
     assert sorted(names) == ["a_b", "a_b_1"]
 
 
 # ---------------------------------------------------------------------------------------------- effort and velocity
 def limits(text):
     return {
-        joint.get("name"): (float(joint.find("limit").get("effort")), float(joint.find("limit").get("velocity")))
+        joint.get("name"): (
+            float(joint.find("limit").get("effort")),
+            float(joint.find("limit").get("velocity")),
+        )
         for joint in ElementTree.fromstring(text).iterfind("joint")
         if joint.find("limit") is not None
     }
@@ -141,15 +166,23 @@ def test_actuators_of_a_coordinate_say_how_strong_its_joint_is():
     model = with_surfaces()
     path = "/jointset/slide/x"
     model.add(
-        CoordinateActuator(name="push", coordinate="x", optimal_force=-20.0, min_control=-2.0, max_control=1.0),
-        ActivationCoordinateActuator(name="pull", coordinate="x", optimal_force=3.0, min_control=0.0, max_control=1.0),
-        CoordinateActuator(name="off", coordinate="x", optimal_force=100.0, max_control=1.0, appliesForce=False),
+        CoordinateActuator(
+            name="push", coordinate="x", optimal_force=-20.0, min_control=-2.0, max_control=1.0
+        ),
+        ActivationCoordinateActuator(
+            name="pull", coordinate="x", optimal_force=3.0, min_control=0.0, max_control=1.0
+        ),
+        CoordinateActuator(
+            name="off", coordinate="x", optimal_force=100.0, max_control=1.0, appliesForce=False
+        ),
         CoordinateActuator(name="gone", coordinate="y", optimal_force=100.0),
     )
     urdf = to_urdf(model)
     assert limits(urdf.text) == {"x": (43.0, UNLIMITED)}
     details = {
-        record.component.rsplit("/", 1)[1]: record.detail for record in urdf.fidelity if record.kind == "actuator"
+        record.component.rsplit("/", 1)[1]: record.detail
+        for record in urdf.fidelity
+        if record.kind == "actuator"
     }
     assert details == {"push": "40 N of joint x", "pull": "3 N of joint x"}
     assert urdf.fidelity.translated[path] == "joint x" and unaccounted(model, urdf) == []

@@ -36,19 +36,27 @@ SPLINE = SimmSpline(x=(-1.0, 0.0, 0.5, 1.2, 2.0), y=(0.1, 0.3, 0.2, 0.25, 0.4))
 
 
 def test_the_walker_walks_as_in_opensim(fixtures):
-    driver = osimlite.mjcf.Driver(osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim"), timestep=2e-4)
-    text = gzip.decompress((fixtures / "walker" / "trajectory_reference.csv.gz").read_bytes()).decode()
+    driver = osimlite.mjcf.Driver(
+        osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim"), timestep=2e-4
+    )
+    text = gzip.decompress(
+        (fixtures / "walker" / "trajectory_reference.csv.gz").read_bytes()
+    ).decode()
     header, *rows = csv.reader(line for line in text.splitlines() if not line.startswith("#"))
     last = dict(zip(header, map(float, rows[-1]), strict=True))
     driver.step(10_000)
     assert driver.data.time == pytest.approx(last["time"], abs=1e-9)
     names = driver.mjcf.robot.mechanism.coordinate_names
-    np.testing.assert_allclose(driver.state()[0], [last[name] for name in names], rtol=0.0, atol=1e-5)
+    np.testing.assert_allclose(
+        driver.state()[0], [last[name] for name in names], rtol=0.0, atol=1e-5
+    )
     assert driver.mjcf.fidelity.translated["/forceset/RHipForce"] == COMPUTED
     assert {record.kind for record in driver.mjcf.fidelity} == {"ellipsoid"}
 
 
-@pytest.mark.parametrize("make", [lambda: on_a_function(SPLINE), lambda: chain()], ids=["spline", "chain"])
+@pytest.mark.parametrize(
+    "make", [lambda: on_a_function(SPLINE), lambda: chain()], ids=["spline", "chain"]
+)
 def test_accelerations_are_those_of_the_mechanism(make):
     driver = osimlite.mjcf.Driver(make())
     mechanism = driver.mjcf.robot.mechanism
@@ -56,7 +64,9 @@ def test_accelerations_are_those_of_the_mechanism(make):
         q, u, _ = driver.state()
         u += 0.2 * k
         driver.set_state(q, u)
-        result = [driver.data.joint(driver.mjcf.leads[place].joint).qacc[0] for place in range(len(q))]
+        result = [
+            driver.data.joint(driver.mjcf.leads[place].joint).qacc[0] for place in range(len(q))
+        ]
         np.testing.assert_allclose(result, mechanism.acceleration(q, u), rtol=1e-9, atol=1e-9)
         driver.step(40)
         state = mechanism.at(driver.state()[0])
@@ -70,11 +80,18 @@ def test_a_ball_joint_turns_by_its_angular_velocity():
     model = Model(name="ball", gravity=(0.0, 0.0, 0.0))
     body = model.add(Body(name="b", mass=1.0, inertia=(0.1, 0.2, 0.3, 0, 0, 0)))
     coordinates = [
-        Coordinate(name=name, default_value=value) for name, value in zip("abc", (0.2, 0.7, -0.4), strict=True)
+        Coordinate(name=name, default_value=value)
+        for name, value in zip("abc", (0.2, 0.7, -0.4), strict=True)
     ]
-    model.add(BallJoint(name="j", coordinates=coordinates).between(model.ground, body, child_at=(0.0, 0.2, 0.0)))
+    model.add(
+        BallJoint(name="j", coordinates=coordinates).between(
+            model.ground, body, child_at=(0.0, 0.2, 0.0)
+        )
+    )
     model.add(SpringGeneralizedForce(name="s", coordinate="b", stiffness=30.0, viscosity=1.0))
-    trajectory = osimlite.simulate(model, to=0.2, accuracy=1e-9, initial_speeds={"a": 1.0, "c": -2.0})
+    trajectory = osimlite.simulate(
+        model, to=0.2, accuracy=1e-9, initial_speeds={"a": 1.0, "c": -2.0}
+    )
     driver = osimlite.mjcf.Driver(model, timestep=1e-3)
     mechanism = driver.mjcf.robot.mechanism
     q = driver.state()[0]
@@ -87,7 +104,11 @@ def test_a_ball_joint_turns_by_its_angular_velocity():
 def slung() -> Model:
     """A body on an ellipsoid."""
     model = Model(name="shoulder")
-    body = model.add(Body(name="scapula", mass=1.0, inertia=(0.1, 0.1, 0.1, 0, 0, 0), mass_center=(0.0, 0.0, 0.1)))
+    body = model.add(
+        Body(
+            name="scapula", mass=1.0, inertia=(0.1, 0.1, 0.1, 0, 0, 0), mass_center=(0.0, 0.0, 0.1)
+        )
+    )
     values = zip("abc", (0.3, 0.4, -0.2), strict=True)
     coordinates = [Coordinate(name=name, default_value=value) for name, value in values]
     joint = EllipsoidJoint(name="j", radii_x_y_z=(0.1, 0.25, 0.18), coordinates=coordinates)
@@ -129,7 +150,9 @@ def test_bodies_on_ellipsoids_and_under_constraints_accelerate_as_they_must(make
     state = mechanism.at(q, u)
     mujoco.mj_kinematics(driver.model, driver.data)
     for index, body in enumerate(mechanism.bodies):
-        np.testing.assert_allclose(driver.data.body(body.name).xpos, state.transform(index)[:3, 3], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(
+            driver.data.body(body.name).xpos, state.transform(index)[:3, 3], rtol=0, atol=1e-12
+        )
     assert all(np.abs(item.position_errors(state)).max() < 1e-5 for item in mechanism.constraints)
 
 
@@ -145,7 +168,9 @@ def test_a_force_on_a_coordinate_without_a_joint_acts_on_the_one_that_leads_it()
 
 def test_controls_and_states_are_mujocos():
     model = chain(
-        ActivationCoordinateActuator(name="slow", coordinate="q1", optimal_force=2.0, activation_time_constant=0.05),
+        ActivationCoordinateActuator(
+            name="slow", coordinate="q1", optimal_force=2.0, activation_time_constant=0.05
+        ),
         CoordinateActuator(name="quick", coordinate="q3", optimal_force=3.0),
     )
     driver = osimlite.mjcf.Driver(model)
@@ -189,7 +214,9 @@ def test_callbacks_of_others_come_back_and_are_called():
 
 
 def test_what_fails_in_a_callback_is_raised(monkeypatch):
-    driver = osimlite.mjcf.Driver(chain(SpringGeneralizedForce(name="s", coordinate="q1", stiffness=1.0)))
+    driver = osimlite.mjcf.Driver(
+        chain(SpringGeneralizedForce(name="s", coordinate="q1", stiffness=1.0))
+    )
     monkeypatch.setattr(driver.system, "applied", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         driver.step()
@@ -199,7 +226,11 @@ def test_what_fails_in_a_callback_is_raised(monkeypatch):
 def test_an_edited_file_is_driven(tmp_path):
     model = on_a_function(SPLINE)
     path, *_ = osimlite.to_mjcf(model, driver=True, name="one").write(tmp_path)
-    path.write_text(path.read_text().replace("<worldbody>", '<worldbody><geom name="rock" type="sphere" size="1"/>'))
+    path.write_text(
+        path.read_text().replace(
+            "<worldbody>", '<worldbody><geom name="rock" type="sphere" size="1"/>'
+        )
+    )
     driver = osimlite.mjcf.Driver(model, file=path)
     assert driver.model.geom("rock").id >= 0
     driver.step(3)
@@ -207,14 +238,17 @@ def test_an_edited_file_is_driven(tmp_path):
 
 
 NEARLY = {"m0163": 3e-3, "m0466": 1e-3}
-"""Relative errors of models with a shoulder that a constraint nearly holds twice (5e-4 with Python 3.11, 1.2e-3 with
-the later numpy of 3.13), and with a helper of 1 g."""
+"""Relative errors of models with a shoulder that a constraint nearly holds twice (5e-4 with Python
+3.11, 1.2e-3 with the later numpy of 3.13), and with a helper of 1 g.
+"""
 
 
 @pytest.mark.filterwarnings("ignore")
 def test_real_models_accelerate_as_the_mechanism_does(corpus_model):
     try:
-        driver = osimlite.mjcf.Driver(osimlite.read(corpus_model.path), folder=corpus_model.path.parent)
+        driver = osimlite.mjcf.Driver(
+            osimlite.read(corpus_model.path), folder=corpus_model.path.parent
+        )
     except OsimliteError as error:
         assert_refused(corpus_model, error)
         return
@@ -227,12 +261,18 @@ def test_real_models_accelerate_as_the_mechanism_does(corpus_model):
     forces, order = np.zeros(len(q)), list(layout.order)
     forces[order] = row[len(order) : 2 * len(order)]
     try:
-        wanted = mechanism.rate_matrix(q) @ mechanism.acceleration(q, u, forces) + mechanism.rate_bias(q, u)
+        wanted = mechanism.rate_matrix(q) @ mechanism.acceleration(
+            q, u, forces
+        ) + mechanism.rate_bias(q, u)
     except SimulationError as error:
         assert_refused(corpus_model, error)
-        assert [record.detail for record in driver.mjcf.fidelity if record.kind == "singular"] == [error.message]
+        assert [record.detail for record in driver.mjcf.fidelity if record.kind == "singular"] == [
+            error.message
+        ]
         return
     for place, (joint, line) in driver.mjcf.leads.items():
         result = driver.data.joint(joint).qacc[0] / line.slope
         tolerance = NEARLY.get(corpus_model.id, 1e-8) * max(1.0, np.abs(wanted).max())
-        assert result == pytest.approx(wanted[place], rel=0.0, abs=tolerance), mechanism.coordinates[place].path
+        assert result == pytest.approx(wanted[place], rel=0.0, abs=tolerance), (
+            mechanism.coordinates[place].path
+        )

@@ -48,7 +48,9 @@ def kinds(urdf: Urdf) -> dict[str, list[str]]:
 
 
 def unaccounted(model: Model, urdf: Urdf) -> list[str]:
-    paths = [component.path for component in model.components() if not isinstance(component, CONTAINERS)]
+    paths = [
+        component.path for component in model.components() if not isinstance(component, CONTAINERS)
+    ]
     return urdf.fidelity.left_out(paths)
 
 
@@ -78,7 +80,9 @@ def test_every_component_of_the_walker_is_accounted_for():
     assert unaccounted(model, urdf) == []
     result = kinds(urdf)
     assert result["force"] == [c.path for c in model.components() if isinstance(c, Force)]
-    assert result["contact-geometry"] == [c.path for c in model.components() if isinstance(c, ContactGeometry)]
+    assert result["contact-geometry"] == [
+        c.path for c in model.components() if isinstance(c, ContactGeometry)
+    ]
     assert result["locked"] == ["/jointset/PlatformToGround/platform_rz"]
     moving = [c.path for c in model.components() if isinstance(c, Coordinate) and not c.locked]
     assert result["coordinate-range"] == moving
@@ -100,17 +104,25 @@ def test_a_component_nobody_thought_of_is_still_named():
 
 
 def test_numbers_and_names_are_in_the_details():
-    details = {(record.kind, record.component): record.detail for record in to_urdf(dynamic_walker()).fidelity}
+    details = {
+        (record.kind, record.component): record.detail
+        for record in to_urdf(dynamic_walker()).fidelity
+    }
     assert details["gravity", "/"] == "(0, -9.80665, 0) m/s^2"
     assert details["default-pose", "/jointset/PelvisToPlatform/Pelvis_ty"] == "0.835 m"
-    assert details["coordinate-range", "/jointset/RightShankToThigh/RKnee_rz"] == "-1.74533 to 0 rad"
+    assert (
+        details["coordinate-range", "/jointset/RightShankToThigh/RKnee_rz"] == "-1.74533 to 0 rad"
+    )
 
 
 def test_what_the_joints_cannot_say_is_told():
     ball = one_body(joint=BallJoint(name="ball", coordinates=[Coordinate(name=n) for n in "abc"]))
     assert kinds(to_urdf(ball))["ball-joint"] == ["/jointset/ball"]
     assert kinds(to_urdf(ball))["massless-link"] == ["/jointset/ball"]
-    coordinates = [Coordinate(name=f"c{k}", clamped=k == 1, default_speed_value=float(k == 2)) for k in range(6)]
+    coordinates = [
+        Coordinate(name=f"c{k}", clamped=k == 1, default_speed_value=float(k == 2))
+        for k in range(6)
+    ]
     free = to_urdf(one_body(joint=FreeJoint(name="free", coordinates=coordinates)))
     assert kinds(free)["clamped"] == ["/jointset/free/c1"]
     assert kinds(free)["default-speed"] == ["/jointset/free/c2"]
@@ -120,7 +132,9 @@ def test_a_body_without_a_joint_is_free():
     model = osimlite.Model(name="loose")
     model.add(osimlite.Body(name="ball", mass=1.0, inertia=(1, 1, 1, 0, 0, 0)))
     exported = osimlite.to_urdf(model)
-    (told,) = [record for record in exported.fidelity.records if record.component == "/bodyset/ball"]
+    (told,) = [
+        record for record in exported.fidelity.records if record.component == "/bodyset/ball"
+    ]
     assert (told.kind, told.detail) == ("loose-body", "/jointset/free_ball")
     assert exported.text.count('type="prismatic"') == 3
 
@@ -131,7 +145,11 @@ def test_limits_locks_and_merging_on_demand():
     knee = limited.find("joint[@name='RKnee_rz']")
     assert knee is not None and knee.get("type") == "revolute"
     limit = knee.find("limit")
-    assert limit is not None and float(limit.get("lower", "")) == np.radians(-100) and limit.get("upper") == "0"
+    assert (
+        limit is not None
+        and float(limit.get("lower", "")) == np.radians(-100)
+        and limit.get("upper") == "0"
+    )
     free = to_urdf(model, locked="joint")
     assert free.fidelity.translated["/jointset/PlatformToGround/platform_rz"] == "joint platform_rz"
     assert kinds(free)["locked"] == ["/jointset/PlatformToGround/platform_rz"]
@@ -152,7 +170,9 @@ def test_impossible_inertia_and_names_and_frames_are_told():
             for field in ("socket_parent", "socket_frame"):
                 if str(getattr(frame, field, "")).endswith("/Pelvis"):
                     setattr(frame, field, "/bodyset/Pel:vis")
-    frame = PhysicalOffsetFrame(name="spot", socket_parent="/bodyset/LeftShank", translation=(0.1, 0.0, 0.0))
+    frame = PhysicalOffsetFrame(
+        name="spot", socket_parent="/bodyset/LeftShank", translation=(0.1, 0.0, 0.0)
+    )
     model.add(frame, Marker(name="m", socket_parent_frame="/bodyset/LeftShank"))
     urdf = to_urdf(model)
     result = kinds(urdf)
@@ -183,7 +203,10 @@ def test_primitives_keep_their_size_place_and_colour():
         item.get("name"): item.find("color").get("rgba")
         for item in ElementTree.fromstring(urdf.text).findall("material")
     }
-    assert [colors[item.find("material").get("name")] for item in (box, ball)] == ["0.8 0.1 0.1 0.5", "1 1 1 1"]
+    assert [colors[item.find("material").get("name")] for item in (box, ball)] == [
+        "0.8 0.1 0.1 0.5",
+        "1 1 1 1",
+    ]
 
 
 def test_ellipsoids_become_meshes_of_their_size():
@@ -198,11 +221,15 @@ def test_ellipsoids_become_meshes_of_their_size():
     assert len(kinds(urdf)["ellipsoid"]) == 3
 
 
-@pytest.mark.parametrize("shape", [Ellipsoid(radii=(0.1, 0.2, 0.3)), Cylinder(scale_factors=(1.0, 1.0, 2.0))])
+@pytest.mark.parametrize(
+    "shape", [Ellipsoid(radii=(0.1, 0.2, 0.3)), Cylinder(scale_factors=(1.0, 1.0, 2.0))]
+)
 def test_meshes_are_closed_and_face_outwards(shape):
     trimesh = pytest.importorskip("trimesh")
     (content,) = to_urdf(one_body(shape)).files.values()
-    mesh = trimesh.load(trimesh.util.wrap_as_stream(content.decode()), file_type="obj", process=False)
+    mesh = trimesh.load(
+        trimesh.util.wrap_as_stream(content.decode()), file_type="obj", process=False
+    )
     mesh.merge_vertices(merge_norm=True)
     assert mesh.is_watertight and mesh.is_winding_consistent
     exact = 4 / 3 * np.pi * 0.006 if isinstance(shape, Ellipsoid) else np.pi * 0.5 * 1.0 * 1.0
@@ -212,7 +239,10 @@ def test_meshes_are_closed_and_face_outwards(shape):
 def test_shapes_in_offset_frames_are_placed_in_the_body():
     model = one_body()
     frame = PhysicalOffsetFrame(
-        name="spot", socket_parent="/bodyset/block", translation=(0.1, 0.2, 0.3), orientation=(0.0, 0.0, 0.5)
+        name="spot",
+        socket_parent="/bodyset/block",
+        translation=(0.1, 0.2, 0.3),
+        orientation=(0.0, 0.0, 0.5),
     )
     model.add(frame)
     frame.attach(Sphere(radius=0.1))
@@ -240,7 +270,10 @@ def test_what_cannot_be_drawn_is_told():
     assert result["mesh"] == ["/bodyset/block/block_geom_3", "/bodyset/block/block_geom_4"]
     assert result["appearance"] == ["/bodyset/block/block_geom_5"]
     details = [record for record in urdf.fidelity if record.kind == "mesh"]
-    assert [record.detail for record in details] == ["bone.vtp", "gone.obj"] and "--geometry" in details[0].done
+    assert [record.detail for record in details] == [
+        "bone.vtp",
+        "gone.obj",
+    ] and "--geometry" in details[0].done
     # A row of the table tells of all files that are not there.
     assert ("/bodyset/block/block_geom_3", "/bodyset/block/block_geom_4") in {
         group.components for group in urdf.fidelity.groups()
@@ -281,8 +314,13 @@ def test_all_files_are_written_and_bullet_reads_them(tmp_path):
     assert json.loads(written[-2].read_text())["file"] == written[0].name
     assert written[0].read_text() == urdf.text
     account = json.loads(written[-1].read_text())
-    assert [set(record) >= {"kind", "component", "cannot_say", "done"} for record in account["records"]]
-    assert len(account["records"]) == len(urdf.fidelity) and account["translated"] == urdf.fidelity.translated
+    assert [
+        set(record) >= {"kind", "component", "cannot_say", "done"} for record in account["records"]
+    ]
+    assert (
+        len(account["records"]) == len(urdf.fidelity)
+        and account["translated"] == urdf.fidelity.translated
+    )
     with in_bullet(urdf.text, urdf.files) as bullet:
         shapes = bullet.pb.getVisualShapeData(bullet.body, physicsClientId=bullet.client)
         assert len(shapes) == 6
@@ -304,7 +342,9 @@ def test_real_models_are_accounted_for_and_load(corpus_model, capfd):
     assert unaccounted(model, urdf) == []
     robot = urdf.robot
     q = np.random.default_rng(3).uniform(-1.0, 1.0, len(robot.mechanism.coordinates))
-    q = np.where([info.locked for info in robot.mechanism.coordinates], robot.mechanism.default_state()[0], q)
+    q = np.where(
+        [info.locked for info in robot.mechanism.coordinates], robot.mechanism.default_state()[0], q
+    )
     # What the URDF lets follow another joint must fit, for its readers make it so.
     reader = Reader(urdf.text, urdf.coordinates)
     paths = [info.path for info in robot.mechanism.coordinates]

@@ -72,9 +72,13 @@ def test_vtk_surfaces_become_obj_files_that_others_read_alike(bones):
     assert mesh.volume == pytest.approx(1.062036759256733, rel=1e-6)
     with in_bullet(urdf.text, urdf.files) as bullet:
         (shape,) = bullet.pb.getVisualShapeData(bullet.body, physicsClientId=bullet.client)
-        assert shape[3] == pytest.approx((0.1, 0.2, 0.3)) and shape[7] == pytest.approx((0.8, 0.1, 0.1, 0.5))
+        assert shape[3] == pytest.approx((0.1, 0.2, 0.3)) and shape[7] == pytest.approx(
+            (0.8, 0.1, 0.1, 0.5)
+        )
     mujoco = pytest.importorskip("mujoco")
-    with written(urdf.text.replace("<compiler ", '<compiler discardvisual="false" '), urdf.files) as path:
+    with written(
+        urdf.text.replace("<compiler ", '<compiler discardvisual="false" '), urdf.files
+    ) as path:
         seen = mujoco.MjModel.from_xml_path(str(path))
     assert seen.nmesh == 1 and seen.mesh_facenum[0] == 76
     assert seen.geom_rgba[-1] == pytest.approx((0.8, 0.1, 0.1, 0.5), abs=1e-6)
@@ -82,7 +86,10 @@ def test_vtk_surfaces_become_obj_files_that_others_read_alike(bones):
 
 @pytest.mark.parametrize("name", ["Femur.vtp", "pelvis.stl", "rib.obj"])
 def test_mirrored_meshes_are_written_mirrored_and_face_outwards(bones, name):
-    urdf = to_urdf(one_body(Mesh(mesh_file=name, scale_factors=(1.0, 1.0, -2.0)), Mesh(mesh_file=name)), folder=bones)
+    urdf = to_urdf(
+        one_body(Mesh(mesh_file=name, scale_factors=(1.0, 1.0, -2.0)), Mesh(mesh_file=name)),
+        folder=bones,
+    )
     mirrored, plain = meshes(urdf)
     assert mirrored["scale"] == "1 1 2" and plain["scale"] == "1 1 1"
     assert mirrored["filename"] != plain["filename"]
@@ -121,11 +128,16 @@ def test_damaged_meshes_are_told(bones):
     (bones / "Geometry" / "Femur.vtp").write_bytes(b"solid bone")
     (bones / "pelvis.stl").write_bytes(b"")
     (bones / "rib.obj").write_text("root:x:0:0:root:/root:/bin/bash")
-    shapes = [Mesh(mesh_file=name) for name in ("Femur.vtp", "pelvis.stl", "bone.ply", "", "rib.obj")]
+    shapes = [
+        Mesh(mesh_file=name) for name in ("Femur.vtp", "pelvis.stl", "bone.ply", "", "rib.obj")
+    ]
     urdf = to_urdf(one_body(*shapes), folder=bones)
     done = [record.done for record in urdf.fidelity if record.kind == "mesh"]
     assert len(done) == 5 and visuals(urdf) == [] and urdf.files == {}
-    assert "Femur.vtp: it is not a VTK file" in done[0] and "pelvis.stl: it is not an STL file" in done[1]
+    assert (
+        "Femur.vtp: it is not a VTK file" in done[0]
+        and "pelvis.stl: it is not an STL file" in done[1]
+    )
     assert "does not read .ply files" in done[2] and "such files" in done[3]
     assert "rib.obj: it is not an OBJ file with faces" in done[4]
 
@@ -133,7 +145,10 @@ def test_damaged_meshes_are_told(bones):
 def test_only_what_was_read_is_written(bones):
     (bones / "rib.obj").write_text("# secret\nmtllib ../../secret.mtl\n" + obj_text() + "l 1 2\n")
     urdf = to_urdf(one_body(Mesh(mesh_file="rib.obj")), folder=bones)
-    assert {line.split()[0] for line in urdf.files["meshes/rib.obj"].decode().splitlines()} == {"v", "f"}
+    assert {line.split()[0] for line in urdf.files["meshes/rib.obj"].decode().splitlines()} == {
+        "v",
+        "f",
+    }
     assert load(urdf, "meshes/rib.obj").volume == pytest.approx(1 / 6)
 
 
@@ -141,7 +156,13 @@ def test_only_what_was_read_is_written(bones):
 def test_files_outside_the_folders_are_refused_by_name(bones):
     (bones / "model").mkdir()
     (bones / "model" / "own.obj").symlink_to(bones / "rib.obj")
-    names = [str(bones / "rib.obj"), "../rib.obj", "own.obj", "../pelvis.stl", "../Geometry/Femur.vtp"]
+    names = [
+        str(bones / "rib.obj"),
+        "../rib.obj",
+        "own.obj",
+        "../pelvis.stl",
+        "../Geometry/Femur.vtp",
+    ]
     model = one_body(*(Mesh(mesh_file=name) for name in names))
     model.contact_geometry_set.objects.append(
         ContactMesh(name="shell", socket_frame=model.body_set.objects[0], filename=names[0])
@@ -157,7 +178,9 @@ def test_files_outside_the_folders_are_refused_by_name(bones):
 
 @pytest.mark.usefixtures("exact_names")
 def test_a_file_spelled_alike_is_taken_and_reported(bones):
-    urdf = to_urdf(one_body(Mesh(mesh_file="geometry\\femur.VTP"), Mesh(mesh_file="PELVIS.stl")), folder=bones)
+    urdf = to_urdf(
+        one_body(Mesh(mesh_file="geometry\\femur.VTP"), Mesh(mesh_file="PELVIS.stl")), folder=bones
+    )
     assert [item["filename"] for item in meshes(urdf)] == ["meshes/Femur.obj", "meshes/pelvis.stl"]
     details = [record.detail for record in urdf.fidelity if record.kind == "mesh-name"]
     assert details == ["geometry\\femur.VTP as Femur.vtp", "PELVIS.stl as pelvis.stl"]
@@ -166,8 +189,12 @@ def test_a_file_spelled_alike_is_taken_and_reported(bones):
 def test_names_of_two_files_are_kept_apart_and_legal(tmp_path):
     for folder in ("a", "b", "c"):
         (tmp_path / folder).mkdir()
-        (tmp_path / folder / ("os coxæ.obj" if folder == "c" else "bone.obj")).write_text(obj_text())
-    shapes = [Mesh(mesh_file=name) for name in ("a/bone.obj", "b/bone.obj", "a/bone.obj", "c/os coxæ.obj")]
+        (tmp_path / folder / ("os coxæ.obj" if folder == "c" else "bone.obj")).write_text(
+            obj_text()
+        )
+    shapes = [
+        Mesh(mesh_file=name) for name in ("a/bone.obj", "b/bone.obj", "a/bone.obj", "c/os coxæ.obj")
+    ]
     urdf = to_urdf(one_body(*shapes), folder=tmp_path)
     wanted = ["meshes/bone.obj", "meshes/bone_2.obj", "meshes/bone.obj", "meshes/os_cox_.obj"]
     assert [item["filename"] for item in meshes(urdf)] == wanted

@@ -59,7 +59,10 @@ def worst(reader: Reader, mechanism: Mechanism, q) -> float:
     values = dict(zip((info.path for info in mechanism.coordinates), q.tolist(), strict=True))
     poses, state = reader.body_poses(values), mechanism.at(q)
     assert poses.keys() == {"/ground", *(body.path for body in mechanism.bodies)}
-    differences = (np.abs(poses[body.path] - state.transform(k)).max() for k, body in enumerate(mechanism.bodies))
+    differences = (
+        np.abs(poses[body.path] - state.transform(k)).max()
+        for k, body in enumerate(mechanism.bodies)
+    )
     return max(differences, default=0.0)
 
 
@@ -100,7 +103,10 @@ def test_urdf_and_coordinates_of_real_models_say_where_bodies_are(corpus_model):
             assert value == pytest.approx(joints[name], abs=1e-12)
         state = mechanism.at(q)
         for constraint in mechanism.constraints:
-            if isinstance(constraint, Coupler) and mechanism.coordinates[constraint.dependent].path not in locked:
+            if (
+                isinstance(constraint, Coupler)
+                and mechanism.coordinates[constraint.dependent].path not in locked
+            ):
                 assert np.abs(constraint.position_errors(state)).max() < 1e-9
 
 
@@ -108,24 +114,38 @@ def test_the_file_tells_what_the_model_says_of_coordinates():
     model = dynamic_walker()
     urdf = to_urdf(model, limits="range", collision=True)
     data = json.loads(urdf.coordinates)
-    assert (data["format"], data["version"], data["file"]) == ("osimlite-coordinates", 1, "DynamicWalkerModel.urdf")
+    assert (data["format"], data["version"], data["file"]) == (
+        "osimlite-coordinates",
+        1,
+        "DynamicWalkerModel.urdf",
+    )
     by_name = {item["name"]: item for item in data["coordinates"]}
     knee = by_name["RKnee_rz"]
     assert knee["path"] == "/jointset/RightShankToThigh/RKnee_rz" and knee["joint"] == "RKnee_rz"
-    assert knee["range"] == [math.radians(-100.0), 0.0] and knee["unit"] == "rad" and not knee["locked"]
+    assert (
+        knee["range"] == [math.radians(-100.0), 0.0]
+        and knee["unit"] == "rad"
+        and not knee["locked"]
+    )
     assert by_name["Pelvis_ty"]["unit"] == "m" and by_name["Pelvis_ty"]["default_value"] == 0.835
     lock = by_name["platform_rz"]
     assert lock["locked"] and lock["joint"] is None and lock["drives"] == []
-    assert {item["path"]: item["link"] for item in data["bodies"]}["/bodyset/RightShank"] == "RightShank"
+    assert {item["path"]: item["link"] for item in data["bodies"]}[
+        "/bodyset/RightShank"
+    ] == "RightShank"
     kinds = [item["as"] for item in data["shapes"]]
-    surfaces = [component for component in model.components() if isinstance(component, ContactGeometry)]
+    surfaces = [
+        component for component in model.components() if isinstance(component, ContactGeometry)
+    ]
     assert kinds.count("visual") == 6 and kinds.count("collision") == len(surfaces)
 
 
 def test_what_is_endless_is_null():
     model = dynamic_walker()
     model.find("/jointset/RightShankToThigh/RKnee_rz").range = (-math.inf, math.inf)
-    item = next(c for c in json.loads(to_urdf(model).coordinates)["coordinates"] if c["name"] == "RKnee_rz")
+    item = next(
+        c for c in json.loads(to_urdf(model).coordinates)["coordinates"] if c["name"] == "RKnee_rz"
+    )
     assert item["range"] == [None, None]
 
 
@@ -158,7 +178,9 @@ FUNCTIONS: list[tuple[Function, int]] = [
 def test_every_function_is_written_exactly(function, arguments):
     data = json.loads(json.dumps(as_data(function)))
     for x in np.random.default_rng(2).uniform(-2.0, 3.0, (200, arguments)):
-        assert evaluate(data, x.tolist()) == pytest.approx(function.evaluate(x)[0], abs=1e-12, rel=1e-12)
+        assert evaluate(data, x.tolist()) == pytest.approx(
+            function.evaluate(x)[0], abs=1e-12, rel=1e-12
+        )
 
 
 def test_no_function_is_forgotten():
@@ -166,7 +188,9 @@ def test_no_function_is_forgotten():
         result = {cls} if not getattr(cls, "__abstractmethods__", None) else set()
         return result.union(*(below(item) for item in cls.__subclasses__()))
 
-    ours = {cls for cls in below(Function) if cls.__module__.startswith("osimlite.mechanics.multibody")}
+    ours = {
+        cls for cls in below(Function) if cls.__module__.startswith("osimlite.mechanics.multibody")
+    }
     # An error of Simbody's accelerations is no part of a pose.
     assert ours - {AccelerationErrorAngle} == {type(function) for function, _ in FUNCTIONS}
 
@@ -181,7 +205,10 @@ def test_no_function_is_forgotten():
 def test_the_guide_describes_the_file(repo):
     guide = (repo / "docs" / "urdf.md").read_text()
     types = {as_data(function)["type"] for function, _ in FUNCTIONS}
-    assert set(re.findall(r"^\| `([a-z-]+)` \| .*", guide.split("| `type` |")[1], re.MULTILINE)) == types
+    assert (
+        set(re.findall(r"^\| `([a-z-]+)` \| .*", guide.split("| `type` |")[1], re.MULTILINE))
+        == types
+    )
     (example,) = re.findall(r"```json\n(.*?)```", guide, re.DOTALL)
     said, made = json.loads(example), json.loads(to_urdf(dynamic_walker()).coordinates)
     assert said.keys() == made.keys()
@@ -206,7 +233,12 @@ def test_axes_along_straight_splines_are_joints_of_one_coordinate():
     assert robot.joint_of.keys() == {0} and mimics(robot)["q0_rx"].leader == "q0"
     for q in ((0.4,), (-3.0,)):
         assert worst(sidecar(robot), mechanism, np.array(q)) < 1e-12
-    assert worst_body(robot, yourdfpy_poses(urdf_text(robot), robot.joint_values((0.4,))), np.array((0.4,))) < 1e-12
+    assert (
+        worst_body(
+            robot, yourdfpy_poses(urdf_text(robot), robot.joint_values((0.4,))), np.array((0.4,))
+        )
+        < 1e-12
+    )
 
 
 # -------------------------------------------------------------------------------------------------------- couplers
@@ -214,7 +246,9 @@ def chain(*laws: tuple[int, int, SchemaFunction], count: int = 4) -> Model:
     """Pins a, b, c, d one on the other; each law makes the first coordinate that function of the second."""
     model, carrier = Model(name="chain"), None
     for name in "abcd"[:count]:
-        body = model.add(Body(name=f"body_{name}", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+        body = model.add(
+            Body(name=f"body_{name}", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+        )
         joint = PinJoint(name=f"pin_{name}", coordinates=[Coordinate(name=name)])
         model.add(joint.between(carrier or model.ground, body, at=(0.1, 0.2, 0.0)))
         carrier = body
@@ -254,7 +288,13 @@ def test_coupled_coordinates_mimic_the_first_of_their_chain():
     reader = Reader(urdf.text, urdf.coordinates)
     assert list(
         reader.coupled(
-            dict(zip((i.path for i in urdf.robot.mechanism.coordinates), (0.3, 0, 0, -0.2), strict=True))
+            dict(
+                zip(
+                    (i.path for i in urdf.robot.mechanism.coordinates),
+                    (0.3, 0, 0, -0.2),
+                    strict=True,
+                )
+            )
         ).values()
     ) == pytest.approx(q.tolist())
 

@@ -29,7 +29,9 @@ class Page:
 
     def run(self, code: str, argument: Any = None) -> Any:
         """The value of an expression, in which `v` is the viewer and `x` the argument."""
-        return self.page.evaluate(f"(x) => {{ const v = window.osimlite?.viewer; return ({code}); }}", argument)
+        return self.page.evaluate(
+            f"(x) => {{ const v = window.osimlite?.viewer; return ({code}); }}", argument
+        )
 
     def until(self, code: str, argument: Any = None, seconds: float = 30.0) -> None:
         """Wait until an expression holds; Playwright's own way of waiting needs eval, which the page forbids."""

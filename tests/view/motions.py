@@ -30,7 +30,10 @@ def stroll(count: int = 51) -> Recorded:
     values, speeds = q + np.outer(times, along), np.tile(u + along, (count, 1))
     load = np.where((times > 0.1) & (times < 0.3), 100.0, 0.0)
     forces = {}
-    for element, body, factor in (("RFootForce", "RightShank", 1.0), ("LFootForce", "LeftShank", 0.0)):
+    for element, body, factor in (
+        ("RFootForce", "RightShank", 1.0),
+        ("LFootForce", "LeftShank", 0.0),
+    ):
         for frame, sign in ((body, 1.0), ("Platform", -1.0)):
             for axis, part in zip("XYZ", (0.6, 0.8, 0.0), strict=True):
                 forces[f"{element}.{frame}.force.{axis}"] = sign * factor * part * load

@@ -45,7 +45,11 @@ def film(tmp_path_factory):
     path = tmp_path_factory.mktemp("film") / "walk.gif"
     told = []
     result = animate(
-        dynamic_walker(), stroll(), path, size=SMALL, progress=lambda done, all_: told.append((done, all_))
+        dynamic_walker(),
+        stroll(),
+        path,
+        size=SMALL,
+        progress=lambda done, all_: told.append((done, all_)),
     )
     assert result == path
     return list(frames(path)), told
@@ -76,10 +80,14 @@ def test_the_camera_follows_the_mass_centre_of_what_moves():
     mechanism = build_mechanism(dynamic_walker())
     film = Film(scene_of(dynamic_walker()), stroll(), 25, 1.0, "xy")
     names = [body.name for body in mechanism.bodies]
-    assert [name for name, moves in zip(names, film.moving, strict=False) if not moves] == ["Platform"]
+    assert [name for name, moves in zip(names, film.moving, strict=False) if not moves] == [
+        "Platform"
+    ]
     for number in (0, 7):
         q = mechanism.values({"Pelvis_tx": film.times[number]})
-        total = mechanism.center_of_mass(q) * 6.0 - film.poses[number].origins[names.index("Platform")]
+        total = (
+            mechanism.center_of_mass(q) * 6.0 - film.poses[number].origins[names.index("Platform")]
+        )
         assert film.focus[number] == pytest.approx(total / 5.0)
 
 
@@ -102,10 +110,14 @@ def test_what_stands_still_is_shown_if_it_is_not_too_large():
     knee = np.array(motion.coordinates) == "RKnee_rz"
     model = dynamic_walker()
     del model.body_set.objects[0].attached_geometry[:]
-    motion = dataclasses.replace(motion, values=motion.values[0] + 0.5 * np.outer(motion.times, knee))
+    motion = dataclasses.replace(
+        motion, values=motion.values[0] + 0.5 * np.outer(motion.times, knee)
+    )
     film = Film(scene_of(model), motion, 25, 1.0, "xy")
     names = [body.name for body in film.mechanism.bodies]
-    assert [name for name, moves in zip(names, film.moving, strict=False) if moves] == ["RightShank"]
+    assert [name for name, moves in zip(names, film.moving, strict=False) if moves] == [
+        "RightShank"
+    ]
     pelvis = film.flat(film.poses[0].origins[[names.index("Pelvis")]])[0]
     assert (np.abs(pelvis - film.flat(film.focus)[0]) < film.reach).all()
 
@@ -116,7 +128,13 @@ def test_ground_stays_in_the_picture_of_a_jump():
     level = motion.values[0] * (np.array(motion.coordinates) != "platform_rz")
     up = np.outer(motion.times, np.array(motion.coordinates) == "Pelvis_ty")
     jump, drop = (
-        Film(scene_of(dynamic_walker()), dataclasses.replace(motion, values=level + speed * up), 25, 1.0, "xy")
+        Film(
+            scene_of(dynamic_walker()),
+            dataclasses.replace(motion, values=level + speed * up),
+            25,
+            1.0,
+            "xy",
+        )
         for speed in (1.0, 40.0)
     )
     highest = jump.flat(jump.focus)[-1, 1]
@@ -128,7 +146,9 @@ def test_a_model_without_shapes_is_a_stick_figure(tmp_path):
     model = dynamic_walker()
     for body in model.body_set.objects:
         del body.attached_geometry[:]
-    path = animate(model, dataclasses.replace(stroll(), forces={}), tmp_path / "sticks.gif", size=SMALL)
+    path = animate(
+        model, dataclasses.replace(stroll(), forces={}), tmp_path / "sticks.gif", size=SMALL
+    )
     with_sticks = next(frames(path))[0]
     del model.contact_geometry_set.objects[:], model.force_set.objects[:]
     assert (with_sticks.max(axis=2) < 70).sum() > 300
@@ -142,19 +162,35 @@ def test_meshes_beside_the_file_are_drawn(tmp_path):
     pelvis.attach(Mesh(mesh_file="sheet.obj"))
     options = {"size": SMALL, "fps": 2}
     (without, _), *_ = frames(animate(model, motion, tmp_path / "a.gif", **options))
-    (result, _), *_ = frames(animate(model, motion, tmp_path / "b.gif", file=tmp_path / "walker.osim", **options))
+    (result, _), *_ = frames(
+        animate(model, motion, tmp_path / "b.gif", file=tmp_path / "walker.osim", **options)
+    )
     assert (without != result).any(axis=2).sum() > 1000
 
 
 def test_a_model_without_coordinates_has_a_film_too(tmp_path):
     still = Recorded(np.array([0.0, 0.1]), (), np.zeros((2, 0)), np.zeros((2, 0)))
-    assert len(list(frames(animate(Model(name="empty"), still, tmp_path / "still.gif", size=SMALL)))) == 3
+    assert (
+        len(list(frames(animate(Model(name="empty"), still, tmp_path / "still.gif", size=SMALL))))
+        == 3
+    )
 
 
 @pytest.mark.parametrize("plane", ["yz", "xz"])
 def test_other_planes_can_be_drawn(plane, tmp_path):
-    motion = dataclasses.replace(stroll(), times=stroll().times[:5], values=stroll().values[:5], forces={})
-    assert len(list(frames(animate(dynamic_walker(), motion, tmp_path / "a.gif", size=SMALL, plane=plane)))) == 2
+    motion = dataclasses.replace(
+        stroll(), times=stroll().times[:5], values=stroll().values[:5], forces={}
+    )
+    assert (
+        len(
+            list(
+                frames(
+                    animate(dynamic_walker(), motion, tmp_path / "a.gif", size=SMALL, plane=plane)
+                )
+            )
+        )
+        == 2
+    )
 
 
 def test_a_plane_that_is_none_is_refused(tmp_path):
@@ -169,7 +205,8 @@ def test_one_moment_makes_a_picture(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("options", "said"), [({"fps": 0}, "1 to 50"), ({"fps": 60}, "1 to 50"), ({"speed": 0.0}, "positive")]
+    ("options", "said"),
+    [({"fps": 0}, "1 to 50"), ({"fps": 60}, "1 to 50"), ({"speed": 0.0}, "positive")],
 )
 def test_options_out_of_range_are_refused(options, said, tmp_path):
     with pytest.raises(OsimliteError, match=said):

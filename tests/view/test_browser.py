@@ -54,7 +54,9 @@ def values(page) -> np.ndarray:
 def slide(page, path: str, value: float) -> None:
     """Move a slider as a hand does."""
     slider = page.page.locator(f'[data-coordinate="{path}"] input[type=range]')
-    slider.evaluate("(s, value) => { s.value = value; s.dispatchEvent(new Event('input')); }", value)
+    slider.evaluate(
+        "(s, value) => { s.value = value; s.dispatchEvent(new Event('input')); }", value
+    )
 
 
 @pytest.mark.parametrize("name", [WALKER, GAIT, SHOULDER])
@@ -62,7 +64,9 @@ def test_a_slider_moves_bodies_to_where_the_mechanism_says(name, file_of, open_p
     view = shown(file_of(name))
     mechanism = view.scene.mechanism
     page = open_page(view.write_page(tmp_path / "page.html"))
-    assert page.run("v.stage.shapes.filter((mesh) => mesh.visible).length + v.data.lines.length") > 10
+    assert (
+        page.run("v.stage.shapes.filter((mesh) => mesh.visible).length + v.data.lines.length") > 10
+    )
     assert page.run("v.stage.renderer.info.render.triangles") > 1000
     assert np.abs(graph(page, mechanism) - says(mechanism, view.q)).max() < 1e-12
     free = [info for info in mechanism.coordinates if not info.locked]
@@ -98,7 +102,9 @@ def test_lines_go_where_the_scene_says(file_of, open_page, tmp_path):
     page.run("v.show(x)", q.tolist())
     bodies, moved = scene.at(q), 0
     for index, expected in enumerate(bodies.lines):
-        corners = np.array(page.run("v.mechanism.corners(x, v.q, v.stage.poses)", index)).reshape(-1, 3)
+        corners = np.array(page.run("v.mechanism.corners(x, v.q, v.stage.poses)", index)).reshape(
+            -1, 3
+        )
         assert corners.shape == expected.shape and np.abs(corners - expected).max() < 1e-12
         moved += not scene.lines[index].body
     assert moved > 5
@@ -110,12 +116,17 @@ def rajagopal(shared) -> Path:
 
 
 def test_paths_run_along_geodesics_on_request(shared, open_page, tmp_path):
-    pages = {wrapping: shown(rajagopal(shared), wrapping=wrapping) for wrapping in ("opensim", "geodesic")}
+    pages = {
+        wrapping: shown(rajagopal(shared), wrapping=wrapping)
+        for wrapping in ("opensim", "geodesic")
+    }
     lines = {wrapping: view.scene.at(view.q).lines for wrapping, view in pages.items()}
     page = open_page(pages["geodesic"].write_page(tmp_path / "page.html"))
     differing = 0
     for index, (usual, expected) in enumerate(zip(*lines.values(), strict=True)):
-        corners = np.array(page.run("v.mechanism.corners(x, v.q, v.stage.poses)", index)).reshape(-1, 3)
+        corners = np.array(page.run("v.mechanism.corners(x, v.q, v.stage.poses)", index)).reshape(
+            -1, 3
+        )
         assert corners.shape == expected.shape and np.abs(corners - expected).max() < 1e-9
         differing += usual.shape != expected.shape or np.abs(usual - expected).max() > 1e-3
     assert differing > 3
@@ -134,7 +145,9 @@ def test_the_page_has_lengths_and_moment_arms_of_paths(shared, open_page, tmp_pa
         place = mechanism.coordinate_index(coordinate)
         result = page.run("x[1].map((k) => v.mechanism.over(k, x[0], v.q))", [place, [*range(80)]])
         path = mechanism.coordinates[place].path
-        assert [item["length"] for item in result] == pytest.approx([lengths[name] for name in names], abs=1e-12)
+        assert [item["length"] for item in result] == pytest.approx(
+            [lengths[name] for name in names], abs=1e-12
+        )
         assert [item["arm"] for item in result] == pytest.approx(
             [arms[name].get(path, 0.0) for name in names], abs=1e-12
         )
@@ -148,9 +161,14 @@ def test_a_muscle_that_is_clicked_shows_its_curves(file_of, open_page, tmp_path)
     muscle = next(line.path for line in view.scene.lines if "gas" in line.path)
     page.run("v.select(x)", muscle)
     length = osimlite.paths(view.model).lengths(values(page))[muscle]
-    assert muscle.rpartition("/")[2] in card.inner_text() and f"{100.0 * length:.2f} cm" in card.inner_text()
+    assert (
+        muscle.rpartition("/")[2] in card.inner_text()
+        and f"{100.0 * length:.2f} cm" in card.inner_text()
+    )
     shown_of = card.locator("figure strong").all_inner_texts()
-    assert any("knee" in name for name in shown_of) and not any("pelvis" in name for name in shown_of)
+    assert any("knee" in name for name in shown_of) and not any(
+        "pelvis" in name for name in shown_of
+    )
     before = card.locator("circle").first.get_attribute("cx")
     page.run("v.setCoordinate(x, -1.0)", next(name for name in shown_of if "knee" in name))
     page.until("document.querySelector('#curves circle').getAttribute('cx') !== x", before)
@@ -164,7 +182,10 @@ def test_what_a_muscle_wraps_around_is_shown_with_it(shared, open_page, tmp_path
     page.run("v.stage.show('wrap', false)")
     assert page.run(seen) == []
     page.run("v.select('/forceset/gasmed_r')")
-    assert sorted(name.rpartition("/")[2] for name in page.run(seen)) == ["GasMed_at_condyles_r", "GasMed_at_shank_r"]
+    assert sorted(name.rpartition("/")[2] for name in page.run(seen)) == [
+        "GasMed_at_condyles_r",
+        "GasMed_at_shank_r",
+    ]
     page.run("v.stage.show('wrap', true)")
     assert len(page.run(seen)) > 10
     page.run("v.stage.show('wrap', false)")
@@ -177,7 +198,10 @@ def test_muscles_have_the_colour_of_their_activation(file_of, open_page, tmp_pat
     mechanism = view.scene.mechanism
     names = [line.path for line in view.scene.lines if line.layer == "paths"][:3]
     q = np.tile(mechanism.default_state()[0], (2, 1))
-    levels = {f"{name}/activation": np.array((0.2, level)) for name, level in zip(names, (0.0, 0.4, 1.0), strict=True)}
+    levels = {
+        f"{name}/activation": np.array((0.2, level))
+        for name, level in zip(names, (0.0, 0.4, 1.0), strict=True)
+    }
     motion = Recorded(np.array((0.0, 1.0)), mechanism.coordinate_names, q, 0.0 * q, {}, levels)
     page = open_page(shown(file_of(GAIT), motion).write_page(tmp_path / "page.html"))
     page.run("v.setTime(1.0)")
@@ -186,16 +210,23 @@ def test_muscles_have_the_colour_of_their_activation(file_of, open_page, tmp_pat
       const light = tubes.colorOf(v.data.lines.findIndex((line) => line.path === name));
       return light.map((l) => l < 0.0031308 ? 12.92 * l : 1.055 * l ** (1 / 2.4) - 0.055);
     })"""
-    assert np.array(page.run(color, names)) == pytest.approx(np.array([(0, 0, 1), (0.4, 0, 0.6), (1, 0, 0)]), abs=2e-3)
+    assert np.array(page.run(color, names)) == pytest.approx(
+        np.array([(0, 0, 1), (0.4, 0, 0.6), (1, 0, 0)]), abs=2e-3
+    )
 
 
-def test_fibers_are_as_thick_as_the_muscle_is_strong_between_thin_tendons(shared, open_page, tmp_path):
+def test_fibers_are_as_thick_as_the_muscle_is_strong_between_thin_tendons(
+    shared, open_page, tmp_path
+):
     view = shown(rajagopal(shared))
     page = open_page(view.write_page(tmp_path / "page.html"))
     strong, weak = (
-        next(line for line in view.scene.lines if line.path == f"/forceset/{name}") for name in ("soleus_r", "tfl_r")
+        next(line for line in view.scene.lines if line.path == f"/forceset/{name}")
+        for name in ("soleus_r", "tfl_r")
     )
-    assert strong.fibers == pytest.approx(0.4 * np.sqrt(view.model[strong.path].max_isometric_force / (np.pi * 6e5)))
+    assert strong.fibers == pytest.approx(
+        0.4 * np.sqrt(view.model[strong.path].max_isometric_force / (np.pi * 6e5))
+    )
     widths = """x.map((name) => {
       const tubes = v.stage.tubed.find((tubes) => tubes.mesh.parent.name === 'paths');
       const place = v.data.lines.findIndex((line) => line.path === name);
@@ -207,8 +238,12 @@ def test_fibers_are_as_thick_as_the_muscle_is_strong_between_thin_tendons(shared
       });
       return found.map((radii) => Math.max(...radii));
     })"""
-    for line, (tendon, fibers) in zip((strong, weak), page.run(widths, [strong.path, weak.path]), strict=True):
-        assert tendon == pytest.approx(line.radius, rel=1e-4) and fibers == pytest.approx(line.fibers, rel=0.02)
+    for line, (tendon, fibers) in zip(
+        (strong, weak), page.run(widths, [strong.path, weak.path]), strict=True
+    ):
+        assert tendon == pytest.approx(line.radius, rel=1e-4) and fibers == pytest.approx(
+            line.fibers, rel=0.02
+        )
     assert strong.fibers > 1.5 * weak.fibers
     # Each triangle of the surface leads to its line.
     last = page.run("20 * (v.stage.tubed[0].rings[0] - 1) - 1")
@@ -220,12 +255,18 @@ def test_dependent_coordinates_follow_in_the_page_alone(shared, open_page, tmp_p
     view = shown(rajagopal(shared))
     mechanism = view.scene.mechanism
     page = open_page(view.write_page(tmp_path / "page.html"))
-    knee, patella = (mechanism.coordinate_index(name) for name in ("knee_angle_r", "knee_angle_r_beta"))
+    knee, patella = (
+        mechanism.coordinate_index(name) for name in ("knee_angle_r", "knee_angle_r_beta")
+    )
     slide(page, mechanism.coordinates[knee].path, 80.0)
     q = values(page)
-    assert q[patella] == pytest.approx(mechanism.assemble({"knee_angle_r": np.radians(80.0)})[patella], abs=1e-8)
+    assert q[patella] == pytest.approx(
+        mechanism.assemble({"knee_angle_r": np.radians(80.0)})[patella], abs=1e-8
+    )
     assert np.abs(graph(page, mechanism) - says(mechanism, q)).max() < 1e-12
-    assert page.page.locator(f'[data-coordinate="{mechanism.coordinates[patella].path}"] input').first.is_disabled()
+    assert page.page.locator(
+        f'[data-coordinate="{mechanism.coordinates[patella].path}"] input'
+    ).first.is_disabled()
 
 
 def test_the_server_keeps_up_the_constraints(file_of, open_page):
@@ -257,14 +298,20 @@ def test_a_motion_plays_and_stops_and_can_be_scrubbed(open_page, tmp_path):
     stopped = page.run("v.time")
     time.sleep(0.1)
     assert page.run("v.time") == stopped
-    expected = motion.values[0] + (motion.values[-1] - motion.values[0]) * stopped / motion.times[-1]
+    expected = (
+        motion.values[0] + (motion.values[-1] - motion.values[0]) * stopped / motion.times[-1]
+    )
     assert values(page) == pytest.approx(expected, abs=1e-9)
     assert np.abs(graph(page, mechanism) - says(mechanism, values(page))).max() < 1e-12
-    page.page.locator("#scrub").evaluate("(s) => { s.value = 0.2; s.dispatchEvent(new Event('input')); }")
+    page.page.locator("#scrub").evaluate(
+        "(s) => { s.value = 0.2; s.dispatchEvent(new Event('input')); }"
+    )
     assert page.run("v.time") == pytest.approx(0.2)
     (arrow,) = page.run("v.arrows")
     assert arrow["path"] == "/forceset/RFootForce"
-    loaded = "v.stage.layered.contact.filter((mesh) => mesh.userData.loaded).map((mesh) => mesh.name)"
+    loaded = (
+        "v.stage.layered.contact.filter((mesh) => mesh.userData.loaded).map((mesh) => mesh.name)"
+    )
     assert page.run(loaded) == ["/contactgeometryset/RFootContact"]
     page.run("v.setTime(0.45)")
     assert page.run("v.arrows") == []
@@ -288,7 +335,10 @@ def test_a_page_that_tells_something_plays_at_once_and_leads_to_others(open_page
     assert page.page.locator("#story [aria-current]").inner_text() == "It strolls"
     for size in ({"width": 390, "height": 800}, {"width": 800, "height": 390}):
         page.page.set_viewport_size(size)
-        assert page.page.locator("#story a").last.is_visible() and page.page.locator("#play").is_visible()
+        assert (
+            page.page.locator("#story a").last.is_visible()
+            and page.page.locator("#play").is_visible()
+        )
     page.page.locator("#story a").last.click()
     page.page.get_by_text("this is two.html").wait_for()
 
@@ -296,10 +346,15 @@ def test_a_page_that_tells_something_plays_at_once_and_leads_to_others(open_page
 def test_the_camera_has_all_of_a_motion_in_sight_and_follows_what_travels(open_page, tmp_path):
     model = dynamic_walker()
     mechanism = build_mechanism(model)
-    for name, course in (("Pelvis_ty", lambda t: np.sin(2.0 * np.pi * t)), ("Pelvis_tx", lambda t: 18.0 * t)):
+    for name, course in (
+        ("Pelvis_ty", lambda t: np.sin(2.0 * np.pi * t)),
+        ("Pelvis_tx", lambda t: 18.0 * t),
+    ):
         motion = stroll()
         motion.values[:, mechanism.coordinate_index(name)] += course(motion.times)
-        page = open_page(Shown.of(model, mechanism, motion=motion).write_page(tmp_path / f"{name}.html"))
+        page = open_page(
+            Shown.of(model, mechanism, motion=motion).write_page(tmp_path / f"{name}.html")
+        )
         assert page.run("v.data.motion.travels") == (name == "Pelvis_tx")
         for moment in (0.0, 0.25, 0.5):
             page.run("v.setTime(x)", moment)
@@ -320,7 +375,9 @@ def test_an_arrow_starts_where_the_force_acts(open_page, tmp_path):
     expected = [point for _, point, force in pushes.at(row, bodies) if force.any()]
     page = open_page(view.write_page(tmp_path / "page.html"))
     page.run("v.setTime(x)", float(motion.times[row]))
-    assert np.array([arrow["at"] for arrow in page.run("v.arrows")]) == pytest.approx(np.array(expected), abs=1e-6)
+    assert np.array([arrow["at"] for arrow in page.run("v.arrows")]) == pytest.approx(
+        np.array(expected), abs=1e-6
+    )
 
 
 def test_a_click_shows_properties(fixtures, open_page, tmp_path):
@@ -334,7 +391,10 @@ def test_a_click_shows_properties(fixtures, open_page, tmp_path):
     words = page.page.locator("#details").inner_text()
     assert "mass_center" in words and "/bodyset/Pelvis" in words
     # The picture answers to clicks, too: the pelvis is the largest thing in it.
-    spot = page.run("v.stage.onPage(x, [0, 0, 0])", [b.name for b in view.scene.mechanism.bodies].index("Pelvis"))
+    spot = page.run(
+        "v.stage.onPage(x, [0, 0, 0])",
+        [b.name for b in view.scene.mechanism.bodies].index("Pelvis"),
+    )
     box = page.page.locator("#canvas").bounding_box()
     page.run("v.select('/')")
     page.page.mouse.click(box["x"] + spot[0], box["y"] + spot[1])
@@ -348,7 +408,9 @@ def test_what_a_finding_concerns_glows(fixtures, open_page, tmp_path):
     view = shown(path)
     (bad,) = {finding.component for finding in view.findings if "radius" in finding.message}
     page = open_page(view.write_page(tmp_path / "page.html"))
-    glowing = "v.stage.shapes.filter((m) => m.material.emissiveIntensity > 0).map((m) => m.userData.path)"
+    glowing = (
+        "v.stage.shapes.filter((m) => m.material.emissiveIntensity > 0).map((m) => m.userData.path)"
+    )
     assert bad in page.run(glowing)
     assert page.page.locator(f'#overlay .pin[title*="{bad}"]').is_visible()
     page.page.locator("#findings .finding").first.click()

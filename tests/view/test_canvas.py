@@ -48,7 +48,9 @@ def test_the_nearest_is_seen_whatever_comes_first():
 
 def test_what_crosses_is_seen_on_its_own_side():
     canvas = Canvas(20, 20, WHITE)
-    places = np.array([((0, 0, 1), (20, 0, -1), (0, 40, 1)), ((0, 0, 0), (40, 0, 0), (0, 40, 0))], dtype=float)
+    places = np.array(
+        [((0, 0, 1), (20, 0, -1), (0, 40, 1)), ((0, 0, 0), (40, 0, 0), (0, 40, 0))], dtype=float
+    )
     canvas.solid(places, np.array((np.tile(RED, (3, 1)), np.tile(GREEN, (3, 1)))))
     seen = red(canvas)
     assert seen[0, 2] and not seen[0, 17]

@@ -67,7 +67,9 @@ class Read:
             )
             matrix[:3, :3] = turn * np.array(node.get("scale", (1, 1, 1)))
             matrix[:3, 3] = node.get("translation", (0, 0, 0))
-        above = [k for k, other in enumerate(self.parts["nodes"]) if place in other.get("children", ())]
+        above = [
+            k for k, other in enumerate(self.parts["nodes"]) if place in other.get("children", ())
+        ]
         return self.placed(above[0], moment) @ matrix if above else matrix
 
 
@@ -94,9 +96,17 @@ def test_bodies_and_shapes_move(tmp_path):
             assert np.abs(read.placed(node, moment) - bodies.matrix(index, np.eye(4))).max() < 1e-5
         for item in scene.drawn():
             shown = [read.placed(node, moment) for node in read.nodes(item.path)]
-            assert min(np.abs(result - bodies.matrix(item.body, item.matrix)).max() for result in shown) < 1e-4
-    # Between two moments players go the straight way, which is the short one for neighbours in sign.
-    for channel, sampler in zip(*(read.parts["animations"][0][what] for what in ("channels", "samplers")), strict=True):
+            assert (
+                min(
+                    np.abs(result - bodies.matrix(item.body, item.matrix)).max() for result in shown
+                )
+                < 1e-4
+            )
+    # Between two moments players go the straight way, which is the short one for neighbours in
+    # sign.
+    for channel, sampler in zip(
+        *(read.parts["animations"][0][what] for what in ("channels", "samplers")), strict=True
+    ):
         if channel["target"]["path"] == "rotation":
             turns = read.array(sampler["output"])
             assert (np.sum(turns[1:] * turns[:-1], axis=1) >= 0.0).all()
@@ -113,7 +123,10 @@ def test_forces_are_arrows(tmp_path):
         assert min(np.linalg.norm(tip[:3] - point) for tip in tips) < 1e-5
         if force.any():
             ways = [b - a for a, b in zip(tips[::2], tips[1::2], strict=True) if (a != b).any()]
-            assert max(way[:3] @ force / np.linalg.norm(way) / np.linalg.norm(force) for way in ways) > 1.0 - 1e-6
+            assert (
+                max(way[:3] @ force / np.linalg.norm(way) / np.linalg.norm(force) for way in ways)
+                > 1.0 - 1e-6
+            )
 
 
 def test_paths_have_as_many_pieces_as_corners(corpus, tmp_path):
@@ -131,9 +144,14 @@ def test_paths_have_as_many_pieces_as_corners(corpus, tmp_path):
             corners = scene.at(row).lines[place]
             pieces = [read.placed(place, moment) for place in read.nodes(line.path)]
             ends = [
-                [piece @ (0.0, 0.0, z, 1.0) for z in (-0.5, 0.5)] for piece in pieces if np.abs(piece[:3, :3]).any()
+                [piece @ (0.0, 0.0, z, 1.0) for z in (-0.5, 0.5)]
+                for piece in pieces
+                if np.abs(piece[:3, :3]).any()
             ]
-            assert np.abs(np.array([ends[0][0], *(end for _, end in ends)])[:, :3] - corners).max() < 1e-5
+            assert (
+                np.abs(np.array([ends[0][0], *(end for _, end in ends)])[:, :3] - corners).max()
+                < 1e-5
+            )
 
 
 def test_up_is_y(tmp_path):

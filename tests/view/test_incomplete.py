@@ -24,18 +24,30 @@ def text(fixtures: Path) -> str:
     ("old", "new", "said"),
     [
         ("/bodyset/RightShank<", "/bodyset/Nowhere<", "not shown: /jointset/RightShankToThigh: "),
-        ("<socket_child_frame>Platform", "<socket_child_frame>x", "not shown: /jointset/PlatformToGround: "),
+        (
+            "<socket_child_frame>Platform",
+            "<socket_child_frame>x",
+            "not shown: /jointset/PlatformToGround: ",
+        ),
         ("<geometry>RFootContact ", "<geometry>RFootContct ", "error: /forceset/RFootForce: "),
-        ("/bodyset/LeftShank</socket_frame>", "/bodyset/Nobody</socket_frame>", "not shown: /contactgeometryset/"),
+        (
+            "/bodyset/LeftShank</socket_frame>",
+            "/bodyset/Nobody</socket_frame>",
+            "not shown: /contactgeometryset/",
+        ),
     ],
 )
-def test_one_wrong_reference_leaves_the_rest(text: str, tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_one_wrong_reference_leaves_the_rest(
+    text: str, tmp_path: Path, old: str, new: str, said: str
+) -> None:
     assert old in text
     (tmp_path / "m.osim").write_text(text.replace(old, new, 1), encoding="utf-8")
     done = run("view", "m.osim", "--html", "m.html", folder=tmp_path)
     assert done.code == 0, done.err
     assert said in done.out and "did you mean" in done.out
-    (data,) = re.findall(r'id="data">(.*?)</script>', (tmp_path / "m.html").read_text(encoding="utf-8"))
+    (data,) = re.findall(
+        r'id="data">(.*?)</script>', (tmp_path / "m.html").read_text(encoding="utf-8")
+    )
     assert "LeftThigh" in json.dumps(json.loads(data))
 
 
@@ -61,7 +73,10 @@ def test_a_fault_of_no_single_part_stays_an_error(monkeypatch: pytest.MonkeyPatc
 
 def test_many_parts_are_counted() -> None:
     parts = [(f"/a/{number}", "it is wrong") for number in range(MAX_REMARKS + 3)]
-    meshes = [("/b/1", "the mesh file x.vtp is missing"), ("/b/2", "the mesh file y.vtp is missing")]
+    meshes = [
+        ("/b/1", "the mesh file x.vtp is missing"),
+        ("/b/2", "the mesh file y.vtp is missing"),
+    ]
     lines = [*describe_left_out([*parts, *meshes])]
     assert len(lines) == MAX_REMARKS + 2 and lines[-2] == "not shown: 3 more parts"
     assert lines[-1] == "not shown: /b/1 and 1 more: the mesh file x.vtp is missing"

@@ -14,9 +14,23 @@ from osimlite.simulation.polylines import Course, Polylines
 from osimlite.view.kernels import kernels_text, program_data
 from tests.simulation.test_compiled import JOINTS, tree
 
-MODELS = ["m0001", "m0005", "m0014", "m0097", "m0109", "m0129", "m0139", "m0163", "m0168", "m0387", "m0923", "m0954"]
-"""Of the corpus: with couplers that depend on each other, balls, points that move along with coordinates, every surface
-to wrap around, and constraints between bodies."""
+MODELS = [
+    "m0001",
+    "m0005",
+    "m0014",
+    "m0097",
+    "m0109",
+    "m0129",
+    "m0139",
+    "m0163",
+    "m0168",
+    "m0387",
+    "m0923",
+    "m0954",
+]
+"""Of the corpus: with couplers that depend on each other, balls, points that move along with
+coordinates, every surface to wrap around, and constraints between bodies.
+"""
 
 FOUND = """([program, lines, poses, asked]) => {
   const mechanism = new window.osimlite.Mechanism({ program, lines });
@@ -69,7 +83,11 @@ def test_models_are_where_osimlite_has_them_and_their_paths_pull_alike(name, sha
     poses = start + random.uniform(-0.3, 0.3, (2, len(start)))
     couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
     still = {item.dependent for item in couplers}
-    free = [k for k, info in enumerate(mechanism.coordinates) if not (info.locked or info.prescribed or k in still)]
+    free = [
+        k
+        for k, info in enumerate(mechanism.coordinates)
+        if not (info.locked or info.prescribed or k in still)
+    ]
     asked = random.permutation(free)[:5]
     for given, (q, bodies, corners, measured) in zip(
         poses, found(mechanism, poses, [*routes.values()], asked), strict=True
@@ -84,6 +102,8 @@ def test_models_are_where_osimlite_has_them_and_their_paths_pull_alike(name, sha
         polylines, far = paths.polylines(expected), np.abs(paths.coupling(expected)).max()
         for route, line, row in zip(routes, corners, measured, strict=True):
             assert line == pytest.approx(polylines[route].ravel(), abs=1e-12)
-            assert [each["length"] for each in row] == pytest.approx([lengths[route]] * len(asked), abs=1e-12)
+            assert [each["length"] for each in row] == pytest.approx(
+                [lengths[route]] * len(asked), abs=1e-12
+            )
             own = arms[paths.names.index(route), asked]
             assert [each["arm"] for each in row] == pytest.approx(own, abs=1e-12 * far)

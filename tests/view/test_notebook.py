@@ -27,7 +27,10 @@ def page_in(html: str) -> str:
 def test_a_model_shows_its_tree_and_itself():
     model = dynamic_walker()
     html = model._repr_html_()
-    assert f"{sum(not model.tree().is_internal(item) for item in model.components())} components" in html
+    assert (
+        f"{sum(not model.tree().is_internal(item) for item in model.components())} components"
+        in html
+    )
     assert "RightThigh <i>Body</i>" in html and "sandbox='allow-scripts'" in html
     assert "three.js" in page_in(html)
     # Nothing that a notebook would have to load.
@@ -96,16 +99,25 @@ def test_paths_are_a_table_of_lengths_and_moment_arms():
     joint = osimlite.PinJoint(name="elbow", coordinates=[osimlite.Coordinate(name="flexion")])
     model.add(joint.between(model.ground, bone))
     path = osimlite.GeometryPath()
-    for name, frame, place in (("a", model.ground, (0.05, 0.0, 0.0)), ("b", bone, (0.0, -0.12, 0.0))):
-        path.path_point_set.objects.append(osimlite.PathPoint(name=name, socket_parent_frame=frame, location=place))
-    model.add(osimlite.PathSpring(name="spring", geometry_path=path, resting_length=0.1, stiffness=1.0))
+    for name, frame, place in (
+        ("a", model.ground, (0.05, 0.0, 0.0)),
+        ("b", bone, (0.0, -0.12, 0.0)),
+    ):
+        path.path_point_set.objects.append(
+            osimlite.PathPoint(name=name, socket_parent_frame=frame, location=place)
+        )
+    model.add(
+        osimlite.PathSpring(name="spring", geometry_path=path, resting_length=0.1, stiffness=1.0)
+    )
     html = osimlite.paths(model)._repr_html_()
     # The hypotenuse of 0.05 and 0.12 m, and the area of the triangle.
     assert "<td style='text-align:left'>0.13</td>" in html and "flexion 0.04615" in html
 
 
 def test_a_motion_is_played_in_a_frame_without_rights(open_page, tmp_path: Path):
-    (tmp_path / "page.html").write_text("<!doctype html>" + osimlite.simulate(dynamic_walker(), to=0.1)._repr_html_())
+    (tmp_path / "page.html").write_text(
+        "<!doctype html>" + osimlite.simulate(dynamic_walker(), to=0.1)._repr_html_()
+    )
     page = open_page(tmp_path / "page.html", waits=False)
     frame = page.page.frame_locator("iframe")
     frame.locator("#play").click(timeout=30_000)
@@ -115,4 +127,6 @@ def test_a_motion_is_played_in_a_frame_without_rights(open_page, tmp_path: Path)
     while inner.evaluate("window.osimlite.viewer.time") == 0.0:
         assert time.monotonic() < end, "the motion does not play"
         page.page.wait_for_timeout(50)
-    assert [url for url in page.asked if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
+    assert [
+        url for url in page.asked if not url.startswith(("file:", "data:", "blob:", "about:"))
+    ] == []

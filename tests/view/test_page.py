@@ -28,7 +28,9 @@ def walker(**more) -> Shown:
 
 
 def data_of(text: str):
-    (result,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+    (result,) = re.findall(
+        r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL
+    )
     return json.loads(result)
 
 
@@ -69,25 +71,33 @@ def test_the_tree_has_components_with_their_properties():
     pelvis = nodes["/bodyset/Pelvis"]
     tags = data["tags"]["Body"]
     assert pelvis["kind"] == "Body" and data["tree"][pelvis["parent"]]["path"] == "/bodyset"
-    assert pelvis["values"][tags.index("mass")] == repr(view.model.body_set.objects[1].mass).removesuffix(".0")
+    assert pelvis["values"][tags.index("mass")] == repr(
+        view.model.body_set.objects[1].mass
+    ).removesuffix(".0")
     assert tags.index("mass") in pelvis["given"]
     sphere = next(node for node in data["tree"] if node["kind"] == "ContactSphere")
     assert "Appearance.color" in data["tags"]["ContactSphere"] and sphere["name"] in sphere["path"]
-    assert not [node for node in data["tree"] if node["kind"] == "FrameGeometry" and not node["path"]]
+    assert not [
+        node for node in data["tree"] if node["kind"] == "FrameGeometry" and not node["path"]
+    ]
 
 
 def test_sliders_know_what_stays_as_it_is():
     view = walker()
     view.model.joint_set.objects[0].coordinates[0].locked = True
     mechanism = build_mechanism(view.model)
-    data = page_data(view.model, Shown.of(view.model, mechanism).scene, None, (), mechanism.assemble({}))
+    data = page_data(
+        view.model, Shown.of(view.model, mechanism).scene, None, (), mechanism.assemble({})
+    )
     assert [c["still"] for c in data["coordinates"]].count("locked") == 1
     for coordinate, value in zip(data["coordinates"], data["q"], strict=True):
         assert coordinate["range"][0] <= value <= coordinate["range"][1]
 
 
 def ask(server, question: bytes, host: str | None = None):
-    request = urllib.request.Request(server.url + "assemble", question, {} if host is None else {"Host": host})
+    request = urllib.request.Request(
+        server.url + "assemble", question, {} if host is None else {"Host": host}
+    )
     with urllib.request.urlopen(request) as answer:
         return json.loads(answer.read())
 
@@ -97,8 +107,14 @@ def test_the_server_answers_the_page_and_nobody_else():
     with view.server() as server:
         with urllib.request.urlopen(server.url) as page:
             assert data_of(page.read().decode())["server"] is True
-        assert ask(server, json.dumps({"values": view.q.tolist()}).encode())["values"] == view.q.tolist()
-        assert "no number" in ask(server, json.dumps({"values": [np.nan] * len(view.q)}).encode())["error"]
+        assert (
+            ask(server, json.dumps({"values": view.q.tolist()}).encode())["values"]
+            == view.q.tolist()
+        )
+        assert (
+            "no number"
+            in ask(server, json.dumps({"values": [np.nan] * len(view.q)}).encode())["error"]
+        )
         for wrong in (
             urllib.request.Request(server.url + "etc/passwd"),
             urllib.request.Request(server.url, headers={"Host": "example.org"}),
@@ -130,7 +146,9 @@ def test_forces_of_a_file_of_states_are_those_of_the_simulation(tmp_path: Path):
 def test_a_motion_without_speeds_has_no_forces(tmp_path: Path):
     model, motion = dynamic_walker(), stroll()
     mechanism = build_mechanism(model)
-    write_sto(tmp_path / "walk.mot", "walk", motion.times, motion.coordinates, motion.values.tolist())
+    write_sto(
+        tmp_path / "walk.mot", "walk", motion.times, motion.coordinates, motion.values.tolist()
+    )
     recording = read_recording(model, mechanism, tmp_path / "walk.mot", values={"RKnee_rz": -0.5})
     assert not recording.forces
     knee = list(motion.coordinates).index("RKnee_rz")
@@ -151,7 +169,9 @@ def test_a_picture_shows_the_moment_asked_for(tmp_path: Path):
             pictures.append(np.asarray(picture.convert("RGB")).astype(int))
     # Force arrows are orange; the walker's platform is of a darker red.
     parts = [np.moveaxis(picture, 2, 0) for picture in pictures]
-    orange = [int(((r > 80) & (g > 0.3 * r) & (g < 0.6 * r) & (b < 0.2 * r)).sum()) for r, g, b in parts]
+    orange = [
+        int(((r > 80) & (g > 0.3 * r) & (g < 0.6 * r) & (b < 0.2 * r)).sum()) for r, g, b in parts
+    ]
     assert orange[0] == orange[2] < orange[1] - 20
     with pytest.raises(OsimliteError, match=r"from 0 to 0\.5 s"):
         view.write_picture(tmp_path / "b.png", size, 0.7)

@@ -23,7 +23,9 @@ def walker():
 
 def drawn(name, motion=None, mechanism="walker"):
     """The figure of a name, laid out as it will be saved."""
-    figures = dict(draw_figures(motion or stroll(), walker() if mechanism == "walker" else mechanism))
+    figures = dict(
+        draw_figures(motion or stroll(), walker() if mechanism == "walker" else mechanism)
+    )
     return laid_out(figures[name])
 
 
@@ -40,9 +42,16 @@ def lines(panel):
 
 def test_pictures_are_written(tmp_path):
     paths = plot_simulation(stroll(), tmp_path / "a" / "b", mechanism=walker())
-    assert [path.name for path in paths] == ["coordinates.png", "contact_forces.png", "other_forces.png", "energy.png"]
+    assert [path.name for path in paths] == [
+        "coordinates.png",
+        "contact_forces.png",
+        "other_forces.png",
+        "energy.png",
+    ]
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
-    assert sorted(path.name for path in (tmp_path / "a" / "b").iterdir()) == sorted(path.name for path in paths)
+    assert sorted(path.name for path in (tmp_path / "a" / "b").iterdir()) == sorted(
+        path.name for path in paths
+    )
 
 
 def test_the_mechanism_of_the_trajectory_will_do(tmp_path):
@@ -80,7 +89,11 @@ def test_many_coordinates_are_shared_out_to_panels():
 def test_a_line_that_lies_on_another_lets_it_through():
     panel, across = figure_of("", (4.0, 3.0)).subplots(), np.linspace(0.0, 1.0, 5)
     gone = np.full(5, np.nan)
-    lines_in(panel, across, {"one": across, "same": across + 1e-5, "other": across**2, "gone": gone, "too": gone})
+    lines_in(
+        panel,
+        across,
+        {"one": across, "same": across + 1e-5, "other": across**2, "gone": gone, "too": gone},
+    )
     assert [line.is_dashed() for line in panel.get_lines()] == [False, True, False, False, True]
 
 
@@ -120,7 +133,9 @@ def test_other_forces_leave_out_what_never_acts():
 
 def test_long_notes_leave_the_panels_their_width():
     motion = stroll()
-    motion.forces |= {f"a_muscle_that_rests_{index}": np.zeros(len(motion.times)) for index in range(60)}
+    motion.forces |= {
+        f"a_muscle_that_rests_{index}": np.zeros(len(motion.times)) for index in range(60)
+    }
     figure = drawn("other_forces.png", motion)
     (panel,), sheet = figure.axes, figure.bbox
     (note,) = panel.texts
@@ -132,7 +147,11 @@ def test_long_notes_leave_the_panels_their_width():
 
 def test_states_of_a_kind_share_panels_and_probes_have_theirs():
     muscles = {f"/forceset/m{index}": np.full(12, index) for index in range(9)}
-    states = {f"{path}/{kind}": column for path, column in muscles.items() for kind in ("activation", "fiber_length")}
+    states = {
+        f"{path}/{kind}": column
+        for path, column in muscles.items()
+        for kind in ("activation", "fiber_length")
+    }
     motion = stroll(12)
     motion.auxiliary = states
     motion.probes = {"work": np.arange(12.0)}
@@ -140,7 +159,9 @@ def test_states_of_a_kind_share_panels_and_probes_have_theirs():
     assert lines(panel)["work"].get_ydata().tolist() == list(range(12))
     panels = drawn("states.png", motion).axes
     assert [panel.get_ylabel() for panel in panels] == ["activation"] * 2 + ["fiber length (m)"] * 2
-    assert [name for panel in panels[:2] for name in lines(panel)] == [path[-2:] for path in muscles]
+    assert [name for panel in panels[:2] for name in lines(panel)] == [
+        path[-2:] for path in muscles
+    ]
     assert lines(panels[3])["m8"].get_ydata().tolist() == [8.0] * 12
 
 
@@ -169,8 +190,12 @@ def test_energy_of_a_simulation_has_what_contacts_store():
     assert result["sum"].get_ydata() == pytest.approx(total)
     # The table of the command says the same.
     said = trajectory.summary["energy_J"]
-    assert result["sum"].get_ydata()[[0, -1]] == pytest.approx([said["start"]["total"], said["end"]["total"]])
-    assert [text.get_text() for text in panel.texts] == ["gravity: zero at the origin of the ground"]
+    assert result["sum"].get_ydata()[[0, -1]] == pytest.approx(
+        [said["start"]["total"], said["end"]["total"]]
+    )
+    assert [text.get_text() for text in panel.texts] == [
+        "gravity: zero at the origin of the ground"
+    ]
 
 
 def test_a_motion_without_forces_has_no_pictures_of_forces(tmp_path):

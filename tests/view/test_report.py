@@ -42,7 +42,9 @@ def loads(tmp_path: Path) -> Path:
     write_sto(tmp_path / "grf.mot", "grf", times.tolist(), columns, np.array(rows).T.tolist())
     forces = "".join(FORCE.format(side=side) for side in "rl")
     text = f'<ExternalLoads name="l"><objects>{forces}</objects><datafile>grf.mot</datafile></ExternalLoads>'
-    (tmp_path / "loads.xml").write_text(f'<OpenSimDocument Version="40600">{text}</OpenSimDocument>')
+    (tmp_path / "loads.xml").write_text(
+        f'<OpenSimDocument Version="40600">{text}</OpenSimDocument>'
+    )
     return tmp_path / "loads.xml"
 
 
@@ -50,7 +52,10 @@ def test_steps_are_where_the_force_begins_and_ends(loads: Path) -> None:
     steps = steps_of(loads, 1)
     assert steps["r"].strikes == pytest.approx((0.25, 1.25, 2.25), abs=0.0101)
     assert steps["r"].offs == pytest.approx((0.85, 1.85, 2.85), abs=0.0101)
-    assert steps["l"].strikes == pytest.approx((0.75, 1.75, 2.75), abs=0.0101) and len(steps["l"].offs) == 2
+    assert (
+        steps["l"].strikes == pytest.approx((0.75, 1.75, 2.75), abs=0.0101)
+        and len(steps["l"].offs) == 2
+    )
     assert len(steps["r"].cycles) == 2
     assert steps_of(loads, 0)["r"].strikes == ()
 
@@ -77,7 +82,10 @@ def trials(tmp_path: Path) -> Path:
 def data_of(page: str) -> list[dict[str, Any]]:
     """The data of the viewers in a page."""
     inner = [html.unescape(text) for text in re.findall(r'srcdoc="([^"]*)"', page)]
-    result = [re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S) for text in inner]
+    result = [
+        re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S)
+        for text in inner
+    ]
     return [json.loads(match[1]) for match in result if match]
 
 
@@ -104,7 +112,9 @@ def test_a_page_says_what_the_results_are_worth(trials: Path) -> None:
     left = next(path for path in (trials / "trial0").glob("*.mot"))
     left.write_text(left.read_text().replace("0.", "9.", 40))
     results = {name: osimlite.run(trials / name, trials / "elsewhere") for name in words[:1]}
-    path = report({trials / name: outcome for name, outcome in results.items()}, trials / "worth.html")
+    path = report(
+        {trials / name: outcome for name, outcome in results.items()}, trials / "worth.html"
+    )
     part = path.read_text().partition("Is it good enough?")[2]
     assert "the peak of the errors of the markers" in part and '<td class="good">good</td>' in part
     assert "OpenSim&#x27;s best practices" in part
@@ -117,13 +127,20 @@ def test_a_setup_that_fails_stops_no_report(trials: Path) -> None:
     (trials / "trial0" / "trial.trc").unlink()
     words = [f"trial{k}/{name}.xml" for k in range(2) for name in ("id", "z_ik")]
     done = run("run", *words, "--report", "report.html", folder=trials)
-    assert done.code == 2 and "4 setups: 2 done, 1 failed, 1 not run" in done.out and "wrote report.html" in done.out
+    assert (
+        done.code == 2
+        and "4 setups: 2 done, 1 failed, 1 not run" in done.out
+        and "wrote report.html" in done.out
+    )
     assert "<h1>trial1</h1>" in (trials / "report.html").read_text()
 
 
 def test_a_report_that_has_no_place_is_told_before_anything_is_run(trials: Path) -> None:
     done = run("run", "trial0/z_ik.xml", "--report", "no/report.html", folder=trials)
-    assert done.code == 2 and "no/report.html: cannot write here: the folder does not exist" in done.err
+    assert (
+        done.code == 2
+        and "no/report.html: cannot write here: the folder does not exist" in done.err
+    )
     assert not (trials / "trial0" / "ik.mot").exists()
 
 
@@ -142,7 +159,9 @@ def test_what_is_drawn_are_the_tables(trials: Path, loads: Path) -> None:
     panels = collect_angles([trial])
     table = outcomes[0].tables["ik.mot"]
     drawn = {label.removesuffix(" (deg)"): lines[0].column for label, lines in panels.items()}
-    assert drawn and all(np.allclose(column, table[name], atol=1e-9) for name, column in drawn.items())
+    assert drawn and all(
+        np.allclose(column, table[name], atol=1e-9) for name, column in drawn.items()
+    )
     # The only joint is that to ground, whose forces are residuals.
     assert collect_moments([trial]) == {} and trial.evidence is outcomes[0].evidence
     assert outcomes[1].evidence is not None and outcomes[1].evidence.loads is None

@@ -37,17 +37,31 @@ def test_bodies_and_forces_are_where_the_scene_has_them(tmp_path: Path):
             # Matrices stand column by column.
             turned = np.array(moves["Transform3D:mat3x3"][moment]).reshape(3, 3).T
             assert np.allclose(turned, pose.rotations[index], atol=1e-6)
-            assert np.allclose(moves["Transform3D:translation"][moment], pose.origins[index], atol=1e-6)
+            assert np.allclose(
+                moves["Transform3D:translation"][moment], pose.origins[index], atol=1e-6
+            )
     assert [time.total_seconds() for time in moves["time"]] == pytest.approx(motion.times)
-    (push,) = [item for item in Pushes.of(scene, motion, motion.times).pushes if item.on.element == "RFootForce"]
+    (push,) = [
+        item
+        for item in Pushes.of(scene, motion, motion.times).pushes
+        if item.on.element == "RFootForce"
+    ]
     arrows = result["/model/forces/forceset/RFootForce/RightShank"]
-    assert np.allclose(arrows["Arrows3D:origins"], [[push.point(k, pose)] for k, pose in enumerate(poses)], atol=1e-6)
+    assert np.allclose(
+        arrows["Arrows3D:origins"],
+        [[push.point(k, pose)] for k, pose in enumerate(poses)],
+        atol=1e-6,
+    )
     size = result["/forces/forceset/RFootForce/RightShank"]["Scalars:scalars"]
     assert np.allclose(np.ravel(size), np.linalg.norm(push.forces, axis=1))
-    assert np.allclose(np.ravel(result["/coordinates/Pelvis_tx"]["Scalars:scalars"]), motion.values[:, 2])
+    assert np.allclose(
+        np.ravel(result["/coordinates/Pelvis_tx"]["Scalars:scalars"]), motion.values[:, 2]
+    )
     items = [item for item in scene.drawn() if item.body >= 0]
     meshes = {name for name, parts in result.items() if "Mesh3D:vertex_positions" in parts}
-    assert {f"/model{scene.mechanism.bodies[item.body].path}{item.path}" for item in items} <= meshes
+    assert {
+        f"/model{scene.mechanism.bodies[item.body].path}{item.path}" for item in items
+    } <= meshes
 
 
 def test_without_rerun_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -88,8 +88,14 @@ def test_meshes_are_read_from_files_of_every_kind(repo: Path):
 
 def test_a_mesh_is_found_scaled_and_shared(tmp_path: Path):
     (tmp_path / "corner.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\n")
-    scene, points = with_shape(Mesh(mesh_file="corner.obj", scale_factors=(2.0, 1.0, -1.0)), MeshFolders(tmp_path))
-    assert points.min(axis=0).tolist() == [0.0, 0.0, -1.0] and points.max(axis=0).tolist() == [2.0, 1.0, 0.0]
+    scene, points = with_shape(
+        Mesh(mesh_file="corner.obj", scale_factors=(2.0, 1.0, -1.0)), MeshFolders(tmp_path)
+    )
+    assert points.min(axis=0).tolist() == [0.0, 0.0, -1.0] and points.max(axis=0).tolist() == [
+        2.0,
+        1.0,
+        0.0,
+    ]
     assert not scene.remarks
 
 
@@ -97,7 +103,9 @@ def test_what_cannot_be_drawn_is_said_and_the_body_becomes_a_stick(tmp_path):
     scene, points = with_shape(Mesh(mesh_file="nowhere.vtp"))
     assert points is None
     ((path, said),) = scene.remarks
-    assert path == "/bodyset/Pelvis/Pelvis_geom_1" and "nowhere.vtp" in said and "--geometry" in said
+    assert (
+        path == "/bodyset/Pelvis/Pelvis_geom_1" and "nowhere.vtp" in said and "--geometry" in said
+    )
     assert [line.path for line in scene.lines] == ["/bodyset/Pelvis"] * 2
     corner = tmp_path / "corner.obj"
     corner.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
@@ -123,10 +131,18 @@ def test_a_line_is_a_line():
 
 def test_contact_surfaces_are_where_the_forces_find_them():
     scene, mechanism = scene_of(dynamic_walker())
-    spheres = [item for item in scene.items if item.layer == "contact" and item.path not in scene.half_spaces]
+    spheres = [
+        item
+        for item in scene.items
+        if item.layer == "contact" and item.path not in scene.half_spaces
+    ]
     assert len(spheres) == 6 and len(scene.half_spaces) == 1 and len(scene.pushed) == 6
     foot = next(push for push in scene.pushed if push.element == "LFootForce")
-    assert foot.labels[:2] == ("LeftShank", "LeftShank") and foot.near.tolist() == [0.0, -0.2175, 0.0]
+    assert foot.labels[:2] == ("LeftShank", "LeftShank") and foot.near.tolist() == [
+        0.0,
+        -0.2175,
+        0.0,
+    ]
     drawn = next(item for item in spheres if item.path == foot.surface)
     assert drawn.matrix[:3, 3].tolist() == [0.0, -0.2175, 0.0] and drawn.matrix[0, 0] == 0.05
     (ground,) = [item for item in scene.items if item.path in scene.half_spaces]
@@ -152,7 +168,9 @@ def test_a_torus_to_wrap_around_is_where_paths_touch_it():
 def test_scenery_does_not_count_for_the_size_of_a_model():
     scene, mechanism = scene_of(dynamic_walker())
     low, high = scene.box(mechanism.default_state()[0])
-    assert {scene.items[place].path.rsplit("/", 1)[1] for place in scene.large} >= {"PlatformContact"}
+    assert {scene.items[place].path.rsplit("/", 1)[1] for place in scene.large} >= {
+        "PlatformContact"
+    }
     assert (high - low).max() < 2.0
 
 
@@ -163,7 +181,10 @@ def test_sticks_join_the_joints():
     scene, mechanism = scene_of(model)
     q = mechanism.values({})
     pose = scene.at(q)
-    lines = {line.path.rsplit("/", 1)[1]: corners for line, corners in zip(scene.lines, pose.lines, strict=True)}
+    lines = {
+        line.path.rsplit("/", 1)[1]: corners
+        for line, corners in zip(scene.lines, pose.lines, strict=True)
+    }
     thigh, shank = lines["RightThigh"], lines["RightShank"]
     assert np.linalg.norm(thigh[1] - thigh[0]) == pytest.approx(0.4)
     # The last body of a limb ends at its mass centre.
@@ -176,7 +197,11 @@ def test_sticks_go_where_a_joint_moves_what_it_carries():
     carrier = model.ground
     for name in ("femur", "tibia"):
         body = model.add(Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-        model.add(SliderJoint(name=f"{name}_slides", coordinates=[Coordinate(name=name)]).between(carrier, body))
+        model.add(
+            SliderJoint(name=f"{name}_slides", coordinates=[Coordinate(name=name)]).between(
+                carrier, body
+            )
+        )
         carrier = body
     scene, mechanism = scene_of(model)
     q = mechanism.values({"femur": 0.5, "tibia": -0.4})

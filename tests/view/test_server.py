@@ -39,7 +39,9 @@ def server(running, capfd, caplog):
     """The server, which still answers afterwards, and says nothing on the terminal."""
     caplog.set_level(logging.DEBUG, "osimlite.view.server")
     yield running
-    assert said(running, b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")[0] == 200
+    assert (
+        said(running, b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")[0] == 200
+    )
     told = capfd.readouterr()
     assert (told.out, told.err) == ("", "")
     failures = [record.exc_info[1] for record in caplog.records if record.exc_info]
@@ -58,7 +60,10 @@ def said(server: PageServer, question: bytes) -> tuple[int, bytes]:
 
 
 def asked(server: PageServer, body: bytes, length: str | None = None) -> tuple[int, dict]:
-    head = HEAD + f"Content-Length: {len(body) if length is None else length}\r\nConnection: close\r\n\r\n"
+    head = (
+        HEAD
+        + f"Content-Length: {len(body) if length is None else length}\r\nConnection: close\r\n\r\n"
+    )
     status, answer = said(server, head.encode() + body)
     return status, json.loads(answer)
 
@@ -90,7 +95,9 @@ def test_numbers_that_no_pose_has(server, number):
     assert "error" in result or all(value == value for value in result["values"])
 
 
-@pytest.mark.parametrize("length", ["abc", "-1", "+2", "1.5", "0x2", "", "٣", "9" * 30, "1_0", "2, 2"])
+@pytest.mark.parametrize(
+    "length", ["abc", "-1", "+2", "1.5", "0x2", "", "٣", "9" * 30, "1_0", "2, 2"]
+)
 def test_lengths_that_are_none(server, length):
     assert asked(server, b"{}", length)[0] == 400
 
@@ -103,7 +110,13 @@ def test_too_long_a_question_is_not_read(server):
 
 @pytest.mark.parametrize(
     "part",
-    ["", "GE", "GET / HTTP/1.1\r\n", "GET / HTTP/1.1\r\nHost: x", HEAD + "Content-Length: 10\r\n\r\n{"],
+    [
+        "",
+        "GE",
+        "GET / HTTP/1.1\r\n",
+        "GET / HTTP/1.1\r\nHost: x",
+        HEAD + "Content-Length: 10\r\n\r\n{",
+    ],
 )
 def test_half_a_question_is_given_up(server, part):
     assert said(server, part.encode()) == (0, b"")

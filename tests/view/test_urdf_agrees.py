@@ -37,12 +37,20 @@ def test_every_shape_is_where_the_scene_has_it(fixtures, tmp_path):
     ours = []
     for item in view.scene.drawn():
         if item.layer == "geometry":
-            points = view.scene.surfaces[item.surface].points @ item.matrix[:3, :3].T + item.matrix[:3, 3]
+            points = (
+                view.scene.surfaces[item.surface].points @ item.matrix[:3, :3].T
+                + item.matrix[:3, 3]
+            )
             points = bodies.points(item.body, points)
             ours.append((points.min(axis=0), points.max(axis=0)))
     assert len(ours) == len(theirs) == 9
     # Round shapes are cut into triangles differently, by up to 1 % of their size.
     for low, high in ours:
-        away = [max(np.abs(low - a).max(), np.abs(high - b).max()) / np.linalg.norm(high - low) for a, b in theirs]
+        away = [
+            max(np.abs(low - a).max(), np.abs(high - b).max()) / np.linalg.norm(high - low)
+            for a, b in theirs
+        ]
         assert min(away) < 0.01
-    assert [0.2, 0.4, 0.6, 1.0] in [material.color.rgba.tolist() for material in robot.robot.materials]
+    assert [0.2, 0.4, 0.6, 1.0] in [
+        material.color.rgba.tolist() for material in robot.robot.materials
+    ]

@@ -31,8 +31,8 @@ from osimlite.schema.tree import Tree, Use, is_a
 class Target(NamedTuple):
     """What a name leads to: an object that stands in a document, or a file.
 
-    `number` is that of its element, or of the element of what has a part that stands in no file; `path` is its path in
-    the model; `at` is the place in a file that is no document.
+    `number` is that of its element, or of the element of what has a part that stands in no file;
+    `path` is its path in the model; `at` is the place in a file that is no document.
     """
 
     file: str
@@ -43,18 +43,22 @@ class Target(NamedTuple):
 
     def is_same(self, other: Target | None) -> bool:
         """Whether another is the same thing."""
-        if other is None or self.item is None or (self.path, self.number) != (other.path, other.number):
+        if (
+            other is None
+            or self.item is None
+            or (self.path, self.number) != (other.path, other.number)
+        ):
             return False
-        return self.file == other.file or os.path.realpath(self.file) == os.path.realpath(other.file)
+        return self.file == other.file or os.path.realpath(self.file) == os.path.realpath(
+            other.file
+        )
 
 
 class Analysis:
     """One version of a file; everything is found out when it is first asked for.
 
-    Args:
-        text: of the file.
-        file: its path; it need not exist.
-        recalls: whether findings about paths and muscles that were measured before are among what is found.
+    Args: text: of the file. file: its path; it need not exist. recalls: whether findings about
+        paths and muscles that were measured before are among what is found.
     """
 
     def __init__(self, text: Text, file: str, *, recalls: bool = False) -> None:
@@ -99,20 +103,28 @@ class Analysis:
     def report(self) -> Report:
         """What the rules find."""
         # Measuring paths takes too long for every change of a text.
-        return Report([]) if self.is_foreign else run(self.subject, measure=False, recall=self.recalls)
+        return (
+            Report([]) if self.is_foreign else run(self.subject, measure=False, recall=self.recalls)
+        )
 
     @property
     def is_to_be_measured(self) -> bool:
         """Whether there are paths or muscles that nobody has measured."""
         subject = self.document
-        if subject is None or subject.model is None or subject.config.classes or MEASURES in subject.kept:
+        if (
+            subject is None
+            or subject.model is None
+            or subject.config.classes
+            or MEASURES in subject.kept
+        ):
             return False
         return any(known.about == MEASURES and subject.is_for(known) for known in all_rules())
 
     def measured(self) -> Report:
         """What the rules find once paths and muscles are measured.
 
-        For another thread: it reads the text anew, and shares nothing with who answers questions meanwhile.
+        For another thread: it reads the text anew, and shares nothing with who answers questions
+        meanwhile.
         """
         source = Source.of_characters(self.text.content, self.file)
         return run(Subject(survey(source, of=Model), self.config))
@@ -126,7 +138,11 @@ class Analysis:
     def document(self) -> Subject | None:
         """The subject, if its elements are numbered as in the text: it is a document, and well-formed."""
         subject = self.subject
-        return subject if isinstance(subject, Subject) and subject.top and subject.sure_until is None else None
+        return (
+            subject
+            if isinstance(subject, Subject) and subject.top and subject.sure_until is None
+            else None
+        )
 
     @property
     def is_certain(self) -> bool:
@@ -187,7 +203,10 @@ class Analysis:
         # The nth word of a list is not found by looking for it: it may stand there twice.
         place = span.tag_end
         for _ in range(use.position + 1):
-            place = next((k for k in range(place, span.inner_end) if not self.source.text[k].isspace()), span.inner_end)
+            place = next(
+                (k for k in range(place, span.inner_end) if not self.source.text[k].isspace()),
+                span.inner_end,
+            )
             start = place
             while place < span.inner_end and not self.source.text[place].isspace():
                 place += 1
@@ -223,12 +242,24 @@ class Analysis:
         setup = self.document if isinstance(self.document, Setup) else None
         text = str(use.value).strip()
         if use.reference.rule in ("file", "output-file"):
-            path = setup.place(text) if setup is not None else os.path.join(os.path.dirname(self.file), text)
+            path = (
+                setup.place(text)
+                if setup is not None
+                else os.path.join(os.path.dirname(self.file), text)
+            )
             return Target(path) if os.path.isfile(path) else None
         if use.reference.rule == "column" and setup is not None:
             table = setup.table(getattr(setup.top, "datafile", ""))
-            labels = () if table is None else (label.at for label in table.labels if label.text.startswith(text))
-            return next((Target(str(table.file), at=at) for at in labels), None) if table is not None else None
+            labels = (
+                ()
+                if table is None
+                else (label.at for label in table.labels if label.text.startswith(text))
+            )
+            return (
+                next((Target(str(table.file), at=at) for at in labels), None)
+                if table is not None
+                else None
+            )
         if self.tree is None:
             return None
         result = named_by(self.tree, use)
@@ -237,8 +268,17 @@ class Analysis:
         if result is not None and setup.tool is not None:
             # A study may hold its model itself.
             return self._target(setup.model_file or setup.tool[0], result)
-        named = ((file, item) for file, top in setup.added for item in top.walk() if item.name == text)
-        return next((Target(*one, number=one[1]._index) for one in named if is_a(one[1], use.reference.target)), None)
+        named = (
+            (file, item) for file, top in setup.added for item in top.walk() if item.name == text
+        )
+        return next(
+            (
+                Target(*one, number=one[1]._index)
+                for one in named
+                if is_a(one[1], use.reference.target)
+            ),
+            None,
+        )
 
     def _target(self, file: str, item: Component) -> Target:
         tree = self.tree

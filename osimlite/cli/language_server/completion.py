@@ -26,7 +26,9 @@ _TOPS = (
 """What may be at the top of documents other than models."""
 
 
-def completions(analysis: Analysis, known: Analysis | None, offset: int) -> list[types.CompletionItem]:
+def completions(
+    analysis: Analysis, known: Analysis | None, offset: int
+) -> list[types.CompletionItem]:
     """What may stand at an offset.
 
     Args:
@@ -37,7 +39,9 @@ def completions(analysis: Analysis, known: Analysis | None, offset: int) -> list
     cursor = analysis.cursor(offset)
     around = cursor.inner
     if cursor.kind == "closing tag" and around is not None:
-        return [_item(analysis, cursor, around.tag, f"{around.tag}>", types.CompletionItemKind.Keyword)]
+        return [
+            _item(analysis, cursor, around.tag, f"{around.tag}>", types.CompletionItemKind.Keyword)
+        ]
     if cursor.kind == "tag":
         return [*_tags(analysis, cursor, around, bracket="")]
     if cursor.kind == "attribute" and cursor.attribute == "name" and cursor.element is not None:
@@ -53,24 +57,39 @@ def completions(analysis: Analysis, known: Analysis | None, offset: int) -> list
     kind = around.spec.names or around.spec.kind
     if isinstance(kind, Value):
         words = ("true", "false") if kind.scalar == "bool" else kind.choices
-        return [_item(analysis, cursor, str(word), str(word), types.CompletionItemKind.Value) for word in words]
+        return [
+            _item(analysis, cursor, str(word), str(word), types.CompletionItemKind.Value)
+            for word in words
+        ]
     if isinstance(kind, Reference):
-        return [*_names(analysis, known, cursor, kind, cursor.around[-2] if len(cursor.around) > 1 else None)]
+        return [
+            *_names(
+                analysis, known, cursor, kind, cursor.around[-2] if len(cursor.around) > 1 else None
+            )
+        ]
     return []
 
 
 def _names(
-    analysis: Analysis, known: Analysis | None, cursor: Cursor, reference: Reference, holder: Element | None
+    analysis: Analysis,
+    known: Analysis | None,
+    cursor: Cursor,
+    reference: Reference,
+    holder: Element | None,
 ) -> Iterator[types.CompletionItem]:
     """The texts that a reference may take."""
     for name in names(known, cursor, reference, holder) if known is not None else ():
-        item = _item(analysis, cursor, name.text, name.text, types.CompletionItemKind.Reference, name.detail)
+        item = _item(
+            analysis, cursor, name.text, name.text, types.CompletionItemKind.Reference, name.detail
+        )
         # Editors sort by it.
         item.sort_text = f"{'0' if name.likely else '1'}{name.text}"
         yield item
 
 
-def _tags(analysis: Analysis, cursor: Cursor, around: Element | None, bracket: str) -> Iterator[types.CompletionItem]:
+def _tags(
+    analysis: Analysis, cursor: Cursor, around: Element | None, bracket: str
+) -> Iterator[types.CompletionItem]:
     """The elements that may stand inside the one around."""
     if around is None:
         return
@@ -97,10 +116,14 @@ def _given_in(analysis: Analysis, around: Element) -> set[str]:
     item = analysis.objects.get(around.number) if analysis.is_certain else None
     if item is None:
         return set()
-    return {spec.tag for spec in field_specs(type(item)).values() if spec.name in item.model_fields_set}
+    return {
+        spec.tag for spec in field_specs(type(item)).values() if spec.name in item.model_fields_set
+    }
 
 
-def _property(analysis: Analysis, cursor: Cursor, spec: FieldSpec, bracket: str) -> types.CompletionItem:
+def _property(
+    analysis: Analysis, cursor: Cursor, spec: FieldSpec, bracket: str
+) -> types.CompletionItem:
     if isinstance(spec.kind, Held):
         inner = ' name="$1">\n\t$0\n' if spec.kind.form == "unnamed" else ">\n\t$0\n"
         text = f"{bracket}{spec.tag}{inner}</{spec.tag}>"
@@ -108,16 +131,22 @@ def _property(analysis: Analysis, cursor: Cursor, spec: FieldSpec, bracket: str)
         default = ""
         if isinstance(spec.kind, Value) and spec.default is not None:
             default = formatter(spec.kind, "shortest")(spec.default)
-        choices = ("true", "false") if isinstance(spec.kind, Value) and spec.kind.scalar == "bool" else ()
+        choices = (
+            ("true", "false") if isinstance(spec.kind, Value) and spec.kind.scalar == "bool" else ()
+        )
         place = f"${{1|{','.join(choices)}|}}" if choices else f"${{1:{_escaped(default)}}}"
         text = f"{bracket}{spec.tag}>{place}</{spec.tag}>"
-    item = _item(analysis, cursor, spec.tag, text, types.CompletionItemKind.Property, value_of(spec))
+    item = _item(
+        analysis, cursor, spec.tag, text, types.CompletionItemKind.Property, value_of(spec)
+    )
     item.documentation = meaning_of(spec) or None
     item.insert_text_format = types.InsertTextFormat.Snippet
     return item
 
 
-def _object(analysis: Analysis, cursor: Cursor, tag: str, bracket: str, name: str) -> types.CompletionItem:
+def _object(
+    analysis: Analysis, cursor: Cursor, tag: str, bracket: str, name: str
+) -> types.CompletionItem:
     named = f'name="{name}"' if name else 'name="$1"'
     text = f"{bracket}{tag} {named}>\n\t$0\n</{tag}>"
     item = _item(analysis, cursor, tag, text, types.CompletionItemKind.Class, name)
@@ -128,14 +157,23 @@ def _object(analysis: Analysis, cursor: Cursor, tag: str, bracket: str, name: st
 
 
 def _item(
-    analysis: Analysis, cursor: Cursor, label: str, text: str, kind: types.CompletionItemKind, detail: str = ""
+    analysis: Analysis,
+    cursor: Cursor,
+    label: str,
+    text: str,
+    kind: types.CompletionItemKind,
+    detail: str = "",
 ) -> types.CompletionItem:
     place = analysis.text.range(cursor.start, cursor.end)
-    # Editors look for what was typed in the text that is to be filtered by; that has the bracket where one is put in.
+    # Editors look for what was typed in the text that is to be filtered by; that has the bracket
+    # where one is put in.
     return types.CompletionItem(
-        label, kind=kind, detail=detail or None, text_edit=types.TextEdit(place, text),
+        label,
+        kind=kind,
+        detail=detail or None,
+        text_edit=types.TextEdit(place, text),
         filter_text=f"<{label}" if text.startswith("<") else label,
-    )  # fmt: skip
+    )
 
 
 def _escaped(text: str) -> str:

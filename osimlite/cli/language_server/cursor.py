@@ -30,7 +30,8 @@ class Element(NamedTuple):
     start: int  # offset of its `<`
     number: int  # in document order, as the reader counts
     given: str  # its attribute `name`
-    cls: type[Object] | None  # the class of the object it is; None for a property, and for what is not known
+    # the class of the object it is; None for a property, and for what is not known
+    cls: type[Object] | None
     spec: FieldSpec | None  # the property it is, or that holds it; None for what is not known
 
 
@@ -40,7 +41,8 @@ class Cursor(NamedTuple):
     kind: Kind  # of what
     # the elements around it, outermost first; for a tag, the element itself is not among them
     around: tuple[Element, ...]
-    start: int  # offset of the beginning of the word there: a tag, an attribute's value, a word of a text
+    # offset of the beginning of the word there: a tag, an attribute's value, a word of a text
+    start: int
     end: int  # and behind its end
     word: str  # that word; of a tag only its name
     attribute: str = ""  # the name of the attribute whose value it is
@@ -79,7 +81,14 @@ def cursor_at(text: str, offset: int) -> Cursor:
     if text.startswith("</", start):
         name = _TAG_NAME.match(text, start + 2)
         assert name is not None
-        return Cursor("closing tag", around, start + 2, name.end(), name[0], element=around[-1] if around else None)
+        return Cursor(
+            "closing tag",
+            around,
+            start + 2,
+            name.end(),
+            name[0],
+            element=around[-1] if around else None,
+        )
     name = _TAG_NAME.match(text, start + 1)
     assert name is not None
     end = _end_of_tag(text, start)
@@ -92,7 +101,9 @@ def cursor_at(text: str, offset: int) -> Cursor:
     rest = re.compile(r"[^\"'<>]*").match(text, offset)
     assert rest is not None
     begin = value.start(3)
-    return Cursor("attribute", around, begin, rest.end(), text[begin : rest.end()], value[1], element)
+    return Cursor(
+        "attribute", around, begin, rest.end(), text[begin : rest.end()], value[1], element
+    )
 
 
 def _in_text(text: str, offset: int, behind: int, around: tuple[Element, ...]) -> Cursor:
@@ -118,14 +129,18 @@ def _close(stack: list[Element], piece: Markup) -> None:
             return
 
 
-def _element(text: str, tag: str, start: int, end: int, number: int, stack: list[Element]) -> Element:
+def _element(
+    text: str, tag: str, start: int, end: int, number: int, stack: list[Element]
+) -> Element:
     given = _NAME_GIVEN.search(text, start, end)
     name = given[2] if given else ""
     cls, spec = _meaning(stack[-1] if stack else None, tag, name)
     return Element(tag, start, number, name, cls, spec)
 
 
-def _meaning(around: Element | None, tag: str, name: str) -> tuple[type[Object] | None, FieldSpec | None]:
+def _meaning(
+    around: Element | None, tag: str, name: str
+) -> tuple[type[Object] | None, FieldSpec | None]:
     """The class of the object that an element `tag` is, and the property that it is or that holds it."""
     if around is None or (around.tag == "OpenSimDocument" and around.cls is None):
         return class_for(tag), None
@@ -143,7 +158,11 @@ def _meaning(around: Element | None, tag: str, name: str) -> tuple[type[Object] 
 
 def _holder(owner: type[Object], held: type[Object], name: str) -> FieldSpec | None:
     """The property that holds one object of a class directly: the tag is the class, the name the property."""
-    fitting = [spec for spec in single_objects(owner) if spec.accepts is not None and issubclass(held, spec.accepts)]
+    fitting = [
+        spec
+        for spec in single_objects(owner)
+        if spec.accepts is not None and issubclass(held, spec.accepts)
+    ]
     return next((spec for spec in fitting if spec.tag == name), fitting[0] if fitting else None)
 
 

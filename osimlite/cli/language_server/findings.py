@@ -64,27 +64,33 @@ def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.Cod
             edits = _edits(analysis, finding.fix.edits)
             result.append(
                 types.CodeAction(
-                    _title(finding), kind=types.CodeActionKind.QuickFix, diagnostics=concerned,
-                    is_preferred=finding.fix.safe, edit=types.WorkspaceEdit({uri: edits}),
+                    _title(finding),
+                    kind=types.CodeActionKind.QuickFix,
+                    diagnostics=concerned,
+                    is_preferred=finding.fix.safe,
+                    edit=types.WorkspaceEdit({uri: edits}),
                 )
-            )  # fmt: skip
+            )
         ignoring = _ignoring(analysis, finding) if finding.code[4] != "0" else None
         if ignoring is not None:
             where = "in this table" if analysis.is_table else "on this line"
             result.append(
                 types.CodeAction(
-                    f"Ignore {finding.code} ({finding.name}) {where}", kind=types.CodeActionKind.QuickFix,
-                    diagnostics=concerned, edit=types.WorkspaceEdit({uri: [ignoring]}),
+                    f"Ignore {finding.code} ({finding.name}) {where}",
+                    kind=types.CodeActionKind.QuickFix,
+                    diagnostics=concerned,
+                    edit=types.WorkspaceEdit({uri: [ignoring]}),
                 )
-            )  # fmt: skip
+            )
     safe = _edits(analysis, edits_of(analysis.report)[0])
     if safe:
         result.append(
             types.CodeAction(
-                "Mend everything that is certain", kind=types.CodeActionKind.SourceFixAll,
+                "Mend everything that is certain",
+                kind=types.CodeActionKind.SourceFixAll,
                 edit=types.WorkspaceEdit({uri: safe}),
             )
-        )  # fmt: skip
+        )
     return result
 
 
@@ -122,4 +128,6 @@ def _ignoring(analysis: Analysis, finding: Finding) -> types.TextEdit | None:
         return types.TextEdit(place, f"osimlite: ignore {finding.code}{header[1]}")
     line = analysis.source.lines[finding.line - 1]
     end = analysis.source.line_start(finding.line) + len(line)
-    return types.TextEdit(analysis.text.range(end, end), f" <!-- osimlite: ignore {finding.code} -->")
+    return types.TextEdit(
+        analysis.text.range(end, end), f" <!-- osimlite: ignore {finding.code} -->"
+    )

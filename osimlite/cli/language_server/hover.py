@@ -33,13 +33,17 @@ def hover(analysis: Analysis, offset: int) -> types.Hover | None:
         if cursor.kind in ("tag", "closing tag"):
             parts.insert(0, _path(analysis, element))
     elif element.spec is not None:
-        around = cursor.around[-2:] if cursor.kind in ("text", "closing tag") else cursor.around[-1:]
+        around = (
+            cursor.around[-2:] if cursor.kind in ("text", "closing tag") else cursor.around[-1:]
+        )
         parts.append(_property(element.spec, around[0].cls if around else None))
     text = "\n\n".join(part for part in parts if part)
     if not text:
         return None
     content = types.MarkupContent(types.MarkupKind.Markdown, text)
-    return types.Hover(content, analysis.text.range(cursor.start, max(cursor.end, cursor.start + 1)))
+    return types.Hover(
+        content, analysis.text.range(cursor.start, max(cursor.end, cursor.start + 1))
+    )
 
 
 def _class(cls: type[Object]) -> str:
@@ -64,12 +68,22 @@ def _led_to(analysis: Analysis, offset: int) -> str:
         return ""
     file = from_folder(target.file, os.path.dirname(analysis.file) or ".")
     if target.item is None:
-        return f"In `{file}`, line {target.at.line}." if target.at is not None else f"File `{file}`."
+        return (
+            f"In `{file}`, line {target.at.line}." if target.at is not None else f"File `{file}`."
+        )
     said = f"{type(target.item).tag} `{target.path or target.item.name}`"
     if target.file == analysis.file:
         return said
-    data = measured(analysis.document) if isinstance(analysis.document, Setup) and is_a(target.item, "Marker") else None
-    also = f"; {'in' if target.item.name in data[1] else '**not** in'} `{data[0]}`" if data is not None else ""
+    data = (
+        measured(analysis.document)
+        if isinstance(analysis.document, Setup) and is_a(target.item, "Marker")
+        else None
+    )
+    also = (
+        f"; {'in' if target.item.name in data[1] else '**not** in'} `{data[0]}`"
+        if data is not None
+        else ""
+    )
     return f"{said} of `{file}`{also}"
 
 

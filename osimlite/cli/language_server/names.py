@@ -18,7 +18,15 @@ from osimlite.schema.specs import FieldSpec, lineage
 from osimlite.schema.states import variables
 from osimlite.schema.tree import Tree, Use
 
-_OPAQUE = ("input", "positional", "point-index", "output-file", "input-folder", "output-folder", "pattern")
+_OPAQUE = (
+    "input",
+    "positional",
+    "point-index",
+    "output-file",
+    "input-folder",
+    "output-folder",
+    "pattern",
+)
 """Rules of references whose texts are no names of what is there."""
 _NAMED_AFTER = {
     "Control": Reference("actuator-name", "Actuator"),
@@ -26,7 +34,12 @@ _NAMED_AFTER = {
 }
 """What objects of a class are called after, although nothing says that they must be."""
 _TABLE = (".sto", ".mot")
-_SUFFIXES = {"Model": (".osim",), "marker data": (".trc", ".sto"), "table": _TABLE, "motion": _TABLE}
+_SUFFIXES = {
+    "Model": (".osim",),
+    "marker data": (".trc", ".sto"),
+    "table": _TABLE,
+    "motion": _TABLE,
+}
 """How files of a content are called; others are documents."""
 
 
@@ -44,13 +57,17 @@ def reference_of(cursor: Cursor) -> Reference | None:
     if cls is None:
         return None
     # Of some classes only the property says so that holds them, or the set that they are in.
-    held = (element.spec.names for element in reversed(cursor.around[-2:]) if element.spec is not None)
+    held = (
+        element.spec.names for element in reversed(cursor.around[-2:]) if element.spec is not None
+    )
     said = next(filter(None, held), None)
     after = (_NAMED_AFTER[name] for name in lineage(cls) if name in _NAMED_AFTER)
     return said or cls.name_reference or next(after, None)
 
 
-def names(analysis: Analysis, cursor: Cursor, reference: Reference, holder: Element | None) -> Iterator[Name]:
+def names(
+    analysis: Analysis, cursor: Cursor, reference: Reference, holder: Element | None
+) -> Iterator[Name]:
     """The texts that a reference may take in a place.
 
     Args:
@@ -61,7 +78,10 @@ def names(analysis: Analysis, cursor: Cursor, reference: Reference, holder: Elem
     """
     setup = analysis.document if isinstance(analysis.document, Setup) else None
     if reference.rule == "file":
-        yield from _files(os.path.dirname(analysis.file), reference.target.removesuffix(" file").partition(" or ")[0])
+        yield from _files(
+            os.path.dirname(analysis.file),
+            reference.target.removesuffix(" file").partition(" or ")[0],
+        )
     elif reference.rule == "column":
         table = None if setup is None else setup.table(getattr(setup.top, "datafile", ""))
         columns = [] if table is None else table.columns
@@ -69,7 +89,9 @@ def names(analysis: Analysis, cursor: Cursor, reference: Reference, holder: Elem
             yield Name(prefix, " ".join(column for column in columns if column.startswith(prefix)))
     elif analysis.tree is not None and reference.rule not in _OPAQUE:
         if setup is None:
-            yield from _components(analysis.tree, reference, _owner(analysis, analysis.tree, holder))
+            yield from _components(
+                analysis.tree, reference, _owner(analysis, analysis.tree, holder)
+            )
         elif reference.rule == "state-path":
             for text, component in variables(analysis.tree, reference.target).items():
                 yield Name(text, type(component).tag)
@@ -85,7 +107,9 @@ def _owner(analysis: Analysis, tree: Tree, holder: Element | None) -> Component:
     item = analysis.objects.get(holder.number)
     if (item is None or type(item) is not holder.cls) and holder.given:
         # Elements before it may have come and gone since; its name tells which it is.
-        item = next((c for c in tree.components if c.name == holder.given and type(c) is holder.cls), None)
+        item = next(
+            (c for c in tree.components if c.name == holder.given and type(c) is holder.cls), None
+        )
     return tree.model if item is None else tree.owner_of(item)
 
 
@@ -102,9 +126,19 @@ def _in_tool(setup: Setup, tree: Tree, reference: Reference) -> Iterator[Name]:
         known = [Name(text) for text in sorted(setup.names_of(reference.target))]
     else:
         known = list(_components(tree, reference, tree.model))
-        added = setup.names_of(reference.target) - {name.text for name in known} if setup.added else set()
-        known += [Name(text, reference.target) for text in sorted(added) if not reference.rule.endswith("path")]
-    table = measured(setup) if reference.target in ("Marker", "PhysicalFrame", "Coordinate") else None
+        added = (
+            setup.names_of(reference.target) - {name.text for name in known}
+            if setup.added
+            else set()
+        )
+        known += [
+            Name(text, reference.target)
+            for text in sorted(added)
+            if not reference.rule.endswith("path")
+        ]
+    table = (
+        measured(setup) if reference.target in ("Marker", "PhysicalFrame", "Coordinate") else None
+    )
     for name in known:
         if table is None or reference.target != "Marker":
             yield name

@@ -42,13 +42,19 @@ def _symbols(analysis: Analysis, item: Object) -> list[types.DocumentSymbol]:
     name = analysis.name_of(item._index)
     start, end = name or (span.start + 1, span.start + 1 + len(span.tag))
     cls = type(item)
-    kind = next((kind for known, kind in _SYMBOLS.items() if is_a(item, known)), types.SymbolKind.Field)
+    kind = next(
+        (kind for known, kind in _SYMBOLS.items() if is_a(item, known)), types.SymbolKind.Field
+    )
     return [
         types.DocumentSymbol(
-            item.name or cls.tag, kind, analysis.text.range(span.start, span.end), analysis.text.range(start, end),
-            detail=cls.tag if item.name else None, children=inner,
+            item.name or cls.tag,
+            kind,
+            analysis.text.range(span.start, span.end),
+            analysis.text.range(start, end),
+            detail=cls.tag if item.name else None,
+            children=inner,
         )
-    ]  # fmt: skip
+    ]
 
 
 def folds(analysis: Analysis) -> list[types.FoldingRange]:

@@ -38,7 +38,9 @@ class Project:
     def uri(self, path: str) -> str:
         """The URI of a file, as the editor writes it."""
         real = os.path.realpath(path)
-        opened = (uri for uri, analysis in self.open.items() if os.path.realpath(analysis.file) == real)
+        opened = (
+            uri for uri, analysis in self.open.items() if os.path.realpath(analysis.file) == real
+        )
         return next(opened, None) or from_fs_path(path) or path
 
     def analysis(self, path: str) -> Analysis | None:
@@ -87,13 +89,17 @@ class Project:
     def location(self, target: Target) -> types.Location | None:
         """Where something stands."""
         if target.item is None:
-            line, column = (0, 0) if target.at is None else (target.at.line - 1, target.at.column - 1)
+            line, column = (
+                (0, 0) if target.at is None else (target.at.line - 1, target.at.column - 1)
+            )
             start = types.Position(line, column)
             return types.Location(self.uri(target.file), types.Range(start, start))
         analysis = self.analysis(target.file)
         if analysis is None or target.number not in analysis.objects:
             return None
-        return types.Location(self.uri(target.file), analysis.text.range(*analysis.place_of(target.number)))
+        return types.Location(
+            self.uri(target.file), analysis.text.range(*analysis.place_of(target.number))
+        )
 
     def naming(self, target: Target) -> Iterator[Analysis]:
         """Every document that may name something, first the one that it is in."""
@@ -126,9 +132,19 @@ class Project:
         """
         own = self.analysis(target.file)
         item = None if own is None or target.number is None else own.objects.get(target.number)
-        place = None if own is None or item is None or item._index is None else own.name_of(item._index)
-        if own is None or item is None or place is None or target.item is None or item.name != target.item.name:
-            raise ModelError(f"the text does not give '{target.path or target.file}' a name; nothing can be renamed")
+        place = (
+            None if own is None or item is None or item._index is None else own.name_of(item._index)
+        )
+        if (
+            own is None
+            or item is None
+            or place is None
+            or target.item is None
+            or item.name != target.item.name
+        ):
+            raise ModelError(
+                f"the text does not give '{target.path or target.file}' a name; nothing can be renamed"
+            )
         path, changes = f"/{name}", {}
         if own.document is not None and own.document.model is not None:
             path, edits = _renamed_in_model(own, item, name)
@@ -145,7 +161,9 @@ class Project:
         return changes
 
 
-def _renamed_in_model(analysis: Analysis, item: object, name: str) -> tuple[str, list[types.TextEdit]]:
+def _renamed_in_model(
+    analysis: Analysis, item: object, name: str
+) -> tuple[str, list[types.TextEdit]]:
     """The new path of a component, and the changes of the references in its model."""
     assert isinstance(item, Component) and item._index is not None
     # Renaming changes a model, so it is done to another one of the same text.
@@ -173,7 +191,9 @@ def _renamed_in_setup(analysis: Analysis, target: Target, path: str) -> list[typ
         if led is None or os.path.realpath(led.file) != os.path.realpath(target.file):
             continue
         if text.startswith("/") and target.path and f"{text}/".startswith(f"{target.path}/"):
-            edits.append(types.TextEdit(analysis.text.range(start, end), path + text[len(target.path) :]))
+            edits.append(
+                types.TextEdit(analysis.text.range(start, end), path + text[len(target.path) :])
+            )
         elif target.is_same(led) and not text.startswith("/"):
             edits.append(types.TextEdit(analysis.text.range(start, end), last_name(path)))
     return edits

@@ -35,7 +35,9 @@ class Protocol(LanguageServerProtocol):
         said = message if isinstance(message, dict) else {}
         number, method = said.get("id", getattr(message, "id", None)), said.get("method")
         if said.get("jsonrpc") == VERSION and isinstance(method, str):
-            error: JsonRpcException = JsonRpcInvalidParams(f"the parameters of {method} are not what the protocol says")
+            error: JsonRpcException = JsonRpcInvalidParams(
+                f"the parameters of {method} are not what the protocol says"
+            )
             if "id" not in said:
                 # Nobody waits for an answer.
                 self._server.report_server_error(error, JsonRpcException)
@@ -48,7 +50,13 @@ class Protocol(LanguageServerProtocol):
         """Answer a question, of which the number may be unknown, by an error."""
         # Without a number the type of pygls leaves out the `id`, which has to be there and null.
         body = {"code": error.code, "message": error.message}
-        self._send_data({"jsonrpc": VERSION, "id": number if isinstance(number, int | str) else None, "error": body})
+        self._send_data(
+            {
+                "jsonrpc": VERSION,
+                "id": number if isinstance(number, int | str) else None,
+                "error": body,
+            }
+        )
 
 
 def keep_log_plain() -> None:

@@ -209,7 +209,9 @@ def _add_files(server: Server) -> None:
         changed = {change.uri for change in params.changes}
         is_settings = any(uri.endswith(".toml") for uri in changed)
         files = server.project.open.items()
-        server.check_again([uri for uri, file in files if is_settings or not file.is_table or uri in changed])
+        server.check_again(
+            [uri for uri, file in files if is_settings or not file.is_table or uri in changed]
+        )
 
 
 def _add_reading(server: Server) -> None:
@@ -222,7 +224,9 @@ def _add_reading(server: Server) -> None:
     @server.feature(types.TEXT_DOCUMENT_COMPLETION, triggers)
     def completed(_: Server, params: types.CompletionParams) -> types.CompletionList:
         analysis, offset = server.at(params)
-        known = analysis if analysis.is_certain else server.project.known.get(params.text_document.uri)
+        known = (
+            analysis if analysis.is_certain else server.project.known.get(params.text_document.uri)
+        )
         return types.CompletionList(False, completions(analysis, known, offset))
 
     @server.feature(types.TEXT_DOCUMENT_DEFINITION)
@@ -249,16 +253,24 @@ def _add_reading(server: Server) -> None:
 
 
 def _add_writing(server: Server) -> None:
-    kinds = types.CodeActionOptions([types.CodeActionKind.QuickFix, types.CodeActionKind.SourceFixAll])
+    kinds = types.CodeActionOptions(
+        [types.CodeActionKind.QuickFix, types.CodeActionKind.SourceFixAll]
+    )
 
     @server.feature(types.TEXT_DOCUMENT_CODE_ACTION, kinds)
     def acted(_: Server, params: types.CodeActionParams) -> list[types.CodeAction]:
         result = actions(server.of(params.text_document), params.text_document.uri, params.range)
         wanted = params.context.only
-        return [a for a in result if not wanted or any((a.kind or "").startswith(kind) for kind in wanted)]
+        return [
+            a
+            for a in result
+            if not wanted or any((a.kind or "").startswith(kind) for kind in wanted)
+        ]
 
     @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
-    def prepared(_: Server, params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
+    def prepared(
+        _: Server, params: types.PrepareRenameParams
+    ) -> types.PrepareRenamePlaceholder | None:
         analysis, offset = server.at(params)
         target = analysis.target_at(offset)
         if target is None or target.item is None or server.project.location(target) is None:

@@ -14,8 +14,8 @@ _LINE_END = re.compile(r"\r\n?|\n")
 class Text:
     """An unchanging text. A change makes another.
 
-    Editors count lines and characters from 0, a character beyond U+FFFF twice unless they agreed on something else;
-    offsets are ours, in characters of Python.
+    Editors count lines and characters from 0, a character beyond U+FFFF twice unless they agreed on
+    something else; offsets are ours, in characters of Python.
 
     Args:
         content: the characters.

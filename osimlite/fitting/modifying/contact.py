@@ -14,8 +14,9 @@ from osimlite.schema.model import Model
 def smooth_contacts(model: Model) -> None:
     """Replace all forces of Hunt and Crossley's between spheres and half spaces by smooth ones of the same stiffness.
 
-    Simbody combines both surfaces: stiffnesses as two springs in a row, dissipations by how much each yields, friction
-    by the harmonic mean. Where both are alike the smooth force has the same numbers.
+    Simbody combines both surfaces: stiffnesses as two springs in a row, dissipations by how much
+    each yields, friction by the harmonic mean. Where both are alike the smooth force has the same
+    numbers.
 
     Raises:
         UnsupportedError: other surfaces touch.
@@ -45,9 +46,13 @@ def _last(item: Any) -> str:
     return str(getattr(item, "name", item)).rpartition("/")[2]
 
 
-def _smooth(force: Any, sphere: str, plane: str, known: dict[str, Any], several: bool) -> SmoothSphereHalfSpaceForce:
+def _smooth(
+    force: Any, sphere: str, plane: str, known: dict[str, Any], several: bool
+) -> SmoothSphereHalfSpaceForce:
     one, other = known[sphere], known[plane]
-    softness = [item.stiffness ** (-2.0 / 3.0) if item.stiffness else float("inf") for item in (one, other)]
+    softness = [
+        item.stiffness ** (-2.0 / 3.0) if item.stiffness else float("inf") for item in (one, other)
+    ]
     share = softness[0] / sum(softness)
 
     def mean(name: str) -> float:

@@ -132,7 +132,11 @@ def _degroote(model: Model, operator: Any, folder: Path) -> None:
                 f"'{muscle.name}' is a {type(muscle).__name__}, which has no DeGrooteFregly2016Muscle of the same "
                 "behavior; there is one for Thelen2003Muscle and Millard2012EquilibriumMuscle"
             )
-        for name in ("default_activation", "activation_time_constant", "deactivation_time_constant"):
+        for name in (
+            "default_activation",
+            "activation_time_constant",
+            "deactivation_time_constant",
+        ):
             given[name] = getattr(muscle, name)
         _replace(model, muscle, DeGrooteFregly2016Muscle(name=muscle.name, **given))
 
@@ -148,16 +152,24 @@ def _take_out(model: Model, muscle: Muscle) -> None:
     """Out of the set of forces, and of its groups: what takes its place is no member, in OpenSim."""
     model.force_set.objects.remove(muscle)
     for group in model.force_set.groups:
-        names = [str(getattr(member, "name", member)).rpartition("/")[2] for member in group.members]
-        group.members = tuple(member for member, name in zip(group.members, names, strict=True) if name != muscle.name)
+        names = [
+            str(getattr(member, "name", member)).rpartition("/")[2] for member in group.members
+        ]
+        group.members = tuple(
+            member for member, name in zip(group.members, names, strict=True) if name != muscle.name
+        )
 
 
 @operation(p.ModOpAddReserves)
 def _reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> None:
     if operator.optimal_force <= 0.0:
-        raise ModelError(f"reserve actuators have an optimal_force of {operator.optimal_force:g}; give a positive one")
+        raise ModelError(
+            f"reserve actuators have an optimal_force of {operator.optimal_force:g}; give a positive one"
+        )
     if operator.bound is not None and operator.bound < 0.0:
-        raise ModelError(f"reserve actuators have a bound of {operator.bound:g}; give one that is not negative")
+        raise ModelError(
+            f"reserve actuators have a bound of {operator.bound:g}; give one that is not negative"
+        )
     tree, mechanism = model.tree(), build_mechanism(model)
     driven = {tree.path_of(item) for item in _driven(model)}
     dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
@@ -173,12 +185,16 @@ def _reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> None:
         if operator.skip_residual_coordinates and _is_on_ground(model, path):
             continue
         bound: dict[str, Any] = (
-            {} if operator.bound is None else {"min_control": -operator.bound, "max_control": operator.bound}
+            {}
+            if operator.bound is None
+            else {"min_control": -operator.bound, "max_control": operator.bound}
         )
         reserve = CoordinateActuator(
-            name="reserve" + path.replace("/", "_"), coordinate=coordinate.name, optimal_force=operator.optimal_force,
+            name="reserve" + path.replace("/", "_"),
+            coordinate=coordinate.name,
+            optimal_force=operator.optimal_force,
             **bound,
-        )  # fmt: skip
+        )
         model.force_set.objects.append(reserve)
 
 
@@ -211,23 +227,36 @@ def _welds(model: Model, operator: p.ModOpReplaceJointsWithWelds, folder: Path) 
         names = {item.name: item for item in joints.values()}
         joint = joints.get(path) or names.get(path) or names.get(path.rpartition("/")[2])
         if joint is None:
-            raise ModelError(f"the model has no joint '{path}'{did_you_mean(path, [*joints, *names])}")
+            raise ModelError(
+                f"the model has no joint '{path}'{did_you_mean(path, [*joints, *names])}"
+            )
         frames: list[PhysicalOffsetFrame] = []
         for socket in ("socket_parent_frame", "socket_child_frame"):
-            frame, base = tree.target(joint, socket, getattr(joint, socket)), _base(model, joint, socket)
-            offset = PhysicalOffsetFrame(name=f"{base.name}_offset", socket_parent=tree.path_of(base) or "")
+            frame, base = (
+                tree.target(joint, socket, getattr(joint, socket)),
+                _base(model, joint, socket),
+            )
+            offset = PhysicalOffsetFrame(
+                name=f"{base.name}_offset", socket_parent=tree.path_of(base) or ""
+            )
             if isinstance(frame, PhysicalOffsetFrame):
                 offset.translation, offset.orientation = frame.translation, frame.orientation
             frames.append(offset)
         one, other = (frame.name for frame in frames)
-        weld = WeldJoint(name=joint.name, socket_parent_frame=one, socket_child_frame=other, frames=frames)
+        weld = WeldJoint(
+            name=joint.name, socket_parent_frame=one, socket_child_frame=other, frames=frames
+        )
         model.joint_set.objects.remove(joint)
         model.joint_set.objects.append(weld)
 
 
 @operation(p.ModOpReplacePathsWithFunctionBasedPaths)
-def _function_paths(model: Model, operator: p.ModOpReplacePathsWithFunctionBasedPaths, folder: Path) -> None:
-    given = read_document(Source.of_file(folder / operator.paths_file.strip()), of=p.FunctionBasedPathSet).top
+def _function_paths(
+    model: Model, operator: p.ModOpReplacePathsWithFunctionBasedPaths, folder: Path
+) -> None:
+    given = read_document(
+        Source.of_file(folder / operator.paths_file.strip()), of=p.FunctionBasedPathSet
+    ).top
     put_paths(model, given.objects)
 
 
@@ -241,7 +270,9 @@ def put_paths(model: Model, paths: Any) -> None:
     for path in paths:
         force = forces.get(path.name)
         if force is None or not hasattr(force, "geometry_path"):
-            raise ModelError(f"the model has no force with a path '{path.name}'{did_you_mean(path.name, [*forces])}")
+            raise ModelError(
+                f"the model has no force with a path '{path.name}'{did_you_mean(path.name, [*forces])}"
+            )
         force.geometry_path = path.copy_deep()
         force.geometry_path.name = "path"
 

@@ -1,7 +1,8 @@
 """Polynomials of the coordinates in the places of paths, fitted to lengths and moment arms over the ranges of motion.
 
-As OpenSim's PolynomialPathFitter: of rising order, until both are met. The moment arms are the derivatives of the
-length, so that a path that slips, whose moment arms are not, is met as well as both can be.
+As OpenSim's PolynomialPathFitter: of rising order, until both are met. The moment arms are the
+derivatives of the length, so that a path that slips, whose moment arms are not, is met as well as
+both can be.
 """
 
 from __future__ import annotations
@@ -67,7 +68,9 @@ def fit_paths(model: Model, tolerance: float = TOLERANCE, poses: int = POSES) ->
     for place, name in enumerate(known.names):
         if isinstance(getattr(tree.at(name), "geometry_path", None), FunctionBasedPath):
             continue
-        result.append(_fitted(known, mechanism, name, q, free, lengths[:, place], arms[:, place], tolerance))
+        result.append(
+            _fitted(known, mechanism, name, q, free, lengths[:, place], arms[:, place], tolerance)
+        )
     return result
 
 
@@ -75,13 +78,17 @@ def _poses(mechanism: Mechanism, count: int) -> tuple[Array, list[int]]:
     """Poses (k, n) where the constraints hold, and the coordinates that are varied."""
     infos = mechanism.coordinates
     dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
-    free = [k for k, info in enumerate(infos) if k not in dependent and not info.locked and info.prescribed is None]
+    free = [
+        k
+        for k, info in enumerate(infos)
+        if k not in dependent and not info.locked and info.prescribed is None
+    ]
     bounds = np.array([_range(infos[k].range) for k in free]).reshape(-1, 2)
     rng = np.random.default_rng(0)
     # One in each of as many equal parts of every range.
-    parts = np.array([rng.permutation(count) for _ in free]).T.reshape(count, len(free)) + rng.random(
-        (count, len(free))
-    )
+    parts = np.array([rng.permutation(count) for _ in free]).T.reshape(
+        count, len(free)
+    ) + rng.random((count, len(free)))
     q = np.tile([info.default_value for info in infos], (count, 1))
     q[:, free] = bounds[:, 0] + parts / count * (bounds[:, 1] - bounds[:, 0])
     if any(not hasattr(item, "locked") for item in mechanism.constraints) and mechanism.constraints:
@@ -109,7 +116,9 @@ def _fitted(
     x, wanted, pulls = q[good][:, own], lengths[good], arms[good][:, own]
     best: Fitted | None = None
     for order in ORDERS:
-        powers = np.array([item for item in product(range(order + 1), repeat=len(own)) if sum(item) <= order])
+        powers = np.array(
+            [item for item in product(range(order + 1), repeat=len(own)) if sum(item) <= order]
+        )
         if len(powers) > 0.5 * len(wanted) * (1 + len(own)):
             break
         values, slopes = _monomials(x, powers)
@@ -124,8 +133,12 @@ def _fitted(
         )
         places = tuple(mechanism.coordinates[k].path for k in own)
         path = FunctionBasedPath(name=name, coordinate_paths=places, length_function=polynomial)
-        best = Fitted(path, order, *(float(np.sqrt(np.mean(each**2))) for each in (length, arm)),
-                      *(float(np.abs(each).max()) for each in (length, arm)))  # fmt: skip
+        best = Fitted(
+            path,
+            order,
+            *(float(np.sqrt(np.mean(each**2))) for each in (length, arm)),
+            *(float(np.abs(each).max()) for each in (length, arm)),
+        )
         if best.length <= tolerance and best.arm <= tolerance:
             break
     assert best is not None

@@ -70,8 +70,12 @@ def _reserves(value: str) -> Any:
 GIVEN: dict[str, Callable[[str], Any]] = {
     "joints": _welds,
     "reserves": _reserves,
-    "strength": lambda value: p.ModOpScaleMaxIsometricForce(scale_factor=_number("strength", value)),
-    "width": lambda value: p.ModOpScaleActiveFiberForceCurveWidthDGF(scale_factor=_number("width", value)),
+    "strength": lambda value: p.ModOpScaleMaxIsometricForce(
+        scale_factor=_number("strength", value)
+    ),
+    "width": lambda value: p.ModOpScaleActiveFiberForceCurveWidthDGF(
+        scale_factor=_number("width", value)
+    ),
     "external-loads": lambda value: p.ModOpAddExternalLoads(filepath=value),
     "paths": lambda value: p.ModOpReplacePathsWithFunctionBasedPaths(paths_file=value),
 }
@@ -97,8 +101,12 @@ def change_of(name: str, value: str) -> Change:
         return _operator(GIVEN[name](value))
     names = sorted({*CHOICES, *GIVEN})
     if name not in names:
-        raise SettingError(f"nothing is called '{name}' that could be replaced{or_known(name, names)}")
-    raise SettingError(f"{name} cannot be replaced with '{value}'{or_known(value, sorted(CHOICES[name]))}")
+        raise SettingError(
+            f"nothing is called '{name}' that could be replaced{or_known(name, names)}"
+        )
+    raise SettingError(
+        f"{name} cannot be replaced with '{value}'{or_known(value, sorted(CHOICES[name]))}"
+    )
 
 
 def modify(
@@ -110,14 +118,12 @@ def modify(
 ) -> Model:
     """A copy of a model with smoother, stiffer or other parts, as OpenSim's ModelProcessor makes it.
 
-    Args:
-        model: that stays as it is.
-        operators: OpenSim's, such as ``osimlite.ModOpAddReserves(optimal_force=100.0)``, applied first.
-        folder: where files are that are named.
-        replace: pairs of a name and what takes its place, in their order: ``("muscles", "degroote")``, ``("tendon",
-            "rigid")``, ``("paths", "polynomial")``, ``("contact", "smooth")``, ``("joints", "weld:mtp_r,mtp_l")``,
-            ``("reserves", "100:1")`` (optimal force, bound), ``("muscles", "none")``.
-        words: the same by keyword.
+    Args: model: that stays as it is. operators: OpenSim's, such as
+        ``osimlite.ModOpAddReserves(optimal_force=100.0)``, applied first. folder: where files are
+        that are named. replace: pairs of a name and what takes its place, in their order:
+        ``("muscles", "degroote")``, ``("tendon", "rigid")``, ``("paths", "polynomial")``,
+        ``("contact", "smooth")``, ``("joints", "weld:mtp_r,mtp_l")``, ``("reserves", "100:1")``
+        (optimal force, bound), ``("muscles", "none")``. words: the same by keyword.
 
     Raises:
         SettingError: there is no such replacement.

@@ -1,7 +1,8 @@
 """Which comments OpenSim wrote itself.
 
-OpenSim prints the description of a property before each property, and drops every comment it reads. We keep what a
-person wrote and drop what OpenSim would print anyway. Its sentences are known by their digests only.
+OpenSim prints the description of a property before each property, and drops every comment it reads.
+We keep what a person wrote and drop what OpenSim would print anyway. Its sentences are known by
+their digests only.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ def all_generated(data: bytes) -> bool:
 
 def digest(text: str) -> bytes:
     """Digest of a comment, white space and digits aside."""
-    # The library behind it takes longer to load than most files do to read, and many have no comments.
+    # The library behind it takes longer to load than most files do to read, and many have no
+    # comments.
     from hashlib import blake2b
 
     plain = re.sub(r"[\s\d]+", " ", text).strip()

@@ -1,9 +1,9 @@
 """Models as plain data: the form of YAML and JSON files.
 
-An object is a mapping from its properties, under their Python names or their XML tags, to values. ``class`` says which
-class it is; it may be left out where a property takes only that class. A set that is nothing but its members may be
-given as the list of them. Numbers that JSON cannot say are the words NaN, Inf and -Inf. Comments of a file are not
-part of its data.
+An object is a mapping from its properties, under their Python names or their XML tags, to values.
+``class`` says which class it is; it may be left out where a property takes only that class. A set
+that is nothing but its members may be given as the list of them. Numbers that JSON cannot say are
+the words NaN, Inf and -Inf. Comments of a file are not part of its data.
 """
 
 from __future__ import annotations
@@ -48,7 +48,9 @@ def read_data(path: str | Path) -> Model:
         text = read_file(place).decode()
     except UnicodeDecodeError as error:
         raise MissingFileError(f"cannot read the file: {error}", file=str(path)) from None
-    data = _parsed_json(text, str(path)) if place.suffix == ".json" else parsed_yaml(text, str(path))
+    data = (
+        _parsed_json(text, str(path)) if place.suffix == ".json" else parsed_yaml(text, str(path))
+    )
     try:
         return from_data(data)
     except ModelError as error:
@@ -75,7 +77,9 @@ def to_json(model: Model) -> str:
 
 def to_yaml(model: Model) -> str:
     """The model as YAML; MissingDependency if PyYAML is not installed."""
-    return _yaml().safe_dump(to_data(model), sort_keys=False, default_flow_style=None, allow_unicode=True, width=120)
+    return _yaml().safe_dump(
+        to_data(model), sort_keys=False, default_flow_style=None, allow_unicode=True, width=120
+    )
 
 
 def to_data(model: Model) -> dict[str, Any]:
@@ -140,7 +144,9 @@ class _Writer:
 
     def _owned(self, spec: FieldSpec, value: Object) -> Any:
         data = self.object(value, spec.accepts)
-        default_name = spec.tag if isinstance(spec.kind, Held) and spec.kind.form == "single" else ""
+        default_name = (
+            spec.tag if isinstance(spec.kind, Held) and spec.kind.form == "single" else ""
+        )
         if spec.factory is not None and not default_name:
             made = spec.factory()
             default_name = made.name if isinstance(made, Object) else ""
@@ -151,7 +157,11 @@ class _Writer:
     def _named(self, item: Object, reference: Reference, value: Any) -> Any:
         if isinstance(value, Component):
             return self.tree.text_for(self.tree.owner_of(item), reference, value)
-        return [self._named(item, reference, word) for word in value] if isinstance(value, tuple) else value
+        return (
+            [self._named(item, reference, word) for word in value]
+            if isinstance(value, tuple)
+            else value
+        )
 
 
 class _Reader:
@@ -166,7 +176,9 @@ class _Reader:
         if isinstance(data, list) and "objects" in field_specs(accepts):
             data = {"objects": data}
         if not isinstance(data, Mapping):
-            raise ModelError(f"{where}: expected a mapping that describes a {accepts.tag}, not {_kind_of(data)}")
+            raise ModelError(
+                f"{where}: expected a mapping that describes a {accepts.tag}, not {_kind_of(data)}"
+            )
         cls = self._class(data, accepts, where)
         specs = field_specs(cls)
         by_name = {spec.name: spec for spec in specs.values()}
@@ -177,12 +189,16 @@ class _Reader:
                 continue
             if key == "name" or (cls is Unknown and key in ("class_name", "content")):
                 if not isinstance(value, str):
-                    raise ModelError(f"{place}: expected a text, not {_kind_of(value)}; put it in quotation marks")
+                    raise ModelError(
+                        f"{place}: expected a text, not {_kind_of(value)}; put it in quotation marks"
+                    )
                 values[key] = value
                 continue
             spec = by_name.get(key) or specs.get(key)
             if spec is None:
-                raise ModelError(f"{where}: a {cls.tag} has no property '{key}'{did_you_mean(str(key), by_name)}")
+                raise ModelError(
+                    f"{where}: a {cls.tag} has no property '{key}'{did_you_mean(str(key), by_name)}"
+                )
             if spec.name in values:
                 raise ModelError(f"{where}: '{spec.name}' is given twice, also as '{spec.tag}'")
             values[spec.name] = self._value(value, spec, place)
@@ -209,7 +225,9 @@ class _Reader:
             return Unknown
         cls = class_for(tag) if isinstance(tag, str) else None
         if cls is None:
-            raise ModelError(f"{where}.class: there is no class '{tag}'{did_you_mean(str(tag), tags())}")
+            raise ModelError(
+                f"{where}.class: there is no class '{tag}'{did_you_mean(str(tag), tags())}"
+            )
         if not issubclass(cls, accepts):
             raise ModelError(f"{where}.class: a {tag} cannot stand here, only a {accepts.tag}")
         return cls
@@ -220,17 +238,26 @@ class _Reader:
             assert spec.accepts is not None
             if kind.form == "list":
                 if not isinstance(data, list):
-                    raise ModelError(f"{where}: expected a list of {spec.accepts.tag}, not {_kind_of(data)}")
-                members = (self.object(item, spec.accepts, f"{where}[{i}]") for i, item in enumerate(data))
+                    raise ModelError(
+                        f"{where}: expected a list of {spec.accepts.tag}, not {_kind_of(data)}"
+                    )
+                members = (
+                    self.object(item, spec.accepts, f"{where}[{i}]") for i, item in enumerate(data)
+                )
                 return ObjectList(members)
             if data is None and kind.form == "optional":
                 return None
             made = spec.factory() if spec.factory is not None else None
             return self.object(
-                data, spec.accepts, where, spec.tag if kind.form == "single" else getattr(made, "name", "")
+                data,
+                spec.accepts,
+                where,
+                spec.tag if kind.form == "single" else getattr(made, "name", ""),
             )
         if isinstance(kind, Value) and kind.scalar == "double":
-            data = [self._real(word) for word in data] if isinstance(data, list) else self._real(data)
+            data = (
+                [self._real(word) for word in data] if isinstance(data, list) else self._real(data)
+            )
         try:
             return kind.check(data, None)
         except (ValueError, OverflowError) as error:
@@ -249,7 +276,9 @@ class _Reader:
     def _counted(self, weight: int = 1) -> None:
         self.count += weight
         if self.count > MAX_NUMBERS:
-            raise ModelError("the data has more values than any model; its aliases may repeat it endlessly")
+            raise ModelError(
+                "the data has more values than any model; its aliases may repeat it endlessly"
+            )
 
 
 def _number(value: Any) -> Any:
@@ -259,13 +288,23 @@ def _number(value: Any) -> Any:
 
 
 def _kind_of(data: Any) -> str:
-    names = {dict: "a mapping", list: "a list", str: "a text", bool: "true or false", type(None): "nothing"}
-    return names.get(type(data), "a number" if isinstance(data, (int, float)) else f"a {type(data).__name__}")
+    names = {
+        dict: "a mapping",
+        list: "a list",
+        str: "a text",
+        bool: "true or false",
+        type(None): "nothing",
+    }
+    return names.get(
+        type(data), "a number" if isinstance(data, (int, float)) else f"a {type(data).__name__}"
+    )
 
 
 def _json_lines(data: Any, indent: str) -> Iterator[str]:
     """JSON with one property a line, and what holds no further objects on one line."""
-    if not isinstance(data, (dict, list)) or not any(isinstance(part, (dict, list)) for part in _parts(data)):
+    if not isinstance(data, (dict, list)) or not any(
+        isinstance(part, (dict, list)) for part in _parts(data)
+    ):
         yield json.dumps(data, ensure_ascii=False, allow_nan=False)
         return
     inner = indent + "  "
@@ -287,9 +326,13 @@ def _parsed_json(text: str, file: str) -> Any:
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:
-        raise DocumentError(f"not JSON: {error.msg}", file=file, line=error.lineno, column=error.colno) from None
+        raise DocumentError(
+            f"not JSON: {error.msg}", file=file, line=error.lineno, column=error.colno
+        ) from None
     except (RecursionError, ValueError):
-        raise DocumentError("the JSON text is nested too deeply, or has too long a number", file=file, line=1) from None
+        raise DocumentError(
+            "the JSON text is nested too deeply, or has too long a number", file=file, line=1
+        ) from None
 
 
 def parsed_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
@@ -307,7 +350,8 @@ def parsed_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
         line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
         reason = getattr(error, "problem", None) or "it cannot be read"
         raise DocumentError(f"not YAML: {reason}", file=file, line=line, column=column) from None
-    # A date of a year beyond 9999, or a number beyond those of Python, raises whatever its constructor does.
+    # A date of a year beyond 9999, or a number beyond those of Python, raises whatever its
+    # constructor does.
     except (RecursionError, ValueError, ArithmeticError, LookupError, TypeError, AttributeError):
         raise DocumentError("the YAML text cannot be read as a model", file=file, line=1) from None
 

@@ -27,9 +27,13 @@ def relaid(xml: str, depth: int, *, comments: bool = True, name: str | None = No
         ModelError: the text is no XML element, or has a DOCTYPE.
     """
     try:
-        element = etree.fromstring(without_namespaces(xml.encode()), etree.XMLParser(resolve_entities=False))
+        element = etree.fromstring(
+            without_namespaces(xml.encode()), etree.XMLParser(resolve_entities=False)
+        )
     except etree.XMLSyntaxError as error:
-        raise ModelError(f"the content of an unknown component is no XML element: {error.msg}") from None
+        raise ModelError(
+            f"the content of an unknown component is no XML element: {error.msg}"
+        ) from None
     if element.getroottree().docinfo.internalDTD is not None:
         raise ModelError("the content of an unknown component has a DOCTYPE; leave it out")
     if name and element.get("name") != name:
@@ -41,11 +45,15 @@ def lines_of(element: etree._Element, depth: int, *, comments: bool = True) -> l
     """The lines of an element in OpenSim's layout; where text and elements mix, white space stays as it was."""
     indent = "\t" * depth
     if not is_element(element):
-        if isinstance(element, etree._Comment) and (not comments or is_generated(element.text or "")):
+        if isinstance(element, etree._Comment) and (
+            not comments or is_generated(element.text or "")
+        ):
             return []
         return [indent + etree.tostring(element, encoding="unicode", with_tail=False)]
     tag = as_written(element.tag)
-    head = f"{indent}<{tag}" + "".join(f" {key}={quoted(text)}" for key, text in _attributes(element))
+    head = f"{indent}<{tag}" + "".join(
+        f" {key}={quoted(text)}" for key, text in _attributes(element)
+    )
     texts = [element.text, *(child.tail for child in element)]
     if not len(element):
         text = "" if element.text is None or element.text.isspace() else escape(element.text)

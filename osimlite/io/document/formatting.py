@@ -17,8 +17,8 @@ from osimlite.schema.model import CURRENT_VERSION
 def formatted(source: Source) -> str:
     """The text of a document in the layout in which it would be printed.
 
-    A document of the current version is read and printed. One of another keeps its version and its words: only white
-    space changes, and the comments that OpenSim prints by itself are dropped.
+    A document of the current version is read and printed. One of another keeps its version and its
+    words: only white space changes, and the comments that OpenSim prints by itself are dropped.
 
     Raises:
         DocumentError: the text is not an OpenSim document; with line and column.

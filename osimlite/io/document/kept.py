@@ -75,7 +75,9 @@ def top_at(path: str) -> Object | None:
 def _is_whole(path: str) -> bool:
     """Whether no part of a document is in another file, which nobody would see change."""
     top = top_at(path)
-    return top is not None and not any(item.layout is not None and item.layout.include for item in top.walk())
+    return top is not None and not any(
+        item.layout is not None and item.layout.include for item in top.walk()
+    )
 
 
 def read_anew(path: str | Path, of: type[Top]) -> Top:

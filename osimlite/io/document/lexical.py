@@ -1,7 +1,8 @@
 """Text to value and back, by the lexical rules of OpenSim 4.6's reader and printer.
 
-OpenSim takes the longest part of a text that is a number (``1,5`` is 1) and drops what it cannot read without failing.
-The functions here read the same value, and raise :class:`Unclean` with it, so that the reader can note what was lost.
+OpenSim takes the longest part of a text that is a number (``1,5`` is 1) and drops what it cannot
+read without failing. The functions here read the same value, and raise :class:`Unclean` with it, so
+that the reader can note what was lost.
 """
 
 from __future__ import annotations
@@ -23,7 +24,13 @@ ABSENT: Any = object()
 _PLAIN_FLAGS = {"true": True, "false": False, "0": False}
 
 _PREFIX = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-_SPECIAL = {"nan": math.nan, "inf": math.inf, "infinity": math.inf, "+inf": math.inf, "+infinity": math.inf}
+_SPECIAL = {
+    "nan": math.nan,
+    "inf": math.inf,
+    "infinity": math.inf,
+    "+inf": math.inf,
+    "+infinity": math.inf,
+}
 _SPECIAL |= {"-inf": -math.inf, "-infinity": -math.inf}
 
 
@@ -57,7 +64,11 @@ def real(word: str) -> float:
         return special
     prefix = _PREFIX.match(word)
     # Of an exponent without digits OpenSim makes nothing.
-    if prefix is None or math.isinf(float(prefix[0])) or ("e" not in prefix[0].lower() and word[prefix.end()] in "eE"):
+    if (
+        prefix is None
+        or math.isinf(float(prefix[0]))
+        or ("e" not in prefix[0].lower() and word[prefix.end()] in "eE")
+    ):
         raise Unclean("unreadable", word)
     raise Unclean("cut", word, float(prefix[0]))
 
@@ -113,7 +124,12 @@ def split(raw: str) -> list[str]:
 
 
 _OTHER = re.compile(r"[^ \t\n\r\f\v]+")
-_WORDS: dict[str, Callable[[str], Any]] = {"double": real, "int": whole, "bool": flag, "string": str}
+_WORDS: dict[str, Callable[[str], Any]] = {
+    "double": real,
+    "int": whole,
+    "bool": flag,
+    "string": str,
+}
 
 
 @cache
@@ -124,7 +140,9 @@ def converter(kind: Kind) -> Callable[[str], Any]:
     assert isinstance(kind, Value)
     word = legacy_flag if kind.legacy and kind.scalar == "bool" else _WORDS[kind.scalar]
     if kind.shape in ("single", "optional"):
-        return text if kind.scalar == "string" else _one(word, kind.shape == "optional", kind.legacy)
+        return (
+            text if kind.scalar == "string" else _one(word, kind.shape == "optional", kind.legacy)
+        )
     if kind.size is not None:
         return _exactly(kind.size)
     if kind.shape == "vector":
@@ -166,7 +184,8 @@ def _one(read: Callable[[str], Any], optional: bool, legacy: bool) -> Callable[[
         if len(words) == 1:
             return read(words[0])
         if not legacy:
-            # OpenSim reads them all before it takes the first, and takes none if it cannot read one.
+            # OpenSim reads them all before it takes the first, and takes none if it cannot read
+            # one.
             _as_read(words[1:], read)
         raise Unclean("too-many", raw.strip(), read(words[0]))
 

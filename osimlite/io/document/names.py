@@ -1,7 +1,8 @@
 """Colons in the names of elements and attributes, which mean nothing to OpenSim.
 
-For OpenSim a colon is a letter: ``HuntCrossleyForce::ContactParameters`` is the name of a class, and an ``xmlns`` is an
-attribute like any other. For lxml it sets off a namespace. While a text is parsed, other characters stand in for it.
+For OpenSim a colon is a letter: ``HuntCrossleyForce::ContactParameters`` is the name of a class,
+and an ``xmlns`` is an attribute like any other. For lxml it sets off a namespace. While a text is
+parsed, other characters stand in for it.
 """
 
 from __future__ import annotations

@@ -39,9 +39,9 @@ NoteKind = Literal[
 class Note(NamedTuple):
     """One fact. `number` is the element concerned, in document order.
 
-    `word` is the tag, attribute or part of the text in question; `owner` the object around it and `spec` the property,
-    where there is one; `value` is what was read instead (None where the default stays). `why` says of a file that is
-    named and not read, as in "which is not there".
+    `word` is the tag, attribute or part of the text in question; `owner` the object around it and
+    `spec` the property, where there is one; `value` is what was read instead (None where the
+    default stays). `why` says of a file that is named and not read, as in "which is not there".
     """
 
     kind: NoteKind

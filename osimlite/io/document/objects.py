@@ -112,7 +112,9 @@ class ObjectReader:
         result: list[Object] = []
         if block is not None:
             start = self.count
-            self.count += 2 + sum(size(node) for node in block.itersiblings(preceding=True) if is_element(node))
+            self.count += 2 + sum(
+                size(node) for node in block.itersiblings(preceding=True) if is_element(node)
+            )
             result = self._block(block)
             self.count = start
         top = self.object(element, cls, skip=block)
@@ -123,7 +125,11 @@ class ObjectReader:
         return top
 
     def object(
-        self, element: etree._Element, cls: type[Read], name: str | None = None, skip: etree._Element | None = None
+        self,
+        element: etree._Element,
+        cls: type[Read],
+        name: str | None = None,
+        skip: etree._Element | None = None,
     ) -> Read:
         """Read one element as an instance of `cls`; `name` overrides the attribute, `skip` is a child to pass over."""
         number = self.count
@@ -148,7 +154,11 @@ class ObjectReader:
         return built if extra is None else self._finish(built, extra)
 
     def _children(
-        self, element: etree._Element, cls: type[Object], skip: etree._Element | None, values: dict[str, Any]
+        self,
+        element: etree._Element,
+        cls: type[Object],
+        skip: etree._Element | None,
+        values: dict[str, Any],
     ) -> _Extra | None:
         """Read the children of an element into `values`, by field name; what they say beyond that is returned."""
         steps, named = plan_for(cls)
@@ -190,7 +200,13 @@ class ObjectReader:
         return extra
 
     def _unclean(
-        self, unclean: Unclean, text: str, number: int, cls: type[Object], spec: FieldSpec, extra: _Extra
+        self,
+        unclean: Unclean,
+        text: str,
+        number: int,
+        cls: type[Object],
+        spec: FieldSpec,
+        extra: _Extra,
     ) -> Any:
         """The value that stands for a text which reads only partly, or not at all."""
         missing = unclean.value is ABSENT
@@ -209,7 +225,9 @@ class ObjectReader:
         members, late = self._members(element, spec)
         if step.action == _LIST:
             return members, late
-        late += [("duplicate-tag", left_out._index, left_out.tag, spec, None) for left_out in members[1:]]
+        late += [
+            ("duplicate-tag", left_out._index, left_out.tag, spec, None) for left_out in members[1:]
+        ]
         if isinstance(spec.kind, Held) and spec.kind.form == "optional":
             return (members[0] if members else None), late
         if not members:
@@ -250,7 +268,9 @@ class ObjectReader:
         if isinstance(result, str):
             empty: Object = self.object(element, cls, name)
             self.notes[known:] = [
-                note._replace(why=result) if note.kind == "include" and note.number == number else note
+                note._replace(why=result)
+                if note.kind == "include" and note.number == number
+                else note
                 for note in self.notes[known:]
             ]
             return empty
@@ -263,10 +283,14 @@ class ObjectReader:
             object.__setattr__(item, "__dict__", {**item.__dict__, "name": name})
         layout_of(item).include = include
         self.notes.append(Note("include", number, "file", item, None, str(file)))
-        self.notes.extend(note._replace(number=number) for note in notes if note.kind != "include" or note.why)
+        self.notes.extend(
+            note._replace(number=number) for note in notes if note.kind != "include" or note.why
+        )
         return item
 
-    def _members(self, wrapper: etree._Element, spec: FieldSpec) -> tuple[ObjectList[Any], list[_Late]]:
+    def _members(
+        self, wrapper: etree._Element, spec: FieldSpec
+    ) -> tuple[ObjectList[Any], list[_Late]]:
         """Read the objects inside ``<objects>`` or another wrapper; and what is noted of them."""
         self.count += 1
         members: list[Any] = []
@@ -285,7 +309,15 @@ class ObjectReader:
             elif is_element(child):
                 tag = as_written(child.tag)
                 known = class_for(tag)
-                late.append(("unknown-class" if known is None else "wrong-class", self.count, tag, spec, known))
+                late.append(
+                    (
+                        "unknown-class" if known is None else "wrong-class",
+                        self.count,
+                        tag,
+                        spec,
+                        known,
+                    )
+                )
                 member = self._unknown(child)
             else:
                 remember(child, pending)
@@ -315,7 +347,11 @@ class ObjectReader:
         spec = named.get(name) if name is not None else None
         if spec is None and name is None and held is not None:
             # OpenSim takes an acceptable object without a name for a property that has none yet.
-            free = (s for s in named.values() if s.name not in values and _accepted(child.tag, s.accepts))
+            free = (
+                s
+                for s in named.values()
+                if s.name not in values and _accepted(child.tag, s.accepts)
+            )
             spec = next(free, None)
         if spec is not None and spec.name not in values:
             accepted = _accepted(child.tag, spec.accepts)
@@ -323,7 +359,9 @@ class ObjectReader:
                 extra.settle(spec.tag)
                 values[spec.name] = self._owned(child, accepted, spec.tag)
                 return
-            extra.late.append(("unknown-class" if held is None else "wrong-class", self.count, tag, spec, held))
+            extra.late.append(
+                ("unknown-class" if held is None else "wrong-class", self.count, tag, spec, held)
+            )
         elif spec is not None:
             self._duplicate(child, spec, extra)
             return
@@ -346,7 +384,14 @@ class ObjectReader:
         if inner:
             extra.late.append(("child-in-value", number, as_written(inner[0].tag), spec, None))
             self.count += sum(size(node) for node in inner)
-        elif sum(1 for piece in (element.text, *(node.tail for node in element)) if piece and piece.strip()) > 1:
+        elif (
+            sum(
+                1
+                for piece in (element.text, *(node.tail for node in element))
+                if piece and piece.strip()
+            )
+            > 1
+        ):
             extra.late.append(("child-in-value", number, "!--", spec, None))
         return "".join([element.text or "", *(node.tail or "" for node in element)])
 

@@ -23,8 +23,13 @@ def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
     """
     document = read_document(Source.of_file(path), of=cls)
     for note in document.notes:
-        # Properties of older versions are still in many files; what is like one of today is misspelt.
-        if note.kind == "unknown-tag" and note.owner and (near := nearest(note.word, field_specs(type(note.owner)))):
+        # Properties of older versions are still in many files; what is like one of today is
+        # misspelt.
+        if (
+            note.kind == "unknown-tag"
+            and note.owner
+            and (near := nearest(note.word, field_specs(type(note.owner))))
+        ):
             message = f"<{note.word}> means nothing in this document; did you mean <{near}>?"
             raise document.source.fault(DocumentError, message, document.source.of_tag(note.number))
     assert isinstance(document.top, cls)

@@ -36,11 +36,27 @@ _OF_A_PROPERTY = (
 )  # fmt: skip
 _OF_A_SOCKET = ("tag", "connectee_type", "type", "list", "optional", "declared_in")
 _OF_AN_OUTPUT = ("name", "type", "list")
-_OF_A_REFERENCE = ("cls", "property", "target", "resolution", "required", "wildcards", "on_missing", "source")
+_OF_A_REFERENCE = (
+    "cls",
+    "property",
+    "target",
+    "resolution",
+    "required",
+    "wildcards",
+    "on_missing",
+    "source",
+)
 _KINDS = ("single", "optional", "list")
 _SCALARS = {"double": float, "int": int, "bool": bool, "string": str}
 _VECTORS = ("Vec2", "Vec3", "Vec6", "Transform", "Vector")
-_ZEROS = {"double": "0", "int": "0", "bool": "false", "Vec2": "0 0", "Vec3": "0 0 0", "Vec6": "0 0 0 0 0 0"}
+_ZEROS = {
+    "double": "0",
+    "int": "0",
+    "bool": "false",
+    "Vec2": "0 0",
+    "Vec3": "0 0 0",
+    "Vec6": "0 0 0 0 0 0",
+}
 
 
 def use(paths: Paths) -> None:
@@ -72,7 +88,9 @@ def classes_in(*paths: str | PathLike[str]) -> dict[str, type[Object]]:
         OsimliteError: a file declares what makes no sense; with file and line.
         MissingFileError: a file is not there.
     """
-    return dict(_declared(tuple((name, stamped(name)) for name in [fspath(path) for path in paths])))
+    return dict(
+        _declared(tuple((name, stamped(name)) for name in [fspath(path) for path in paths]))
+    )
 
 
 @lru_cache(maxsize=16)
@@ -81,8 +99,16 @@ def _declared(files: tuple[tuple[str, int | None], ...]) -> Mapping[str, type[Ob
     for path, _ in files:
         try:
             _Declarations(path, result).build()
-        except (TypeError, ValueError, ArithmeticError, LookupError, AttributeError, RecursionError) as error:
-            # The file holds data of kinds that no declaration has; those that people mix up have messages of their own.
+        except (
+            TypeError,
+            ValueError,
+            ArithmeticError,
+            LookupError,
+            AttributeError,
+            RecursionError,
+        ) as error:
+            # The file holds data of kinds that no declaration has; those that people mix up have
+            # messages of their own.
             raise OsimliteError(f"its classes cannot be made: {error}", file=path) from None
     return result
 
@@ -105,7 +131,9 @@ class _Declarations:
             top = json.loads(self.text)
         except (ValueError, RecursionError) as error:
             line = getattr(error, "lineno", None)
-            raise OsimliteError(f"this is no JSON: {getattr(error, 'msg', error)}", file=path, line=line) from None
+            raise OsimliteError(
+                f"this is no JSON: {getattr(error, 'msg', error)}", file=path, line=line
+            ) from None
         self.top: dict[str, Any] = self.mapping(top, _TOP, "the file")
         self.entries: dict[str, Any] = self.mapping(self.top.get("classes"), None, "'classes'")
         self.pending: list[str] = []
@@ -117,14 +145,20 @@ class _Declarations:
             rule = entry.get("resolution")
             if not isinstance(rule, str) or rule not in RULES:
                 raise self.error(
-                    f"there is no resolution '{rule}'{or_known(str(rule), RULES)}", "references", str(rule)
+                    f"there is no resolution '{rule}'{or_known(str(rule), RULES)}",
+                    "references",
+                    str(rule),
                 )
             self.references[str(entry.get("cls")), str(entry.get("property"))] = entry
         for name in self.entries:
             self.cls(name, name)
         for owner, name in self.references:
-            if owner not in self.entries or not any(row["name"] == name for row in self.properties(owner)):
-                raise self.error(f"no class of this file has a property '{owner}.{name}'", "references", name)
+            if owner not in self.entries or not any(
+                row["name"] == name for row in self.properties(owner)
+            ):
+                raise self.error(
+                    f"no class of this file has a property '{owner}.{name}'", "references", name
+                )
 
     def cls(self, name: str, *words: str) -> type[Object]:
         """The class of a name: OpenSim's, one of another file, or one of this, which is made when it is needed."""
@@ -139,7 +173,9 @@ class _Declarations:
             if len(self.pending) > MAX_LINEAGE:
                 raise self.error(f"more than {MAX_LINEAGE} classes derive from each other", name)
             if name in self.pending:
-                raise self.error(f"{listed(self.pending)} derive from each other, or hold each other", name)
+                raise self.error(
+                    f"{listed(self.pending)} derive from each other, or hold each other", name
+                )
             self.pending.append(name)
             self.found[name] = self.made(name)
             self.pending.pop()
@@ -150,9 +186,18 @@ class _Declarations:
         if not name.isidentifier():
             raise self.error(f"'{name}' is no name of a class", name)
         bases = entry.get("bases")
-        if not isinstance(bases, list) or not bases or not all(isinstance(base, str) for base in bases):
-            raise self.error(f"'bases' of '{name}' must list the class that it derives from, the nearest first", name)
-        base = self.cls(next((word for word in bases if "<" not in word), "Object"), name, "bases", bases[0])
+        if (
+            not isinstance(bases, list)
+            or not bases
+            or not all(isinstance(base, str) for base in bases)
+        ):
+            raise self.error(
+                f"'bases' of '{name}' must list the class that it derives from, the nearest first",
+                name,
+            )
+        base = self.cls(
+            next((word for word in bases if "<" not in word), "Object"), name, "bases", bases[0]
+        )
         inside: dict[str, Any] = {
             "__module__": __name__,
             "__doc__": f"A class of a plug-in, as declared in {self.path}.",
@@ -168,26 +213,50 @@ class _Declarations:
             spec = known.get(row["name"])
             if spec is None and row["name"] not in sockets:
                 self.add(inside, base, row["name"], *self.property(name, row))
-            elif spec is not None and isinstance(spec.kind, Value) and row.get("default") is not None:
+            elif (
+                spec is not None and isinstance(spec.kind, Value) and row.get("default") is not None
+            ):
                 # A class may give what it has from its base another default.
                 inside["__annotations__"][spec.name] = Annotated[Any, spec.kind, Tag(spec.tag)]
                 inside[spec.name] = self.default(name, row, spec.kind, _text(row["default"]))
         metaclass: Any = type(base)
-        return cast("type[Object]", metaclass(name, (base,), inside, tag=name, abstract=bool(entry.get("abstract"))))
+        return cast(
+            "type[Object]",
+            metaclass(name, (base,), inside, tag=name, abstract=bool(entry.get("abstract"))),
+        )
 
-    def add(self, inside: dict[str, Any], base: type[Object], tag: str, held: Any, kind: Kind, default: Any) -> None:
+    def add(
+        self,
+        inside: dict[str, Any],
+        base: type[Object],
+        tag: str,
+        held: Any,
+        kind: Kind,
+        default: Any,
+    ) -> None:
         """Put a field into the body of a class that is to be; not in the way of what all objects have."""
         taken = hasattr(base, tag) or iskeyword(tag) or not tag.isidentifier()
-        field = "".join(letter if letter.isalnum() else "_" for letter in tag) + "_" if taken else tag
-        inside["__annotations__"][field] = Annotated[held, kind, Tag(tag)] if taken else Annotated[held, kind]
+        field = (
+            "".join(letter if letter.isalnum() else "_" for letter in tag) + "_" if taken else tag
+        )
+        inside["__annotations__"][field] = (
+            Annotated[held, kind, Tag(tag)] if taken else Annotated[held, kind]
+        )
         inside[field] = default
 
     def socket(self, row: Any) -> tuple[Any, Kind, Any]:
         """Type, kind and default of a socket or an input."""
-        rule, target = ("socket", row.get("connectee_type")) if "connectee_type" in row else ("input", row.get("type"))
+        rule, target = (
+            ("socket", row.get("connectee_type"))
+            if "connectee_type" in row
+            else ("input", row.get("type"))
+        )
         many = bool(row.get("list"))
         kind = Reference(
-            rule, str(target), "list" if many else "single", required=not row.get("optional", rule == "input")
+            rule,
+            str(target),
+            "list" if many else "single",
+            required=not row.get("optional", rule == "input"),
         )
         held = str | Component
         return (tuple[held, ...], kind, ()) if many else (held, kind, "")
@@ -196,7 +265,9 @@ class _Declarations:
         """Type, kind and default of a property."""
         name, typed, shape = row["name"], str(row.get("type")), row.get("kind", "single")
         if shape not in _KINDS:
-            raise self.error(f"there is no kind '{shape}'{or_known(str(shape), _KINDS)}", owner, name, str(shape))
+            raise self.error(
+                f"there is no kind '{shape}'{or_known(str(shape), _KINDS)}", owner, name, str(shape)
+            )
         legacy = bool(row.get("legacy"))
         if row.get("object") or typed not in (*_SCALARS, *_VECTORS):
             return self.holding(owner, row, shape, legacy)
@@ -206,17 +277,30 @@ class _Declarations:
             if shape == "list":
                 raise self.error(f"a list of {typed} is read by no class of OpenSim", owner, name)
             vector = cast("Any", typed.replace("Vector", "vector"))
-            kind = Value("double", vector, row.get("unit"), legacy=legacy, optional=shape == "optional")
+            kind = Value(
+                "double", vector, row.get("unit"), legacy=legacy, optional=shape == "optional"
+            )
             held: Any = tuple[float, ...]
         elif reference is not None:
             required = bool(reference.get("required", True))
-            kind = Reference(reference["resolution"], str(reference.get("target")), shape, required, legacy)
+            kind = Reference(
+                reference["resolution"], str(reference.get("target")), shape, required, legacy
+            )
             held = str | Component
         else:
             least, most = row.get("min") or 0, row.get("max")
             for key, count in (("min", least), ("max", 0 if most is None else most)):
-                if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count <= MAX_VALUES:
-                    raise self.error(f"'{key}' of '{name}' must be a number of values, not '{count}'", owner, name, key)
+                if (
+                    isinstance(count, bool)
+                    or not isinstance(count, int)
+                    or not 0 <= count <= MAX_VALUES
+                ):
+                    raise self.error(
+                        f"'{key}' of '{name}' must be a number of values, not '{count}'",
+                        owner,
+                        name,
+                        key,
+                    )
             if not isinstance(row.get("unit") or "", str):
                 raise self.error(f"'unit' of '{name}' must be a text", owner, name, "unit")
             kind = Value(cast("Any", typed), shape, row.get("unit"), "", least, most, legacy)
@@ -238,7 +322,9 @@ class _Declarations:
             return converter(kind)(text)
         except Unclean:
             words = kind.words() if isinstance(kind, Value) else "a text"
-            raise self.error(f"the default of '{name}' must be {words}, not '{text}'", owner, name, "default") from None
+            raise self.error(
+                f"the default of '{name}' must be {words}, not '{text}'", owner, name, "default"
+            ) from None
 
     def holding(self, owner: str, row: Any, shape: str, legacy: bool) -> tuple[Any, Kind, Any]:
         """Type, kind and default of a property that holds objects."""
@@ -253,7 +339,11 @@ class _Declarations:
         word = default.get("class") if isinstance(default, dict) else typed
         starts = self.cls(str(word), owner, name, "default", str(word))
         if starts.abstract or not issubclass(starts, accepts):
-            raise self.error(f"the default of '{name}' must be an object: {{\"class\": ...}} of {typed}", owner, name)
+            raise self.error(
+                f"the default of '{name}' must be an object: {{\"class\": ...}} of {typed}",
+                owner,
+                name,
+            )
         form = "optional" if shape == "optional" else "unnamed" if row.get("unnamed") else "single"
         named = {"name": name} if form == "single" else {}
         return accepts, Held(cast("Any", form), legacy), made(starts, **named)
@@ -262,7 +352,13 @@ class _Declarations:
         rows = self.rows(self.entries[name], "properties", name)
         for row in rows:
             where = f"a property of '{name}'"
-            self.mapping(row, _OF_A_PROPERTY, where, name, str(row.get("name") if isinstance(row, dict) else ""))
+            self.mapping(
+                row,
+                _OF_A_PROPERTY,
+                where,
+                name,
+                str(row.get("name") if isinstance(row, dict) else ""),
+            )
             if not isinstance(row.get("name"), str):
                 raise self.error(f"{where} has no name", name)
             if "type" not in row:
@@ -273,9 +369,12 @@ class _Declarations:
         rows = [*self.rows(entry, "sockets", name), *self.rows(entry, "inputs", name)]
         for row in rows:
             self.mapping(row, _OF_A_SOCKET, f"a socket of '{name}'", name)
-            if not isinstance(row.get("tag"), str) or not ("connectee_type" in row or "type" in row):
+            if not isinstance(row.get("tag"), str) or not (
+                "connectee_type" in row or "type" in row
+            ):
                 raise self.error(
-                    f"a socket of '{name}' needs 'tag' and 'connectee_type', an input 'tag' and 'type'", name
+                    f"a socket of '{name}' needs 'tag' and 'connectee_type', an input 'tag' and 'type'",
+                    name,
                 )
         return rows
 
@@ -292,7 +391,9 @@ class _Declarations:
             raise self.error(f"'{key}' must be a list", *words, key)
         return result
 
-    def mapping(self, value: Any, known: tuple[str, ...] | None, what: str, *words: str) -> dict[str, Any]:
+    def mapping(
+        self, value: Any, known: tuple[str, ...] | None, what: str, *words: str
+    ) -> dict[str, Any]:
         """A value that must be an object of JSON with keys that are known."""
         if not isinstance(value, dict):
             raise self.error(f"{what} must be an object of JSON, in braces", *words)
@@ -313,4 +414,10 @@ def _text(value: Any) -> str:
     """A default as a document has it; in the file it may be written as JSON has it, too."""
     if isinstance(value, bool):
         return str(value).lower()
-    return " ".join(map(_text, value)) if isinstance(value, list) else "" if value is None else str(value)
+    return (
+        " ".join(map(_text, value))
+        if isinstance(value, list)
+        else ""
+        if value is None
+        else str(value)
+    )

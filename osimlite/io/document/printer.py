@@ -25,10 +25,9 @@ DECLARATION = '<?xml version="1.0" encoding="UTF-8" ?>'
 def to_text(top: Object, *, numbers: Numbers = "shortest", comments: bool = True) -> str:
     """The document of a model, or of another object that has one of its own, such as the setup of a tool.
 
-    Args:
-        top: what to print; components given as references must be part of it, if it is a model.
-        numbers: ``"shortest"`` prints the shortest decimal that reads back equal, ``"opensim"`` 17 significant digits.
-        comments: whether to print the comments the model was read with.
+    Args: top: what to print; components given as references must be part of it, if it is a model.
+        numbers: ``"shortest"`` prints the shortest decimal that reads back equal, ``"opensim"`` 17
+        significant digits. comments: whether to print the comments the model was read with.
 
     Raises:
         ModelError: a reference leads to a component outside the model.
@@ -39,8 +38,8 @@ def to_text(top: Object, *, numbers: Numbers = "shortest", comments: bool = True
 def write(top: Object, path: str | Path, *, numbers: Numbers = "shortest") -> None:
     """Write the file of a model or of another object; it appears whole or not at all.
 
-    What was read from a file of its own and is unchanged stays a reference to that file. Arguments and errors as
-    `to_text`.
+    What was read from a file of its own and is unchanged stays a reference to that file. Arguments
+    and errors as `to_text`.
     """
     write_atomically(path, _document(_Printer(top, numbers, True, Path(path).resolve().parent)))
 
@@ -61,7 +60,9 @@ def _document(printer: _Printer) -> str:
 class _Printer:
     """Collects the lines of one document; `folder` is where it will stand, if that is known."""
 
-    def __init__(self, top: Object, numbers: str, comments: bool, folder: Path | None = None) -> None:
+    def __init__(
+        self, top: Object, numbers: str, comments: bool, folder: Path | None = None
+    ) -> None:
         if not isinstance(top, Object) or type(top).abstract:
             expect_model(top)
         self.top = top
@@ -82,7 +83,9 @@ class _Printer:
         if isinstance(item, Unknown):
             self._unknown(item, depth)
         elif layout is not None and layout.include is not None and layout.include.held == item:
-            self.lines.append(f"{indent}<{item.tag} file={quoted(self._place_of(layout.include))} />")
+            self.lines.append(
+                f"{indent}<{item.tag} file={quoted(self._place_of(layout.include))} />"
+            )
         else:
             head = f"{indent}<{item.tag}" + (f" name={quoted(name)}" if name else "")
             if layout is not None:
@@ -92,8 +95,13 @@ class _Printer:
                 self._block(layout.defaults, depth + 1)
             present = item.model_fields_set
             default = self.defaults.get(type(item))
-            # What nobody has asked for is no part of the object yet, and need not become one to say nothing.
-            silent = defaults(type(item))[1].keys() - item.__dict__.keys() - present if default is None else set()
+            # What nobody has asked for is no part of the object yet, and need not become one to say
+            # nothing.
+            silent = (
+                defaults(type(item))[1].keys() - item.__dict__.keys() - present
+                if default is None
+                else set()
+            )
             if silent:
                 silent &= _silent(type(item))
             for spec in field_specs(type(item)).values():
@@ -106,9 +114,16 @@ class _Printer:
                     spec.name in present
                     or (default is not None and value != getattr(default, spec.name))
                     or (default is None and layout is not None and spec.name in layout.inherited)
-                    or (default is None and isinstance(spec.kind, Held) and has_content(value, spec))
-                    # A part may start with a value that its class does not have elsewhere, as the axes of a transform.
-                    or (default is None and not isinstance(spec.kind, Held) and value != spec.default == spec.default)
+                    or (
+                        default is None and isinstance(spec.kind, Held) and has_content(value, spec)
+                    )
+                    # A part may start with a value that its class does not have elsewhere, as the
+                    # axes of a transform.
+                    or (
+                        default is None
+                        and not isinstance(spec.kind, Held)
+                        and value != spec.default == spec.default
+                    )
                 ):
                     self._property(item, spec, value, depth + 1)
             if layout is not None and None in layout.before:
@@ -125,7 +140,9 @@ class _Printer:
             if self.numbers == "opensim":
                 # Here OpenSim writes out all that a class has in its first property system.
                 item = copy(item)
-                item.model_fields_set.update(spec.name for spec in field_specs(type(item)).values() if spec.legacy)
+                item.model_fields_set.update(
+                    spec.name for spec in field_specs(type(item)).values() if spec.legacy
+                )
             self.object(item, item.name, depth + 1)
         self.lines.append("\t" * depth + "</defaults>")
         self.defaults = defaults
@@ -150,10 +167,15 @@ class _Printer:
             if value is None and not (isinstance(kind, Value) and kind.scalar != "string"):
                 return  # An empty element would be an empty text.
             text = self._text(item, spec, value)
-            # OpenSim closes what is empty in its first property system like this, and all else with an end tag.
+            # OpenSim closes what is empty in its first property system like this, and all else with
+            # an end tag.
             short = not text and spec.legacy
-            self.lines.append(f"{indent}<{spec.tag} />" if short else f"{indent}<{spec.tag}>{text}</{spec.tag}>")
-        elif kind.form == "single" and not (isinstance(value, Unknown) and value.class_name in field_specs(type(item))):
+            self.lines.append(
+                f"{indent}<{spec.tag} />" if short else f"{indent}<{spec.tag}>{text}</{spec.tag}>"
+            )
+        elif kind.form == "single" and not (
+            isinstance(value, Unknown) and value.class_name in field_specs(type(item))
+        ):
             self.object(value, spec.tag, depth)
         elif kind.form == "unnamed":
             self.object(value, value.name, depth)
@@ -180,7 +202,11 @@ class _Printer:
     def _named(self, item: Object, reference: Reference, value: Any) -> Any:
         if isinstance(value, Component):
             if self.tree is None:
-                return value.path if reference.rule == "socket" or "path" in reference.rule else value.name
+                return (
+                    value.path
+                    if reference.rule == "socket" or "path" in reference.rule
+                    else value.name
+                )
             return self.tree.text_for(self.tree.owner_of(item), reference, value)
         if isinstance(value, tuple):
             return tuple(self._named(item, reference, word) for word in value)
@@ -204,7 +230,11 @@ class _Printer:
 def _silent(cls: type[Object]) -> frozenset[str]:
     """The properties of a class whose objects and lists, as they are made for it, are not printed."""
     made = defaults(cls)[1]
-    held = (spec for spec in field_specs(cls).values() if spec.name in made and isinstance(spec.kind, Held))
+    held = (
+        spec
+        for spec in field_specs(cls).values()
+        if spec.name in made and isinstance(spec.kind, Held)
+    )
     return frozenset(spec.name for spec in held if not has_content(made[spec.name](), spec))
 
 
@@ -216,7 +246,8 @@ def has_content(value: Any, spec: FieldSpec | None = None) -> bool:
         return False
     form = spec.kind.form if spec is not None and isinstance(spec.kind, Held) else ""
     if form == "list" or (form == "optional" and spec is not None and spec.factory is None):
-        # What nothing puts there is content even if nothing in it was set: a marker at the origin in a set of one.
+        # What nothing puts there is content even if nothing in it was set: a marker at the origin
+        # in a set of one.
         return True
     if value.model_fields_set - {"name"} or value.layout is not None:
         return True

@@ -53,7 +53,9 @@ _COUNT = etree.XPath("count(descendant-or-self::*)")
 _MIXED = etree.XPath("/descendant::*[*][text()]")
 """Elements in which there is text beside an element; blank text the parser leaves out."""
 
-_ATTRIBUTES = etree.XPath("boolean(//@*[name() != 'name' and name() != 'file' and name() != 'Version'])")
+_ATTRIBUTES = etree.XPath(
+    "boolean(//@*[name() != 'name' and name() != 'file' and name() != 'Version'])"
+)
 """Whether there is an attribute besides those that mean something."""
 
 _LEAST_COUNTED = 100_000
@@ -105,13 +107,11 @@ class Document:
 def read(path: str | Path, *, classes: Paths = ()) -> Model:
     """Read a model file.
 
-    Args:
-        path: the file.
-        classes: files that declare the classes of plug-ins; without them objects of such classes are kept as text.
+    Args: path: the file. classes: files that declare the classes of plug-ins; without them objects
+        of such classes are kept as text.
 
-    Raises:
-        DocumentError: the file is missing or is not an OpenSim model document; with line and column.
-        OsimliteError: a class is declared wrongly; with file and line.
+    Raises: DocumentError: the file is missing or is not an OpenSim model document; with line and
+        column. OsimliteError: a class is declared wrongly; with file and line.
     """
     from osimlite.io.document.plugins import used
 
@@ -141,7 +141,9 @@ def read_text(text: str | bytes, *, classes: Paths = ()) -> Model:
     from osimlite.io.document.plugins import used
 
     with used(classes):
-        return read_document(Source(text) if isinstance(text, bytes) else Source.of_characters(text)).model
+        return read_document(
+            Source(text) if isinstance(text, bytes) else Source.of_characters(text)
+        ).model
 
 
 def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = False) -> Document:
@@ -149,14 +151,18 @@ def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = 
 
     A text that is `to_check` is also asked whether there is anything between its elements.
 
-    Raises:
-        DocumentError: the text is not an OpenSim document, or holds something else; with line and column.
+    Raises: DocumentError: the text is not an OpenSim document, or holds something else; with line
+        and column.
     """
     try:
         root = parse(source)
         if to_check:
             mixed = cast("list[etree._Element]", _MIXED(root))
-            source.mixed = [number for number, each in enumerate(root.iter("*")) if each in mixed] if mixed else ()
+            source.mixed = (
+                [number for number, each in enumerate(root.iter("*")) if each in mixed]
+                if mixed
+                else ()
+            )
             source.attributes = cast("bool", _ATTRIBUTES(root))
     except NotWellFormedError as fault:
         from osimlite.io.document.repair import read_repaired
@@ -169,11 +175,13 @@ def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = 
     return document_of(source, root, version_of(source, root), of)
 
 
-def document_of(source: Source, root: etree._Element, version: int, of: type[Object] = Model) -> Document:
+def document_of(
+    source: Source, root: etree._Element, version: int, of: type[Object] = Model
+) -> Document:
     """The document that an element tree stands for.
 
-    Raises:
-        DocumentError: there is no such object in it, or something that no rule carries over from an older version.
+    Raises: DocumentError: there is no such object in it, or something that no rule carries over
+        from an older version.
     """
     with collector_paused():
         if version < CURRENT_VERSION:
@@ -182,7 +190,9 @@ def document_of(source: Source, root: etree._Element, version: int, of: type[Obj
                 wrapped = _upgraded(source, root, CURRENT_VERSION)
                 return _document(source, root, version, of, wrapped, is_known=True)
             return _document(source, root, version, of, _upgraded(source, root, version))
-        document = None if _class_of(_first(root)) is None else _document(source, root, version, of, None)
+        document = (
+            None if _class_of(_first(root)) is None else _document(source, root, version, of, None)
+        )
         if document is None or any(note.kind in _NOT_KNOWN for note in document.notes):
             from osimlite.io.document.upgrade import with_present_names
 
@@ -213,7 +223,11 @@ def require_stated_version(source: Source) -> None:
     except NotWellFormedError:
         return
     version = version_of(source, root)
-    newer = None if root.tag != ROOT or version >= CURRENT_VERSION else find_newer_content(root, version)
+    newer = (
+        None
+        if root.tag != ROOT or version >= CURRENT_VERSION
+        else find_newer_content(root, version)
+    )
     if newer is None:
         return
     number = [*root.iter(etree.Element)].index(newer.element)
@@ -301,7 +315,8 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
     """
     data = source.data if source.encoding in ("utf-8", "utf-8-sig") else source.text.encode()
     data = without_namespaces(data)
-    # OpenSim accepts blank lines before the XML declaration, with or without a byte-order mark before them.
+    # OpenSim accepts blank lines before the XML declaration, with or without a byte-order mark
+    # before them.
     unmarked = data.removeprefix(BOM_UTF8)
     body = unmarked.lstrip()
     if body.startswith(BOM_UTF8):
@@ -321,15 +336,22 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
         root = etree.fromstring(body, parser)
     except etree.XMLSyntaxError as error:
         if not body:
-            raise NotWellFormedError("the file is empty", file=source.file, line=1, column=1) from None
+            raise NotWellFormedError(
+                "the file is empty", file=source.file, line=1, column=1
+            ) from None
         message = str(error.msg or "the text is not XML")
-        raise _not_well_formed(source, error.position[0] + blank, error.position[1], message) from None
+        raise _not_well_formed(
+            source, error.position[0] + blank, error.position[1], message
+        ) from None
     if root is None:
-        raise NotWellFormedError("not well-formed XML: no element", file=source.file, line=1, column=1)
+        raise NotWellFormedError(
+            "not well-formed XML: no element", file=source.file, line=1, column=1
+        )
     if root.getroottree().docinfo.internalDTD is not None:
         expect_plain_doctype(source)
         for remark in parser.error_log.filter_types(etree.ErrorTypes.WAR_UNDECLARED_ENTITY):
-            # With a DOCTYPE the parser takes it that the entity is declared elsewhere, and leaves it out.
+            # With a DOCTYPE the parser takes it that the entity is declared elsewhere, and leaves
+            # it out.
             raise _not_well_formed(source, remark.line + blank, remark.column, remark.message)
     if not recover:
         source.elements = int(cast("float", _COUNT(root)))
@@ -343,7 +365,9 @@ def _not_well_formed(source: Source, line: int, column: int, message: str) -> No
     words = plain_words(message) if "<" in source.text else "there is no element in it"
     if source.file is not None and source.file.lower().endswith(TABLES):
         words += "; of tables, 'validate', 'info' and 'diff' know more"
-    return NotWellFormedError(f"not well-formed XML: {words}", file=source.file, line=line, column=column)
+    return NotWellFormedError(
+        f"not well-formed XML: {words}", file=source.file, line=line, column=column
+    )
 
 
 def version_of(source: Source, root: etree._Element) -> int:
@@ -371,8 +395,14 @@ def version_of(source: Source, root: etree._Element) -> int:
         message = f"the root element is <{tag}>, not <OpenSimDocument>: this is no OpenSim document"
         raise _meaning(source.fault(DocumentError, message, place), _root_meant(tag, root))
     if number is None:
-        result = "has no Version" if text is None else f'has Version="{text[:40]}", which is not a whole number'
-        raise source.fault(VersionError, f'<OpenSimDocument> {result}; write Version="{CURRENT_VERSION}"', place)
+        result = (
+            "has no Version"
+            if text is None
+            else f'has Version="{text[:40]}", which is not a whole number'
+        )
+        raise source.fault(
+            VersionError, f'<OpenSimDocument> {result}; write Version="{CURRENT_VERSION}"', place
+        )
     message = (
         f"document version {number} is none that OpenSim ever wrote (they begin at {OLDEST}); "
         f'write Version="{CURRENT_VERSION}" if the model is in the current format'
@@ -393,7 +423,11 @@ def _root_meant(tag: str, root: etree._Element) -> str | None:
     name = tag.rpartition(":")[2]
     first = _first(root)
     held = first is not None and nearest(as_written(first.tag), tags(), cutoff=85) is not None
-    return ROOT if held or nearest(name, [ROOT], cutoff=85) is not None else nearest(name, tags(), cutoff=85)
+    return (
+        ROOT
+        if held or nearest(name, [ROOT], cutoff=85) is not None
+        else nearest(name, tags(), cutoff=85)
+    )
 
 
 def _first(root: etree._Element) -> etree._Element | None:
@@ -420,7 +454,11 @@ def _top_in(source: Source, root: etree._Element, reader: ObjectReader, of: type
             tag = as_written(first.tag)
             what = f"a <{tag}>, not a <{of.tag}>"
         at = source.of_tag(0 if first is None else 1)
-        meant = None if first is None or cls is not None else nearest(tag, tags() if of is Object else [of.tag])
+        meant = (
+            None
+            if first is None or cls is not None
+            else nearest(tag, tags() if of is Object else [of.tag])
+        )
         raise _meaning(source.fault(DocumentError, f"the document holds {what}", at), meant)
     reader.count = 1
     top = reader.top(first, cls)
@@ -437,16 +475,21 @@ def _top_in(source: Source, root: etree._Element, reader: ObjectReader, of: type
         for node in nodes:
             remember(node, remarks)
         if remarks:
-            getattr(layout_of(top), place).extend(remarks if place == "after" else [remark.text for remark in remarks])
+            getattr(layout_of(top), place).extend(
+                remarks if place == "after" else [remark.text for remark in remarks]
+            )
     return top
 
 
-def _included_by(source: Source, around: tuple[str, ...] = (), read: list[int] | None = None) -> Included | None:
+def _included_by(
+    source: Source, around: tuple[str, ...] = (), read: list[int] | None = None
+) -> Included | None:
     """What reads the objects that ``file`` attributes of a text name, from files beside it.
 
-    A text without a file has none beside it. Like OpenSim, a file that cannot be read, or holds something else, or
-    is being read already, leaves the object as it is. `around` are the files that are being read, `read` is how many
-    bytes have been read of files so far: a few that name each other often enough would never end.
+    A text without a file has none beside it. Like OpenSim, a file that cannot be read, or holds
+    something else, or is being read already, leaves the object as it is. `around` are the files
+    that are being read, `read` is how many bytes have been read of files so far: a few that name
+    each other often enough would never end.
     """
     around_it = source.file
     if around_it is None:

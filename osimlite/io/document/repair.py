@@ -1,7 +1,8 @@
 """Text that is not quite XML, read where its meaning is certain.
 
-No repair adds or removes a line or an element, so that every position stays what it was: each puts something else in
-place of characters of one line, or spaces in place of what stands in no element. What could mean two things is refused.
+No repair adds or removes a line or an element, so that every position stays what it was: each puts
+something else in place of characters of one line, or spaces in place of what stands in no element.
+What could mean two things is refused.
 """
 
 from __future__ import annotations
@@ -68,7 +69,9 @@ def read_repaired(
     mark = _MARK.search(source.text)
     if mark is not None:
         said = f"'{mark[0].rstrip()[:40]}' is a mark it left; keep one side and take the marks out"
-        raise source.fault(NotWellFormedError, f"an unfinished merge: {said}", source.position(mark.start()))
+        raise source.fault(
+            NotWellFormedError, f"an unfinished merge: {said}", source.position(mark.start())
+        )
     unended = _unended(source.text)
     if unended is not None:
         message = "not well-formed XML: what begins here with '<!' has no end"
@@ -80,11 +83,15 @@ def read_repaired(
     root = parse(Source(text.encode("utf-8", "replace"), source.file))
     spans = source.spans
     tags = [element.tag for element in root.iter(etree.Element)]
-    if len(tags) != len(spans) or any(span.tag != as_written(tag) for span, tag in zip(spans, tags, strict=True)):
+    if len(tags) != len(spans) or any(
+        span.tag != as_written(tag) for span, tag in zip(spans, tags, strict=True)
+    ):
         raise fault
     notes = []
     repairs.sort(key=lambda repair: repair.offset)
-    for repair, number in zip(repairs, elements_at(source, [repair.offset for repair in repairs]), strict=True):
+    for repair, number in zip(
+        repairs, elements_at(source, [repair.offset for repair in repairs]), strict=True
+    ):
         line = source.position(repair.offset).line
         notes.append(Note(repair.kind, number, repair.word, value=repair.meant, line=line))
     return root, notes
@@ -127,7 +134,9 @@ def repaired(text: str) -> tuple[str, list[Repair]]:
     place = depth = 0
     for kind, start, end, _ in markup(text, as_opensim=True):
         gap, piece = text[place:start], text[start:end]
-        pieces.append(_outside(gap, place, repairs) if not depth else _ampersands(gap, place, repairs))
+        pieces.append(
+            _outside(gap, place, repairs) if not depth else _ampersands(gap, place, repairs)
+        )
         if kind == "comment":
             piece = _comment(piece, start, repairs)
         elif kind == "instruction":
@@ -139,7 +148,9 @@ def repaired(text: str) -> tuple[str, list[Repair]]:
                 piece = _blanked(piece)
         elif kind in ("open", "empty"):
             depth += kind == "open"
-            piece = _quoted(_ampersands(_attributes(piece, start, repairs), start, repairs), start, repairs)
+            piece = _quoted(
+                _ampersands(_attributes(piece, start, repairs), start, repairs), start, repairs
+            )
         elif kind == "close":
             if not depth:
                 repairs.append(Repair("overlooked", start, piece, "OpenSim passes over it"))
@@ -173,7 +184,11 @@ def _outside(text: str, offset: int, repairs: list[Repair]) -> str:
         return _blanked(text)
     stripped = text.strip("\ufeff \t\r\n")
     if offset and stripped.startswith("<?") and ">" not in stripped:
-        repairs.append(Repair("overlooked", offset + text.index("<?"), stripped[:40], "OpenSim reads no further"))
+        repairs.append(
+            Repair(
+                "overlooked", offset + text.index("<?"), stripped[:40], "OpenSim reads no further"
+            )
+        )
     elif stripped and "<" not in stripped:
         word = stripped.splitlines()[0][:40]
         repairs.append(Repair("text-outside-root", offset + text.index(stripped), word, ""))
@@ -190,7 +205,11 @@ def _comment(piece: str, offset: int, repairs: list[Repair]) -> str:
     result = _HYPHENS.search(inner)
     if result is None:
         return piece
-    repairs.append(Repair("hyphens-in-comment", offset + 4 + result.start(), result[0], _EN_DASH * len(result[0])))
+    repairs.append(
+        Repair(
+            "hyphens-in-comment", offset + 4 + result.start(), result[0], _EN_DASH * len(result[0])
+        )
+    )
     return f"<!--{_HYPHENS.sub(lambda match: _EN_DASH * len(match[0]), inner)}-->"
 
 
@@ -201,7 +220,9 @@ def _attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
     for match in given:
         kept = last[match["name"]]
         if match is not kept:
-            repairs.append(Repair("duplicate-attribute", offset + match.start(), match["name"], kept[0]))
+            repairs.append(
+                Repair("duplicate-attribute", offset + match.start(), match["name"], kept[0])
+            )
             piece = piece[: match.start()] + _blanked(match[0]) + piece[match.end() :]
     return piece
 
@@ -221,12 +242,18 @@ def _quoted(piece: str, offset: int, repairs: list[Repair]) -> str:
     def quote(match: re.Match[str]) -> str:
         if match["name"] is None:
             return match[0]
-        meant = "OpenSim takes it for quoted" if match["bare"] else "OpenSim takes its value for empty"
+        meant = (
+            "OpenSim takes it for quoted" if match["bare"] else "OpenSim takes its value for empty"
+        )
         repairs.append(Repair("overlooked", offset + match.start(), match[0], meant))
         return f'{match["name"]}="{match["bare"] or ""}"'
 
     def part(match: re.Match[str]) -> str:
-        repairs.append(Repair("overlooked", offset + match.start(), match[0], "OpenSim needs no blank behind it"))
+        repairs.append(
+            Repair(
+                "overlooked", offset + match.start(), match[0], "OpenSim needs no blank behind it"
+            )
+        )
         return f"{match[0]} "
 
     return _VALUE.sub(quote, _TOUCHING.sub(part, piece)) if "=" in piece else piece
@@ -235,19 +262,30 @@ def _quoted(piece: str, offset: int, repairs: list[Repair]) -> str:
 def _ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
     """Text in which an ampersand that begins no reference stands for itself, as does what would end a CDATA section.
 
-    HTML's references mean what they mean in HTML; of a number that is no character OpenSim keeps a byte.
+    HTML's references mean what they mean in HTML; of a number that is no character OpenSim keeps a
+    byte.
     """
     if "]]>" in text:
-        repairs += [Repair("overlooked", offset + m.start(), m[0], "OpenSim keeps it") for m in _ENDING.finditer(text)]
+        repairs += [
+            Repair("overlooked", offset + m.start(), m[0], "OpenSim keeps it")
+            for m in _ENDING.finditer(text)
+        ]
         text = text.replace("]]>", "]]&gt;")
     if "&" not in text:
         return text
 
     def number(match: re.Match[str]) -> str:
         value = int(match[1], 16) if match[1] else int(match[2])
-        if value in (9, 10, 13) or 32 <= value < 0xD800 or 0xE000 <= value < 0xFFFE or 0x10000 <= value < 0x110000:
+        if (
+            value in (9, 10, 13)
+            or 32 <= value < 0xD800
+            or 0xE000 <= value < 0xFFFE
+            or 0x10000 <= value < 0x110000
+        ):
             return match[0]
-        repairs.append(Repair("overlooked", offset + match.start(), match[0], "OpenSim makes a byte of it"))
+        repairs.append(
+            Repair("overlooked", offset + match.start(), match[0], "OpenSim makes a byte of it")
+        )
         return _REPLACEMENT
 
     def mend(match: re.Match[str]) -> str:
@@ -255,7 +293,9 @@ def _ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
         if name in _OWN_ENTITIES:
             return match[0]
         meant = html5.get(f"{name};") if name else None
-        repairs.append(Repair("bare-ampersand", offset + match.start(), match[0], meant or match[0]))
+        repairs.append(
+            Repair("bare-ampersand", offset + match.start(), match[0], meant or match[0])
+        )
         if meant is None:
             return "&amp;" + match[0][1:]
         return meant.replace("\n", " ").replace("&", "&amp;").replace("<", "&lt;")

@@ -97,7 +97,9 @@ class Source:
             for match in ATTRIBUTE.finditer(self.text, span.start, span.tag_end):
                 before = span.start + len(self.text[span.start : match.start()].rstrip())
                 value = match["quoted"][1:-1]
-                result.setdefault(match["name"], Attribute(before, match.start(), match.end(), value))
+                result.setdefault(
+                    match["name"], Attribute(before, match.start(), match.end(), value)
+                )
         return self._attributes[number]
 
     @cached_property
@@ -136,7 +138,8 @@ class Source:
         inner, end = number + 1, self.spans[number].end
         while inner < len(self._starts) and self._starts[inner] < end:
             yield inner
-            # Elements are numbered as they begin: the next beside this one is the first that begins behind its end.
+            # Elements are numbered as they begin: the next beside this one is the first that begins
+            # behind its end.
             inner = bisect_left(self._starts, self.spans[inner].end, inner + 1)
 
     def child(self, number: int, tag: str) -> int | None:
@@ -232,7 +235,9 @@ _MARKS = {
 }
 _DECLARED = re.compile(rb"\s*<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]+)")
 
-_BYTEWISE = re.compile(r"utf-?8|us-ascii|ascii|iso-?8859|latin|windows-|cp\d|mac|koi8|gb|big5|shift|euc")
+_BYTEWISE = re.compile(
+    r"utf-?8|us-ascii|ascii|iso-?8859|latin|windows-|cp\d|mac|koi8|gb|big5|shift|euc"
+)
 
 
 def _encoding(data: bytes) -> str:
@@ -257,7 +262,9 @@ def _decoded(data: bytes, encoding: str) -> str:
     if encoding != "cp1252":
         return data.decode(encoding, "replace")
     codecs.register_error("osimlite.cp1252", _as_windows)
-    return data.decode("utf-8-sig" if data.startswith(codecs.BOM_UTF8) else "utf-8", "osimlite.cp1252")
+    return data.decode(
+        "utf-8-sig" if data.startswith(codecs.BOM_UTF8) else "utf-8", "osimlite.cp1252"
+    )
 
 
 def _as_windows(error: UnicodeError) -> tuple[str, int]:

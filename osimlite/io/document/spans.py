@@ -11,8 +11,8 @@ from typing import NamedTuple, overload
 class Span(NamedTuple):
     """Where one element stands, as character offsets into the text.
 
-    `start` is at ``<``, `tag_end` behind the ``>`` of the start tag, `inner_end` at ``</``, `end` behind the element;
-    for an empty element all of the last three are equal.
+    `start` is at ``<``, `tag_end` behind the ``>`` of the start tag, `inner_end` at ``</``, `end`
+    behind the element; for an empty element all of the last three are equal.
     """
 
     tag: str
@@ -25,7 +25,8 @@ class Span(NamedTuple):
 class Markup(NamedTuple):
     """One piece of markup in a text: characters `start` to `end`.
 
-    `kind` is ``open``, ``empty`` or ``close`` for tags, else ``comment``, ``cdata``, ``instruction`` or ``doctype``.
+    `kind` is ``open``, ``empty`` or ``close`` for tags, else ``comment``, ``cdata``,
+    ``instruction`` or ``doctype``.
     """
 
     kind: str
@@ -34,8 +35,8 @@ class Markup(NamedTuple):
     tag: str = ""
 
 
-# No part of a tag may be given back once matched, and none goes past the next "<": the time is linear in the length
-# of any text, also of one that is no XML.
+# No part of a tag may be given back once matched, and none goes past the next "<": the time is
+# linear in the length of any text, also of one that is no XML.
 _MARKUP = re.compile(
     r"<(?:(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)|/(?P<close>[^\s<>]++)\s*+>|"
     r"(?P<open>[^\s/<>!?\"']++)(?:[^<>\"'/]++|/(?!>)|\"[^\"<]*+\"|'[^'<]*+')*+(?P<empty>/?)>)"
@@ -56,10 +57,8 @@ _INSTRUCTION_END = {False: "?>", True: ">"}
 def markup(text: str, *, as_opensim: bool = False) -> Iterator[Markup]:
     """Yield the markup of a text in order; it ends where a comment or its like has no end.
 
-    Args:
-        text: the text.
-        as_opensim: whether an instruction ends at its first ``>``, as it does for OpenSim, and not at
-            ``?>``, as it does for XML.
+    Args: text: the text. as_opensim: whether an instruction ends at its first ``>``, as it does for
+        OpenSim, and not at ``?>``, as it does for XML.
     """
     place = 0
     while (match := _MARKUP.search(text, place)) is not None:
@@ -86,9 +85,9 @@ _REMARK = re.compile(r"<(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)")
 def blank_remarks(text: str, character: str = " ") -> str:
     """Return a text in which each comment, CDATA section, instruction and DOCTYPE is one character as often.
 
-    One that has no end stays as it is. An ending that was not found once is not looked for again, so that
-    the time is linear in the length of any text: a pattern such as `<!--.*?-->` looks for the end of each of
-    many open comments through all that follows.
+    One that has no end stays as it is. An ending that was not found once is not looked for again,
+    so that the time is linear in the length of any text: a pattern such as `<!--.*?-->` looks for
+    the end of each of many open comments through all that follows.
     """
     pieces: list[str] = []
     missing: set[str] = set()
@@ -128,7 +127,8 @@ def spans_of(text: str, *, as_opensim: bool = False) -> list[Span]:
     for match in _MARKUP.finditer(text):
         start, end = match.span()
         if start < behind:
-            # Inside a comment or its like; the match holds no second "<", and so hides nothing behind its end.
+            # Inside a comment or its like; the match holds no second "<", and so hides nothing
+            # behind its end.
             continue
         if match["close"] is not None:
             if open_numbers:
@@ -143,7 +143,11 @@ def spans_of(text: str, *, as_opensim: bool = False) -> list[Span]:
             inner_ends.append(end)
             ends.append(end)
         else:
-            ending = _INSTRUCTION_END[as_opensim] if match["special"] == "?" else _SPECIAL[match["special"]][1]
+            ending = (
+                _INSTRUCTION_END[as_opensim]
+                if match["special"] == "?"
+                else _SPECIAL[match["special"]][1]
+            )
             result = text.find(ending, end)
             if result < 0:
                 break
@@ -226,7 +230,13 @@ class PlainSpans(Sequence[Span]):
         text = self.text
         place = text.index("<", place)
         while text[place + 1] in "!?":
-            ending = "-->" if text.startswith("<!--", place) else "]]>" if text[place + 1] == "!" else "?>"
+            ending = (
+                "-->"
+                if text.startswith("<!--", place)
+                else "]]>"
+                if text[place + 1] == "!"
+                else "?>"
+            )
             place = text.index("<", text.index(ending, place + 2))
         return place
 
@@ -236,7 +246,8 @@ class PlainSpans(Sequence[Span]):
         if match["empty"]:
             return Span(tag, start, tag_end, tag_end, tag_end)
         close = self.text.rfind(f"</{tag}") if number == 0 else -1
-        # Behind the root there is rarely anything, which could be a comment with what looks like its end.
+        # Behind the root there is rarely anything, which could be a comment with what looks like
+        # its end.
         if close < 0 or "".join(self.text[close:].split()) != f"</{tag}>":
             close = self._close(tag, tag_end)
         return Span(tag, start, tag_end, close, self.text.index(">", close) + 1)
@@ -259,7 +270,11 @@ class PlainSpans(Sequence[Span]):
             return close
         first = self.text.index(f"</{tag}", close)
         is_its = self.text[first + len(tag) + 2] in "> \t\r\n"
-        if is_its and self.text.find(f"<{tag}", close, first) < 0 and self._is_in_sight(first, close):
+        if (
+            is_its
+            and self.text.find(f"<{tag}", close, first) < 0
+            and self._is_in_sight(first, close)
+        ):
             # As good as always: what stands before it neither nests nor hides one.
             return first
         depth = 1

@@ -26,8 +26,8 @@ from osimlite.schema.model import CURRENT_VERSION, Model
 class Survey:
     """What could be read of a text.
 
-    `document` is None if nothing could. `faults` are the errors the reader would have raised. Of a text that is not
-    well-formed only what stands before line `sure_until` was certainly understood.
+    `document` is None if nothing could. `faults` are the errors the reader would have raised. Of a
+    text that is not well-formed only what stands before line `sure_until` was certainly understood.
     """
 
     source: Source
@@ -46,7 +46,8 @@ def survey(source: Source, *, of: type[Object] = Model) -> Survey:
     except NotWellFormedError as fault:
         return _recovered(source, fault, of)
     except VersionError as fault:
-        # Without a version the document is taken for a current one; an older format would give false findings.
+        # Without a version the document is taken for a current one; an older format would give
+        # false findings.
         if fault.version is not None:
             return Survey(source, None, [fault])
         try:

@@ -10,17 +10,32 @@ from osimlite.io.document.source import Position, Source
 from osimlite.io.document.spans import markup
 
 _PLAIN = (
-    (r"Opening and ending tag mismatch: (\S+) line (\d+) and (\S+)", r"<\1> of line \2 is not closed before </\3>"),
-    (r"Premature end of data in tag (\S+) line (\d+)", r"the file ends before <\1> of line \2 is closed"),
+    (
+        r"Opening and ending tag mismatch: (\S+) line (\d+) and (\S+)",
+        r"<\1> of line \2 is not closed before </\3>",
+    ),
+    (
+        r"Premature end of data in tag (\S+) line (\d+)",
+        r"the file ends before <\1> of line \2 is closed",
+    ),
     (r"Couldn't find end of Start Tag (\S+)(?: line \d+)?", r"the tag <\1 has no '>'"),
     (r"EndTag: '</' not found", "the file ends before its elements are closed"),
     (r"Failed to parse QName '(.*)'", r"'\1' is no name of an element or attribute"),
-    (r"StartTag: invalid element name", "no tag begins with this '<'; write &lt; for the character itself"),
-    (r"Extra content at the end of the document", "something follows after the root element has ended"),
+    (
+        r"StartTag: invalid element name",
+        "no tag begins with this '<'; write &lt; for the character itself",
+    ),
+    (
+        r"Extra content at the end of the document",
+        "something follows after the root element has ended",
+    ),
     (r"Specification mandates value for attribute (\S+)", r"the attribute \1 has no value"),
     (r"AttValue: \" or ' expected", "the value of an attribute stands in quotes"),
     (r"AttValue: ' expected", "the value of an attribute has no closing quote"),
-    (r"Unescaped '<' not allowed in attributes values", "no '<' may stand in an attribute, nor a quote be left out"),
+    (
+        r"Unescaped '<' not allowed in attributes values",
+        "no '<' may stand in an attribute, nor a quote be left out",
+    ),
     (r"attributes construct error", "blanks belong between attributes"),
     (
         r"(?:PCDATA i|I|xmlParse\w+: i)nvalid (?:xml)?Char(?: value)? (\d+).*",

@@ -19,7 +19,8 @@ class MeshFolders:
     """Where the mesh files of a model may be."""
 
     beside: Path | None = None  # the folder of the model's file; None if it has none
-    named: Sequence[str | Path] = ()  # folders that the user names; those in the environment variable follow them
+    # folders that the user names; those in the environment variable follow them
+    named: Sequence[str | Path] = ()
 
     @property
     def searched(self) -> tuple[Path, ...]:
@@ -34,8 +35,9 @@ class MeshFolders:
     def find(self, name: str) -> Path | None:
         """The first file of this name; failing that, one spelled with other capitals or slashes; None without any.
 
-        A model is not to be trusted with what else is on the machine: wherever an absolute name, ``..`` or a link
-        leads, the file itself is in the model's folder or in one that the user names.
+        A model is not to be trusted with what else is on the machine: wherever an absolute name,
+        ``..`` or a link leads, the file itself is in the model's folder or in one that the user
+        names.
 
         Args:
             name: relative to a folder, or absolute.
@@ -56,7 +58,11 @@ class MeshFolders:
         return None
 
     def _holds(self, path: Path) -> bool:
-        roots = self._trusted_elsewhere if self.beside is None else (self.beside, *self._trusted_elsewhere)
+        roots = (
+            self._trusted_elsewhere
+            if self.beside is None
+            else (self.beside, *self._trusted_elsewhere)
+        )
         return any(path.resolve().is_relative_to(root.resolve()) for root in roots)
 
 

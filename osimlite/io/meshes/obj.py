@@ -18,12 +18,17 @@ def read_obj(content: bytes, name: str) -> Surface:
     polygons, normals, chosen = _parsed(content, name)
     if normals is None:
         return Surface(polygons.points, triangulated(*polygons))
-    # A surface has one normal at each point: where faces disagree, the point is there once for each of its normals.
-    pairs, corners = np.unique(np.column_stack((polygons.corners, chosen)), axis=0, return_inverse=True)
+    # A surface has one normal at each point: where faces disagree, the point is there once for each
+    # of its normals.
+    pairs, corners = np.unique(
+        np.column_stack((polygons.corners, chosen)), axis=0, return_inverse=True
+    )
     points = polygons.points[pairs[:, 0]]
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     unit = normals / np.where(lengths > 0.0, lengths, 1.0)
-    return Surface(points, triangulated(points, corners.reshape(-1), polygons.ends), unit[pairs[:, 1]])
+    return Surface(
+        points, triangulated(points, corners.reshape(-1), polygons.ends), unit[pairs[:, 1]]
+    )
 
 
 def obj_polygons(content: bytes, name: str) -> Polygons:
@@ -63,7 +68,9 @@ def _parsed(content: bytes, name: str) -> tuple[Polygons, Array | None, Indices]
                         chosen.append(_place(normal, len(normals)))
                 ends.append(len(corners))
         except ValueError:
-            raise OsimliteError(f"this is no {'point' if kind == 'v' else 'face'}", file=name, line=number) from None
+            raise OsimliteError(
+                f"this is no {'point' if kind == 'v' else 'face'}", file=name, line=number
+            ) from None
     if not corners:
         raise OsimliteError("it is not an OBJ file with faces; save it again", file=name)
     if max(corners) >= len(points):

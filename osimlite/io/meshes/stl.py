@@ -25,8 +25,8 @@ def binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 1.0, 1.
         name: of the file, for messages.
         signs: (3,) of 1 and -1 that multiply the coordinates; the outside remains outside.
 
-    Raises:
-        OsimliteError: it is not an STL file, is cut off, has no triangle, or a corner without a place.
+    Raises: OsimliteError: it is not an STL file, is cut off, has no triangle, or a corner without a
+        place.
     """
     binary = _from_binary(content, name)
     triangles = binary if binary is not None else _from_text(content, name)
@@ -47,7 +47,8 @@ def stl_corners(content: bytes, name: str) -> Array:
 def is_binary(content: bytes) -> bool:
     """Whether a file has the binary form.
 
-    Some programs begin binary files with the word that text files begin with, so the length decides.
+    Some programs begin binary files with the word that text files begin with, so the length
+    decides.
     """
     return 84 < 84 + 50 * _count(content) <= len(content)
 
@@ -70,7 +71,12 @@ def _text_corners(content: bytes, name: str) -> Array:
         raise OsimliteError("it is not an STL file, or is cut off; save it again", file=name)
     numbers = np.array(_CORNER.findall(content + b"\n"), dtype="S").astype(np.float64)
     corners_said = len(re.findall(rb"\bvertex\b", content, re.IGNORECASE))
-    if not len(numbers) or len(numbers) % 3 or len(numbers) != corners_said or b"endsolid" not in content.lower():
+    if (
+        not len(numbers)
+        or len(numbers) % 3
+        or len(numbers) != corners_said
+        or b"endsolid" not in content.lower()
+    ):
         raise OsimliteError("its triangles are damaged or cut off; save it again", file=name)
     _require_finite(numbers, name)
     return numbers.reshape(-1, 3, 3)

@@ -18,7 +18,8 @@ class Polygons(NamedTuple):
     """Polygons of any number of corners."""
 
     points: Array  # (n, 3)
-    corners: Indices  # of all polygons, one after the other (places of points), counter-clockwise seen from outside
+    # of all polygons, one after the other (places of points), counter-clockwise seen from outside
+    corners: Indices
     ends: Indices  # where each polygon ends in `corners`, increasing
 
 
@@ -37,7 +38,8 @@ class Surface:
         turned = a * b * c < 0.0
         triangles, normals = self.triangles[:, ::-1] if turned else self.triangles, self.normals
         if normals is not None:
-            # They are stretched the other way, by 1/a, 1/b, 1/c; these products serve what is flat too.
+            # They are stretched the other way, by 1/a, 1/b, 1/c; these products serve what is flat
+            # too.
             normals = normals * np.array((b * c, c * a, a * b)) * (-1.0 if turned else 1.0)
             lengths = np.linalg.norm(normals, axis=1, keepdims=True)
             normals = normals / np.where(lengths > 0.0, lengths, 1.0)
@@ -59,16 +61,16 @@ MAX_EAR_WORK = 250_000
 """Sum of the squares of the corners of polygons that are cut at their ears, which takes ten seconds at most.
 
 Polygons beyond that are cut from one corner, which is right of convex ones. Meshes of bones have
-triangles; a polygon of a million corners would take years."""
+triangles; a polygon of a million corners would take years.
+"""
 
 
 def triangulated(points: Array, corners: Indices, ends: Indices) -> Indices:
     """Triangles (t, 3) that cover polygons, turning the same way.
 
-    Args:
-        points: (n, 3).
-        corners: of all polygons, one after the other (places of points).
-        ends: where each polygon ends in `corners`, increasing; polygons of fewer than three corners are left out.
+    Args: points: (n, 3). corners: of all polygons, one after the other (places of points). ends:
+        where each polygon ends in `corners`, increasing; polygons of fewer than three corners are
+        left out.
     """
     starts = np.concatenate(([0], ends[:-1])).astype(np.int64)
     sizes = ends - starts
@@ -115,7 +117,10 @@ def _ears(corners: Array) -> Indices:
     while len(left) > 3:
         ears = ((left[k - 1], left[k], left[(k + 1) % len(left)]) for k in range(len(left)))
         # A polygon that crosses itself may have no ear; then any corner will do.
-        ear = next((ear for ear in ears if _is_ear(corners, ear, left, normal)), (left[0], left[1], left[2]))
+        ear = next(
+            (ear for ear in ears if _is_ear(corners, ear, left, normal)),
+            (left[0], left[1], left[2]),
+        )
         triangles.append(ear)
         left.remove(ear[1])
     return np.array([*triangles, left], dtype=np.int64)
@@ -126,5 +131,8 @@ def _is_ear(corners: Array, ear: tuple[int, int, int], left: Iterable[int], norm
     if np.cross(b - a, c - b) @ normal <= 0.0:
         return False
     others = corners[[place for place in left if place not in ear]]
-    inside = [np.cross(end - start, others - start) @ normal >= 0.0 for start, end in ((a, b), (b, c), (c, a))]
+    inside = [
+        np.cross(end - start, others - start) @ normal >= 0.0
+        for start, end in ((a, b), (b, c), (c, a))
+    ]
     return not bool(np.any(inside[0] & inside[1] & inside[2]))

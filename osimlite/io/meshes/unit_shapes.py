@@ -58,7 +58,9 @@ def cube() -> Surface:
             normals.append(np.tile(sign * np.eye(3)[axis], (4, 1)))
             corners = np.array(((0, 1, 2), (0, 2, 3))) + first
             triangles.append(corners if sign > 0.0 else corners[:, ::-1])
-    return Surface(np.concatenate(points), np.concatenate(triangles), np.concatenate(normals), is_closed=True)
+    return Surface(
+        np.concatenate(points), np.concatenate(triangles), np.concatenate(normals), is_closed=True
+    )
 
 
 @cache
@@ -68,17 +70,18 @@ def sheet() -> Surface:
     return Surface(points, np.array(((0, 2, 1), (0, 3, 2))), np.tile((-1.0, 0.0, 0.0), (4, 1)))
 
 
-def _strip(start: tuple[float, float], end: tuple[float, float], normal: tuple[float, float]) -> Array:
+def _strip(
+    start: tuple[float, float], end: tuple[float, float], normal: tuple[float, float]
+) -> Array:
     return np.array(((*start, *normal), (*end, *normal)), dtype=float)
 
 
 def _turned(strips: Sequence[Array], slices: int = SLICES) -> Surface:
     """The surface that lines in a half plane sweep when they turn about Z.
 
-    Args:
-        strips: lines (k, 4), each row distance from Z, height, and the outward normal in the same two directions. With
-            the distance to the right and the height up, the outside is to the right of the way along a line.
-        slices: how many there are around.
+    Args: strips: lines (k, 4), each row distance from Z, height, and the outward normal in the same
+        two directions. With the distance to the right and the height up, the outside is to the
+        right of the way along a line. slices: how many there are around.
     """
     around = 2.0 * np.pi * np.arange(slices) / slices
     points: list[Array] = []
@@ -88,7 +91,9 @@ def _turned(strips: Sequence[Array], slices: int = SLICES) -> Surface:
     for strip in strips:
         for vectors, columns in ((points, strip[:, :2]), (normals, strip[:, 2:])):
             out, up = columns[:, :1], np.repeat(columns[:, 1:], slices, axis=1)
-            vectors.append(np.stack((out * np.cos(around), out * np.sin(around), up), axis=2).reshape(-1, 3))
+            vectors.append(
+                np.stack((out * np.cos(around), out * np.sin(around), up), axis=2).reshape(-1, 3)
+            )
         row, k = np.divmod(np.arange((len(strip) - 1) * slices), slices)
         a, b = first + row * slices + k, first + row * slices + (k + 1) % slices
         # On the axis nothing is between two slices.
@@ -96,7 +101,9 @@ def _turned(strips: Sequence[Array], slices: int = SLICES) -> Surface:
         triangles.append(np.column_stack((a, b, b + slices))[apart[row]])
         triangles.append(np.column_stack((a, b + slices, a + slices))[apart[row + 1]])
         first += len(strip) * slices
-    return Surface(np.concatenate(points), np.concatenate(triangles), np.concatenate(normals), is_closed=True)
+    return Surface(
+        np.concatenate(points), np.concatenate(triangles), np.concatenate(normals), is_closed=True
+    )
 
 
 def normals_of(surface: Surface) -> Array:

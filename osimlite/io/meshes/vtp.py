@@ -1,8 +1,8 @@
 """Reading surfaces in VTK's XML format (``.vtp``, PolyData), in every encoding that VTK writes.
 
-The format: https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html. Numbers stand as text, or as
-base64 in place, or after the tree, raw or as base64; either of the last three may be compressed in blocks. Vertices
-and lines have no surface and are passed over.
+The format: https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html. Numbers stand
+as text, or as base64 in place, or after the tree, raw or as base64; either of the last three may be
+compressed in blocks. Vertices and lines have no surface and are passed over.
 """
 
 from __future__ import annotations
@@ -75,8 +75,8 @@ def read_vtp(content: bytes, name: str) -> Surface:
         content: of the file.
         name: of the file, for messages.
 
-    Raises:
-        OsimliteError: it is not such a file, is damaged, or is compressed in a way that osimlite does not know.
+    Raises: OsimliteError: it is not such a file, is damaged, or is compressed in a way that
+        osimlite does not know.
     """
     with _named(name):
         return _File(content).surface()
@@ -94,11 +94,14 @@ def vtp_polygons(content: bytes, name: str) -> Polygons:
 @contextmanager
 def _named(name: str) -> Iterator[None]:
     try:
-        # Nonsense in a damaged file is found by what it gives; numpy need not warn of it on the way.
+        # Nonsense in a damaged file is found by what it gives; numpy need not warn of it on the
+        # way.
         with np.errstate(all="ignore"):
             yield
     except _Unreadable as problem:
-        raise OsimliteError(f"{problem}; save it again as PolyData (.vtp) or as .obj", file=name) from None
+        raise OsimliteError(
+            f"{problem}; save it again as PolyData (.vtp) or as .obj", file=name
+        ) from None
 
 
 class _File:
@@ -108,7 +111,10 @@ class _File:
         self.appended = b""
         mark = content.find(b"<AppendedData")
         if mark >= 0:
-            first, last = content.find(b"_", content.find(b">", mark)) + 1, content.rfind(b"</AppendedData")
+            first, last = (
+                content.find(b"_", content.find(b">", mark)) + 1,
+                content.rfind(b"</AppendedData"),
+            )
             if not 0 < first <= last:
                 raise _Unreadable("the file ends in the middle")
             self.appended, content = content[first:last], content[:first] + content[last:]
@@ -126,7 +132,9 @@ class _File:
         section = self.root.find("AppendedData")
         self.raw = section is not None and section.get("encoding") == "raw"
         self.order = ">" if self.root.get("byte_order") == "BigEndian" else "<"
-        self.header = np.dtype(self.order + _TYPES.get(self.root.get("header_type", "UInt32"), "u4"))
+        self.header = np.dtype(
+            self.order + _TYPES.get(self.root.get("header_type", "UInt32"), "u4")
+        )
         self.compressor = self.root.get("compressor", "")
         try:
             offsets = {int(array.get("offset", "0")) for array in self.root.iter("DataArray")}
@@ -140,7 +148,11 @@ class _File:
 
     def polygons(self) -> tuple[Polygons, Array | None]:
         """All polygons, those of strips among them, and the normals at the points if there are any."""
-        points, corners, normals = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
+        points, corners, normals = (
+            [np.zeros((0, 3))],
+            [np.zeros(0, dtype=np.int64)],
+            [np.zeros((0, 3))],
+        )
         sizes, count, all_normals = [np.zeros(0, dtype=np.int64)], 0, True
         for piece in self.root.iterfind("PolyData/Piece"):
             own = self._vectors(piece.find("Points/DataArray"))
@@ -172,7 +184,10 @@ class _File:
         """Corners of all cells of a kind, one after the other, and where each cell ends."""
         corners, ends = (
             np.zeros(0, dtype=np.int64) if array is None else self._numbers(array).astype(np.int64)
-            for array in (piece.find(f"{tag}/DataArray[@Name='{name}']") for name in ("connectivity", "offsets"))
+            for array in (
+                piece.find(f"{tag}/DataArray[@Name='{name}']")
+                for name in ("connectivity", "offsets")
+            )
         )
         if not len(ends):
             return corners[:0], ends
@@ -188,7 +203,9 @@ class _File:
         if data is None:
             return None
         wanted = data.get("Normals", "Normals")
-        array = next((item for item in data.iterfind("DataArray") if item.get("Name") == wanted), None)
+        array = next(
+            (item for item in data.iterfind("DataArray") if item.get("Name") == wanted), None
+        )
         if array is None or array.get("NumberOfComponents") != "3":
             return None
         normals = self._vectors(array)
@@ -199,7 +216,9 @@ class _File:
             raise _Unreadable("it has a piece without points")
         numbers = self._numbers(array).astype(np.float64)
         if len(numbers) % 3 or not np.isfinite(numbers).all():
-            raise _Unreadable(f"its {array.get('Name', 'points')} are not three finite numbers each")
+            raise _Unreadable(
+                f"its {array.get('Name', 'points')} are not three finite numbers each"
+            )
         return numbers.reshape(-1, 3)
 
     def _numbers(self, array: etree._Element) -> NDArray[np.generic]:
@@ -212,7 +231,9 @@ class _File:
             match form:
                 case "ascii":
                     exact = self.all_digits and dtype.kind == "f"
-                    return np.array((array.text or "").split(), dtype=np.float64 if exact else dtype)
+                    return np.array(
+                        (array.text or "").split(), dtype=np.float64 if exact else dtype
+                    )
                 case "binary":
                     data = self._payload(_base64((array.text or "").encode()))
                 case "appended":
@@ -221,9 +242,13 @@ class _File:
                     raise _Unreadable(f"it has numbers in the format '{form}'")
             return np.frombuffer(data, dtype)
         except MemoryError:
-            raise _Unreadable(f"its numbers named '{array.get('Name', '')}' need more memory than there is") from None
+            raise _Unreadable(
+                f"its numbers named '{array.get('Name', '')}' need more memory than there is"
+            ) from None
         except (ValueError, IndexError, OverflowError, binascii.Error, zlib.error, lzma.LZMAError):
-            raise _Unreadable(f"its numbers named '{array.get('Name', '')}' are damaged or cut off") from None
+            raise _Unreadable(
+                f"its numbers named '{array.get('Name', '')}' are damaged or cut off"
+            ) from None
 
     def _after(self, offset: int) -> bytes:
         """The bytes of the array that starts at an offset of what is appended."""
@@ -250,7 +275,9 @@ class _File:
                 raise ValueError
             return data
         if self.compressor not in _DECOMPRESS:
-            raise _Unreadable(f"it is compressed by {self.compressor}, which osimlite does not read")
+            raise _Unreadable(
+                f"it is compressed by {self.compressor}, which osimlite does not read"
+            )
         blocks = int(np.frombuffer(stream, self.header, 1)[0])
         if not blocks:
             return b""
@@ -259,7 +286,9 @@ class _File:
         self._take(whole * (blocks - bool(last)) + last)
         place, parts = (3 + blocks) * width, []
         for size in sizes:
-            parts.append(_DECOMPRESS[self.compressor](stream[place : place + size], max(whole, last)))
+            parts.append(
+                _DECOMPRESS[self.compressor](stream[place : place + size], max(whole, last))
+            )
             place += size
         # A last block that is as long as the others is written as having length zero.
         if sum(map(len, parts)) != whole * (blocks - bool(last)) + last:

@@ -1,6 +1,7 @@
 """Files of motion capture (.c3d), read by ezc3d as OpenSim reads them: markers, and the forces of the force plates.
 
-Everything is in the axes of the file, which often are not those of a model, whose y axis points upwards.
+Everything is in the axes of the file, which often are not those of a model, whose y axis points
+upwards.
 """
 
 from __future__ import annotations
@@ -53,8 +54,8 @@ def read_c3d_markers(path: str | Path) -> tuple[tuple[str, ...], Array, Array]:
 def read_c3d_forces(path: str | Path) -> StoTable:
     """The forces of the plates over time, as OpenSim's reader names them.
 
-    Of the first plate ``f1_x``, ``f1_y``, ``f1_z`` is the force (N), ``p1_x`` ... the middle of the plate (m), and
-    ``m1_x`` ... the moment about it (N·m).
+    Of the first plate ``f1_x``, ``f1_y``, ``f1_z`` is the force (N), ``p1_x`` ... the middle of the
+    plate (m), and ``m1_x`` ... the moment about it (N·m).
 
     Raises:
         MissingFileError: there is no such file.
@@ -64,13 +65,16 @@ def read_c3d_forces(path: str | Path) -> StoTable:
     arrays = _read_apart(path, "forces")
     if not len(arrays["names"]):
         raise DocumentError("the file has no force plates", file=str(path))
-    return StoTable("forces", arrays["times"], tuple(arrays["names"].tolist()), arrays["rows"], file=str(path))
+    return StoTable(
+        "forces", arrays["times"], tuple(arrays["names"].tolist()), arrays["rows"], file=str(path)
+    )
 
 
 def _read_apart(path: str | Path, what: str) -> dict[str, Array]:
     """Return the arrays that a process of its own reads from a file.
 
-    Damaged files make ezc3d 1.6 write beyond its memory (a process ends by SIGSEGV), or loop without
+    Damaged files make ezc3d 1.6 write beyond its memory (a process ends by SIGSEGV), or loop
+    without
     end: it may do so where nothing else is lost, and for a limited time.
 
     Args:
@@ -90,7 +94,16 @@ def _read_apart(path: str | Path, what: str) -> dict[str, Array]:
     import subprocess
 
     package = str(Path(__file__).parents[3])
-    command = [sys.executable, "-P", "-c", PROGRAM, what, os.path.abspath(path), str(seconds), package]
+    command = [
+        sys.executable,
+        "-P",
+        "-c",
+        PROGRAM,
+        what,
+        os.path.abspath(path),
+        str(seconds),
+        package,
+    ]
     try:
         done = subprocess.run(
             command,
@@ -102,9 +115,13 @@ def _read_apart(path: str | Path, what: str) -> dict[str, Array]:
             env={**os.environ, SAFE_PATH: "1", "OPENBLAS_NUM_THREADS": "1"},
         )
     except subprocess.TimeoutExpired:
-        raise DocumentError("the file cannot be read: reading it does not end", file=str(path)) from None
+        raise DocumentError(
+            "the file cannot be read: reading it does not end", file=str(path)
+        ) from None
     except OSError as error:
-        raise DocumentError(f"no process can be started that reads it: {error}", file=str(path)) from None
+        raise DocumentError(
+            f"no process can be started that reads it: {error}", file=str(path)
+        ) from None
     if done.returncode != 0:
         raise DocumentError(f"the file cannot be read: {_reason(done)}", file=str(path))
     with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:

@@ -34,7 +34,8 @@ def serve() -> None:
             raise ValueError("its frames have no times")
         buffer = io.BytesIO()
         np.savez(buffer, allow_pickle=False, **arrays)
-    # ezc3d raises whatever its standard library does, and a damaged header leads to any key or index.
+    # ezc3d raises whatever its standard library does, and a damaged header leads to any key or
+    # index.
     except Exception as error:
         reason = str(error) or type(error).__name__
         known = isinstance(error, OSError | RuntimeError | ValueError)
@@ -49,7 +50,9 @@ def read_markers(path: str) -> dict[str, Array]:
     result = import_module("ezc3d").c3d(path)
     points = result["parameters"]["POINT"]
     unit = METRES.get(points["UNITS"]["value"][0].strip().lower(), 0.001)
-    names = [name for key, more in points.items() if key.startswith("LABELS") for name in more["value"]]
+    names = [
+        name for key, more in points.items() if key.startswith("LABELS") for name in more["value"]
+    ]
     positions = np.moveaxis(result["data"]["points"][:3], (2, 1, 0), (0, 1, 2))
     times = _start(result) + np.arange(len(positions)) / result["header"]["points"]["frame_rate"]
     names = names[: positions.shape[1]]
@@ -64,18 +67,31 @@ def read_forces(path: str) -> dict[str, Array]:
     columns, rows = list[str](), list[Array]()
     for number, plate in enumerate(result["data"]["platform"], start=1):
         length = METRES.get(plate["unit_position"].strip().lower(), 0.001)
-        middle = np.repeat(length * plate["corners"].mean(axis=1)[:, None], plate["force"].shape[1], axis=1)
+        middle = np.repeat(
+            length * plate["corners"].mean(axis=1)[:, None], plate["force"].shape[1], axis=1
+        )
         moment = MOMENTS.get(plate["unit_moment"].strip().lower(), 0.001) * plate["moment"]
         for letter, values in (("f", plate["force"]), ("p", middle), ("m", moment)):
             columns += [f"{letter}{number}_{axis}" for axis in "xyz"]
             rows += list(values)
     if not rows:
-        return {"names": np.array([], dtype=np.str_), "times": np.zeros(0), "rows": np.zeros((0, 0))}
+        return {
+            "names": np.array([], dtype=np.str_),
+            "times": np.zeros(0),
+            "rows": np.zeros((0, 0)),
+        }
     times = _start(result) + np.arange(len(rows[0])) / result["header"]["analogs"]["frame_rate"]
-    return {"names": np.array(columns, dtype=np.str_), "times": times, "rows": np.stack(rows, axis=1)}
+    return {
+        "names": np.array(columns, dtype=np.str_),
+        "times": times,
+        "rows": np.stack(rows, axis=1),
+    }
 
 
-READERS: dict[str, Callable[[str], dict[str, Array]]] = {"markers": read_markers, "forces": read_forces}
+READERS: dict[str, Callable[[str], dict[str, Array]]] = {
+    "markers": read_markers,
+    "forces": read_forces,
+}
 
 
 def _start(result: Any) -> float:

@@ -1,6 +1,7 @@
 """The headers of tables over time: storage files (.sto, .mot) and marker files (.trc).
 
-Whatever is wrong with a header, all that can be read of it is there; who reads the rows says what is missing.
+Whatever is wrong with a header, all that can be read of it is there; who reads the rows says what
+is missing.
 """
 
 from __future__ import annotations
@@ -55,7 +56,9 @@ def suffixes(kind: str, file: str | None = None) -> tuple[str, ...]:
     if kind.lower() == "double":
         return SUFFIXES["double"]
     if kind not in SUFFIXES:
-        raise UnsupportedError(f"the table holds {kind}; tables hold {', '.join(SUFFIXES)}", file=file)
+        raise UnsupportedError(
+            f"the table holds {kind}; tables hold {', '.join(SUFFIXES)}", file=file
+        )
     return SUFFIXES[kind]
 
 
@@ -89,10 +92,19 @@ class MarkerHeader:
 
     def __init__(self, data: bytes) -> None:
         result = [match for match in islice(_LINE.finditer(data), 5) if match.end() > match.start()]
-        self.lines = [_text(data[match.start() : min(match.end(), match.start() + LONGEST_LINE)]) for match in result]
+        self.lines = [
+            _text(data[match.start() : min(match.end(), match.start() + LONGEST_LINE)])
+            for match in result
+        ]
         # Where the line of X1 Y1 Z1 is missing the rows begin with the fifth.
         self.row_line = 5 if self.lines[4:] and self.lines[4][:1].isdigit() else len(result) + 1
-        self.rows = result[4].start() if self.row_line == 5 and result[4:] else result[-1].end() if result else 0
+        self.rows = (
+            result[4].start()
+            if self.row_line == 5 and result[4:]
+            else result[-1].end()
+            if result
+            else 0
+        )
         keys, values = self.words(2), self.words(3)
         # Of a value that is missing nobody knows to which key it belongs.
         pairs = zip(keys, values, strict=True) if len(keys) == len(values) else ()
@@ -101,21 +113,21 @@ class MarkerHeader:
 
     def words(self, number: int) -> list[Word]:
         """The words of a line, those without a letter left out; none if there is no such line."""
-        return words(self.lines[number - 1], number, _BETWEEN_TABS) if len(self.lines) >= number else []
+        return (
+            words(self.lines[number - 1], number, _BETWEEN_TABS)
+            if len(self.lines) >= number
+            else []
+        )
 
 
 class StorageHeader:
     """The header of a storage file, and the labels behind it.
 
-    Attributes:
-        lines: its text without ends, up to the line that ends it.
-        end: what ends it, ``endheader`` in whatever letters, and where; before the labels it may be nothing.
-        entries: the first word of each line and the rest, by that word.
-        labels: of all columns, with that of the time.
-        label_line: the number of their line.
-        has_tabs: whether there are tabs in it.
-        rows: the offset behind it.
-        row_line: the number of the line there.
+    Attributes: lines: its text without ends, up to the line that ends it. end: what ends it,
+        ``endheader`` in whatever letters, and where; before the labels it may be nothing. entries:
+        the first word of each line and the rest, by that word. labels: of all columns, with that of
+        the time. label_line: the number of their line. has_tabs: whether there are tabs in it.
+        rows: the offset behind it. row_line: the number of the line there.
     """
 
     def __init__(self, data: bytes, file: str = "") -> None:
@@ -136,14 +148,18 @@ class StorageHeader:
                 self.entries[COUNTS.get(key.text, key.text)] = Entry(key, value)
         start = mark + end.end() if end else mark + labels.start() if labels else len(data)
         result = _SOLID.search(data, start)
-        self.label_line = number + bool(end) + (data.count(b"\n", start, result.start()) if result else 0)
+        self.label_line = (
+            number + bool(end) + (data.count(b"\n", start, result.start()) if result else 0)
+        )
         start = data.rfind(b"\n", 0, result.start()) + 1 if result else len(data)
         self.rows = data.find(b"\n", start) + 1 or len(data)
         self.row_line = self.label_line + 1
         # The newer of OpenSim's readers takes a label up to a tab, the older up to a blank.
         line = _text(data[max(start, mark) : min(self.rows, start + LONGEST_LINE)])
         self.has_tabs = "\t" in line
-        self.labels = words(line, self.label_line, _BETWEEN_TABS if self.is_strict and self.has_tabs else _WORD)
+        self.labels = words(
+            line, self.label_line, _BETWEEN_TABS if self.is_strict and self.has_tabs else _WORD
+        )
 
     def value(self, key: str) -> str:
         """What it says under a key, or nothing."""
@@ -153,7 +169,9 @@ class StorageHeader:
     def name(self) -> str:
         """What the table is called: the first line, unless it says so under a key."""
         plain = (line.strip() for line in self.lines if line.strip() and "=" not in line)
-        return self.value("name") or next((line for line in plain if line.split()[0] not in _KEYS), "")
+        return self.value("name") or next(
+            (line for line in plain if line.split()[0] not in _KEYS), ""
+        )
 
     @property
     def form(self) -> int:

@@ -65,8 +65,11 @@ def _decimals(rows: Array, cell: str, eights: int) -> str | None:
         eight[eight == 10**8] = 0
     wholes, fours = _texts()
     names = [f"{half}{number}" for number in range(eights) for half in ("first", "last")]
-    # A number as text: up to the point, four decimals and four more each time, and what stands behind it.
-    cells = np.empty(rows.shape, [("whole", "u8"), *((name, "u4") for name in names), ("end", "u1")])
+    # A number as text: up to the point, four decimals and four more each time, and what stands
+    # behind it.
+    cells = np.empty(
+        rows.shape, [("whole", "u8"), *((name, "u4") for name in names), ("end", "u1")]
+    )
     cells["whole"] = wholes[digits[0] + 10000 * np.signbit(rows)]
     for number, eight in enumerate(digits[1:]):
         first, last = np.divmod(eight.astype(np.int32), 10000)
@@ -85,8 +88,9 @@ def _decimals(rows: Array, cell: str, eights: int) -> str | None:
 def _eights(part: Array, count: int) -> list[NDArray[np.int64]]:
     """Whole numbers of eight decimals each, one behind the other, of numbers from 0 up to 1.
 
-    The last is rounded to the nearest, to the even of two, and may be 1e8. A product comes with what its rounding
-    leaves over: T. J. Dekker, Numer. Math. 18, 1971. 1e8 has few enough digits for all to be exact.
+    The last is rounded to the nearest, to the even of two, and may be 1e8. A product comes with
+    what its rounding leaves over: T. J. Dekker, Numer. Math. 18, 1971. 1e8 has few enough digits
+    for all to be exact.
     """
     high, low, result = part, np.zeros_like(part), []
     for number in range(count):

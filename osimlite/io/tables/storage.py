@@ -23,15 +23,11 @@ from osimlite.mechanics.multibody.spatial import Array
 class StoTable(Tabular):
     """A table over time.
 
-    Attributes:
-        name: first line of the file.
-        times: (n,), s.
-        columns: labels of the m columns besides the time, in order; OpenSim itself writes some labels twice.
-        rows: (n, m).
-        in_degrees: whether rotational values are in degrees.
-        header: the first word of every line of the header, with the rest of the line.
-        kind: what the file holds; where it is not ``double``, a value has several columns.
-        file: where it was read from.
+    Attributes: name: first line of the file. times: (n,), s. columns: labels of the m columns
+        besides the time, in order; OpenSim itself writes some labels twice. rows: (n, m).
+        in_degrees: whether rotational values are in degrees. header: the first word of every line
+        of the header, with the rest of the line. kind: what the file holds; where it is not
+        ``double``, a value has several columns. file: where it was read from.
     """
 
     name: str
@@ -87,15 +83,11 @@ def write_sto(
 ) -> None:
     """Write a table to a file, whole or not at all; the rows are taken one by one.
 
-    Args:
-        path: of the file.
-        name: first line of the file.
-        times: s.
-        columns: labels; for another kind than ``double`` one for each value.
-        rows: numbers, of one value after the other.
-        in_degrees: whether rotational values are in degrees.
-        kind: of the values: ``Vec3``, ``Quaternion`` and whatever else OpenSim knows.
-        has_missing: whether NaN stands for what was not measured, such as a marker that was not seen.
+    Args: path: of the file. name: first line of the file. times: s. columns: labels; for another
+        kind than ``double`` one for each value. rows: numbers, of one value after the other.
+        in_degrees: whether rotational values are in degrees. kind: of the values: ``Vec3``,
+        ``Quaternion`` and whatever else OpenSim knows. has_missing: whether NaN stands for what was
+        not measured, such as a marker that was not seen.
 
     Raises:
         SimulationError: a number is NaN or infinite.
@@ -174,7 +166,9 @@ def expect_numbers(name: str, columns: Sequence[str], times: Array, rows: Array)
         )
 
 
-def _header(name: str, columns: Sequence[str], rows: int, in_degrees: bool, kind: str) -> Iterator[str]:
+def _header(
+    name: str, columns: Sequence[str], rows: int, in_degrees: bool, kind: str
+) -> Iterator[str]:
     expect_plain_labels(name, columns)
     yield f"{name}\n"
     yield f"inDegrees={'yes' if in_degrees else 'no'}\n"
@@ -196,7 +190,9 @@ def _lines(
         words = [word[:-2] if word.endswith(".0") else word for word in map(repr, map(float, row))]
         if size > 1:
             if len(words) % size:
-                raise OsimliteError(f"a row has {len(words)} numbers, which makes no whole values of {size} each")
+                raise OsimliteError(
+                    f"a row has {len(words)} numbers, which makes no whole values of {size} each"
+                )
             words = [",".join(words[start : start + size]) for start in range(0, len(words), size)]
         yield "\t".join((number_text(time), *words)) + "\n"
 

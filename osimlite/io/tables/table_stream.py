@@ -18,8 +18,8 @@ _NO_NUMBER = re.compile(r"[-+]?1\.#(IND|QNAN|SNAN|INF)\d*", re.IGNORECASE)
 class TableStream:
     """A storage file of which one row at a time is read; close it after use, or use it in a ``with`` statement.
 
-    Iterating gives ``(time, row)`` with the time in s and the numbers of the columns in their order; blank lines are
-    passed over.
+    Iterating gives ``(time, row)`` with the time in s and the numbers of the columns in their
+    order; blank lines are passed over.
 
     Attributes:
         file: its path.
@@ -107,7 +107,9 @@ class TableStream:
         ends = suffixes(result.kind, self.file)
         self.kind = "double" if ends == ("",) else result.kind
         if not result.labels:
-            raise DocumentError("the table ends before its column labels", file=self.file, line=result.end.at.line)
+            raise DocumentError(
+                "the table ends before its column labels", file=self.file, line=result.end.at.line
+            )
         labels = [label.text for label in result.labels]
         at = next((index for index, label in enumerate(labels) if label.lower() == "time"), None)
         if at is None or (at > 0 and self.kind != "double"):
@@ -130,7 +132,9 @@ def _no_storage(beginning: bytes) -> str:
             "coordinates of markers"
         )
     if beginning.startswith(b"<"):
-        return "this is XML, and no storage file (.sto, .mot); are the arguments in the right order?"
+        return (
+            "this is XML, and no storage file (.sto, .mot); are the arguments in the right order?"
+        )
     return "this is no storage file (.sto, .mot): it has no line 'endheader'"
 
 

@@ -34,7 +34,9 @@ class Tabular(ABC):
             MissingDependency: pyarrow is not installed.
         """
         rows, columns = self.table
-        return require("pyarrow", extra="frame", purpose="an Arrow table").table({**rows, **columns})
+        return require("pyarrow", extra="frame", purpose="an Arrow table").table(
+            {**rows, **columns}
+        )
 
     def to_xarray(self) -> Any:
         """The `table` as an xarray Dataset over what tells the rows apart.

@@ -38,7 +38,11 @@ def write_trc(
 
 
 def _lines(
-    name: str, times: Sequence[float], markers: Sequence[str], rows: Iterable[Sequence[float]], units: str
+    name: str,
+    times: Sequence[float],
+    markers: Sequence[str],
+    rows: Iterable[Sequence[float]],
+    units: str,
 ) -> Iterator[str]:
     count = len(times)
     span = times[-1] - times[0] if count > 1 else 0.0
@@ -48,7 +52,9 @@ def _lines(
     yield "\t".join(MARKER_KEYS)
     yield "\t".join(map(str, values))
     yield "Frame#\tTime\t" + "".join(f"{marker}\t\t\t" for marker in markers)
-    yield "\t\t" + "".join(f"{axis}{number + 1}\t" for number in range(len(markers)) for axis in "XYZ")
+    yield "\t\t" + "".join(
+        f"{axis}{number + 1}\t" for number in range(len(markers)) for axis in "XYZ"
+    )
     yield ""
     for frame, (time, row) in enumerate(zip(times, rows, strict=True), start=1):
         words = ("" if number != number else number_text(number) for number in row)

@@ -41,16 +41,17 @@ _QUOTED_PATH = re.compile(r"'(/[^']*)'")
 
 
 @np.errstate(all="ignore")
-def try_construction(model: Model, folder: Path | None = None) -> tuple[list[Obstacle], Mechanism | None]:
+def try_construction(
+    model: Model, folder: Path | None = None
+) -> tuple[list[Obstacle], Mechanism | None]:
     """Return what stops the computation of a model.
 
     Args:
         model: the model to build.
         folder: where its file is, and the files that it names; None for a model that is in no file.
 
-    Returns:
-        The obstacles in the order of the steps, and the mechanism for those who compute more of the model; None if it
-        has none.
+    Returns: The obstacles in the order of the steps, and the mechanism for those who compute more
+        of the model; None if it has none.
     """
     with warnings.catch_warnings():
         # Rules report what a simulation only warns of.
@@ -101,7 +102,8 @@ class _Construction:
             return
         for force in builder.forces():
             if isinstance(getattr(force, "geometry_path", None), Scholz2015GeometryPath):
-                # Its way is searched once; in every evaluation it takes seconds without machine code.
+                # Its way is searched once; in every evaluation it takes seconds without machine
+                # code.
                 try:
                     check_cable(builder, force)
                 except OsimliteError as error:
@@ -190,7 +192,9 @@ class _Construction:
                 yield Obstacle(Stage.ACCELERATION, "", "the accelerations are no numbers")
         elif not np.isfinite(np.array(system.found())[: 2 * len(system.order)]).all():
             culprits = [*self.find_culprits(mechanism, forces, q, u)]
-            yield from culprits or [Obstacle(Stage.ACCELERATION, "", "the accelerations are no numbers")]
+            yield from culprits or [
+                Obstacle(Stage.ACCELERATION, "", "the accelerations are no numbers")
+            ]
         else:
             yield from self.find_rates(system)
 
@@ -219,7 +223,9 @@ class _Construction:
                 return Obstacle(Stage.INERTIA, info.path, message)
         return Obstacle(Stage.INERTIA, "", message)
 
-    def find_culprits(self, mechanism: Mechanism, forces: Forces, q: Array, u: Array) -> Iterator[Obstacle]:
+    def find_culprits(
+        self, mechanism: Mechanism, forces: Forces, q: Array, u: Array
+    ) -> Iterator[Obstacle]:
         """Yield the forces that alone make accelerations that are no numbers."""
         if not _is_computed(mechanism, Forces(()), q, u):
             # Other rules report NaN among the numbers of the mechanism.

@@ -18,14 +18,16 @@ from osimlite.simulation.paths import Paths
 LEAST = 1e-3
 """A jump (m) that is told; smaller ones are not looked for."""
 ASIDE = 1e-4
-"""How far (rad or m) on either side of a jump lengths are taken: OpenSim's conditional points, which come 1e-5 before
-their range and go 1e-5 after it, are all there or gone then."""
+"""How far (rad or m) on either side of a jump lengths are taken: OpenSim's conditional points,
+which come 1e-5 before their range and go 1e-5 after it, are all there or gone then.
+"""
 
 
 class Suspect(NamedTuple):
     """An interval of a sweep in which the length of a path may jump."""
 
-    # by how much the length changes otherwise than next to the interval, m; infinite at a conditional point
+    # by how much the length changes otherwise than next to the interval, m; infinite at a
+    # conditional point
     excess: float
     usual: float  # the change next to it, m
     sweep: Sweep  # of a coordinate
@@ -37,8 +39,8 @@ class Suspect(NamedTuple):
 def jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[Jump]:
     """The greatest jump of the length of each path that has one.
 
-    They are looked for where conditional points come or go, and between values where a length changes otherwise than
-    next to them: there a jump can hardly be greater than the difference.
+    They are looked for where conditional points come or go, and between values where a length
+    changes otherwise than next to them: there a jump can hardly be greater than the difference.
     """
     suspects = [suspect for sweep in looked_at for suspect in _suspects(paths, sweep)]
     if not suspects:
@@ -58,7 +60,9 @@ def jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[Jump]:
     names = [*paths.routes]
     for path, k in greatest.items():
         sweep, name = suspects[k].sweep, names[path]
-        yield Jump(name, sizes[k], sweep.pose(values[k]), _changed(paths, name, sides[2 * k : 2 * k + 2]))
+        yield Jump(
+            name, sizes[k], sweep.pose(values[k]), _changed(paths, name, sides[2 * k : 2 * k + 2])
+        )
 
 
 def _suspects(paths: Paths, sweep: Sweep) -> Iterator[Suspect]:
@@ -86,7 +90,10 @@ def _narrowed(paths: Paths, suspects: Sequence[Suspect]) -> list[float]:
     first, last, active = low, high, high - low > ASIDE
     begin, end = (np.array([item.sweep.poses[item.pose + k] for item in suspects]) for k in (0, 1))
     rate = np.array([item.usual for item in suspects]) / np.where(active, high - low, 1.0)
-    before, after = (np.array([item.sweep.lengths[item.pose + k, item.path] for item in suspects]) for k in (0, 1))
+    before, after = (
+        np.array([item.sweep.lengths[item.pose + k, item.path] for item in suspects])
+        for k in (0, 1)
+    )
     while places := np.flatnonzero(active).tolist():
         middle = 0.5 * (low + high)
         part = (middle - first) / (last - first)
@@ -116,7 +123,9 @@ def _changed(paths: Paths, name: str, sides: Array) -> tuple[str, ...]:
     before, after = ({number for number, _ in paths.points(q)[name]} for q in sides)
     count = len(route.points)
     names = [
-        route.points[k].name or f"point {k + 1}" if k < count else route.surfaces[(k - count) // 2].tangent.name
+        route.points[k].name or f"point {k + 1}"
+        if k < count
+        else route.surfaces[(k - count) // 2].tangent.name
         for k in sorted(before ^ after)
     ]
     return tuple(dict.fromkeys(names))

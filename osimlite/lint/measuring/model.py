@@ -53,12 +53,10 @@ def measured(
 ) -> Measures:
     """Measure the paths and muscles of a model.
 
-    Args:
-        model: what is measured.
-        compiles: whether kernels that are in no library or file yet are compiled, which takes longer than to do
-            without for a model that has few surfaces.
-        known: what was measured when some paths were others, or not there, and all else as it is; and what still holds.
-        mechanism: of the model; made if left out.
+    Args: model: what is measured. compiles: whether kernels that are in no library or file yet are
+        compiled, which takes longer than to do without for a model that has few surfaces. known:
+        what was measured when some paths were others, or not there, and all else as it is; and what
+        still holds. mechanism: of the model; made if left out.
 
     Raises:
         UnsupportedError: a path, a joint or a constraint cannot be computed.
@@ -70,8 +68,12 @@ def measured(
     if compiles and not has_machine_code():
         raise NoMachineCodeError(NEEDS_MACHINE_CODE)
     code = None if compiles else AT_HAND
-    paths = Paths(model, code=code, left_out=still.swept if still is not None else (), mechanism=mechanism)
-    has_surfaces = any(isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values())
+    paths = Paths(
+        model, code=code, left_out=still.swept if still is not None else (), mechanism=mechanism
+    )
+    has_surfaces = any(
+        isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values()
+    )
     around = paths.around_surfaces(model, GEODESIC, code) if has_surfaces else None
     _expect_few_loops(paths.mechanism)
     start = paths.mechanism.assemble({})
@@ -89,7 +91,10 @@ def measured(
         reaches += [reach_of(fibers, shortest, True, short), reach_of(fibers, longest, False, long)]
     moved = {sweep.place: sweep.moved for sweep in looked_at}
     result = Measures(
-        {name: tuple(place for place, own in moved.items() if own[k]) for k, name in enumerate(paths.names)},
+        {
+            name: tuple(place for place, own in moved.items() if own[k])
+            for k, name in enumerate(paths.names)
+        },
         [*wrappings(around, paths, start, looked_at)] if around is not None else [],
         [*jumps(paths, looked_at)],
         [*_on_surfaces(paths, start, looked_at)],
@@ -124,16 +129,23 @@ def _expect_few_loops(mechanism: Mechanism) -> None:
         )
 
 
-def _ends(looked_at: list[Sweep], default: Array) -> Iterator[tuple[tuple[float, Pose], tuple[float, Pose]]]:
+def _ends(
+    looked_at: list[Sweep], default: Array
+) -> Iterator[tuple[tuple[float, Pose], tuple[float, Pose]]]:
     """Where each path is shortest and where it is longest, by default and in the middle of the ranges."""
     poses, rows = [Pose()], [default[None]]
     for sweep in looked_at:
         low, high = sweep.info.range
-        inside = np.flatnonzero(np.round(np.abs((sweep.values - low) / (high - low) - 0.5), 9) <= 0.5 * MIDDLE)
+        inside = np.flatnonzero(
+            np.round(np.abs((sweep.values - low) / (high - low) - 0.5), 9) <= 0.5 * MIDDLE
+        )
         poses += [sweep.pose(value) for value in sweep.values[inside]]
         rows.append(sweep.lengths[inside])
     lengths = np.concatenate(rows)
     unknown = np.isnan(lengths) & ~np.isnan(default)
-    ends = np.argmin(np.where(unknown, np.inf, lengths), axis=0), np.argmax(np.where(unknown, -np.inf, lengths), axis=0)
+    ends = (
+        np.argmin(np.where(unknown, np.inf, lengths), axis=0),
+        np.argmax(np.where(unknown, -np.inf, lengths), axis=0),
+    )
     for path, (short, long) in enumerate(zip(*ends, strict=True)):
         yield (float(lengths[short, path]), poses[short]), (float(lengths[long, path]), poses[long])

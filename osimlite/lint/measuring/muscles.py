@@ -47,16 +47,26 @@ class Fibers(NamedTuple):
         if not self.is_elastic:
             return states
         is_found, *result = self._asked(self.kind.equilibrium, length, states)
-        return states | dict(zip(self.kind.settled, result if is_found else repeat(nan), strict=False))
+        return states | dict(
+            zip(self.kind.settled, result if is_found else repeat(nan), strict=False)
+        )
 
     def at(self, length: float, states: dict[str, float]) -> dict[str, float]:
         """What the law gives by the names of its outputs, the path at rest; tension and fiber length are normalized."""
-        known = dict(zip(self.kind.outputs, map(float, self._asked(self.kind.law, length, states)), strict=False))
+        known = dict(
+            zip(
+                self.kind.outputs,
+                map(float, self._asked(self.kind.law, length, states)),
+                strict=False,
+            )
+        )
         known["tension"] /= self.component.max_isometric_force or nan
         known["fiber_length"] /= self.component.optimal_fiber_length
         return known
 
-    def _asked(self, law: Callable[..., Any] | None, length: float, states: dict[str, float]) -> Sequence[Any]:
+    def _asked(
+        self, law: Callable[..., Any] | None, length: float, states: dict[str, float]
+    ) -> Sequence[Any]:
         assert law is not None
         try:
             result: Sequence[Any] = law(
@@ -82,14 +92,23 @@ def fibers_of(model: Model, mechanism: Mechanism, wanted: Container[str]) -> Ite
         if kind is None or not muscle.appliesForce or builder.path(muscle) not in wanted:
             continue
         _, *terms = kind.terms
-        parts = (part for term in terms for part in (term.terms if isinstance(term, Together) else (term,)))
+        parts = (
+            part
+            for term in terms
+            for part in (term.terms if isinstance(term, Together) else (term,))
+        )
         if not all(isinstance(part, Fields | Number | Numbers) for part in parts):
             continue
         # What OpenSim refuses, other rules have told.
         with suppress(ModelError):
             if kind.check is not None:
                 kind.check(builder, muscle)
-            yield Fibers(builder.path(muscle), kind, muscle, tuple(term.read(builder, muscle) for term in terms))
+            yield Fibers(
+                builder.path(muscle),
+                kind,
+                muscle,
+                tuple(term.read(builder, muscle) for term in terms),
+            )
 
 
 def start_of(fibers: Fibers, length: float) -> Start | None:
@@ -104,8 +123,13 @@ def start_of(fibers: Fibers, length: float) -> Start | None:
 
 def reach_of(fibers: Fibers, length: float, is_active: bool, pose: Pose) -> Reach:
     """Fibers in equilibrium at a length of the path, m."""
-    known = fibers.at(length, fibers.settled(length, fibers.starts() | {"activation": 1.0 if is_active else REST}))
+    known = fibers.at(
+        length, fibers.settled(length, fibers.starts() | {"activation": 1.0 if is_active else REST})
+    )
     numbers = fibers.values[0]
-    least = getattr(numbers, "smallest", getattr(numbers, "shortest", 0.0)) / fibers.component.optimal_fiber_length
+    least = (
+        getattr(numbers, "smallest", getattr(numbers, "shortest", 0.0))
+        / fibers.component.optimal_fiber_length
+    )
     is_limit = known["fiber_length"] <= least * (1.0 + ROUNDING) or known["cos_pennation"] <= 0.0
     return Reach(fibers.path, is_active, pose, known["fiber_length"], is_limit)

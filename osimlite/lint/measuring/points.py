@@ -40,7 +40,9 @@ def moving_points(paths: Paths) -> Iterator[MovingPoint]:
 def _at(point: Node, value: float) -> tuple[Array, Array]:
     """Place of a point at a value of its coordinate, and the derivative of it."""
     result = [function.evaluate(np.array([value])) for function in point.functions]
-    return np.array([place for place, _, _ in result]), np.array([slope[0] for _, slope, _ in result])
+    return np.array([place for place, _, _ in result]), np.array(
+        [slope[0] for _, slope, _ in result]
+    )
 
 
 def _given(point: Node) -> tuple[float, float]:

@@ -17,8 +17,9 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
 
 VALUES, TIED_VALUES, TIED_POSES = 9, 5, 40
-"""Of each coordinate; of each that constraints tie to others, whose poses take long to find; and how many of these
-poses are found at most."""
+"""Of each coordinate; of each that constraints tie to others, whose poses take long to find; and
+how many of these poses are found at most.
+"""
 WIDEST = 4.0 * pi
 """A wider range (rad or m) stands for none."""
 STILL = 1e-9
@@ -31,7 +32,8 @@ class Sweep:
 
     paths: Paths  # whose lengths change
     place: int  # of the coordinate in the mechanism
-    poses: Array  # values of all coordinates (k, n), those of this one increasing; as far as constraints allow
+    # values of all coordinates (k, n), those of this one increasing; as far as constraints allow
+    poses: Array
     is_tied: bool  # whether a constraint moves others with the coordinate
     lengths: Array  # of all paths there (k, p), m
 
@@ -86,16 +88,25 @@ def sweeps(paths: Paths, start: Array, others: Container[int] = ()) -> list[Swee
     result: list[tuple[int, Array, bool]] = []
     for place, info in enumerate(paths.mechanism.coordinates):
         low, high = info.range
-        if info.locked or info.prescribed is not None or info.yielding or not 0.0 < high - low <= WIDEST:
+        if (
+            info.locked
+            or info.prescribed is not None
+            or info.yielding
+            or not 0.0 < high - low <= WIDEST
+        ):
             continue
         is_tied = bool(are_tied[place])
         if is_tied and left < TIED_VALUES:
             continue
         left -= is_tied * TIED_VALUES
-        poses = _poses(paths, start, place, np.linspace(low, high, TIED_VALUES if is_tied else VALUES), is_tied)
+        poses = _poses(
+            paths, start, place, np.linspace(low, high, TIED_VALUES if is_tied else VALUES), is_tied
+        )
         if len(poses) > 1:
             result.append((place, poses, is_tied))
-    rows = paths.system.lengths(np.concatenate([np.empty((0, len(start))), *(poses for _, poses, _ in result)]))
+    rows = paths.system.lengths(
+        np.concatenate([np.empty((0, len(start))), *(poses for _, poses, _ in result)])
+    )
     swept = []
     for place, poses, is_tied in result:
         own, rows = np.split(rows, [len(poses)])

@@ -20,7 +20,9 @@ ASIDE, NEAR = 1e-7, 1e-4
 """How far (rad or m) beside a pose a length is computed again, and by how much (m) it may differ there."""
 
 
-def wrappings(geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[Sweep]) -> Iterator[Wrapping]:
+def wrappings(
+    geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[Sweep]
+) -> Iterator[Wrapping]:
     """Each path around surfaces: by how much it is longer than along geodesics by default, and where by most.
 
     Args:
@@ -38,7 +40,9 @@ def wrappings(geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[S
     excesses = np.concatenate([ends[0], *swept, ends[1]]) - geodesic.system.lengths(poses)
     for own, (name, path) in enumerate(zip(geodesic.names, columns, strict=True)):
         route, excess = paths.routes[name], excesses[:, own]
-        around = tuple(surface.tangent.name for surface in getattr(route, "surfaces", ()) if surface.law)
+        around = tuple(
+            surface.tangent.name for surface in getattr(route, "surfaces", ()) if surface.law
+        )
         if not around:
             continue
         moved = [sweep for sweep in free if sweep.moved[path]]
@@ -56,24 +60,36 @@ def wrappings(geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[S
             return Pose(tuple(sweep.value(q[sweep.place]) for sweep in moved)), q
 
         order = np.argsort(-np.nan_to_num(np.abs(excess)), kind="stable").tolist()
-        certain = (k for k in order if _is_certain(geodesic, paths, own, path, excess[k], told(k)[1]))
+        certain = (
+            k for k in order if _is_certain(geodesic, paths, own, path, excess[k], told(k)[1])
+        )
         worst = next(certain, order[-1])
         yield Wrapping(name, around, float(excess[0]), float(excess[worst]), told(worst)[0])
 
 
 def _together(start: Array, free: Sequence[Sweep]) -> Array:
     """Poses (k, n) with values of all coordinates anywhere in their ranges."""
-    # Python's own generator, since pydantic has loaded it: `numpy.random` would take five milliseconds more.
+    # Python's own generator, since pydantic has loaded it: `numpy.random` would take five
+    # milliseconds more.
     generator = Random(0)
-    parts = np.array([[generator.random() for _ in free] for _ in range(TOGETHER)]).reshape(TOGETHER, len(free))
-    values = [low + parts[:, k] * (high - low) for k, (low, high) in enumerate(sweep.info.range for sweep in free)]
+    parts = np.array([[generator.random() for _ in free] for _ in range(TOGETHER)]).reshape(
+        TOGETHER, len(free)
+    )
+    values = [
+        low + parts[:, k] * (high - low)
+        for k, (low, high) in enumerate(sweep.info.range for sweep in free)
+    ]
     together = np.tile(start, (TOGETHER, 1))
     together[:, [sweep.place for sweep in free]] = np.array(values).reshape(len(free), TOGETHER).T
     return together
 
 
-def _is_certain(geodesic: Paths, paths: Paths, own: int, path: int, excess: float, q: Array) -> bool:
+def _is_certain(
+    geodesic: Paths, paths: Paths, own: int, path: int, excess: float, q: Array
+) -> bool:
     """Whether a path is as much too long right beside a pose; if not, rounding decides, or what nobody is told of."""
     beside = np.array([q - ASIDE, q + ASIDE])
-    there = paths.system.lengths_of([path] * 2, beside) - geodesic.system.lengths_of([own] * 2, beside)
+    there = paths.system.lengths_of([path] * 2, beside) - geodesic.system.lengths_of(
+        [own] * 2, beside
+    )
     return bool((np.abs(there - excess) < NEAR).all())

@@ -13,17 +13,19 @@ FOR_PEOPLE = ("full", "concise")
 
 
 def render(
-    report: Report, name: str = "full", *, colour: bool = False, width: int = 80, everything: bool = False
+    report: Report,
+    name: str = "full",
+    *,
+    colour: bool = False,
+    width: int = 80,
+    everything: bool = False,
 ) -> str:
     """The report in a format.
 
-    Args:
-        report: what was found.
-        name: one of `FORMATS`.
-        colour: whether to write the colours of a terminal, in the formats that people read.
-        width: columns to keep to, in the full format.
-        everything: whether findings that are alike are all written, where people read them; else the first stands
-            for all. The formats for programs are always whole.
+    Args: report: what was found. name: one of `FORMATS`. colour: whether to write the colours of a
+        terminal, in the formats that people read. width: columns to keep to, in the full format.
+        everything: whether findings that are alike are all written, where people read them; else
+        the first stands for all. The formats for programs are always whole.
 
     Raises:
         OsimliteError: there is no such format.

@@ -12,7 +12,10 @@ def render(report: Report, *, colour: bool = False, everything: bool = False) ->
     """``file:line:column: severity code message`` for each finding, and a closing line."""
     folds = folded(report.findings, everything=everything)
     closing = " ".join(
-        filter(None, (summary(report, colour), told(folds), passed(report, everything), unmeasured(report)))
+        filter(
+            None,
+            (summary(report, colour), told(folds), passed(report, everything), unmeasured(report)),
+        )
     )
     return "\n".join([*(_line(fold, colour) for fold in folds), closing]) + "\n"
 

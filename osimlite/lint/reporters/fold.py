@@ -35,11 +35,17 @@ class Fold(NamedTuple):
         """``91 more like this, on lines 12, 40 and 88 more``; nothing if there are none."""
         result = []
         if self.more:
-            lines = list(dict.fromkeys(str(finding.line) for finding in self.more if finding.line is not None))
+            lines = list(
+                dict.fromkeys(
+                    str(finding.line) for finding in self.more if finding.line is not None
+                )
+            )
             places = f", on line{'s' * (len(lines) > 1)} {listed(lines, most=4)}" if lines else ""
             result.append(f"{len(self.more)} more like this{places}")
         if self.elsewhere:
-            files = dict.fromkeys(os.path.basename(finding.file or "") for finding in self.elsewhere)
+            files = dict.fromkeys(
+                os.path.basename(finding.file or "") for finding in self.elsewhere
+            )
             result.append(f"{len(self.elsewhere)} more in other files: {listed(files, most=3)}")
         return result
 
@@ -52,7 +58,9 @@ def folded(findings: Iterable[Finding], *, everything: bool = False) -> list[Fol
     parts = [
         part
         for group in _grouped(every, lambda finding: (finding.file, *_kind(finding, names=False)))
-        for part in ([group] if len(group) >= _least(group[0]) else [[finding] for finding in group])
+        for part in (
+            [group] if len(group) >= _least(group[0]) else [[finding] for finding in group]
+        )
     ]
     result: list[Fold] = []
     # What other files say is the same only with the same names, unless there is one cause.
@@ -62,7 +70,9 @@ def folded(findings: Iterable[Finding], *, everything: bool = False) -> list[Fol
             result += [Fold(part[0], part[1:], []) for part in alike]
         else:
             here = [finding for finding in rest if finding.file == first.file]
-            result.append(Fold(first, here, [finding for finding in rest if finding.file != first.file]))
+            result.append(
+                Fold(first, here, [finding for finding in rest if finding.file != first.file])
+            )
     place = {id(finding): number for number, finding in enumerate(every)}
     return sorted(result, key=lambda fold: place[id(fold.first)])
 

@@ -14,7 +14,9 @@ from osimlite.lint.reporters.style import painted, passed, summary, unmeasured
 _ELLIPSIS = "..."
 
 
-def render(report: Report, *, colour: bool = False, width: int = 80, everything: bool = False) -> str:
+def render(
+    report: Report, *, colour: bool = False, width: int = 80, everything: bool = False
+) -> str:
     """The report as text of at most `width` columns (but for places, which are never broken)."""
     blocks: list[str] = []
     every = folded(report.findings, everything=everything)
@@ -23,9 +25,14 @@ def render(report: Report, *, colour: bool = False, width: int = 80, everything:
         lines = _lines(report, file, max(fold.first.line or 0 for fold in folds))
         blocks += [_block(fold, lines, colour, width) for fold in folds]
     closing, length = summary(report, colour), len(summary(report))
-    for more in filter(None, (_fixes(report), told(every), passed(report, everything), unmeasured(report))):
+    for more in filter(
+        None, (_fixes(report), told(every), passed(report, everything), unmeasured(report))
+    ):
         fits = length + 1 + len(more) <= width
-        closing, length = f"{closing}{' ' if fits else chr(10)}{more}", (length + 1 if fits else 0) + len(more)
+        closing, length = (
+            f"{closing}{' ' if fits else chr(10)}{more}",
+            (length + 1 if fits else 0) + len(more),
+        )
     return "\n\n".join([*blocks, closing]) + "\n"
 
 
@@ -50,13 +57,21 @@ def _lines(report: Report, file: str | None, last: int) -> list[str] | None:
 
 def _block(fold: Fold, lines: list[str] | None, colour: bool, width: int) -> str:
     finding = fold.first
-    head = f"{painted(finding.severity.value, finding.severity, colour)} {finding.code} {finding.name}"
+    head = (
+        f"{painted(finding.severity.value, finding.severity, colour)} {finding.code} {finding.name}"
+    )
     place = painted(visible(finding.place), "strong", colour)
     rows = [f"{place}: {head}" if finding.place else head]
-    if len(f"{visible(finding.place)}: {finding.severity.value} {finding.code} {finding.name}") > width:
+    if (
+        len(f"{visible(finding.place)}: {finding.severity.value} {finding.code} {finding.name}")
+        > width
+    ):
         # Broken where it means something, not where the terminal ends.
         rows = [f"{place}:", f"  {head}"]
-    rows += [f"  {row}" for row in textwrap.wrap(visible(finding.message), width - 4, break_on_hyphens=False)]
+    rows += [
+        f"  {row}"
+        for row in textwrap.wrap(visible(finding.message), width - 4, break_on_hyphens=False)
+    ]
     if finding.line is not None and lines is not None and finding.line <= len(lines):
         rows += _snippet(finding, lines[finding.line - 1], colour, width)
     notes: list[tuple[str, str]] = []
@@ -67,9 +82,14 @@ def _block(fold: Fold, lines: list[str] | None, colour: bool, width: int) -> str
     if finding.component not in ("", "/") and finding.line is not None:
         notes.append((f"in {finding.component}", "dim"))
     margin = " " * len(str(finding.line or ""))
-    notes += [(textwrap.shorten(it, width - len(margin) - 3, placeholder=" ..."), "strong") for it in fold.remarks]
+    notes += [
+        (textwrap.shorten(it, width - len(margin) - 3, placeholder=" ..."), "strong")
+        for it in fold.remarks
+    ]
     for note, style in notes:
-        rows.append(f"{margin} {painted('=', 'dim', colour)} {painted(visible(note), style, colour)}")
+        rows.append(
+            f"{margin} {painted('=', 'dim', colour)} {painted(visible(note), style, colour)}"
+        )
     return "\n".join(rows)
 
 
@@ -85,7 +105,9 @@ def _snippet(finding: Finding, line: str, colour: bool, width: int) -> list[str]
     length = max(1, min(finding.length, len(shown) - start))
     margin = len(str(finding.line))
     room = max(20, width - margin - 3)
-    before, marked, after = map(visible, (shown[:start], shown[start : start + length], shown[start + length :]))
+    before, marked, after = map(
+        visible, (shown[:start], shown[start : start + length], shown[start + length :])
+    )
     shown, start, length = before + marked + after, len(before), max(1, len(marked))
     if len(shown) > room:
         shown, start, length = _cut(shown, start, length, room)
@@ -105,7 +127,11 @@ def _cut(shown: str, start: int, length: int, room: int) -> tuple[str, int, int]
         first = min(start, max(0, start + min(length, room // 2) - room // 2))
     part = shown[first:]
     if first:
-        part = _ELLIPSIS + part[len(_ELLIPSIS) :] if start - first >= len(_ELLIPSIS) else _ELLIPSIS + part
+        part = (
+            _ELLIPSIS + part[len(_ELLIPSIS) :]
+            if start - first >= len(_ELLIPSIS)
+            else _ELLIPSIS + part
+        )
         start = start - first if start - first >= len(_ELLIPSIS) else start - first + len(_ELLIPSIS)
     if len(part) > room:
         part = part[: room - len(_ELLIPSIS)] + _ELLIPSIS

@@ -9,8 +9,9 @@ from osimlite.lint.diagnostic import Report
 def render(report: Report) -> str:
     """Return an array of objects: code, name, severity, message, file, line, column, component, suggestion, fixable.
 
-    Without the numeric packages the array ends with a note for each model that has something to measure. Its name is
-    "not-measured", and its code that of a family of rules that were left out, such as OSIM63.
+    Without the numeric packages the array ends with a note for each model that has something to
+    measure. Its name is "not-measured", and its code that of a family of rules that were left out,
+    such as OSIM63.
     """
     notes = [
         {

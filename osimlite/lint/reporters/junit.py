@@ -14,7 +14,11 @@ def render(report: Report) -> str:
     for finding in report.findings:
         by_file.setdefault(finding.file or "model", []).append(finding)
     failed = sum(1 for findings in by_file.values() if any(map(_fails, findings)))
-    counts = {"tests": str(max(report.checked, len(by_file))), "failures": str(failed), "errors": "0"}
+    counts = {
+        "tests": str(max(report.checked, len(by_file))),
+        "failures": str(failed),
+        "errors": "0",
+    }
     suites = etree.Element("testsuites", {"name": "osimlite", **counts})
     suite = etree.SubElement(suites, "testsuite", {"name": "osimlite", **counts})
     for file, findings in by_file.items():
@@ -27,7 +31,9 @@ def render(report: Report) -> str:
         if rest:
             etree.SubElement(case, "system-out").text = "\n".join(map(str, rest))
     for number in range(report.checked - len(by_file)):
-        etree.SubElement(suite, "testcase", name=f"without findings {number + 1}", classname="osimlite")
+        etree.SubElement(
+            suite, "testcase", name=f"without findings {number + 1}", classname="osimlite"
+        )
     body = harmless(etree.tostring(suites, encoding="unicode", pretty_print=True))
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + body
 

@@ -12,7 +12,9 @@ from osimlite.base.text import json_lines
 from osimlite.lint.diagnostic import Finding, Report, Severity
 from osimlite.lint.engine import Rule, all_rules
 
-_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+_SCHEMA = (
+    "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+)
 _LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "note"}
 
 
@@ -28,8 +30,12 @@ def render(report: Report) -> str:
     }
     notes = [note.message for note in report.missing_package_notes()]
     if notes:
-        notifications = [{"level": "note", "message": {"text": text}} for text in dict.fromkeys(notes)]
-        run["invocations"] = [{"executionSuccessful": True, "toolExecutionNotifications": notifications}]
+        notifications = [
+            {"level": "note", "message": {"text": text}} for text in dict.fromkeys(notes)
+        ]
+        run["invocations"] = [
+            {"executionSuccessful": True, "toolExecutionNotifications": notifications}
+        ]
     return json_lines({"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]})
 
 
@@ -42,7 +48,11 @@ def _rule(rule: Rule) -> dict[str, Any]:
         "defaultConfiguration": {"level": _LEVELS[rule.severity]},
         "properties": {"category": rule.family},
         # What alerts of before were filed under.
-        **({"deprecatedIds": [rule.code[:-2]], "deprecatedNames": [_joined(rule.group)]} if rule.group else {}),
+        **(
+            {"deprecatedIds": [rule.code[:-2]], "deprecatedNames": [_joined(rule.group)]}
+            if rule.group
+            else {}
+        ),
     }
 
 

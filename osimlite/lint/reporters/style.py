@@ -29,7 +29,9 @@ def summary(report: Report, colour: bool = False) -> str:
         (Severity.INFO, len(report.infos)),
     )
     parts = [
-        painted(f"{count} {_plural(severity.value, count)}", severity, colour) for severity, count in counts if count
+        painted(f"{count} {_plural(severity.value, count)}", severity, colour)
+        for severity, count in counts
+        if count
     ]
     files = f"{report.checked} {_plural('file', report.checked)}"
     known = f", besides {report.known} of the baseline" if report.known else ""

@@ -18,9 +18,14 @@ from osimlite.lint.words import called, quantity
 from osimlite.schema.frames import Body
 
 SLACK = Threshold(
-    "inertia-slack", 1e-6, "", "relative excess up to which an inertia counts as possible; files have rounded numbers"
+    "inertia-slack",
+    1e-6,
+    "",
+    "relative excess up to which an inertia counts as possible; files have rounded numbers",
 )
-GYRATION = Threshold("largest-radius-of-gyration", 5.0, "m", "the mass of a body cannot lie further from its centre")
+GYRATION = Threshold(
+    "largest-radius-of-gyration", 5.0, "m", "the mass of a body cannot lie further from its centre"
+)
 MASS = Threshold("largest-mass", 1000.0, "kg", "no body of a model is heavier")
 
 
@@ -39,7 +44,11 @@ def missing_mass(subject: Subject, found: FindingSink) -> None:
     """
     mass = Body.field_specs()["mass"]
     for body in subject.each(Body):
-        if body.mass != body.mass and "mass" not in body.model_fields_set and not subject.noted(body, mass):
+        if (
+            body.mass != body.mass
+            and "mass" not in body.model_fields_set
+            and not subject.noted(body, mass)
+        ):
             found(f"{called(body)} has no mass: OpenSim refuses to load the file", body)
 
 
@@ -47,10 +56,11 @@ def missing_mass(subject: Subject, found: FindingSink) -> None:
 def impossible_inertia(subject: Subject, found: FindingSink) -> None:
     """No distribution of mass has this inertia.
 
-    Reports inertias of which one principal moment is larger than the other two together, and by how much.
+    Reports inertias of which one principal moment is larger than the other two together, and by how
+    much.
 
-    Such a body cannot exist. OpenSim computes with it all the same, and accelerations about that axis are too small.
-    Often two numbers are swapped, or the inertia was scaled axis by axis.
+    Such a body cannot exist. OpenSim computes with it all the same, and accelerations about that
+    axis are too small. Often two numbers are swapped, or the inertia was scaled axis by axis.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.5 0 0 0</inertia> </Body>
@@ -77,11 +87,11 @@ def impossible_inertia(subject: Subject, found: FindingSink) -> None:
 def inertia_not_positive(subject: Subject, found: FindingSink) -> None:
     """An inertia has a negative principal moment.
 
-    Reports inertias that are negative about some axis: a negative moment, or products that are too large for the
-    moments.
+    Reports inertias that are negative about some axis: a negative moment, or products that are too
+    large for the moments.
 
-    A torque about that axis turns the body the other way. OpenSim does not check, and the simulation blows up or
-    quietly shows nonsense.
+    A torque about that axis turns the body the other way. OpenSim does not check, and the
+    simulation blows up or quietly shows nonsense.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.3 0 0</inertia> </Body>
@@ -91,7 +101,9 @@ def inertia_not_positive(subject: Subject, found: FindingSink) -> None:
     slack = subject.config.value_of(SLACK)
     for body, moments in _inertias(subject):
         if moments[0] < -slack * max(map(abs, moments)):
-            cause = "" if min(body.inertia[:3]) < 0 else "; its products are too large for its moments"
+            cause = (
+                "" if min(body.inertia[:3]) < 0 else "; its products are too large for its moments"
+            )
             found(
                 f"the inertia of {called(body)} has a negative principal moment, {quantity(moments[0])}{cause}"
                 + _closest(body),
@@ -105,11 +117,12 @@ def inertia_not_positive(subject: Subject, found: FindingSink) -> None:
 def no_inertia(subject: Subject, found: FindingSink) -> None:
     """A body has mass and no inertia.
 
-    Reports bodies with a mass whose inertia is zero or not given; and, for information, those without a mass that have
-    an inertia, which OpenSim drops with a line in its log.
+    Reports bodies with a mass whose inertia is zero or not given; and, for information, those
+    without a mass that have an inertia, which OpenSim drops with a line in its log.
 
-    All the mass is then in one point. A joint that turns about this point has no resistance at all: accelerations
-    become NaN if the body is the last of its chain (an error), and the integrator takes ever smaller steps otherwise.
+    All the mass is then in one point. A joint that turns about this point has no resistance at all:
+    accelerations become NaN if the body is the last of its chain (an error), and the integrator
+    takes ever smaller steps otherwise.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> </Body>
@@ -155,11 +168,12 @@ def _spins_freely(subject: Subject, body: Body) -> bool:
 def mass_out_of_proportion(subject: Subject, found: FindingSink) -> None:
     """A mass, or an inertia for its mass, is larger than that of any body.
 
-    Reports bodies heavier than a tonne, and inertias that would need the mass to lie several metres from the mass
-    center (the radius of gyration, the square root of the largest moment over the mass).
+    Reports bodies heavier than a tonne, and inertias that would need the mass to lie several metres
+    from the mass center (the radius of gyration, the square root of the largest moment over the
+    mass).
 
-    Most often the unit is wrong: grams for kilograms, or kg mm^2 (a million times as much) for kg m^2. The model moves
-    as if its limbs were cast in lead, and no force in it fits.
+    Most often the unit is wrong: grams for kilograms, or kg mm^2 (a million times as much) for kg
+    m^2. The model moves as if its limbs were cast in lead, and no force in it fits.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>100000 100000 20000 0 0 0</inertia> </Body>
@@ -209,7 +223,11 @@ def _closest(body: Body) -> str:
 def _nearest(subject: Subject, body: Body) -> _Mend:
     """The nearest possible inertia, as what to write instead."""
     text = " ".join(f"{number:.9g}" for number in possible_inertia(body.inertia))
-    place = subject.position(body, tag="inertia") if subject.element_of(body, "inertia") is not None else None
+    place = (
+        subject.position(body, tag="inertia")
+        if subject.element_of(body, "inertia") is not None
+        else None
+    )
     return {"suggestion": text, "fix": replaced(subject.source, place, text, safe=False)}
 
 

@@ -23,13 +23,14 @@ from osimlite.schema.specs import FieldSpec, field_specs
 def unknown_class(subject: Subject, found: FindingSink) -> None:
     """An object is of a class that OpenSim does not have.
 
-    Reports elements that should be objects and are of no class of OpenSim 4.6: misspelt, in the wrong case, or of a
-    plug-in. Names the class that is meant if the spelling is a slip away from it, it may stand there, and it has the
-    properties that the element gives.
+    Reports elements that should be objects and are of no class of OpenSim 4.6: misspelt, in the
+    wrong case, or of a plug-in. Names the class that is meant if the spelling is a slip away from
+    it, it may stand there, and it has the properties that the element gives.
 
-    In a set (bodies, joints, forces ...) OpenSim refuses to load the file; elsewhere it leaves the object out. Of a
-    plug-in, OpenSim must have loaded that plug-in first; the rest of the file is checked all the same. With the file
-    that the setting `classes` names, osimlite knows the classes of a plug-in as well.
+    In a set (bodies, joints, forces ...) OpenSim refuses to load the file; elsewhere it leaves the
+    object out. Of a plug-in, OpenSim must have loaded that plug-in first; the rest of the file is
+    checked all the same. With the file that the setting `classes` names, osimlite knows the classes
+    of a plug-in as well.
 
     ```xml
     - <MarkerSet> <objects> <Merker name="asis" /> </objects> </MarkerSet>
@@ -42,7 +43,9 @@ def unknown_class(subject: Subject, found: FindingSink) -> None:
     """
     for note, owner in subject.notes_of("unknown-class"):
         fate = _fate(subject, note)
-        accepted = tags() if note.spec is None or note.spec.accepts is None else tags_of(note.spec.accepts)
+        accepted = (
+            tags() if note.spec is None or note.spec.accepts is None else tags_of(note.spec.accepts)
+        )
         suggestion = _nearest_class(subject, note, accepted)
         message = f"OpenSim has no class '{note.word}' and {fate}"
         plugin = plugin_of(note.word)
@@ -120,14 +123,17 @@ def _is_part(specs: Mapping[str, FieldSpec], tag: str) -> bool:
     part = class_for(tag)
     if part is None:
         return False
-    return any(spec.accepts is not None and issubclass(part, spec.accepts) for spec in specs.values())
+    return any(
+        spec.accepts is not None and issubclass(part, spec.accepts) for spec in specs.values()
+    )
 
 
 @rule("OSIM103", "wrong-class", severity=ERROR)
 def wrong_class(subject: Subject, found: FindingSink) -> None:
     """An object of a known class stands where that class may not stand.
 
-    Reports members of a set, or of another property, that are of a class the property does not take.
+    Reports members of a set, or of another property, that are of a class the property does not
+    take.
 
     In a set OpenSim refuses to load the file; elsewhere it leaves the object out.
 
@@ -145,7 +151,9 @@ def wrong_class(subject: Subject, found: FindingSink) -> None:
         kinds = note.spec.accepts.__name__
         home = set_for(note.value)
         where = f"; it belongs in the {home}" if home else ""
-        holder = f"{called(owner)}: {note.spec.tag}" if note.spec.tag != "objects" else called(owner)
+        holder = (
+            f"{called(owner)}: {note.spec.tag}" if note.spec.tag != "objects" else called(owner)
+        )
         found(
             f"{holder} takes {a(kinds)}, not {a(note.word)}: OpenSim {_fate(subject, note)}{where}",
             owner,
@@ -157,7 +165,8 @@ def wrong_class(subject: Subject, found: FindingSink) -> None:
 def wrong_part_name(subject: Subject, found: FindingSink) -> None:
     """A part of an object has a name other than that of its property.
 
-    Reports objects such as `<FrameGeometry name="axes">`: a property that holds one object finds it by its name.
+    Reports objects such as `<FrameGeometry name="axes">`: a property that holds one object finds it
+    by its name.
 
     OpenSim does not take the object and goes on with the default: everything inside is lost.
 
@@ -180,7 +189,10 @@ def wrong_part_name(subject: Subject, found: FindingSink) -> None:
                 attribute="name",
                 suggestion=spec.tag,
                 fix=replaced(
-                    subject.source, subject.position(None, number=note.number, attribute="name"), spec.tag, safe=False
+                    subject.source,
+                    subject.position(None, number=note.number, attribute="name"),
+                    spec.tag,
+                    safe=False,
                 ),
             )
 
@@ -223,8 +235,19 @@ def wrapper_for(note: Note, owner: Object) -> str | None:
     """The list of `owner` that an object standing directly in it belongs in."""
     if note.value is None or part_for(note, owner) is not None:
         return None
-    lists = (s for s in field_specs(type(owner)).values() if isinstance(s.kind, Held) and s.kind.form == "list")
-    best = next((s for s in lists if s.accepts and issubclass(note.value, s.accepts) and s.tag != "components"), None)
+    lists = (
+        s
+        for s in field_specs(type(owner)).values()
+        if isinstance(s.kind, Held) and s.kind.form == "list"
+    )
+    best = next(
+        (
+            s
+            for s in lists
+            if s.accepts and issubclass(note.value, s.accepts) and s.tag != "components"
+        ),
+        None,
+    )
     return best.tag if best is not None else None
 
 
@@ -233,7 +256,11 @@ def part_for(note: Note, owner: Object) -> FieldSpec | None:
     if note.value is None:
         return None
     for spec in field_specs(type(owner)).values():
-        free = isinstance(spec.kind, Held) and spec.kind.form == "single" and spec.name not in owner.model_fields_set
+        free = (
+            isinstance(spec.kind, Held)
+            and spec.kind.form == "single"
+            and spec.name not in owner.model_fields_set
+        )
         if free and spec.accepts is not None and issubclass(note.value, spec.accepts):
             return spec
     return None

@@ -85,7 +85,9 @@ def range_not_kept(subject: Subject, report: FindingSink) -> None:
     ```
     """
     for obstacle in _select_unreported(subject, report, Stage.CLAMP):
-        _report(subject, report, obstacle, f"{obstacle.message}; OpenSim simulates without the clamp")
+        _report(
+            subject, report, obstacle, f"{obstacle.message}; OpenSim simulates without the clamp"
+        )
 
 
 @rule("OSIM424", "singular-mass-matrix", severity=ERROR, about=CONSTRUCTION)
@@ -127,8 +129,8 @@ def impossible_force(subject: Subject, report: FindingSink) -> None:
     """A force, a controller or a probe has no meaning.
 
     Makes all forces, controllers and probes as `osimlite simulate` does, and reports what stops
-    that and no other rule has reported. It is a warning for a number that OpenSim computes with though
-    it makes no sense.
+    that and no other rule has reported. It is a warning for a number that OpenSim computes with
+    though it makes no sense.
 
     OpenSim refuses such a model when it builds the system, or fails when it needs the force. No
     command that computes takes it.
@@ -226,9 +228,9 @@ def not_computed(subject: Subject, report: FindingSink) -> None:
 def impassable_obstacle(subject: Subject, report: FindingSink) -> None:
     """A path cannot be laid over an obstacle.
 
-    Reports paths over obstacles (Scholz2015GeometryPath) of which a point, or another obstacle, is inside
-    an obstacle in the default pose, as written or as assembled; and those whose search fails, since
-    a `contact_hint` is in the middle of the surface or leads nowhere.
+    Reports paths over obstacles (Scholz2015GeometryPath) of which a point, or another obstacle, is
+    inside an obstacle in the default pose, as written or as assembled; and those whose search
+    fails, since a `contact_hint` is in the middle of the surface or leads nowhere.
 
     OpenSim refuses the model: it lays the path as soon as it initialises the system. A GeometryPath
     is another matter, it goes straight through a surface that a point of it is inside of (OSIM616).
@@ -297,4 +299,6 @@ def _report(
     severity: Severity | None = None,
 ) -> None:
     item = subject.tree.by_path.get(obstacle.path, subject.model)
-    report(message.replace("; 'osimlite validate' lists every such place", ""), item, severity=severity)
+    report(
+        message.replace("; 'osimlite validate' lists every such place", ""), item, severity=severity
+    )

@@ -23,10 +23,11 @@ from osimlite.schema.tree import Use
 def contact_without_partner(subject: Subject, found: FindingSink) -> None:
     """A contact force has no two surfaces that can meet.
 
-    Reports contact forces that list no contact geometry, or only one, over all their parameter sets together; and those
-    of whose surfaces no two can meet: all are on one body, or of shapes between which OpenSim computes no contact. A
-    HuntCrossleyForce acts between spheres, ellipsoids, and these and a half-space; an ElasticFoundationForce between a
-    mesh and a mesh, a sphere or a half-space.
+    Reports contact forces that list no contact geometry, or only one, over all their parameter sets
+    together; and those of whose surfaces no two can meet: all are on one body, or of shapes between
+    which OpenSim computes no contact. A HuntCrossleyForce acts between spheres, ellipsoids, and
+    these and a half-space; an ElasticFoundationForce between a mesh and a mesh, a sphere or a
+    half-space.
 
     Such a force never acts, and OpenSim does not mention it.
 
@@ -78,7 +79,8 @@ def _reason_for_no_contact(subject: Subject, force: Component, uses: list[Use]) 
     if all(first[1] is second[1] for first, second in pairs):
         return f"surfaces of {called(bases[0])} alone" if bases[0] is not None else ""
     if any(
-        first[1] is not second[1] and _can_meet(kind, type(first[0]).__name__, type(second[0]).__name__)
+        first[1] is not second[1]
+        and _can_meet(kind, type(first[0]).__name__, type(second[0]).__name__)
         for first, second in pairs
     ):
         return ""
@@ -145,7 +147,11 @@ def unused_contact_geometry(subject: Subject, found: FindingSink) -> None:
         return
     if any(len(uses) < 2 for _, _, uses in _contact_lists(subject)):
         return
-    used = {id(subject.resolution(use).target) for use in subject.uses if use.reference.target in _SURFACES}
+    used = {
+        id(subject.resolution(use).target)
+        for use in subject.uses
+        if use.reference.target in _SURFACES
+    }
     for surface in surfaces:
         if id(surface) not in used:
             found(f"no force uses {called(surface)}", surface, attribute="name")
@@ -171,6 +177,8 @@ def _contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Object], 
         lists = [
             holder
             for holder in holders
-            if any(spec.reference.target == "ContactGeometry" for spec in reference_specs(type(holder)))
+            if any(
+                spec.reference.target == "ContactGeometry" for spec in reference_specs(type(holder))
+            )
         ]
         yield owner, lists, uses

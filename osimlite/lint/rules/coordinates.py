@@ -14,22 +14,32 @@ from osimlite.lint.words import called, quantity
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.joints import Joint
 
-ANGLE = Threshold("largest-angle", 10 * math.pi, "rad", "a coordinate that turns further is taken to be in degrees")
-UNBOUNDED = Threshold("unbounded-angle", 1000.0, "rad", "a bound of a range from which on it stands for none")
+ANGLE = Threshold(
+    "largest-angle",
+    10 * math.pi,
+    "rad",
+    "a coordinate that turns further is taken to be in degrees",
+)
+UNBOUNDED = Threshold(
+    "unbounded-angle", 1000.0, "rad", "a bound of a range from which on it stands for none"
+)
 _ASSEMBLY_ACCURACY = 1e-10
 """Difference from the default value (rad or m) up to which OpenSim 4.6 takes a locked coordinate."""
 
-ORIENTATION = Threshold("largest-orientation", 2 * math.pi, "rad", "a larger angle of a frame is in degrees")
+ORIENTATION = Threshold(
+    "largest-orientation", 2 * math.pi, "rad", "a larger angle of a frame is in degrees"
+)
 
 
 @rule("OSIM511", "inverted-range", severity=WARNING, mends="unsafe")
 def inverted_range(subject: Subject, found: FindingSink) -> None:
     """The range of a coordinate ends before it begins.
 
-    Reports ranges whose first number is larger than the second; an error if the coordinate is clamped.
+    Reports ranges whose first number is larger than the second; an error if the coordinate is
+    clamped.
 
-    OpenSim refuses to load a clamped coordinate like this. Otherwise it does not check, and sliders and solvers that
-    use the range misbehave.
+    OpenSim refuses to load a clamped coordinate like this. Otherwise it does not check, and sliders
+    and solvers that use the range misbehave.
 
     ```xml
       <PinJoint name="knee">
@@ -43,14 +53,20 @@ def inverted_range(subject: Subject, found: FindingSink) -> None:
     for coordinate in subject.each(Coordinate):
         low, high = coordinate.range
         if low > high:
-            refused = ": OpenSim refuses to load a clamped coordinate like this" if coordinate.clamped else ""
+            refused = (
+                ": OpenSim refuses to load a clamped coordinate like this"
+                if coordinate.clamped
+                else ""
+            )
             found(
                 f"the range of {called(coordinate)} runs from {quantity(low)} down to {quantity(high)}{refused}",
                 coordinate,
                 tag="range",
                 severity=ERROR if coordinate.clamped else None,
                 suggestion=(better := f"{shortest(high)} {shortest(low)}"),
-                fix=replaced(subject.source, subject.position(coordinate, tag="range"), better, safe=False),
+                fix=replaced(
+                    subject.source, subject.position(coordinate, tag="range"), better, safe=False
+                ),
             )
 
 
@@ -60,8 +76,8 @@ def default_outside_range(subject: Subject, found: FindingSink) -> None:
 
     Reports such defaults; an error if the coordinate is clamped.
 
-    OpenSim refuses to load a clamped coordinate like this. Otherwise the model starts in a pose that its own range
-    rules out; often the range or the default is in degrees.
+    OpenSim refuses to load a clamped coordinate like this. Otherwise the model starts in a pose
+    that its own range rules out; often the range or the default is in degrees.
 
     ```xml
     - <Coordinate name="knee_angle"> <default_value>0.3</default_value> <range>-2.1 0</range> </Coordinate>
@@ -70,11 +86,19 @@ def default_outside_range(subject: Subject, found: FindingSink) -> None:
     """
     for coordinate in subject.each(Coordinate):
         low, high = coordinate.range
-        slack = 1e-9 * max(abs(low), abs(high), 1.0) if math.isfinite(low) and math.isfinite(high) else 0.0
+        slack = (
+            1e-9 * max(abs(low), abs(high), 1.0)
+            if math.isfinite(low) and math.isfinite(high)
+            else 0.0
+        )
         if low <= high and not low - slack <= coordinate.default_value <= high + slack:
             if not math.isfinite(coordinate.default_value):
                 continue
-            refused = ": OpenSim refuses to load a clamped coordinate like this" if coordinate.clamped else ""
+            refused = (
+                ": OpenSim refuses to load a clamped coordinate like this"
+                if coordinate.clamped
+                else ""
+            )
             found(
                 f"the default value of {called(coordinate)}, {quantity(coordinate.default_value)}, is outside its "
                 f"range, {quantity(low)} to {quantity(high)}{refused}",
@@ -142,15 +166,17 @@ def prescribed_without_function(subject: Subject, found: FindingSink) -> None:
             )
 
 
-@rule("OSIM514", "degrees-for-radians", severity=WARNING, thresholds=(ANGLE, UNBOUNDED, ORIENTATION))
+@rule(
+    "OSIM514", "degrees-for-radians", severity=WARNING, thresholds=(ANGLE, UNBOUNDED, ORIENTATION)
+)
 def degrees_for_radians(subject: Subject, found: FindingSink) -> None:
     """An angle looks as if it were in degrees.
 
-    Reports rotational coordinates whose default value or range goes beyond five turns, in radians, and frames,
-    surfaces and wrap objects that are turned by more than one.
+    Reports rotational coordinates whose default value or range goes beyond five turns, in radians,
+    and frames, surfaces and wrap objects that are turned by more than one.
 
-    Coordinates are in radians (only the limits of a CoordinateLimitForce are in degrees); 90 is more than fourteen
-    turns.
+    Coordinates are in radians (only the limits of a CoordinateLimitForce are in degrees); 90 is
+    more than fourteen turns.
 
     ```xml
       <PinJoint name="knee">
@@ -166,7 +192,9 @@ def degrees_for_radians(subject: Subject, found: FindingSink) -> None:
         for coordinate, motion in zip(joint.coordinates, joint.motion_types or (), strict=False):
             if motion != "rotational" or not isinstance(coordinate, Coordinate):
                 continue
-            largest = max((abs(bound) for bound in coordinate.range if math.isfinite(bound)), default=0.0)
+            largest = max(
+                (abs(bound) for bound in coordinate.range if math.isfinite(bound)), default=0.0
+            )
             # 99999.9 and the like stand for "no bound".
             if turns < largest < unbounded:
                 found(

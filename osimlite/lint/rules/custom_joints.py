@@ -35,11 +35,12 @@ if TYPE_CHECKING:
 def made_up_coordinate(subject: Subject, found: FindingSink) -> None:
     """An axis of a custom joint names a coordinate that the joint does not declare.
 
-    Reports such names where OpenSim takes the model all the same; where it refuses the model, the name is reported as
-    a reference that leads nowhere. It is a warning if the joint declares no coordinate at all.
+    Reports such names where OpenSim takes the model all the same; where it refuses the model, the
+    name is reported as a reference that leads nowhere. It is a warning if the joint declares no
+    coordinate at all.
 
-    OpenSim makes a coordinate of that name up, without a word: the joint has one degree of freedom more, its value is
-    0, and the axis no longer follows the coordinate it was meant to follow.
+    OpenSim makes a coordinate of that name up, without a word: the joint has one degree of freedom
+    more, its value is 0, and the axis no longer follows the coordinate it was meant to follow.
 
     ```xml
       <TransformAxis name="translation1">
@@ -74,8 +75,8 @@ def made_up_coordinate(subject: Subject, found: FindingSink) -> None:
 def axis_without_coordinate(subject: Subject, found: FindingSink) -> None:
     """An axis of a custom joint has a function and no coordinate for it.
 
-    Reports axes that name no coordinate though their function wants a variable. Constant and linear functions do
-    without.
+    Reports axes that name no coordinate though their function wants a variable. Constant and linear
+    functions do without.
 
     OpenSim crashes, without a message.
 
@@ -89,9 +90,16 @@ def axis_without_coordinate(subject: Subject, found: FindingSink) -> None:
     for joint in subject.named("CustomJoint"):
         for axis in axes_of(joint):
             function = axis.function
-            while is_a(function, "MultiplierFunction") and getattr(function, "function", None) is not None:
+            while (
+                is_a(function, "MultiplierFunction")
+                and getattr(function, "function", None) is not None
+            ):
                 function = cast("Any", function).function
-            if not axis.coordinates and type(function).__name__ not in ("Constant", "LinearFunction", "Unknown"):
+            if not axis.coordinates and type(function).__name__ not in (
+                "Constant",
+                "LinearFunction",
+                "Unknown",
+            ):
                 found(
                     f"{axis.name} of {called(joint)} names no coordinate for its {called(axis.function)}: "
                     "OpenSim crashes",
@@ -104,9 +112,11 @@ def axis_without_coordinate(subject: Subject, found: FindingSink) -> None:
 def collinear_axes(subject: Subject, found: FindingSink) -> None:
     """Two rotations, or two translations, of a custom joint have the same axis.
 
-    Reports axes of a custom joint that are parallel to one before of the same kind, or have no length.
+    Reports axes of a custom joint that are parallel to one before of the same kind, or have no
+    length.
 
-    OpenSim refuses to load the file, also where an axis moves nothing. Give each unused axis a direction of its own.
+    OpenSim refuses to load the file, also where an axis moves nothing. Give each unused axis a
+    direction of its own.
 
     ```xml
       <TransformAxis name="rotation1"> <axis>0 0 1</axis> </TransformAxis>
@@ -121,12 +131,22 @@ def collinear_axes(subject: Subject, found: FindingSink) -> None:
             kind = [axis for axis in kind if not any(map(math.isnan, axis.axis))]
             for index, axis in enumerate(kind):
                 twin = next(
-                    (other for other in kind[:index] if not norm(cross(axis.axis, other.axis)) >= _COLLINEAR), None
+                    (
+                        other
+                        for other in kind[:index]
+                        if not norm(cross(axis.axis, other.axis)) >= _COLLINEAR
+                    ),
+                    None,
                 )
-                # An axis without a length is parallel to every other one; the finding belongs to it.
+                # An axis without a length is parallel to every other one; the finding belongs to
+                # it.
                 short = math.hypot(*axis.axis) < _COLLINEAR
                 if short or (twin is not None and math.hypot(*twin.axis) >= _COLLINEAR):
-                    state = "has no length" if short else f"is parallel to that of {twin.name if twin else ''}"
+                    state = (
+                        "has no length"
+                        if short
+                        else f"is parallel to that of {twin.name if twin else ''}"
+                    )
                     found(
                         f"the axis of {axis.name} of {called(joint)} {state}: OpenSim refuses to load the file",
                         axis,
@@ -138,11 +158,13 @@ def collinear_axes(subject: Subject, found: FindingSink) -> None:
 def idle_coordinate(subject: Subject, found: FindingSink) -> None:
     """A coordinate of a custom joint moves nothing.
 
-    Reports coordinates that no axis uses, or only with a function that does not change with them in the default pose: a
-    constant one, one with the weight 0, or one of a single variable that reads another coordinate.
+    Reports coordinates that no axis uses, or only with a function that does not change with them in
+    the default pose: a constant one, one with the weight 0, or one of a single variable that reads
+    another coordinate.
 
-    The joint has a degree of freedom without a motion, so that the mass matrix cannot be inverted: all accelerations of
-    the joint become NaN, without a message, also if the coordinate is locked or prescribed.
+    The joint has a degree of freedom without a motion, so that the mass matrix cannot be inverted:
+    all accelerations of the joint become NaN, without a message, also if the coordinate is locked
+    or prescribed.
 
     ```xml
       <TransformAxis name="rotation1">
@@ -185,7 +207,9 @@ def _motion_by(joint: CustomJoint, coordinate: Coordinate) -> list[float]:
     for number, axis in enumerate(axes_of(joint)):
         names = axis.names
         # Of a name that stands twice the last place counts.
-        place = max((place for place, name in enumerate(names) if name == coordinate.name), default=None)
+        place = max(
+            (place for place, name in enumerate(names) if name == coordinate.name), default=None
+        )
         known = 0.0 if place is None else _slope(axis.function, place, values.get(names[0], 0.0))
         # No combination of these numbers is 0 by chance.
         result.append(math.sqrt(2 + number + 7 * (place or 0)) if known is None else known)
@@ -208,7 +232,11 @@ def _slope(function: Function | None, place: int, first: float) -> float | None:
             return sum((degree - n) * weight * first ** (degree - n - 1) for n, weight in powers)
         case SimmSpline() | PiecewiseLinearFunction() | PiecewiseConstantFunction() | GCVSpline():
             return 0.0 if place or len(set(function.y)) < 2 else None
-    return 0.0 if place and not isinstance(function, Unknown | MultivariatePolynomialFunction) else None
+    return (
+        0.0
+        if place and not isinstance(function, Unknown | MultivariatePolynomialFunction)
+        else None
+    )
 
 
 def _rank(rows: list[list[float]]) -> int:

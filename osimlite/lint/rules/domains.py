@@ -23,12 +23,13 @@ from osimlite.schema.specs import FieldSpec, lineage, value_specs
 def not_finite(subject: Subject, found: FindingSink) -> None:
     """A number is NaN, or infinite where that makes no sense.
 
-    Reports NaN in any number, and infinity except in bounds (ranges, smallest and largest controls), where it is
-    a way to say that there is none.
+    Reports NaN in any number, and infinity except in bounds (ranges, smallest and largest
+    controls), where it is a way to say that there is none.
 
-    OpenSim accepts a single number or a vector in silence, and everything that is computed with it becomes NaN: the
-    simulation runs to its end without a message and without a result. It refuses to load a file with such a number in a
-    list, as the points of a function are. In what is only drawn, and in bounds, it is a warning: the motion stays.
+    OpenSim accepts a single number or a vector in silence, and everything that is computed with it
+    becomes NaN: the simulation runs to its end without a message and without a result. It refuses
+    to load a file with such a number in a list, as the points of a function are. In what is only
+    drawn, and in bounds, it is a warning: the motion stays.
 
     ```xml
     - <gravity>0 NaN 0</gravity>
@@ -72,8 +73,8 @@ def _fate_of_nan(item: Object, spec: FieldSpec, number: float) -> str:
 def impossible_value(subject: Subject, found: FindingSink) -> None:
     """A number makes OpenSim fail or compute NaN.
 
-    Reports values outside their domain of which it is known that OpenSim refuses them, or computes nonsense: contact
-    stiffness 0, a negative mass, a limit without transition.
+    Reports values outside their domain of which it is known that OpenSim refuses them, or computes
+    nonsense: contact stiffness 0, a negative mass, a limit without transition.
 
     Most of them pass in silence. A contact stiffness of 0 is 0/0 as soon as the surfaces touch.
 
@@ -94,11 +95,11 @@ def impossible_value(subject: Subject, found: FindingSink) -> None:
 def doubtful_value(subject: Subject, found: FindingSink) -> None:
     """A number is outside the values that make sense for its property.
 
-    Reports numbers outside the domain that the property declares: a negative radius or dissipation, an opacity of 3;
-    and numbers of 1e20 and more.
+    Reports numbers outside the domain that the property declares: a negative radius or dissipation,
+    an opacity of 3; and numbers of 1e20 and more.
 
-    OpenSim computes with it all the same: a negative dissipation feeds energy into each impact, and a sphere with a
-    negative radius touches nothing.
+    OpenSim computes with it all the same: a negative dissipation feeds energy into each impact, and
+    a sphere with a negative radius touches nothing.
 
     ```xml
     - <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <radius>-0.05</radius> </ContactSphere>
@@ -113,8 +114,10 @@ def doubtful_value(subject: Subject, found: FindingSink) -> None:
         if huge and not _bound(item, spec):
             found(
                 f"{subject.titled(item, spec)} is {shown(value)}: no quantity of a motion is of this size",
-                item, tag=spec.tag, word=_word_of(subject, item, spec, huge[0]),
-            )  # fmt: skip
+                item,
+                tag=spec.tag,
+                word=_word_of(subject, item, spec, huge[0]),
+            )
 
 
 @rule("OSIM208", "unknown-choice", severity=ERROR)
@@ -171,7 +174,13 @@ class Verdict(NamedTuple):
 _NAN_FATE = "what is computed with it becomes NaN, without a message"
 _DRAWN_FATE = "it cannot be drawn"
 _BOUND_FATE = "what takes it as a bound fails"
-_DRAWN = {"Geometry", "Appearance", "SurfaceProperties", "ModelDisplayHints", "ModelVisualPreferences"}
+_DRAWN = {
+    "Geometry",
+    "Appearance",
+    "SurfaceProperties",
+    "ModelDisplayHints",
+    "ModelVisualPreferences",
+}
 """Classes of what is only drawn."""
 
 
@@ -197,13 +206,19 @@ def _find_outside(subject: Subject) -> Iterator[_Outside]:
                 value = item.__dict__[spec.name]
                 if value is None or (value.__class__ is float and inside(value)):
                     continue
-                wrong = [number for number in _numbers(value) if not inside(number) and math.isfinite(number)]
+                wrong = [
+                    number
+                    for number in _numbers(value)
+                    if not inside(number) and math.isfinite(number)
+                ]
                 if not wrong and _is_missing(item, spec, value):
                     fate, fails = consequence(cls, spec.name, math.nan)
                     if fails:
                         yield item, spec, value, Verdict(math.nan, "", fate, fails)
                     continue
-                if not wrong or (subject.noted(item, spec) and wrong == list(_numbers(spec.default))):
+                if not wrong or (
+                    subject.noted(item, spec) and wrong == list(_numbers(spec.default))
+                ):
                     continue
                 if id(item) in obstacles and (spec.name, wrong[0]) != ("torus_radius", 0):
                     fate, fails = REFUSED, True
@@ -220,15 +235,32 @@ def _is_missing(item: Object, spec: FieldSpec, value: Any) -> bool:
 
 
 def _report_domain(
-    subject: Subject, found: FindingSink, item: Object, spec: FieldSpec, value: Any, verdict: Verdict
+    subject: Subject,
+    found: FindingSink,
+    item: Object,
+    spec: FieldSpec,
+    value: Any,
+    verdict: Verdict,
 ) -> None:
     given = spec.name in item.model_fields_set
     assert isinstance(spec.kind, Value)
     if verdict.number != verdict.number:
-        found(f"{subject.titled(item, spec)} is not given and has no default: {verdict.fate}", item, tag=spec.tag)
+        found(
+            f"{subject.titled(item, spec)} is not given and has no default: {verdict.fate}",
+            item,
+            tag=spec.tag,
+        )
         return
-    size = quantity(value, spec.kind.unit) if given else f"not given, so {quantity(value, spec.kind.unit)}"
-    wanted = re.sub(r"^>= (\S+)$", r"\1 or more", verdict.domain).replace(">", "more than").replace("!=", "other than")
+    size = (
+        quantity(value, spec.kind.unit)
+        if given
+        else f"not given, so {quantity(value, spec.kind.unit)}"
+    )
+    wanted = (
+        re.sub(r"^>= (\S+)$", r"\1 or more", verdict.domain)
+        .replace(">", "more than")
+        .replace("!=", "other than")
+    )
     fate = f": {verdict.fate}" if verdict.fate else ""
     found(
         f"{subject.titled(item, spec)} is {size}, it should be {wanted}{fate}",
@@ -241,7 +273,11 @@ def _report_domain(
 def _domain(cls: type[Object], spec: FieldSpec) -> str:
     """The numbers that a property of a class may have; what a base has stricter is not so for it."""
     assert isinstance(spec.kind, Value)
-    return cls.facts.domains.get(spec.name, spec.kind.domain) if "facts" in cls.__dict__ else spec.kind.domain
+    return (
+        cls.facts.domains.get(spec.name, spec.kind.domain)
+        if "facts" in cls.__dict__
+        else spec.kind.domain
+    )
 
 
 @cache
@@ -275,7 +311,11 @@ def _reals(subject: Subject) -> Iterator[tuple[Object, FieldSpec, Any]]:
 @cache
 def _numeric(cls: type[Object]) -> tuple[tuple[FieldSpec, str], ...]:
     """The properties of a class that hold real numbers, each with its name."""
-    specs = (spec for spec in value_specs(cls) if isinstance(spec.kind, Value) and spec.kind.scalar == "double")
+    specs = (
+        spec
+        for spec in value_specs(cls)
+        if isinstance(spec.kind, Value) and spec.kind.scalar == "double"
+    )
     return tuple((spec, spec.name) for spec in specs)
 
 

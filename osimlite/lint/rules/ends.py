@@ -44,7 +44,10 @@ def ends_in_one_place(subject: Subject, report: FindingSink) -> None:
         if not getattr(force, "appliesForce", True):
             continue
         # OpenSim takes the points in the body itself, also where a frame that is off it is named.
-        ends = [_place_in_ground(subject, base_of(subject, frame), point) for frame, point in (first, second)]
+        ends = [
+            _place_in_ground(subject, base_of(subject, frame), point)
+            for frame, point in (first, second)
+        ]
         if ends[0] is None or ends[1] is None:
             continue
         if norm(plus(ends[0], times(-1.0, ends[1]))) < NO_LENGTH_M:
@@ -91,7 +94,9 @@ def spring_on_one_body(subject: Subject, report: FindingSink) -> None:
     ```
     """
     for spring in subject.named("PointToPointSpring"):
-        first, second = (base_of(subject, subject.target_of(spring, f"socket_body{number}")) for number in (1, 2))
+        first, second = (
+            base_of(subject, subject.target_of(spring, f"socket_body{number}")) for number in (1, 2)
+        )
         if first is not None and first is second:
             report(
                 f"both ends of {called(spring)} are on {called(first)}: OpenSim refuses the model",

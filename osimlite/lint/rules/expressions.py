@@ -13,7 +13,9 @@ from osimlite.schema.base import Object
 from osimlite.schema.forces import Force
 
 _BUSHING_VARIABLES = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
-_BUSHING_PROPERTIES = tuple(f"{letter}{axis}_expression" for letter in ("M", "F") for axis in ("x", "y", "z"))
+_BUSHING_PROPERTIES = tuple(
+    f"{letter}{axis}_expression" for letter in ("M", "F") for axis in ("x", "y", "z")
+)
 
 FORMULAS = {
     "ExpressionBasedCoordinateForce": (("expression",), ("q", "qdot")),
@@ -33,8 +35,8 @@ def broken_expression(subject: Subject, report: FindingSink) -> None:
 
     OpenSim refuses the model where the formula is wrong, and fails at the first acceleration where
     a variable is unknown; if what has the formula is off, it never gets there (a warning). Formulas
-    know + - * / ^, functions such as sin, sqrt, exp, min, step, and after a semicolon definitions as
-    in `k*q; k=100`. There is no pi and no `**`. What drops out needs no value: `0*x` is 0.
+    know + - * / ^, functions such as sin, sqrt, exp, min, step, and after a semicolon definitions
+    as in `k*q; k=100`. There is no pi and no `**`. What drops out needs no value: `0*x` is 0.
 
     ```xml
       <ExpressionBasedCoordinateForce name="spring">

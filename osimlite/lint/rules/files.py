@@ -20,12 +20,13 @@ from osimlite.schema.geometry import Mesh
 def missing_mesh(subject: Subject, found: FindingSink) -> None:
     """A mesh file is not there.
 
-    Looks for the file of each mesh where OpenSim does: beside the model, in the folder `Geometry` beside it, and in
-    the folders that the configuration names. A file of the same name in other letter case is pointed out, and one that
-    is found with / in the place of a backslash.
+    Looks for the file of each mesh where OpenSim does: beside the model, in the folder `Geometry`
+    beside it, and in the folders that the configuration names. A file of the same name in other
+    letter case is pointed out, and one that is found with / in the place of a backslash.
 
-    OpenSim draws nothing for such a mesh. A contact mesh that is missing makes it refuse the model. A name in the wrong
-    case is found on Windows and macOS and missing on Linux; one with a backslash is found on Windows alone.
+    OpenSim draws nothing for such a mesh. A contact mesh that is missing makes it refuse the model.
+    A name in the wrong case is found on Windows and macOS and missing on Linux; one with a
+    backslash is found on Windows alone.
 
     ```xml
       <Body name="thigh"> <attached_geometry>
@@ -34,7 +35,9 @@ def missing_mesh(subject: Subject, found: FindingSink) -> None:
       </attached_geometry> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
-    items: list[tuple[Object, str, str]] = [(mesh, "mesh_file", mesh.mesh_file) for mesh in subject.each(Mesh)]
+    items: list[tuple[Object, str, str]] = [
+        (mesh, "mesh_file", mesh.mesh_file) for mesh in subject.each(Mesh)
+    ]
     items += [(mesh, "filename", mesh.filename) for mesh in subject.each(ContactMesh)]
     folder = subject.folder if items else None
     if folder is None:
@@ -76,12 +79,14 @@ def missing_mesh(subject: Subject, found: FindingSink) -> None:
 def included_file(subject: Subject, found: FindingSink) -> None:
     """An object is kept in another file.
 
-    Reports `file=` on an object: for information, as a warning if that file is not there or does not hold it, is no
-    ordinary file (a pipe, a device) or larger than the settings allow (`largest-file`), and as an error if the element
-    itself holds something, or if another component names the object, which without its file has no name.
+    Reports `file=` on an object: for information, as a warning if that file is not there or does
+    not hold it, is no ordinary file (a pipe, a device) or larger than the settings allow
+    (`largest-file`), and as an error if the element itself holds something, or if another component
+    names the object, which without its file has no name.
 
-    OpenSim reads the object from the other file, and writes that file anew when it saves the model; if it is missing,
-    it goes on with an empty object. Of what stands inside an element with `file=` it reads nothing.
+    OpenSim reads the object from the other file, and writes that file anew when it saves the model;
+    if it is missing, it goes on with an empty object. Of what stands inside an element with `file=`
+    it reads nothing.
 
     ```xml
     - <MarkerSet file="markers.xml" />
@@ -109,7 +114,13 @@ def included_file(subject: Subject, found: FindingSink) -> None:
         ignored = _has_content(subject.source, note.number)
         state = "is read from" if read else "should be read from"
         why = "" if read else f", which {note.why or 'OpenSim does not open for a member of a set'}"
-        fate = ": OpenSim ignores what stands here" if ignored else ": it stays empty" if note.why else ""
+        fate = (
+            ": OpenSim ignores what stands here"
+            if ignored
+            else ": it stays empty"
+            if note.why
+            else ""
+        )
         # What stays empty has no name either.
         uses = subject.uses if note.why and subject.model is not None else []
         wanted = sum(subject.resolution(use).target is note.owner for use in uses)
@@ -129,7 +140,10 @@ def _has_content(source: Source | None, number: int) -> bool:
     if source is None:
         return False
     # An empty set has empty elements for members and groups.
-    if all(source.spans[i].tag in ("objects", "groups") and not source.children(i) for i in source.children(number)):
+    if all(
+        source.spans[i].tag in ("objects", "groups") and not source.children(i)
+        for i in source.children(number)
+    ):
         return False
     end = source.spans[number].end
     around = next((i for i in range(number - 1, -1, -1) if source.spans[i].end >= end), 0)
@@ -140,10 +154,11 @@ def _has_content(source: Source | None, number: int) -> bool:
 def missing_data_file(subject: Subject, found: FindingSink) -> None:
     """A file of measured loads, of controls or of a table is not there.
 
-    Looks for the files of external loads, of controllers and of table sources beside the model and in the folder that
-    the program was started in.
+    Looks for the files of external loads, of controllers and of table sources beside the model and
+    in the folder that the program was started in.
 
-    OpenSim refuses the model when it is connected; only a ControlSetController goes on, without any controls.
+    OpenSim refuses the model when it is connected; only a ControlSetController goes on, without any
+    controls.
 
     ```xml
       <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
@@ -172,8 +187,15 @@ def missing_data_file(subject: Subject, found: FindingSink) -> None:
         if name and any(folders.has(place, name) for place in places):
             continue
         twin = folders.in_other_case(places, name)
-        fate = "it has no controls" if cls == "ControlSetController" else "OpenSim refuses the model"
-        found(f"the file '{name}' of {called(item)} is not there: {fate}", item, tag=tag, suggestion=twin)
+        fate = (
+            "it has no controls" if cls == "ControlSetController" else "OpenSim refuses the model"
+        )
+        found(
+            f"the file '{name}' of {called(item)} is not there: {fate}",
+            item,
+            tag=tag,
+            suggestion=twin,
+        )
 
 
 class _Folders:

@@ -37,12 +37,14 @@ Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstant
 def unsorted_abscissae(subject: Subject, found: FindingSink) -> None:
     """The x values of a function do not rise.
 
-    Reports the first x that is smaller than the one before it, and of splines also the first that is equal to it.
+    Reports the first x that is smaller than the one before it, and of splines also the first that
+    is equal to it.
 
-    A GCVSpline is refused, or OpenSim fails when a force or a controller asks for its value. A SimmSpline divides by
-    the difference without a word and gives values in the millions; piecewise functions take the wrong piece. A moment
-    arm or a moving point is then anywhere. Where the same point stands twice, a SimmSpline has no slope (a warning).
-    What is off, a controller or a force, never computes its functions (a warning).
+    A GCVSpline is refused, or OpenSim fails when a force or a controller asks for its value. A
+    SimmSpline divides by the difference without a word and gives values in the millions; piecewise
+    functions take the wrong piece. A moment arm or a moving point is then anywhere. Where the same
+    point stands twice, a SimmSpline has no slope (a warning). What is off, a controller or a force,
+    never computes its functions (a warning).
 
     ```xml
       <Coordinate name="knee_angle">
@@ -61,7 +63,9 @@ def unsorted_abscissae(subject: Subject, found: FindingSink) -> None:
                 refused = isinstance(function, GCVSpline)
                 is_off = is_unused(subject, function)
                 level = (
-                    here == before and not refused and function.y[index - 1 : index] == function.y[index : index + 1]
+                    here == before
+                    and not refused
+                    and function.y[index - 1 : index] == function.y[index : index + 1]
                 )
                 fate = (
                     UNUSED
@@ -93,8 +97,8 @@ def unequal_points(subject: Subject, found: FindingSink) -> None:
 
     Reports tabulated functions whose lists are of different length. Too many y are a warning.
 
-    Where y is missing OpenSim reads beyond the end of the list, whatever is in memory there; a GCVSpline is refused.
-    Too many y are ignored.
+    Where y is missing OpenSim reads beyond the end of the list, whatever is in memory there; a
+    GCVSpline is refused. Too many y are ignored.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -110,7 +114,13 @@ def unequal_points(subject: Subject, found: FindingSink) -> None:
         if xs == ys:
             continue
         is_off = is_unused(subject, function)
-        fate = UNUSED if is_off else "OpenSim reads beyond the end of the list" if ys < xs else "the rest is ignored"
+        fate = (
+            UNUSED
+            if is_off
+            else "OpenSim reads beyond the end of the list"
+            if ys < xs
+            else "the rest is ignored"
+        )
         found(
             f"{subject.called_with(function)} has {xs} x and {ys} y: {fate}",
             function,
@@ -123,10 +133,11 @@ def unequal_points(subject: Subject, found: FindingSink) -> None:
 def too_few_points(subject: Subject, found: FindingSink) -> None:
     """A function has too few points.
 
-    Reports a SimmSpline of fewer than two points, a GCVSpline of fewer than twice its half order or without a half
-    order, and piecewise functions without any.
+    Reports a SimmSpline of fewer than two points, a GCVSpline of fewer than twice its half order or
+    without a half order, and piecewise functions without any.
 
-    A SimmSpline is then NaN everywhere, a GCVSpline is refused, and a piecewise function returns what is in memory.
+    A SimmSpline is then NaN everywhere, a GCVSpline is refused, and a piecewise function returns
+    what is in memory.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -143,7 +154,11 @@ def too_few_points(subject: Subject, found: FindingSink) -> None:
         elif isinstance(function, GCVSpline):
             least = 2 * function.half_order
         if isinstance(function, GCVSpline) and function.half_order < 1:
-            given = str(function.half_order) if "half_order" in function.model_fields_set else "not given"
+            given = (
+                str(function.half_order)
+                if "half_order" in function.model_fields_set
+                else "not given"
+            )
             fate = _describe_refusal(subject, function)
             found(
                 f"half_order of {subject.called_with(function)} is {given}: {fate}; 2 is a cubic spline",
@@ -168,12 +183,14 @@ def too_few_points(subject: Subject, found: FindingSink) -> None:
 def coefficient_count(subject: Subject, found: FindingSink) -> None:
     """A linear function or a polynomial has too many or too few coefficients.
 
-    Reports linear functions without coefficients (an error), polynomials of several variables with another number than
-    their dimension and order ask for (an error), and linear functions on the axis of a joint or of a coordinate
-    coupler that have fewer (an error) or more than the coordinates there and a constant.
+    Reports linear functions without coefficients (an error), polynomials of several variables with
+    another number than their dimension and order ask for (an error), and linear functions on the
+    axis of a joint or of a coordinate coupler that have fewer (an error) or more than the
+    coordinates there and a constant.
 
-    OpenSim crashes on an empty list, and refuses a polynomial. Where the constant is missing it reads beyond the end of
-    the list. Of too many it takes the first for the weights, the next for the constant, and ignores the rest.
+    OpenSim crashes on an empty list, and refuses a polynomial. Where the constant is missing it
+    reads beyond the end of the list. Of too many it takes the first for the weights, the next for
+    the constant, and ignores the rest.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -195,8 +212,14 @@ def coefficient_count(subject: Subject, found: FindingSink) -> None:
                 severity=WARNING if is_off else ERROR,
             )
     for polynomial in subject.each(MultivariatePolynomialFunction):
-        dimension, order, given = polynomial.dimension, polynomial.order, len(polynomial.coefficients)
-        wanted = comb(dimension + order, order) if 0 <= dimension < 100 and 0 <= order < 100 else given
+        dimension, order, given = (
+            polynomial.dimension,
+            polynomial.order,
+            len(polynomial.coefficients),
+        )
+        wanted = (
+            comb(dimension + order, order) if 0 <= dimension < 100 and 0 <= order < 100 else given
+        )
         if given != wanted:
             is_off = is_unused(subject, polynomial)
             fate = UNUSED if is_off else "OpenSim fails when it needs a value"
@@ -210,7 +233,11 @@ def coefficient_count(subject: Subject, found: FindingSink) -> None:
     for holder, names, function in _linear(subject):
         given, wanted = len(function.coefficients), names + 1
         if given and given != wanted:
-            fate = "OpenSim reads beyond the end of the list" if given < wanted else "OpenSim ignores the rest"
+            fate = (
+                "OpenSim reads beyond the end of the list"
+                if given < wanted
+                else "OpenSim ignores the rest"
+            )
             found(
                 f"the LinearFunction of {called(holder)} has {counted(given, 'coefficient')} for "
                 f"{counted(names, 'coordinate')}: {wanted} belong there; {fate}",
@@ -224,12 +251,13 @@ def coefficient_count(subject: Subject, found: FindingSink) -> None:
 def function_of_several(subject: Subject, report: FindingSink) -> None:
     """A function of one variable stands on several coordinates.
 
-    Reports splines, piecewise functions, polynomials, sines and steps on an axis of a CustomJoint, or in a
-    CoordinateCouplerConstraint, that names more than one coordinate; and MultivariatePolynomialFunctions whose
-    `dimension` is not the number of the coordinates.
+    Reports splines, piecewise functions, polynomials, sines and steps on an axis of a CustomJoint,
+    or in a CoordinateCouplerConstraint, that names more than one coordinate; and
+    MultivariatePolynomialFunctions whose `dimension` is not the number of the coordinates.
 
-    OpenSim gives no message. It takes values and derivatives of different coordinates, so that the motion is that of
-    neither. A LinearFunction takes any number of coordinates, a MultivariatePolynomialFunction those of its dimension.
+    OpenSim gives no message. It takes values and derivatives of different coordinates, so that the
+    motion is that of neither. A LinearFunction takes any number of coordinates, a
+    MultivariatePolynomialFunction those of its dimension.
 
     ```xml
       <CoordinateCouplerConstraint name="follow">
@@ -247,7 +275,11 @@ def function_of_several(subject: Subject, report: FindingSink) -> None:
         while isinstance(function, MultiplierFunction):
             function = function.function
         wanted = function.dimension if isinstance(function, MultivariatePolynomialFunction) else 1
-        if not isinstance(function, (*_OF_ONE, MultivariatePolynomialFunction)) or count == wanted or not count:
+        if (
+            not isinstance(function, (*_OF_ONE, MultivariatePolynomialFunction))
+            or count == wanted
+            or not count
+        ):
             continue
         report(
             f"the {type(function).tag} of {called(holder)} is a function of {counted(wanted, 'variable')} and stands "
@@ -260,7 +292,9 @@ _NEEDED: Final = {
     "Bhargava2004SmoothedMuscleMetabolics_MuscleParameters": ("use_provided_muscle_mass",),
     "CoordinateCouplerConstraint": ("coupled_coordinates_function",),
     "FunctionBasedBushingForce": tuple(
-        f"{letter}_{axis}_{kind}_{axis}_function" for letter, kind in (("m", "theta"), ("f", "delta")) for axis in "xyz"
+        f"{letter}_{axis}_{kind}_{axis}_function"
+        for letter, kind in (("m", "theta"), ("f", "delta"))
+        for axis in "xyz"
     ),
     "FunctionBasedPath": ("length_function",),
     "MovingPathPoint": ("x_location", "y_location", "z_location"),
@@ -272,12 +306,13 @@ _NEEDED: Final = {
 def missing_function(subject: Subject, found: FindingSink) -> None:
     """A function is not there that OpenSim cannot do without.
 
-    Reports MultiplierFunctions, CoordinateCouplerConstraints and FunctionBasedPaths without a function inside, and
-    empty functions of MovingPathPoints and FunctionBasedBushingForces; and PrescribedForces with other than three
-    functions, or none, for the force, its point or the torque.
+    Reports MultiplierFunctions, CoordinateCouplerConstraints and FunctionBasedPaths without a
+    function inside, and empty functions of MovingPathPoints and FunctionBasedBushingForces; and
+    PrescribedForces with other than three functions, or none, for the force, its point or the
+    torque.
 
-    OpenSim refuses the model, or fails when it needs the value. Scaling a model wraps functions in multipliers; one
-    that was taken out later leaves an empty multiplier.
+    OpenSim refuses the model, or fails when it needs the value. Scaling a model wraps functions in
+    multipliers; one that was taken out later leaves an empty multiplier.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -301,7 +336,11 @@ def missing_function(subject: Subject, found: FindingSink) -> None:
     if subject.has_unknown:
         return
     for kind, properties in _NEEDED.items():
-        refused = "OpenSim refuses the model" if len(properties) == 1 else "OpenSim fails when it needs a value"
+        refused = (
+            "OpenSim refuses the model"
+            if len(properties) == 1
+            else "OpenSim fails when it needs a value"
+        )
         for item in subject.named(kind):
             for name in properties:
                 if getattr(item, name) is None:
@@ -328,7 +367,9 @@ _OF_ONE: Final = (
 )
 
 
-def _find_functions_of_coordinates(subject: Subject) -> Iterator[tuple[Object, int, Function | None]]:
+def _find_functions_of_coordinates(
+    subject: Subject,
+) -> Iterator[tuple[Object, int, Function | None]]:
     """Yield the functions of coordinates: what they belong to, the number of coordinates, the function."""
     for joint in subject.named("CustomJoint"):
         # An axis without coordinates takes any function that needs none.
@@ -336,7 +377,11 @@ def _find_functions_of_coordinates(subject: Subject) -> Iterator[tuple[Object, i
             if axis.coordinates:
                 yield axis, len(axis.coordinates), axis.function
     for coupler in subject.named("CoordinateCouplerConstraint"):
-        yield coupler, len(coupler.independent_coordinate_names), coupler.coupled_coordinates_function
+        yield (
+            coupler,
+            len(coupler.independent_coordinate_names),
+            coupler.coupled_coordinates_function,
+        )
 
 
 def _linear(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
@@ -345,7 +390,9 @@ def _linear(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
         function = held
         while isinstance(function, MultiplierFunction):
             function = function.function
-        if isinstance(function, LinearFunction) and (function._index is not None or subject.source is None):
+        if isinstance(function, LinearFunction) and (
+            function._index is not None or subject.source is None
+        ):
             yield holder, count, function
 
 
@@ -355,9 +402,9 @@ UNUSED: Final = "what it belongs to is off, and OpenSim does not compute it"
 def is_unused(subject: Subject, function: Object) -> bool:
     """Return whether OpenSim never computes a function, since what it belongs to is off.
 
-    That is a force that is not applied or a controller that is not enabled. Functions of coordinates and
-    constraints are made with the system, even where they are off, and the integrator asks each enabled
-    controller, even if no actuator does.
+    That is a force that is not applied or a controller that is not enabled. Functions of
+    coordinates and constraints are made with the system, even where they are off, and the
+    integrator asks each enabled controller, even if no actuator does.
     """
     user = _find_user(subject, function)
     if isinstance(user, Force):
@@ -369,7 +416,8 @@ def _find_user(subject: Subject, function: Object) -> Force | Controller | None:
     """Return what asks for the values of a function; None if it is made with the model or the system."""
     item: Component | None = subject.owner(function)
     while item is not None and not isinstance(item, Force | Controller):
-        # OpenSim makes the functions of such a path as it reads it, whether the force is applied or not.
+        # OpenSim makes the functions of such a path as it reads it, whether the force is applied or
+        # not.
         item = None if isinstance(item, FunctionBasedPath) else subject.tree.parent_of(item)
     return item
 

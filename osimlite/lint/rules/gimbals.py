@@ -18,13 +18,13 @@ _LOCKED = 1e-8
 def gimbal_lock(subject: Subject, found: FindingSink) -> None:
     """Two of the three rotations of a joint are about one axis in the default pose.
 
-    Reports GimbalJoints, and CustomJoints with three rotations, whose second rotation has by default a right angle that
-    lays the third axis on the first.
+    Reports GimbalJoints, and CustomJoints with three rotations, whose second rotation has by
+    default a right angle that lays the third axis on the first.
 
-    The joint cannot turn about the direction that is lost, its mass matrix has no inverse there, and every acceleration
-    of the model is NaN, or beyond 1e12 rad/s^2 where rounding leaves a little, also where the coordinates are locked.
-    Inverse kinematics goes on, but the two angles may take any value. A default a thousandth away is enough; a
-    BallJoint has no such pose.
+    The joint cannot turn about the direction that is lost, its mass matrix has no inverse there,
+    and every acceleration of the model is NaN, or beyond 1e12 rad/s^2 where rounding leaves a
+    little, also where the coordinates are locked. Inverse kinematics goes on, but the two angles
+    may take any value. A default a thousandth away is enough; a BallJoint has no such pose.
 
     ```xml
       <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>

@@ -44,11 +44,11 @@ def joint_to_itself(subject: Subject, found: FindingSink) -> None:
 def wrong_coordinate_count(subject: Subject, found: FindingSink) -> None:
     """A joint has not as many coordinates as it needs.
 
-    Reports joints with more or fewer coordinates than their class moves by, custom joints with a coordinate that none
-    of their axes uses, and (as a warning) joints with none at all.
+    Reports joints with more or fewer coordinates than their class moves by, custom joints with a
+    coordinate that none of their axes uses, and (as a warning) joints with none at all.
 
-    OpenSim refuses the model. Where `<coordinates>` is left out it makes coordinates up, with a name such as `_coord_0`
-    and the value 0.
+    OpenSim refuses the model. Where `<coordinates>` is left out it makes coordinates up, with a
+    name such as `_coord_0` and the value 0.
 
     ```xml
       <PinJoint name="knee">
@@ -60,7 +60,10 @@ def wrong_coordinate_count(subject: Subject, found: FindingSink) -> None:
     ```
     """
     for custom in subject.named("CustomJoint"):
-        names, declared_names = names_on_axes(custom), [coordinate.name for coordinate in coordinates_of(custom)]
+        names, declared_names = (
+            names_on_axes(custom),
+            [coordinate.name for coordinate in coordinates_of(custom)],
+        )
         if axes_refused(custom) and all(name in declared_names for name in names):
             unused = [f"'{name}'" for name in declared_names if name not in names]
             reason = f"no axis of {called(custom)} uses {listed(unused)}"
@@ -81,7 +84,9 @@ def wrong_coordinate_count(subject: Subject, found: FindingSink) -> None:
             continue
         wanted = len(joint.motion_types)
         given = len(coordinates_of(joint))
-        declared = "coordinates" in joint.model_fields_set and (given > 0 or _says_none(subject, joint))
+        declared = "coordinates" in joint.model_fields_set and (
+            given > 0 or _says_none(subject, joint)
+        )
         if not declared and wanted and subject.source is not None:
             found(
                 f"{called(joint)} gives no coordinates; OpenSim makes {wanted} up, called '_coord_0'"
@@ -101,18 +106,22 @@ def wrong_coordinate_count(subject: Subject, found: FindingSink) -> None:
 def _says_none(subject: Subject, joint: Joint) -> bool:
     """Whether a text has an element for the coordinates of a joint; an empty one of an older format says nothing."""
     number = subject.element_of(joint, "coordinates")
-    return number is not None and subject.source is not None and subject.source.spans[number].tag == "coordinates"
+    return (
+        number is not None
+        and subject.source is not None
+        and subject.source.spans[number].tag == "coordinates"
+    )
 
 
 @rule("OSIM406", "shared-coordinate-name", severity=ERROR)
 def shared_coordinate_name(subject: Subject, found: FindingSink) -> None:
     """Two joints have a coordinate of the same name.
 
-    Reports the second coordinate of a name, with the forces and others that look the name up. Without any it is a
-    warning.
+    Reports the second coordinate of a name, with the forces and others that look the name up.
+    Without any it is a warning.
 
-    Forces, actuators and constraints find a coordinate by its bare name, and always find the first: two limit forces
-    then act on one knee, and none on the other.
+    Forces, actuators and constraints find a coordinate by its bare name, and always find the first:
+    two limit forces then act on one knee, and none on the other.
 
     ```xml
       <PinJoint name="knee">
@@ -145,8 +154,8 @@ def ground_as_child(subject: Subject, found: FindingSink) -> None:
 
     Reports joints whose child frame is fixed to ground.
 
-    It is allowed: OpenSim turns the joint round inside, and the coordinate keeps its meaning from parent to child. But
-    other programs expect chains that start at ground.
+    It is allowed: OpenSim turns the joint round inside, and the coordinate keeps its meaning from
+    parent to child. But other programs expect chains that start at ground.
 
     ```xml
       <PlanarJoint name="ground_pelvis">
@@ -175,11 +184,12 @@ def ground_as_child(subject: Subject, found: FindingSink) -> None:
 def stray_joint_frame(subject: Subject, found: FindingSink) -> None:
     """A joint holds a frame that has nothing to do with it.
 
-    Reports frames in the `<frames>` of a joint that are fixed to neither of the bodies it connects. It is an error if
-    that body is further from ground than the joint's child.
+    Reports frames in the `<frames>` of a joint that are fixed to neither of the bodies it connects.
+    It is an error if that body is further from ground than the joint's child.
 
-    OpenSim builds joints from ground outwards, and the frames of a joint with it: a frame on a body that is not there
-    yet ends in a message about an invalid index. Usually a socket names the wrong frame.
+    OpenSim builds joints from ground outwards, and the frames of a joint with it: a frame on a body
+    that is not there yet ends in a message about an invalid index. Usually a socket names the wrong
+    frame.
 
     ```xml
       <PinJoint name="hip">

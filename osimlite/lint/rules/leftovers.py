@@ -25,11 +25,11 @@ from osimlite.schema.specs import field_specs
 def unknown_attribute(subject: Subject, found: FindingSink) -> None:
     """An element has an attribute that means nothing.
 
-    Reports attributes of objects other than `name` and `file`; a warning on an element that is no object. Attributes of
-    XML itself (`xmlns`, and all with a colon) are for information.
+    Reports attributes of objects other than `name` and `file`; a warning on an element that is no
+    object. Attributes of XML itself (`xmlns`, and all with a colon) are for information.
 
-    OpenSim ignores them: properties are elements, not attributes. Those of objects stay when a model is written, those
-    of other elements are lost.
+    OpenSim ignores them: properties are elements, not attributes. Those of objects stay when a
+    model is written, those of other elements are lost.
 
     ```xml
     - <Marker name="asis" fixed="true"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -40,11 +40,24 @@ def unknown_attribute(subject: Subject, found: FindingSink) -> None:
         message = f"OpenSim ignores the attribute '{note.word}' of {called(owner)}"
         if note.word in field_specs(type(owner)):
             message += f"; write <{note.word}>{note.value}</{note.word}> inside"
-        suggestion = "name" if nearest(note.word, ["name", "file"]) == "name" and not owner.name else None
-        fix = without_attribute(subject.source, note.number, note.word) if suggestion is None else None
+        suggestion = (
+            "name" if nearest(note.word, ["name", "file"]) == "name" and not owner.name else None
+        )
+        fix = (
+            without_attribute(subject.source, note.number, note.word)
+            if suggestion is None
+            else None
+        )
         of_xml = INFO if _of_xml(note.word) else None
         place = subject.attribute_name(note.number, note.word)
-        found(message, owner, at=place, severity=of_xml, suggestion=suggestion, fix=None if of_xml else fix)
+        found(
+            message,
+            owner,
+            at=place,
+            severity=of_xml,
+            suggestion=suggestion,
+            fix=None if of_xml else fix,
+        )
     for number, tag, word in _beside_objects(subject):
         found(
             f"OpenSim ignores the attribute '{word}' of <{tag}>; it is lost when the model is written",
@@ -87,7 +100,8 @@ def stray_text(subject: Subject, found: FindingSink) -> None:
 
     Reports text that stands beside elements, where only elements have a meaning.
 
-    OpenSim drops it in silence. It is often what is left of a tag: a value that lost its element, or half a comment.
+    OpenSim drops it in silence. It is often what is left of a tag: a value that lost its element,
+    or half a comment.
 
     ```xml
     - <Body name="thigh"> mass 8 <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -109,14 +123,20 @@ def stray_text(subject: Subject, found: FindingSink) -> None:
         text = stray.splitlines()[0]
         shown = "U+FEFF (a byte-order mark)" if text == "\ufeff" else f"'{text}'"
         whole = without_text(source, start, start + len(stray))
-        found(f"OpenSim ignores the text {shown} between elements", at=source.position(start, len(text)), fix=whole)
+        found(
+            f"OpenSim ignores the text {shown} between elements",
+            at=source.position(start, len(text)),
+            fix=whole,
+        )
 
 
 def _beside_elements(source: Source) -> Iterator[tuple[int, str]]:
     """Where text stands beside elements, and the text; what stands in a comment is none."""
     if source.mixed is None:
         plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), blank_remarks(source.text))
-        for start, end in {match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)}:
+        for start, end in {
+            match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)
+        }:
             yield start, plain[start:end].rstrip()
         return
     for number in source.mixed:
@@ -133,11 +153,13 @@ def _beside_elements(source: Source) -> Iterator[tuple[int, str]]:
 def defaults_block(subject: Subject, found: FindingSink) -> None:
     """The file has a `<defaults>` block.
 
-    Reports `<defaults>`: a warning if there is something in it, else for information. What OpenSim cannot read in the
-    objects that belong to tools, a CMC_Joint, is an error: it refuses to load the file.
+    Reports `<defaults>`: a warning if there is something in it, else for information. What OpenSim
+    cannot read in the objects that belong to tools, a CMC_Joint, is an error: it refuses to load
+    the file.
 
-    Each object inside replaces the defaults of its class in the whole running program, for this file and for all that
-    are loaded later. What a model means then depends on what was loaded before. Here the block counts for its own file.
+    Each object inside replaces the defaults of its class in the whole running program, for this
+    file and for all that are loaded later. What a model means then depends on what was loaded
+    before. Here the block counts for its own file.
 
     ```xml
     - <defaults> <Marker name="default"> <fixed>true</fixed> </Marker> </defaults>
@@ -149,7 +171,11 @@ def defaults_block(subject: Subject, found: FindingSink) -> None:
         return
     number = subject.element_of(model, "defaults")
     if number is not None and source.children(number):
-        found("<defaults> changes the defaults of every model that OpenSim loads later", model, number=number)
+        found(
+            "<defaults> changes the defaults of every model that OpenSim loads later",
+            model,
+            number=number,
+        )
         for item in source.children(number):
             tag = source.spans[item].tag
             for name, kind in _OF_TOOLS.get(tag, {}).items():
@@ -170,11 +196,12 @@ def defaults_block(subject: Subject, found: FindingSink) -> None:
 def force_outside_set(subject: Subject, found: FindingSink) -> None:
     """Forces stand elsewhere than in the ForceSet.
 
-    Reports forces, actuators and muscles among the `<components>` of the model or of another part of it, or in its
+    Reports forces, actuators and muscles among the `<components>` of the model or of another part
+    of it, or in its
     ComponentSet: once for each such place.
 
-    They act. But OpenSim's lists of forces, actuators and muscles go through the ForceSet alone, so that controllers,
-    probes, static optimization and CMC do not see a muscle that stands elsewhere.
+    They act. But OpenSim's lists of forces, actuators and muscles go through the ForceSet alone, so
+    that controllers, probes, static optimization and CMC do not see a muscle that stands elsewhere.
 
     ```xml
     - <components>
@@ -203,11 +230,12 @@ def force_outside_set(subject: Subject, found: FindingSink) -> None:
 def not_upgradable(subject: Subject, found: FindingSink) -> None:
     """OpenSim cannot bring an old document up to date.
 
-    Reports what OpenSim needs while it changes a document of an older version into the current format, and finds
-    missing or unreadable: a body without `<Joint>`, a transform that is not six finite numbers, a display preference
-    that is no whole number, a connector without a name.
+    Reports what OpenSim needs while it changes a document of an older version into the current
+    format, and finds missing or unreadable: a body without `<Joint>`, a transform that is not six
+    finite numbers, a display preference that is no whole number, a connector without a name.
 
-    OpenSim refuses to load the file. `osimlite upgrade` is more lenient, and writes the current format.
+    OpenSim refuses to load the file. `osimlite upgrade` is more lenient, and writes the current
+    format.
 
     ```document
       <OpenSimDocument Version="30000">
@@ -248,7 +276,11 @@ def not_upgradable(subject: Subject, found: FindingSink) -> None:
 def _unread(source: Source, number: int, kind: str) -> str:
     """What an element should hold; empty if it does."""
     span, inside = source.spans[number], source.children(number)
-    pieces = [piece for piece in _COMMENT.split(source.text[span.tag_end : span.inner_end]) if piece.strip()]
+    pieces = [
+        piece
+        for piece in _COMMENT.split(source.text[span.tag_end : span.inner_end])
+        if piece.strip()
+    ]
     if inside or len(pieces) > 1:
         return "a value"
     text = "".join(pieces)
@@ -261,7 +293,8 @@ def _unread(source: Source, number: int, kind: str) -> str:
     except Unclean as unclean:
         if kind == "numbers":
             return "a list of finite numbers"
-        # Of several numbers OpenSim takes the first, unless it is none, and of a word the beginning.
+        # Of several numbers OpenSim takes the first, unless it is none, and of a word the
+        # beginning.
         return "" if unclean.value is not ABSENT and isfinite(unclean.value) else "a number"
     return ""
 
@@ -273,8 +306,11 @@ _OF_TOOLS = {
     | {"limit": "number"},
 }
 """Classes that are no part of a model and that old files hold defaults of: how OpenSim reads what they say."""
-_KEPT_WHOLE = frozenset(("unknown-tag", "unknown-class", "wrong-class", "wrong-name", "duplicate-tag"))
+_KEPT_WHOLE = frozenset(
+    ("unknown-tag", "unknown-class", "wrong-class", "wrong-name", "duplicate-tag")
+)
 _QUOTED = re.compile(r"=\s*+(?:\"[^\"<]*>[^\"<]*\"|'[^'<]*>[^'<]*')")
-# A tag is looked for from the last "<" before its ">": else the time would be that of all open ones.
+# A tag is looked for from the last "<" before its ">": else the time would be that of all open
+# ones.
 _AFTER = re.compile(r"(?:</[^<>]+>|/>)\s*+([^<]++)")
 _BEFORE = re.compile(r"<[^/!?<>][^<>]*+(?<!/)>\s*+([^<]++)<(?![/!?])")

@@ -17,10 +17,11 @@ _LARGEST, _SMALLEST = 8.0, 0.02
 def marker_units(table: Table, found: FindingSink) -> None:
     """The units of a marker file do not fit its numbers.
 
-    Looks how far the markers of a frame are spread: more than 8 m or less than 2 cm is no moving body.
+    Looks how far the markers of a frame are spread: more than 8 m or less than 2 cm is no moving
+    body.
 
-    OpenSim takes millimetres for metres without a word: inverse kinematics ends with errors of kilometres, and a scaled
-    model is a thousand times too large.
+    OpenSim takes millimetres for metres without a word: inverse kinematics ends with errors of
+    kilometres, and a scaled model is a thousand times too large.
 
     ```trc
       PathFileType→4→(X/Y/Z)→walk.trc
@@ -37,16 +38,21 @@ def marker_units(table: Table, found: FindingSink) -> None:
     unit = METRES.get(units.value.text) if units is not None else None
     if units is None or unit is None or len(table.labels) < 2:
         return
-    spreads = sorted(spread for sample in table.rows.samples if (spread := _spread(sample)) is not None)
+    spreads = sorted(
+        spread for sample in table.rows.samples if (spread := _spread(sample)) is not None
+    )
     if not spreads:
         return
     usual = spreads[len(spreads) // 2]
     if not _SMALLEST <= usual * unit <= _LARGEST:
-        right = next((name for name in ("m", "mm", "cm") if 0.2 <= usual * METRES[name] <= 3.0), None)
+        right = next(
+            (name for name in ("m", "mm", "cm") if 0.2 <= usual * METRES[name] <= 3.0), None
+        )
         found(
             f"the markers of a frame are spread over {usual * unit:.3g} m if the units are '{units.value.text}'",
-            at=units.value.at, suggestion=right,
-        )  # fmt: skip
+            at=units.value.at,
+            suggestion=right,
+        )
 
 
 def _spread(sample: list[float]) -> float | None:
@@ -61,11 +67,11 @@ def _spread(sample: list[float]) -> float | None:
 def marker_gap(table: Table, found: FindingSink) -> None:
     """A marker is at the origin, or only a part of it is there.
 
-    Finds markers at 0 0 0, where programs put what they did not see, markers of which one or two cells are empty, and
-    (for information) markers that no frame has.
+    Finds markers at 0 0 0, where programs put what they did not see, markers of which one or two
+    cells are empty, and (for information) markers that no frame has.
 
-    OpenSim takes 0 0 0 for where the marker is and bends the model towards it. A marker with one empty cell is not
-    seen at all in that frame.
+    OpenSim takes 0 0 0 for where the marker is and bends the model towards it. A marker with one
+    empty cell is not seen at all in that frame.
 
     ```trc
       PathFileType→4→(X/Y/Z)→walk.trc
@@ -82,9 +88,18 @@ def marker_gap(table: Table, found: FindingSink) -> None:
     """
     for fault in table.rows.of("zero", "part"):
         name = table.label_of(fault.number)
-        what = "is at 0 0 0 as if it had been seen there" if fault.kind == "zero" else "lacks a part of its place"
-        found(f"the marker '{name}' {what}{fault.more()}", at=Position(fault.line, fault.column, fault.length))
-    for label in [label for number, label in enumerate(table.labels) if number in table.rows.unseen]:
+        what = (
+            "is at 0 0 0 as if it had been seen there"
+            if fault.kind == "zero"
+            else "lacks a part of its place"
+        )
+        found(
+            f"the marker '{name}' {what}{fault.more()}",
+            at=Position(fault.line, fault.column, fault.length),
+        )
+    for label in [
+        label for number, label in enumerate(table.labels) if number in table.rows.unseen
+    ]:
         found(f"no frame has the marker '{label.text}'", at=label.at, severity=INFO)
 
 

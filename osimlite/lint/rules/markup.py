@@ -24,8 +24,8 @@ def character_reference(subject: Subject, found: FindingSink) -> None:
 
     Reports references such as `&#233;` with a number above 127.
 
-    OpenSim keeps the lowest byte of the number and throws the rest away: a name with `&#233;` in it becomes invalid
-    UTF-8, and `&#8364;` becomes another character. Write the character itself.
+    OpenSim keeps the lowest byte of the number and throws the rest away: a name with `&#233;` in it
+    becomes invalid UTF-8, and `&#8364;` becomes another character. Write the character itself.
 
     ```xml
     - <credits>Ren&#233;</credits>
@@ -51,9 +51,9 @@ def character_reference(subject: Subject, found: FindingSink) -> None:
 def lenient_xml(subject: Subject, found: FindingSink) -> None:
     """The text is not XML in a way that OpenSim overlooks.
 
-    Reports a bare `&`, `]]>`, two hyphens inside a comment, characters that XML does not have, values of attributes
-    without quotes, attributes without a blank between, and an XML declaration that is none or does not stand at the
-    very beginning.
+    Reports a bare `&`, `]]>`, two hyphens inside a comment, characters that XML does not have,
+    values of attributes without quotes, attributes without a blank between, and an XML declaration
+    that is none or does not stand at the very beginning.
 
     OpenSim's parser reads such a file, and most other XML readers refuse it. A bare `&` it leaves out: of `Anna & Bert`
     it keeps `Anna  Bert`.
@@ -92,7 +92,11 @@ def lenient_xml(subject: Subject, found: FindingSink) -> None:
                 )
             case "overlooked":
                 odd = len(note.word) == 1 and not note.word.isprintable()
-                what = f"the character U+{ord(note.word):04X}" if odd else f"'{note.word.splitlines()[0][:40]}'"
+                what = (
+                    f"the character U+{ord(note.word):04X}"
+                    if odd
+                    else f"'{note.word.splitlines()[0][:40]}'"
+                )
                 found(f"{what} is not XML; {note.value}, others refuse the file", at=place)
             case "control-character":
                 place = source.position(_control(source, offset))
@@ -116,7 +120,9 @@ def lenient_xml(subject: Subject, found: FindingSink) -> None:
         )
 
 
-_OVERLOOKED = frozenset(("bare-ampersand", "hyphens-in-comment", "control-character", "late-declaration", "overlooked"))
+_OVERLOOKED = frozenset(
+    ("bare-ampersand", "hyphens-in-comment", "control-character", "late-declaration", "overlooked")
+)
 
 
 def _word_behind(source: Source, start: int, word: str) -> int:
@@ -133,11 +139,11 @@ def _control(source: Source, start: int) -> int:
 def text_outside_root(subject: Subject, found: FindingSink) -> None:
     """There is text before or after the root element.
 
-    Reports text that stands outside `<OpenSimDocument>`, be it a remark that is no comment, what an editor left behind,
-    or a byte-order mark at another place than the beginning.
+    Reports text that stands outside `<OpenSimDocument>`, be it a remark that is no comment, what an
+    editor left behind, or a byte-order mark at another place than the beginning.
 
-    OpenSim finds no root element then and refuses the file, with a message about a node that is none. Make a comment of
-    a remark: `<!-- ... -->`.
+    OpenSim finds no root element then and refuses the file, with a message about a node that is
+    none. Make a comment of a remark: `<!-- ... -->`.
 
     ```document
     - scaled by Anna, 2021
@@ -155,11 +161,15 @@ def text_outside_root(subject: Subject, found: FindingSink) -> None:
             if not start and note.kind == "byte-order-mark":
                 # Two of them at the beginning do no harm.
                 continue
-            what = "a byte-order mark" if note.kind == "byte-order-mark" else f"the text '{note.word}'"
+            what = (
+                "a byte-order mark" if note.kind == "byte-order-mark" else f"the text '{note.word}'"
+            )
             found(
                 f"{what} stands outside the document: OpenSim refuses the file",
                 at=source.position(start, len(note.word)),
-                fix=without_text(source, start, start + 1) if note.kind == "byte-order-mark" else None,
+                fix=without_text(source, start, start + 1)
+                if note.kind == "byte-order-mark"
+                else None,
             )
 
 
@@ -167,11 +177,11 @@ def text_outside_root(subject: Subject, found: FindingSink) -> None:
 def byte_order_mark(subject: Subject, found: FindingSink) -> None:
     """The file has a byte-order mark.
 
-    Reports the bytes EF BB BF at the beginning of a file, which some Windows editors write, and the same mark between
-    elements.
+    Reports the bytes EF BB BF at the beginning of a file, which some Windows editors write, and the
+    same mark between elements.
 
-    OpenSim and XML readers pass over it. Files that are joined, cut or compared with other tools carry it to places
-    where it is part of a name or a number, and nobody sees it.
+    OpenSim and XML readers pass over it. Files that are joined, cut or compared with other tools
+    carry it to places where it is part of a name or a number, and nobody sees it.
 
     ```document
     - \ufeff<OpenSimDocument Version="40600">
@@ -191,8 +201,8 @@ def closing_tag(subject: Subject, found: FindingSink) -> None:
 
     Reports closing tags such as `</mass >`, and those that are broken over two lines.
 
-    XML allows it, so that editors and other programs say nothing. OpenSim's parser does not know it and cannot load the
-    file.
+    XML allows it, so that editors and other programs say nothing. OpenSim's parser does not know it
+    and cannot load the file.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass > <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>

@@ -10,7 +10,10 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 
 OFF = Threshold(
-    "off-equilibrium", 0.1, "", "of the optimal fiber length, and of the strength: so far may a muscle start off"
+    "off-equilibrium",
+    0.1,
+    "",
+    "of the optimal fiber length, and of the strength: so far may a muscle start off",
 )
 
 
@@ -18,17 +21,19 @@ OFF = Threshold(
 def start_off_equilibrium(subject: Subject, found: FindingSink) -> None:
     """A muscle starts far from equilibrium.
 
-    Reports muscles with an elastic tendon whose fibers, in the default pose and at their default activation, start more
-    than 0.1 optimal fiber lengths from where they would be in equilibrium, or whose tension is off by more than 0.1
-    `max_isometric_force`. A muscle without an equilibrium there is a warning. Thelen2003Muscle,
-    Millard2012EquilibriumMuscle and DeGrooteFregly2016Muscle are looked at.
+    Reports muscles with an elastic tendon whose fibers, in the default pose and at their default
+    activation, start more than 0.1 optimal fiber lengths from where they would be in equilibrium,
+    or whose tension is off by more than 0.1 `max_isometric_force`. A muscle without an equilibrium
+    there is a warning. Thelen2003Muscle, Millard2012EquilibriumMuscle and DeGrooteFregly2016Muscle
+    are looked at.
 
-    OpenSim brings muscles into equilibrium only where it is asked to (`solve_for_equilibrium_for_auxiliary_states` of
-    ForwardTool, Model::equilibrateMuscles); else fibers begin with `default_fiber_length`, which is 0.1 m where a file
-    does not say. The tendon is slack then or pulls with many times the muscle's strength, and the fibers snap into
-    place with hundreds of lengths per second: the motion of the first tenths of a second is that of no muscle. Where
-    there is no equilibrium OpenSim throws an exception when it is asked for one. The fibers' length in equilibrium is a
-    good default.
+    OpenSim brings muscles into equilibrium only where it is asked to
+    (`solve_for_equilibrium_for_auxiliary_states` of ForwardTool, Model::equilibrateMuscles); else
+    fibers begin with `default_fiber_length`, which is 0.1 m where a file does not say. The tendon
+    is slack then or pulls with many times the muscle's strength, and the fibers snap into place
+    with hundreds of lengths per second: the motion of the first tenths of a second is that of no
+    muscle. Where there is no equilibrium OpenSim throws an exception when it is asked for one. The
+    fibers' length in equilibrium is a good default.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -60,15 +65,17 @@ def start_off_equilibrium(subject: Subject, found: FindingSink) -> None:
 def fiber_limit(subject: Subject, found: FindingSink) -> None:
     """The fibers of a muscle reach a limit within the ranges of the coordinates.
 
-    Reports muscles whose fibers in equilibrium, fully active, are as short as pennation (`maximum_pennation_angle`) or
-    the curve of active force lets them be where the path is shortest; those whose fibers at rest are longer than 2
-    optimal lengths where it is longest; and muscles that have no equilibrium in one of these poses. The poses are the
-    default one and five values of each coordinate in the middle half of its range, the others as in the default pose:
-    at the ends of wide ranges there are few muscles that have reached no limit.
+    Reports muscles whose fibers in equilibrium, fully active, are as short as pennation
+    (`maximum_pennation_angle`) or the curve of active force lets them be where the path is
+    shortest; those whose fibers at rest are longer than 2 optimal lengths where it is longest; and
+    muscles that have no equilibrium in one of these poses. The poses are the default one and five
+    values of each coordinate in the middle half of its range, the others as in the default pose: at
+    the ends of wide ranges there are few muscles that have reached no limit.
 
-    A muscle whose fibers can shorten no further has a slack tendon and no force, whatever its activation. Fibers beyond
-    twice their length are torn in life. The lengths may be those of another muscle, a scaling may have forgotten them,
-    or the range of the coordinate is wider than the joint.
+    A muscle whose fibers can shorten no further has a slack tendon and no force, whatever its
+    activation. Fibers beyond twice their length are torn in life. The lengths may be those of
+    another muscle, a scaling may have forgotten them, or the range of the coordinate is wider than
+    the joint.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">

@@ -27,12 +27,12 @@ _ALLOW = ("allow_unused_references", "kinematics_allow_extra_columns")
 def impossible_bounds(setup: Setup, found: FindingSink) -> None:
     """Bounds of a study leave no value.
 
-    Compares both ends of all bounds, bounds at the start and at the end with those of the whole phase, and the times at
-    which a phase begins and ends. Points out a state or control that has bounds twice, bounds of an angle that look
-    like degrees, and bounds of a time that are empty.
+    Compares both ends of all bounds, bounds at the start and at the end with those of the whole
+    phase, and the times at which a phase begins and ends. Points out a state or control that has
+    bounds twice, bounds of an angle that look like degrees, and bounds of a time that are empty.
 
-    The optimizer fails with a message that names neither bounds nor variable. Of two sets of bounds the last counts,
-    without a word.
+    The optimizer fails with a message that names neither bounds nor variable. Of two sets of bounds
+    the last counts, without a word.
 
     ```setup
       <MocoPhase name="phase">
@@ -43,42 +43,62 @@ def impossible_bounds(setup: Setup, found: FindingSink) -> None:
       </MocoPhase>
     ```
     """
-    for item in chain.from_iterable(map(setup.named, ("MocoBounds", "MocoVariableInfo", "MocoScaleFactor"))):
+    for item in chain.from_iterable(
+        map(setup.named, ("MocoBounds", "MocoVariableInfo", "MocoScaleFactor"))
+    ):
         for tag in ("bounds", "initial_bounds", "final_bounds"):
             ends: tuple[float, ...] = getattr(item, tag, ())
             whole: tuple[float, ...] = item.bounds
             if len(ends) == 2 and ends[0] > ends[1]:
                 found(f"bounds from {ends[0]:g} to {ends[1]:g}: OpenSim fails", item, tag=tag)
-            elif ends and whole and whole[0] <= whole[-1] and (ends[-1] < whole[0] or ends[0] > whole[-1]):
+            elif (
+                ends
+                and whole
+                and whole[0] <= whole[-1]
+                and (ends[-1] < whole[0] or ends[0] > whole[-1])
+            ):
                 found(
                     f"{tag} of {called(item)} are outside its bounds from {whole[0]:g} to {whole[-1]:g}: OpenSim fails",
-                    item, tag=tag,
-                )  # fmt: skip
+                    item,
+                    tag=tag,
+                )
     angles = angles_of(setup)
     for phase in setup.named("MocoPhase"):
         for info in members(phase.state_infos, "MocoVariableInfo"):
             bounds = (*info.bounds, *info.initial_bounds, *info.final_bounds)
             largest = max(filter(math.isfinite, map(abs, bounds)), default=0.0)
-            if info.name.endswith("/value") and coordinate_of(info.name) in angles and largest > 10.0:
+            if (
+                info.name.endswith("/value")
+                and coordinate_of(info.name) in angles
+                and largest > 10.0
+            ):
                 found(
-                    f"a bound of {largest:g} for the angle '{info.name}' is in radians: in degrees?", info,
+                    f"a bound of {largest:g} for the angle '{info.name}' is in radians: in degrees?",
+                    info,
                     severity=WARNING,
-                )  # fmt: skip
+                )
         for bounds in (phase.time_initial_bounds, phase.time_final_bounds):
             if bounds._index and not bounds.bounds:
-                found("a time without bounds may be any: the optimizer seldom ends", bounds, severity=WARNING)
+                found(
+                    "a time without bounds may be any: the optimizer seldom ends",
+                    bounds,
+                    severity=WARNING,
+                )
         starts, ends = phase.time_initial_bounds.bounds, phase.time_final_bounds.bounds
         if starts and ends and ends[-1] < starts[0]:
             found(
                 f"the phase ends at {ends[-1]:g} s at the latest, and begins at {starts[0]:g} s at the earliest",
-                phase.time_final_bounds, tag="bounds",
-            )  # fmt: skip
+                phase.time_final_bounds,
+                tag="bounds",
+            )
         for infos in (phase.state_infos, phase.control_infos, phase.input_control_infos):
             for info in _repeated(infos):
                 found(
-                    f"'{info.name}' has bounds already: these replace all of them", info, attribute="name",
+                    f"'{info.name}' has bounds already: these replace all of them",
+                    info,
+                    attribute="name",
                     severity=WARNING,
-                )  # fmt: skip
+                )
 
 
 def _repeated(items: list[Any]) -> Iterator[Any]:
@@ -90,7 +110,15 @@ def _repeated(items: list[Any]) -> Iterator[Any]:
         names.add(item.name)
 
 
-_COUNTED = ("states", "controls", "multipliers", "derivatives", "slacks", "parameters", "input_controls")
+_COUNTED = (
+    "states",
+    "controls",
+    "multipliers",
+    "derivatives",
+    "slacks",
+    "parameters",
+    "input_controls",
+)
 """What the columns of a trajectory are, of which its header must say how many; the last need not be counted."""
 
 
@@ -98,9 +126,9 @@ _COUNTED = ("states", "controls", "multipliers", "derivatives", "slacks", "param
 def study_data(setup: Setup, found: FindingSink) -> None:
     """A table that a study follows, or starts from, does not fit its model.
 
-    Looks for tables that are not named, for motions that do not say whether they are in degrees, for times that a table
-    does not have, for columns that are no state, control, generalized force or marker of the model, and for states and
-    controls that an initial guess lacks.
+    Looks for tables that are not named, for motions that do not say whether they are in degrees,
+    for times that a table does not have, for columns that are no state, control, generalized force
+    or marker of the model, and for states and controls that an initial guess lacks.
 
     OpenSim refuses the study.
 
@@ -125,7 +153,11 @@ def study_data(setup: Setup, found: FindingSink) -> None:
     """
     for processor in setup.named("ModelProcessor"):
         if not processor.filepath and processor.model is None:
-            found(f"{called(processor)} names no model: OpenSim refuses the study", processor, tag="filepath")
+            found(
+                f"{called(processor)} names no model: OpenSim refuses the study",
+                processor,
+                tag="filepath",
+            )
     for item in setup.items:
         for spec in member_specs(type(item)) if getattr(item, "enabled", True) else ():
             held = getattr(item, spec.name)
@@ -138,7 +170,11 @@ def study_data(setup: Setup, found: FindingSink) -> None:
             if table is not None and spec.names.target == "state variable":
                 said = table.entries.get("inDegrees")
                 if said is None or said.value.text not in ("yes", "no"):
-                    found(f"'{name}' must say inDegrees=yes or inDegrees=no: OpenSim refuses the study", held, tag=tag)
+                    found(
+                        f"'{name}' must say inDegrees=yes or inDegrees=no: OpenSim refuses the study",
+                        held,
+                        tag=tag,
+                    )
             if table is not None and table.span is not None and is_a(item, "MocoTool"):
                 first, last = table.span
                 for time in ("initial_time", "final_time"):
@@ -146,24 +182,32 @@ def study_data(setup: Setup, found: FindingSink) -> None:
                     if wanted is not None and not first <= wanted <= last:
                         found(
                             f"'{name}' has {first!r} to {last!r} s, and not {wanted!r} s: OpenSim refuses the tool",
-                            item, tag=time,
-                        )  # fmt: skip
+                            item,
+                            tag=time,
+                        )
             allowed = any(getattr(item, flag, False) for flag in _ALLOW)
-            for column in [] if allowed or table is None else _strangers(setup, spec.names, held, table):
+            for column in (
+                [] if allowed or table is None else _strangers(setup, spec.names, held, table)
+            ):
                 found(
                     f"'{name}' has a column '{column}', which is nothing of the model: OpenSim refuses the study",
-                    held, tag=tag,
-                )  # fmt: skip
+                    held,
+                    tag=tag,
+                )
     if setup.tree is None or any(setup.named("ModelOperator")):
         return
     for item, guess in setup.with_tables(setup.having("guess_file"), "guess_file"):
         if fault := _fault_of_guess(setup, setup.tree, guess):
-            found(f"the guess '{item.guess_file}' {fault}: OpenSim refuses it", item, tag="guess_file")
+            found(
+                f"the guess '{item.guess_file}' {fault}: OpenSim refuses it", item, tag="guess_file"
+            )
 
 
 def _fault_of_guess(setup: Setup, tree: Tree, guess: Table) -> str:
     """What is wrong with the columns of a trajectory, their counts and their order; nothing if all is right."""
-    wanted = set(variables(tree, "state or control variable")) | {item.name for item in setup.named("MocoParameter")}
+    wanted = set(variables(tree, "state or control variable")) | {
+        item.name for item in setup.named("MocoParameter")
+    }
     columns = {
         column
         for column in guess.columns
@@ -171,16 +215,28 @@ def _fault_of_guess(setup: Setup, tree: Tree, guess: Table) -> str:
     }
     missing, more = sorted(wanted - columns), sorted(columns - wanted)
     if missing or more:
-        return f"lacks {listed(missing)}" if missing else f"has {listed(more)}, which the model has not"
-    said = {what: guess.entries[key].value.text if (key := f"num_{what}") in guess.entries else "" for what in _COUNTED}
+        return (
+            f"lacks {listed(missing)}"
+            if missing
+            else f"has {listed(more)}, which the model has not"
+        )
+    said = {
+        what: guess.entries[key].value.text if (key := f"num_{what}") in guess.entries else ""
+        for what in _COUNTED
+    }
     odd = next((what for what in _COUNTED[:-1] if not said[what].isdecimal()), None)
     if odd is not None:
         return f"must say how many of its columns are {odd} (num_{odd}=...)"
-    total, count = sum(int(number) for number in said.values() if number.isdecimal()), len(guess.columns)
+    total, count = (
+        sum(int(number) for number in said.values() if number.isdecimal()),
+        len(guess.columns),
+    )
     if total != count:
         return f"has {count} columns, and {total} by the counts in its header"
     states = variables(tree, "state variable")
-    odd = next((column for column in guess.columns[: int(said["states"])] if column not in states), None)
+    odd = next(
+        (column for column in guess.columns[: int(said["states"])] if column not in states), None
+    )
     return "" if odd is None else f"has '{odd}' among its first columns, which are those of states"
 
 
@@ -189,18 +245,25 @@ def _strangers(setup: Setup, reference: Reference, held: Any, table: Table) -> l
     tree = setup.tree
     if tree is None or Unknown in tree.by_class or any(setup.named("ModelOperator")):
         return []
-    if any(is_a(operator, "TabOpUseAbsoluteStateNames") for operator in getattr(held, "operators", ())):
+    if any(
+        is_a(operator, "TabOpUseAbsoluteStateNames") for operator in getattr(held, "operators", ())
+    ):
         return []
-    return [column for column in table.columns if tree.lookup(reference, column, tree.model).target is None]
+    return [
+        column
+        for column in table.columns
+        if tree.lookup(reference, column, tree.model).target is None
+    ]
 
 
 @rule("OSIM863", "study-parts", severity=ERROR, about="document")
 def study_parts(setup: Setup, found: FindingSink) -> None:
     """A part of a study has a name or a target that OpenSim refuses.
 
-    Looks for goals, constraints and parameters without a name or with that of another, for parameters of properties
-    that a component has not or that are no numbers, for measured forces that the loads have not, and for models with
-    locked coordinates or with joints whose speeds are not the rates of their coordinates.
+    Looks for goals, constraints and parameters without a name or with that of another, for
+    parameters of properties that a component has not or that are no numbers, for measured forces
+    that the loads have not, and for models with locked coordinates or with joints whose speeds are
+    not the rates of their coordinates.
 
     OpenSim refuses the study.
 
@@ -221,7 +284,11 @@ def study_parts(setup: Setup, found: FindingSink) -> None:
                 if not part.name:
                     found(f"{called(part)} has no name: OpenSim refuses it", part)
             for part in _repeated([part for part in parts if part.name]):
-                found(f"another is called '{part.name}' already: OpenSim refuses it", part, attribute="name")
+                found(
+                    f"another is called '{part.name}' already: OpenSim refuses it",
+                    part,
+                    attribute="name",
+                )
     for goal in setup.items:
         if hasattr(goal, "contact_groups") and goal.enabled:
             loads = goal.external_loads or setup.document(goal.external_loads_file)
@@ -229,9 +296,11 @@ def study_parts(setup: Setup, found: FindingSink) -> None:
             for group in goal.contact_groups if names else ():
                 if group.external_force_name not in names:
                     found(
-                        f"the loads have no force '{group.external_force_name}': OpenSim refuses the goal", group,
-                        tag="external_force_name", suggestion=nearest_name(group.external_force_name, names),
-                    )  # fmt: skip
+                        f"the loads have no force '{group.external_force_name}': OpenSim refuses the goal",
+                        group,
+                        tag="external_force_name",
+                        suggestion=nearest_name(group.external_force_name, names),
+                    )
     tree = setup.tree
     if tree is None:
         return
@@ -243,15 +312,31 @@ def study_parts(setup: Setup, found: FindingSink) -> None:
             fault = _fault_of(parameter, component)
             if fault:
                 found(
-                    f"{fault}: OpenSim refuses the study", parameter, tag="property_name",
-                    suggestion=nearest_name(parameter.property_name, [*field_specs(type(component))]),
-                )  # fmt: skip
-    welded = {str(path) for operator in setup.named("ModOpReplaceJointsWithWelds") for path in operator.joint_paths}
-    for processor in setup.named("ModelProcessor") if any(map(setup.named, ("MocoStudy", "MocoTool"))) else ():
+                    f"{fault}: OpenSim refuses the study",
+                    parameter,
+                    tag="property_name",
+                    suggestion=nearest_name(
+                        parameter.property_name, [*field_specs(type(component))]
+                    ),
+                )
+    welded = {
+        str(path)
+        for operator in setup.named("ModOpReplaceJointsWithWelds")
+        for path in operator.joint_paths
+    }
+    for processor in (
+        setup.named("ModelProcessor") if any(map(setup.named, ("MocoStudy", "MocoTool"))) else ()
+    ):
         for joint in tree.of_class("Joint").values():
-            faults = [f"{called(item)} is locked" for item in joint.coordinates if getattr(item, "locked", False)]
+            faults = [
+                f"{called(item)} is locked"
+                for item in joint.coordinates
+                if getattr(item, "locked", False)
+            ]
             if not joint.speeds_are_rates:
-                faults.append(f"{called(joint)} has speeds that are not the rates of its coordinates")
+                faults.append(
+                    f"{called(joint)} has speeds that are not the rates of its coordinates"
+                )
             for fault in faults if tree.path_of(joint) not in welded else ():
                 found(f"{fault}: Moco refuses the model", processor, tag="filepath")
 
@@ -268,4 +353,6 @@ def _fault_of(parameter: Any, component: Component) -> str:
     if size == 1:
         return "" if element is None else f"{name} is one number, and wants no property_element"
     wrong = element is None or not 0 <= element < size
-    return f"property_element must say which of the {size} numbers of {name} is meant" if wrong else ""
+    return (
+        f"property_element must say which of the {size} numbers of {name} is meant" if wrong else ""
+    )

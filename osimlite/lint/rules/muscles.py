@@ -14,7 +14,9 @@ from osimlite.mechanics.laws.vectors import Vector
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint
 
-PENNATION = Threshold("largest-pennation", math.pi / 2, "rad", "fibers that turn as far pull on nothing")
+PENNATION = Threshold(
+    "largest-pennation", math.pi / 2, "rad", "fibers that turn as far pull on nothing"
+)
 SHORTEST = Threshold("shortest-fiber", 0.2, "of the optimal length", "no fiber starts shorter")
 LONGEST = Threshold("longest-fiber", 2.0, "of the optimal length", "no fiber starts longer")
 
@@ -23,12 +25,13 @@ LONGEST = Threshold("longest-fiber", 2.0, "of the optimal length", "no fiber sta
 def doubtful_muscle(subject: Subject, found: FindingSink) -> None:
     """The fibers of a muscle have an implausible length or angle.
 
-    Reports a pennation angle of a quarter turn or more, and a default fiber length, given in the file, that is less
-    than 0.2 or more than 2 optimal lengths. Numbers that OpenSim refuses are reported as impossible values.
+    Reports a pennation angle of a quarter turn or more, and a default fiber length, given in the
+    file, that is less than 0.2 or more than 2 optimal lengths. Numbers that OpenSim refuses are
+    reported as impossible values.
 
-    Fibers across the tendon pull nothing along it; often the angle is in degrees. Beyond twice the optimal length a
-    muscle is torn, and below a fifth it has no force; the search for equilibrium then starts far from any, and often
-    the numbers belong to two different muscles.
+    Fibers across the tendon pull nothing along it; often the angle is in degrees. Beyond twice the
+    optimal length a muscle is torn, and below a fifth it has no force; the search for equilibrium
+    then starts far from any, and often the numbers belong to two different muscles.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -37,7 +40,9 @@ def doubtful_muscle(subject: Subject, found: FindingSink) -> None:
       </Millard2012EquilibriumMuscle>
     ```
     """
-    steepest, shortest, longest = (subject.config.value_of(known) for known in (PENNATION, SHORTEST, LONGEST))
+    steepest, shortest, longest = (
+        subject.config.value_of(known) for known in (PENNATION, SHORTEST, LONGEST)
+    )
     for muscle in subject.named("Muscle"):
         angle = muscle.pennation_angle_at_optimal
         if steepest <= angle < math.inf:
@@ -66,10 +71,11 @@ def doubtful_muscle(subject: Subject, found: FindingSink) -> None:
 def control_below_activation(subject: Subject, found: FindingSink) -> None:
     """The least control of a muscle is below its least activation.
 
-    Reports Thelen and Millard muscles whose `min_control` is smaller than their `minimum_activation`.
+    Reports Thelen and Millard muscles whose `min_control` is smaller than their
+    `minimum_activation`.
 
-    OpenSim refuses the model. Activation never falls below its minimum, since the equations of the muscle divide by
-    it; a control that asks for less is a contradiction.
+    OpenSim refuses the model. Activation never falls below its minimum, since the equations of the
+    muscle divide by it; a control that asks for less is a contradiction.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -84,7 +90,9 @@ def control_below_activation(subject: Subject, found: FindingSink) -> None:
                 f"min_control of {called(muscle)} is {quantity(muscle.min_control)}, less than its minimum_activation, "
                 f"{quantity(muscle.minimum_activation)}: OpenSim refuses the model",
                 muscle,
-                tag="min_control" if "min_control" in muscle.model_fields_set else "minimum_activation",
+                tag="min_control"
+                if "min_control" in muscle.model_fields_set
+                else "minimum_activation",
             )
 
 
@@ -92,13 +100,14 @@ def control_below_activation(subject: Subject, found: FindingSink) -> None:
 def out_of_reach(subject: Subject, found: FindingSink) -> None:
     """The path of a muscle leaves its fibers no length that they could have.
 
-    Reports muscles whose path, in the default pose, is shorter than the slack tendon, or longer than it by more than 2
-    optimal fiber lengths. Paths that wrap around surfaces count as if they were straight, which is the least they can
-    be; those through moving points, or points whose place cannot be told without a simulation, are not looked at.
+    Reports muscles whose path, in the default pose, is shorter than the slack tendon, or longer
+    than it by more than 2 optimal fiber lengths. Paths that wrap around surfaces count as if they
+    were straight, which is the least they can be; those through moving points, or points whose
+    place cannot be told without a simulation, are not looked at.
 
-    A slack muscle bears no force, and fibers are torn at twice their optimal length. OpenSim finds no equilibrium of
-    such muscles, or computes NaN; where it computes on, the forces are those of no muscle. Often the lengths are those
-    of another muscle, or were not scaled with the bones.
+    A slack muscle bears no force, and fibers are torn at twice their optimal length. OpenSim finds
+    no equilibrium of such muscles, or computes NaN; where it computes on, the forces are those of
+    no muscle. Often the lengths are those of another muscle, or were not scaled with the bones.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -109,14 +118,22 @@ def out_of_reach(subject: Subject, found: FindingSink) -> None:
     """
     longest = subject.config.value_of(LONGEST)
     for muscle in subject.named("Muscle"):
-        path, slack, optimal = muscle.geometry_path, muscle.tendon_slack_length, muscle.optimal_fiber_length
+        path, slack, optimal = (
+            muscle.geometry_path,
+            muscle.tendon_slack_length,
+            muscle.optimal_fiber_length,
+        )
         points = _in_ground(subject, path) if isinstance(path, GeometryPath) and optimal > 0 else []
         if len(points) < 2:
             continue
         length = sum(math.dist(*pair) for pair in pairwise(points))
         tells = f"the path of {called(muscle)} is {length:.4g} m long in the default pose"
         if length < slack and not path.path_wrap_set.objects:
-            found(f"{tells}, less than its tendon_slack_length, {slack:.4g} m", muscle, tag="tendon_slack_length")
+            found(
+                f"{tells}, less than its tendon_slack_length, {slack:.4g} m",
+                muscle,
+                tag="tendon_slack_length",
+            )
         elif (ratio := (length - slack) / optimal) > longest:
             found(
                 f"{tells}, which leaves its fibers {ratio:.3g} optimal lengths beyond the slack tendon",
@@ -129,12 +146,14 @@ def out_of_reach(subject: Subject, found: FindingSink) -> None:
 def shared_time_constants(subject: Subject, found: FindingSink) -> None:
     """Muscles differ in time constants that OpenSim has only once.
 
-    Reports each DeGrooteFregly2016Muscle whose `activation_time_constant`, `deactivation_time_constant` or
-    `activation_dynamics_smoothing` is not that of the first one in the model, among those whose activation is a state.
+    Reports each DeGrooteFregly2016Muscle whose `activation_time_constant`,
+    `deactivation_time_constant` or `activation_dynamics_smoothing` is not that of the first one in
+    the model, among those whose activation is a state.
 
-    OpenSim keeps these three for the whole process. They are those of the muscle that it computes first, also if that
-    belongs to a model that was loaded before: a muscle of 30 ms that comes after one of 15 ms is activated twice as
-    fast as its file says. Muscles of other classes each have their own.
+    OpenSim keeps these three for the whole process. They are those of the muscle that it computes
+    first, also if that belongs to a model that was loaded before: a muscle of 30 ms that comes
+    after one of 15 ms is activated twice as fast as its file says. Muscles of other classes each
+    have their own.
 
     ```xml
       <DeGrooteFregly2016Muscle name="fast">
@@ -162,7 +181,11 @@ def shared_time_constants(subject: Subject, found: FindingSink) -> None:
                 )
 
 
-_SHARED = ("activation_time_constant", "deactivation_time_constant", "activation_dynamics_smoothing")
+_SHARED = (
+    "activation_time_constant",
+    "deactivation_time_constant",
+    "activation_dynamics_smoothing",
+)
 
 
 def _in_ground(subject: Subject, path: GeometryPath) -> list[Vector]:

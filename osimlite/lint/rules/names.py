@@ -22,10 +22,11 @@ _ILLEGAL = frozenset(ILLEGAL_CHARACTERS)
 def duplicate_name(subject: Subject, found: FindingSink) -> None:
     """Two components beside each other have the same name.
 
-    Reports the second of two siblings with one name, with the name OpenSim gives it and with those who name it.
+    Reports the second of two siblings with one name, with the name OpenSim gives it and with those
+    who name it.
 
-    OpenSim renames the second and adds a number. Everything that was meant to name it leads to the first: both feet
-    then touch the ground with the same sphere.
+    OpenSim renames the second and adds a number. Everything that was meant to name it leads to the
+    first: both feet then touch the ground with the same sphere.
 
     ```xml
       <MarkerSet>
@@ -56,8 +57,9 @@ def illegal_name(subject: Subject, found: FindingSink) -> None:
 
     Reports white space, `/`, `\\`, `*` and `+` in the names of components.
 
-    Names are the parts of paths; OpenSim refuses to load the file. Of files older than version 30500 it takes white
-    space out of the names by itself, and not out of what refers to them: a muscle or a marker is then not found.
+    Names are the parts of paths; OpenSim refuses to load the file. Of files older than version
+    30500 it takes white space out of the names by itself, and not out of what refers to them: a
+    muscle or a marker is then not found.
 
     ```xml
     - <Marker name="right asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -72,13 +74,21 @@ def illegal_name(subject: Subject, found: FindingSink) -> None:
     for component in components:
         if _ILLEGAL.isdisjoint(component.name):
             continue
-        bad = [character for character in dict.fromkeys(component.name) if character in ILLEGAL_CHARACTERS]
-        shown = listed(["white space" if character.isspace() else f"'{character}'" for character in bad])
+        bad = [
+            character
+            for character in dict.fromkeys(component.name)
+            if character in ILLEGAL_CHARACTERS
+        ]
+        shown = listed(
+            ["white space" if character.isspace() else f"'{character}'" for character in bad]
+        )
         found(
             f"the name of {called(component)} has {shown} in it: OpenSim refuses to load the file",
             component,
             attribute="name",
-            suggestion="".join("_" if character in bad else character for character in component.name),
+            suggestion="".join(
+                "_" if character in bad else character for character in component.name
+            ),
             severity=ERROR,
         )
     # In a file this old OpenSim mends the name, but not what names it.
@@ -91,7 +101,9 @@ def illegal_name(subject: Subject, found: FindingSink) -> None:
                 better = "".join(name.split())
                 used = subject.source.text.count(name) > 1
                 frame = subject.source.spans[change.number].tag in ("Body", "Ground")
-                fate = f"OpenSim makes it '{better}'" + (", and not where others use it" if used else "")
+                fate = f"OpenSim makes it '{better}'" + (
+                    ", and not where others use it" if used else ""
+                )
                 if frame:
                     fate = "OpenSim makes frames of that name for the joints and refuses them"
                 found(
@@ -106,11 +118,11 @@ def illegal_name(subject: Subject, found: FindingSink) -> None:
 def missing_name(subject: Subject, found: FindingSink) -> None:
     """A component that others name by its name has none.
 
-    Reports members of sets, and coordinates, without a name or with an empty one. It is an error if something names a
-    component that is missing, which may be this one.
+    Reports members of sets, and coordinates, without a name or with an empty one. It is an error if
+    something names a component that is missing, which may be this one.
 
-    OpenSim calls such a component after its class, in lower case. Nothing can name it by what the author had in mind,
-    and the columns of results are called `body` or `pinjoint`.
+    OpenSim calls such a component after its class, in lower case. Nothing can name it by what the
+    author had in mind, and the columns of results are called `body` or `pinjoint`.
 
     ```xml
     - <Marker> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -118,15 +130,19 @@ def missing_name(subject: Subject, found: FindingSink) -> None:
     ```
     """
     tree = subject.tree
-    # What the file does not name has got a name while it was upgraded, as OpenSim does. It is looked at if others name
-    # what is not there.
-    renamed = subject.upgraded and any(broken.why in ("missing", "form") for broken in broken_references(subject))
+    # What the file does not name has got a name while it was upgraded, as OpenSim does. It is
+    # looked at if others name what is not there.
+    renamed = subject.upgraded and any(
+        broken.why in ("missing", "form") for broken in broken_references(subject)
+    )
     for component in tree.components:
         if component.name and not (renamed and not subject.names_itself(component)):
             continue
         if isinstance(component, (Model, ModelComponentSet)):
             continue
-        frame = isinstance(component, PhysicalOffsetFrame) and isinstance(tree.parent_of(component), Joint)
+        frame = isinstance(component, PhysicalOffsetFrame) and isinstance(
+            tree.parent_of(component), Joint
+        )
         if not frame and not _should_have_name(subject, component):
             continue
         wanted = _wanted_names(subject, component)
@@ -135,7 +151,10 @@ def missing_name(subject: Subject, found: FindingSink) -> None:
         last = _last(tree.path_of(component) or "")
         message = f"this {type(component).tag} has no name; OpenSim calls it '{last}'"
         if wanted:
-            count = counted(sum(_last(b.text) == wanted[0] for b in _leading_nowhere(subject, component)), "reference")
+            count = counted(
+                sum(_last(b.text) == wanted[0] for b in _leading_nowhere(subject, component)),
+                "reference",
+            )
             message += f", while {count} to '{wanted[0]}' {'leads' if count.startswith('1 ') else 'lead'} nowhere"
         found(
             message,
@@ -163,14 +182,17 @@ def _leading_nowhere(subject: Subject, component: Component) -> list[Broken]:
     result = []
     for broken in broken_references(subject):
         use = broken.use
-        # Of a group OpenSim drops what is missing, and a probe it switches off: neither needs the name to load.
+        # Of a group OpenSim drops what is missing, and a probe it switches off: neither needs the
+        # name to load.
         if use.reference.rule == "set-member" or use.spec.name == "name":
             continue
         if not is_a(component, use.reference.target):
             continue
         if isinstance(parent, Joint) and not isinstance(component, Coordinate):
             # A joint names its own frames, where a frame elsewhere of that name is of no use.
-            near = use.owner is parent and "/" not in broken.text and broken.why in ("missing", "form")
+            near = (
+                use.owner is parent and "/" not in broken.text and broken.why in ("missing", "form")
+            )
         else:
             beside = f"{subject.path(component).rpartition('/')[0]}/{_last(broken.text)}"
             near = broken.why == "missing" and ("/" not in broken.text or broken.text == beside)
@@ -181,7 +203,9 @@ def _leading_nowhere(subject: Subject, component: Component) -> list[Broken]:
 
 def _wanted_names(subject: Subject, component: Component) -> list[str]:
     """Names that are missing and that a component of this class would bear."""
-    return list(dict.fromkeys(_last(broken.text) for broken in _leading_nowhere(subject, component)))
+    return list(
+        dict.fromkeys(_last(broken.text) for broken in _leading_nowhere(subject, component))
+    )
 
 
 def _last(text: str) -> str:

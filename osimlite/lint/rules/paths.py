@@ -43,7 +43,10 @@ def short_path(subject: Subject, found: FindingSink) -> None:
         if len(points) > 1 or owner is None:
             continue
         if path._index is not None or subject.source is None:
-            found(f"the path of {called(owner)} has {counted(len(points), 'point')} and needs two", path)
+            found(
+                f"the path of {called(owner)} has {counted(len(points), 'point')} and needs two",
+                path,
+            )
         elif not any(note.owner is owner and note.kind in _NOT_READ for note in subject.notes):
             found(f"{called(owner)} has no path, and OpenSim refuses the model", owner)
     for path in subject.named("Scholz2015GeometryPath"):
@@ -55,7 +58,10 @@ def short_path(subject: Subject, found: FindingSink) -> None:
             continue
         for item, end in ((elements[0], "begins"), (elements[-1], "ends")):
             if item.tag != _CABLE_POINT:
-                found(f"the path of {called(owner)} {end} with an obstacle, and OpenSim refuses the model", item)
+                found(
+                    f"the path of {called(owner)} {end} with an obstacle, and OpenSim refuses the model",
+                    item,
+                )
 
 
 _CABLE_POINT = "Scholz2015GeometryPathPoint"
@@ -63,7 +69,9 @@ _NOT_READ = frozenset(("unknown-tag", "wrong-name", "wrong-class", "unknown-clas
 """What is reported of an element that may have been meant for the path."""
 
 
-DISTANCE = Threshold("path-point-distance", 0.0, "m", "points of a path this near to each other count as one")
+DISTANCE = Threshold(
+    "path-point-distance", 0.0, "m", "points of a path this near to each other count as one"
+)
 
 
 @rule("OSIM612", "coincident-path-points", severity=WARNING, thresholds=(DISTANCE,))
@@ -72,8 +80,8 @@ def coincident_path_points(subject: Subject, found: FindingSink) -> None:
 
     Reports a point fixed at the same place of the same frame as the point before it.
 
-    The piece between them has no length and no direction; if it is the whole path, the length of the muscle is 0.
-    Usually one point was copied and not moved.
+    The piece between them has no length and no direction; if it is the whole path, the length of
+    the muscle is 0. Usually one point was copied and not moved.
 
     ```xml
       <PathPointSet>
@@ -91,7 +99,10 @@ def coincident_path_points(subject: Subject, found: FindingSink) -> None:
         for before, point in pairwise(points):
             if type(before) is not PathPoint or type(point) is not PathPoint:
                 continue
-            if before.location != point.location and not math.dist(before.location, point.location) <= nearest:
+            if (
+                before.location != point.location
+                and not math.dist(before.location, point.location) <= nearest
+            ):
                 continue
             frame = subject.target_of(point, "socket_parent_frame")
             if frame is not None and frame is subject.target_of(before, "socket_parent_frame"):
@@ -107,8 +118,9 @@ def coincident_path_points(subject: Subject, found: FindingSink) -> None:
 def inverted_point_range(subject: Subject, found: FindingSink) -> None:
     """A conditional path point is never in the path.
 
-    Reports conditional points whose range ends before it begins, or lies outside of the range of the coordinate, and
-    those without any. Where both ends in radians would lie in the range of the coordinate, the range is in degrees.
+    Reports conditional points whose range ends before it begins, or lies outside of the range of
+    the coordinate, and those without any. Where both ends in radians would lie in the range of the
+    coordinate, the range is in degrees.
 
     The coordinate is never inside, so that the path always leaves the point out.
 
@@ -131,7 +143,11 @@ def inverted_point_range(subject: Subject, found: FindingSink) -> None:
         elif "range" in point.model_fields_set:
             _report_unreachable(subject, found, point)
         else:
-            found(f"{called(point)} has no range: it counts only where the coordinate is exactly 0", point, tag="range")
+            found(
+                f"{called(point)} has no range: it counts only where the coordinate is exactly 0",
+                point,
+                tag="range",
+            )
 
 
 def _report_unreachable(subject: Subject, report: FindingSink, point: ConditionalPathPoint) -> None:
@@ -142,11 +158,20 @@ def _report_unreachable(subject: Subject, report: FindingSink, point: Conditiona
     low, high = sorted(coordinate.range)
     first, last = point.range
     joint = subject.tree.parent_of(coordinate)
-    motion = motions_of(joint).get(coordinate.name) if isinstance(joint, Joint) and joint.motion_types else None
+    motion = (
+        motions_of(joint).get(coordinate.name)
+        if isinstance(joint, Joint) and joint.motion_types
+        else None
+    )
     turns = motion != "translational"
     slack = 0.02 * (high - low) + 1e-5
     meant = (radians(first), radians(last))
-    fits = turns and max(abs(first), abs(last)) > pi and low - slack <= meant[0] and meant[1] <= high + slack
+    fits = (
+        turns
+        and max(abs(first), abs(last)) > pi
+        and low - slack <= meant[0]
+        and meant[1] <= high + slack
+    )
     never = last < low - 1e-5 or first > high + 1e-5
     # A range in degrees may begin at 0 or end there, which is in the range in radians too.
     if never or (fits and max(abs(first), abs(last)) > 4.0 * pi):
@@ -182,7 +207,11 @@ def unused_wrap_object(subject: Subject, found: FindingSink) -> None:
     surfaces = list(subject.each(WrapObject))
     if not surfaces or subject.has_unknown:
         return
-    used = {id(subject.resolution(use).target) for use in subject.uses if use.reference.target == "WrapObject"}
+    used = {
+        id(subject.resolution(use).target)
+        for use in subject.uses
+        if use.reference.target == "WrapObject"
+    }
     for surface in surfaces:
         if id(surface) not in used:
             found(f"no path wraps around {called(surface)}", surface, attribute="name")
@@ -194,8 +223,8 @@ def moving_point_coordinates(subject: Subject, found: FindingSink) -> None:
 
     Reports moving path points whose x, y and z follow different coordinates.
 
-    OpenSim refuses the model. Such a point moves along a curve on the bone as one joint turns, as the patellar tendon
-    does with the knee; two joints would need a surface.
+    OpenSim refuses the model. Such a point moves along a curve on the bone as one joint turns, as
+    the patellar tendon does with the knee; two joints would need a surface.
 
     ```xml
       <MovingPathPoint name="patella">

@@ -20,19 +20,32 @@ from osimlite.schema.states import motions_of
 from osimlite.schema.tree import Use
 
 GRAVITY = Threshold("largest-gravity", 30.0, "m/s^2", "no planet that people walk on has more")
-BEYOND = Threshold("limit-beyond-range", 0.0, "of the range", "share of the range by which a limit may lie outside it")
-INSIDE = Threshold("limit-inside-range", 0.25, "of the range", "share of the range by which a limit may lie inside it")
-UNLIMITED = Threshold("unlimited-range", 4 * math.pi, "rad", "a wider range stands for none, or is in degrees")
+BEYOND = Threshold(
+    "limit-beyond-range",
+    0.0,
+    "of the range",
+    "share of the range by which a limit may lie outside it",
+)
+INSIDE = Threshold(
+    "limit-inside-range",
+    0.25,
+    "of the range",
+    "share of the range by which a limit may lie inside it",
+)
+UNLIMITED = Threshold(
+    "unlimited-range", 4 * math.pi, "rad", "a wider range stands for none, or is in degrees"
+)
 
 
 @rule("OSIM505", "strange-gravity", severity=WARNING, thresholds=(GRAVITY,))
 def strange_gravity(subject: Subject, found: FindingSink) -> None:
     """Gravity is far from that of the Earth.
 
-    Reports gravity stronger than 30 m/s^2, which is usually one in millimetres, and gravity that points up along Y.
+    Reports gravity stronger than 30 m/s^2, which is usually one in millimetres, and gravity that
+    points up along Y.
 
-    OpenSim works in metres, kilograms and seconds, with Y up. Lengths in millimetres make a model that falls a thousand
-    times too fast.
+    OpenSim works in metres, kilograms and seconds, with Y up. Lengths in millimetres make a model
+    that falls a thousand times too fast.
 
     ```xml
     - <gravity>0 -9806.65 0</gravity>
@@ -57,9 +70,10 @@ def friction_order(subject: Subject, found: FindingSink) -> None:
 
     Reports contact materials whose static coefficient is below the dynamic one.
 
-    No material resists sliding more than sticking; usually the two numbers are swapped. Simbody's friction rises with
-    the speed v of sliding, measured in transition velocities, as min(v, 1) (d + 2 (s - d) / (1 + v^2)), with s static
-    and d dynamic: where s is less than half of d this is negative at small v, and friction pushes the way things slide.
+    No material resists sliding more than sticking; usually the two numbers are swapped. Simbody's
+    friction rises with the speed v of sliding, measured in transition velocities, as min(v, 1) (d +
+    2 (s - d) / (1 + v^2)), with s static and d dynamic: where s is less than half of d this is
+    negative at small v, and friction pushes the way things slide.
 
     ```xml
       <HuntCrossleyForce::ContactParameters>
@@ -90,7 +104,8 @@ def limits_swapped(subject: Subject, found: FindingSink) -> None:
 
     Reports limit forces whose upper limit is smaller than the lower one.
 
-    Between the two both springs push against each other, at every pose of the joint that was meant to be free.
+    Between the two both springs push against each other, at every pose of the joint that was meant
+    to be free.
 
     ```xml
       <CoordinateLimitForce name="stop">
@@ -115,8 +130,8 @@ def limit_outside_range(subject: Subject, found: FindingSink) -> None:
 
     Reports limits that lie outside the range of the coordinate by more than the transition.
 
-    The range does not stop the motion, the limit force does; the model then moves further than its range says. Note
-    that limits are in degrees and ranges in radians.
+    The range does not stop the motion, the limit force does; the model then moves further than its
+    range says. Note that limits are in degrees and ranges in radians.
 
     ```xml
       <CoordinateLimitForce name="stop">
@@ -145,11 +160,12 @@ def limit_outside_range(subject: Subject, found: FindingSink) -> None:
 def limit_inside_range(subject: Subject, found: FindingSink) -> None:
     """A limit force begins well inside the range of its coordinate.
 
-    Reports limits inside the range of the coordinate by more than the transition and a quarter of the range. It is a
-    warning if the default value of the coordinate is already beyond the limit.
+    Reports limits inside the range of the coordinate by more than the transition and a quarter of
+    the range. It is a warning if the default value of the coordinate is already beyond the limit.
 
-    Part of the range can only be reached against the spring. Past the limit in the default pose, the force is there
-    from the first instant. Note that limits are in degrees and ranges in radians.
+    Part of the range can only be reached against the spring. Past the limit in the default pose,
+    the force is there from the first instant. Note that limits are in degrees and ranges in
+    radians.
 
     ```xml
       <CoordinateLimitForce name="stop">
@@ -163,16 +179,28 @@ def limit_inside_range(subject: Subject, found: FindingSink) -> None:
         slack = max(abs(force.transition), subject.config.value_of(INSIDE) * (high - low)) + 1e-6
         start = coordinate.default_value * scale
         for tag, limit, inside, beyond in (
-            ("upper_limit", force.upper_limit, low <= force.upper_limit < high - slack, start - force.upper_limit),
-            ("lower_limit", force.lower_limit, high >= force.lower_limit > low + slack, force.lower_limit - start),
+            (
+                "upper_limit",
+                force.upper_limit,
+                low <= force.upper_limit < high - slack,
+                start - force.upper_limit,
+            ),
+            (
+                "lower_limit",
+                force.lower_limit,
+                high >= force.lower_limit > low + slack,
+                force.lower_limit - start,
+            ),
         ):
             acts = beyond > abs(force.transition)
-            # A range of many turns stands for none, or is in degrees; so does a limit that is not given.
+            # A range of many turns stands for none, or is in degrees; so does a limit that is not
+            # given.
             widest = math.degrees(subject.config.value_of(UNLIMITED))
             given = tag in force.model_fields_set and (unit == "m" or high - low < widest)
             if inside and given and force.lower_limit <= force.upper_limit:
                 meant = math.degrees(limit)
-                # Both limits are as small as angles in radians are, and one is a bound of the range then.
+                # Both limits are as small as angles in radians are, and one is a bound of the range
+                # then.
                 small = max(abs(force.lower_limit), abs(force.upper_limit)) <= 2 * math.pi
                 near = min(abs(meant - low), abs(meant - high)) <= 0.1 * (high - low)
                 radians = unit == "deg" and small and near
@@ -191,14 +219,21 @@ def limit_inside_range(subject: Subject, found: FindingSink) -> None:
 def _drives(subject: Subject, material: HuntCrossleyContactParameters) -> bool:
     """Whether friction at the smallest speeds acts along the sliding, even with the viscous part."""
     force = subject.owner(material)
-    viscous = material.viscous_friction * force.transition_velocity if isinstance(force, HuntCrossleyForce) else 0.0
+    viscous = (
+        material.viscous_friction * force.transition_velocity
+        if isinstance(force, HuntCrossleyForce)
+        else 0.0
+    )
     return 2 * material.static_friction + viscous < material.dynamic_friction
 
 
-def _limited(subject: Subject) -> Iterator[tuple[CoordinateLimitForce, Coordinate, float, float, float]]:
+def _limited(
+    subject: Subject,
+) -> Iterator[tuple[CoordinateLimitForce, Coordinate, float, float, float]]:
     """Limit forces with their coordinates, in how many of the forces' units 1 rad or 1 m is, and the range in these.
 
-    A coordinate without a range is left out, and one of which the functions of its joint decide what it means.
+    A coordinate without a range is left out, and one of which the functions of its joint decide
+    what it means.
     """
     spec = CoordinateLimitForce.field_specs()["coordinate"]
     for force in subject.each(CoordinateLimitForce):
@@ -206,7 +241,11 @@ def _limited(subject: Subject) -> Iterator[tuple[CoordinateLimitForce, Coordinat
         if not isinstance(coordinate, Coordinate) or "range" not in coordinate.model_fields_set:
             continue
         joint = subject.tree.parent_of(coordinate)
-        motion = motions_of(joint).get(coordinate.name) if isinstance(joint, Joint) and joint.motion_types else None
+        motion = (
+            motions_of(joint).get(coordinate.name)
+            if isinstance(joint, Joint) and joint.motion_types
+            else None
+        )
         if motion is not None:
             scale = 180 / math.pi if motion == "rotational" else 1.0
             low, high = sorted(bound * scale for bound in coordinate.range)

@@ -27,11 +27,12 @@ if TYPE_CHECKING:
 def unresolved_reference(subject: Subject, found: FindingSink) -> None:
     """A component names another component that does not exist.
 
-    Follows every reference by OpenSim's own rule for that property and reports those that lead nowhere, with the force,
-    joint or other component that holds them and the nearest name that exists.
+    Follows every reference by OpenSim's own rule for that property and reports those that lead
+    nowhere, with the force, joint or other component that holds them and the nearest name that
+    exists.
 
-    OpenSim refuses the model when it is connected, and its message names neither the line nor, for a contact, the
-    force. A group that names a missing member loses it in silence.
+    OpenSim refuses the model when it is connected, and its message names neither the line nor, for
+    a contact, the force. A group that names a missing member loses it in silence.
 
     ```xml
       <HuntCrossleyForce::ContactParameters>
@@ -55,8 +56,8 @@ def unresolved_reference(subject: Subject, found: FindingSink) -> None:
 def reference_to_wrong_type(subject: Subject, found: FindingSink) -> None:
     """A reference leads to a component of a class that the property cannot use.
 
-    Reports references to something that exists and is of another kind: a joint as the parent frame, a body where a
-    contact geometry belongs.
+    Reports references to something that exists and is of another kind: a joint as the parent frame,
+    a body where a contact geometry belongs.
 
     OpenSim says that the component does not exist, and refuses the model.
 
@@ -69,10 +70,10 @@ def reference_to_wrong_type(subject: Subject, found: FindingSink) -> None:
         other = broken.other
         assert other is not None
         kind = other.class_name if isinstance(other, Unknown) else type(other).tag
-        message = (
-            f"{_names(subject, broken.use)} '{broken.text}', which is {a(kind)}, not {a(broken.use.reference.target)}"
+        message = f"{_names(subject, broken.use)} '{broken.text}', which is {a(kind)}, not {a(broken.use.reference.target)}"
+        fixed = (
+            _contacts_on(subject, other) if broken.use.reference.target == "ContactGeometry" else []
         )
-        fixed = _contacts_on(subject, other) if broken.use.reference.target == "ContactGeometry" else []
         if fixed:
             message += f"; contact geometry fixed to it: {listed(fixed)}"
         _report(subject, found, broken, message)
@@ -116,11 +117,13 @@ def missing_reference(subject: Subject, found: FindingSink) -> None:
 def reference_form(subject: Subject, found: FindingSink) -> None:
     """A component is named by its path where a bare name belongs, or by its name where a path belongs.
 
-    Reports references that would be right in another form: a bare name in a socket, a path without its leading slash,
-    a path where OpenSim looks a bare name up, a path of the years before version 4 that leaves the sets out.
+    Reports references that would be right in another form: a bare name in a socket, a path without
+    its leading slash, a path where OpenSim looks a bare name up, a path of the years before version
+    4 that leaves the sets out.
 
-    OpenSim does not search. A bare name in a socket means a child of the component itself; a path in
-    `<coordinate>` of a limit force means a coordinate with slashes in its name. It refuses the model.
+    OpenSim does not search. A bare name in a socket means a child of the component itself; a path
+    in `<coordinate>` of a limit force means a coordinate with slashes in its name. It refuses the
+    model.
 
     ```xml
     - <Marker name="asis"> <socket_parent_frame>pelvis</socket_parent_frame> </Marker>
@@ -184,7 +187,12 @@ def reference_case(subject: Subject, found: FindingSink) -> None:
     ```
     """
     for broken in _broken(subject, "case"):
-        _report(subject, found, broken, f"{_names(subject, broken.use)} '{broken.text}'; upper and lower case count")
+        _report(
+            subject,
+            found,
+            broken,
+            f"{_names(subject, broken.use)} '{broken.text}'; upper and lower case count",
+        )
 
 
 class Broken(NamedTuple):
@@ -219,7 +227,9 @@ def _find(subject: Subject) -> Iterator[Broken]:
                 if use.value != written:
                     yield Broken(use, use.value, "form", None, written)
             continue
-        if resolution.failure != "illegal" and (_overwritten(subject, use) or _made_up(subject, use)):
+        if resolution.failure != "illegal" and (
+            _overwritten(subject, use) or _made_up(subject, use)
+        ):
             continue
         text = use.text
         if isinstance(use.value, str) and (resolution.failure == "empty" or _unassigned(use)):
@@ -229,7 +239,9 @@ def _find(subject: Subject) -> Iterator[Broken]:
             # Often OpenSim makes such a coordinate up, of which another rule speaks.
             if axes_refused(cast("CustomJoint", use.owner)):
                 yield _explained(subject, use, text, resolution)
-        elif not _undecided(subject, use, text) and not (use.position == 0 and use.reference.takes(text)):
+        elif not _undecided(subject, use, text) and not (
+            use.position == 0 and use.reference.takes(text)
+        ):
             yield _explained(subject, use, text, resolution)
 
 
@@ -243,7 +255,8 @@ def _uses(subject: Subject) -> Iterator[Use]:
     for use in subject.uses:
         if use.reference.rule not in ("file", "column", "input", "positional", "point-index"):
             yield use
-    # An optional reference that OpenSim insists on all the same is not among the uses when it is left out.
+    # An optional reference that OpenSim insists on all the same is not among the uses when it is
+    # left out.
     for cls, items in subject.by_class.items():
         for spec in reference_specs(cls):
             if spec.reference.shape == "optional" and spec.reference.required:
@@ -261,7 +274,14 @@ def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) ->
     last = text.rstrip("/").rpartition("/")[2]
     same_name = [word for word in right if word.rpartition("/")[2] == last]
     if same_name and resolution.failure != "wrong-type" and _same_place(text, same_name):
-        return Broken(use, text, "form", None, closest(text, same_name), "" if len(same_name) == 1 else "several")
+        return Broken(
+            use,
+            text,
+            "form",
+            None,
+            closest(text, same_name),
+            "" if len(same_name) == 1 else "several",
+        )
     other = resolution.found or _elsewhere(subject, use, text)
     if other is not None and is_a(other, reference.target):
         # A coordinate, but of another joint.
@@ -271,7 +291,14 @@ def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) ->
     if same_name and resolution.failure == "wrong-type":
         if other is not None and text.startswith("/"):
             return Broken(use, text, "wrong-type", other, closest(text, same_name))
-        return Broken(use, text, "form", None, closest(text, same_name), "" if len(same_name) == 1 else "several")
+        return Broken(
+            use,
+            text,
+            "form",
+            None,
+            closest(text, same_name),
+            "" if len(same_name) == 1 else "several",
+        )
     lowered = [word for word in right if word.lower() == text.lower()]
     if lowered:
         return Broken(use, text, "case", None, lowered[0])
@@ -284,11 +311,15 @@ def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) ->
 
 def _right_words(subject: Subject, use: Use) -> list[str]:
     """Every text that would be right; the same for all references of one kind in one component."""
-    known = cast("dict[tuple[str, str, int], list[str]]", subject.kept.setdefault("right words", {}))
+    known = cast(
+        "dict[tuple[str, str, int], list[str]]", subject.kept.setdefault("right words", {})
+    )
     key = (use.reference.rule, use.reference.target, id(use.owner))
     if key not in known and use.reference.rule == "set-member":
         tree = subject.tree
-        known[key] = sorted({item.name for item in tree.components if tree.parent_of(item) is use.owner})
+        known[key] = sorted(
+            {item.name for item in tree.components if tree.parent_of(item) is use.owner}
+        )
     elif key not in known:
         known[key] = subject.tree.spellings(use)
     return known[key]
@@ -309,7 +340,9 @@ def _elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
         return at_path
     if "/" in text:
         return None
-    return next((item for item in tree.by_name.get(text, ()) if not is_a(item, use.reference.target)), None)
+    return next(
+        (item for item in tree.by_name.get(text, ()) if not is_a(item, use.reference.target)), None
+    )
 
 
 def _wants_plain_path(use: Use) -> bool:
@@ -332,14 +365,20 @@ def _made_up(subject: Subject, use: Use) -> bool:
 
 def _overwritten(subject: Subject, use: Use) -> bool:
     """Whether OpenSim sets this reference itself: the frame of the geometry that a frame draws."""
-    return isinstance(use.holder, Geometry) and use.spec.tag == "socket_frame" and _drawn_by_frame(subject, use.holder)
+    return (
+        isinstance(use.holder, Geometry)
+        and use.spec.tag == "socket_frame"
+        and _drawn_by_frame(subject, use.holder)
+    )
 
 
 def _drawn_by_frame(subject: Subject, geometry: Geometry) -> bool:
     parent = subject.tree.parent_of(geometry)
     if not isinstance(parent, Frame):
         return False
-    return parent.frame_geometry is geometry or any(item is geometry for item in parent.attached_geometry)
+    return parent.frame_geometry is geometry or any(
+        item is geometry for item in parent.attached_geometry
+    )
 
 
 def _undecided(subject: Subject, use: Use, text: str) -> bool:
@@ -388,11 +427,18 @@ def _report(subject: Subject, found: FindingSink, broken: Broken, message: str) 
     by_name = use.spec.name == "name"
     if by_name:
         message += "; OpenSim switches the whole probe off"
-    place = None if by_name else subject.position(use.holder, tag=use.spec.tag, word=broken.text, nth=nth)
+    place = (
+        None
+        if by_name
+        else subject.position(use.holder, tag=use.spec.tag, word=broken.text, nth=nth)
+    )
     certain = broken.hint == "comma" or (broken.why in ("case", "form") and not broken.hint)
     # A frame deep in another component only happens to have the name.
     certain = certain and (broken.suggestion or "").count("/") < 3
-    if any(note.owner is use.owner and note.kind in ("unknown-tag", "unknown-class") for note in subject.notes):
+    if any(
+        note.owner is use.owner and note.kind in ("unknown-tag", "unknown-class")
+        for note in subject.notes
+    ):
         # What OpenSim ignores here may hold what is meant.
         place = None
     found(

@@ -42,9 +42,10 @@ from osimlite.schema.tree import is_a
 def contradicting_values(subject: Subject, found: FindingSink) -> None:
     """Numbers of one object contradict each other.
 
-    Reports curves of muscles whose numbers make no curve, what a class of muscles does not have or cannot compute with
-    (`ignore_tendon_compliance` of a Thelen2003Muscle, a `minimum_activation` of 1, `optimal_force` beside
-    `max_isometric_force`), a torus without a hole, and a path given by functions that do not take its coordinates.
+    Reports curves of muscles whose numbers make no curve, what a class of muscles does not have or
+    cannot compute with (`ignore_tendon_compliance` of a Thelen2003Muscle, a `minimum_activation` of
+    1, `optimal_force` beside `max_isometric_force`), a torus without a hole, and a path given by
+    functions that do not take its coordinates.
 
     OpenSim refuses the model, and its message names neither the muscle nor the property.
 
@@ -59,11 +60,15 @@ def contradicting_values(subject: Subject, found: FindingSink) -> None:
     """
     strange = {id(item) for item, *_ in outside(subject)}
     for cls, items in subject.by_class.items():
-        relation = next((_RELATIONS[base.__name__] for base in cls.__mro__ if base.__name__ in _RELATIONS), None)
+        relation = next(
+            (_RELATIONS[base.__name__] for base in cls.__mro__ if base.__name__ in _RELATIONS), None
+        )
         if relation is not None or cls.contradictions is not Object.contradictions:
             for item in [item for item in items if id(item) not in strange]:
                 owner = subject.owner(item)
-                for tag, message in relation(item, owner) if relation is not None else item.contradictions():
+                for tag, message in (
+                    relation(item, owner) if relation is not None else item.contradictions()
+                ):
                     of = "" if item.name and item is owner else f" of {called(owner)}"
                     found(f"{called(item)}{of}: {message}: {REFUSED}", item, tag=tag)
 
@@ -74,8 +79,8 @@ def controls_swapped(subject: Subject, found: FindingSink) -> None:
 
     Reports actuators and muscles whose `min_control` is larger than their `max_control`.
 
-    No control is allowed. OpenSim simulates the model all the same; static optimization, computed muscle control and
-    optimal control take the two as bounds and fail.
+    No control is allowed. OpenSim simulates the model all the same; static optimization, computed
+    muscle control and optimal control take the two as bounds and fail.
 
     ```xml
       <CoordinateActuator name="motor">
@@ -134,7 +139,10 @@ def _function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]:
     for tag, function, wanted in functions:
         result = _arguments(function)
         if result is not None and result != wanted:
-            yield tag, f"a function of its {tag} takes {counted(result, 'argument')} instead of {wanted}"
+            yield (
+                tag,
+                f"a function of its {tag} takes {counted(result, 'argument')} instead of {wanted}",
+            )
 
 
 def _arguments(function: Any) -> int | None:

@@ -18,11 +18,13 @@ from osimlite.schema.tree import is_a
 def missing_column(setup: Setup, found: FindingSink) -> None:
     """A table of coordinates lacks coordinates of the model, or has none of them.
 
-    Compares the columns of a table of coordinates with the coordinates of the model: OpenSim's inverse dynamics
-    takes plain names alone, analyses and `osimlite run` take paths too. A task whose value is to come from a file
-    needs its column there, and a table of states one for every state of the model.
+    Compares the columns of a table of coordinates with the coordinates of the model: OpenSim's
+    inverse dynamics takes plain names alone, analyses and `osimlite run` take paths too. A task
+    whose value is to come from a file needs its column there, and a table of states one for every
+    state of the model.
 
-    OpenSim gives a coordinate without a column its default value, in analyses 0, without a word or with a line in the
+    OpenSim gives a coordinate without a column its default value, in analyses 0, without a word or
+    with a line in the
     log: the motion is another one.
 
     ```setup
@@ -39,7 +41,9 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
             continue
         plain = is_a(item, "InverseDynamicsTool")
         columns = {
-            column if plain or "/" not in column else (parts[-2] if (parts := column.split("/"))[-1] == "value" else "")
+            column
+            if plain or "/" not in column
+            else (parts[-2] if (parts := column.split("/"))[-1] == "value" else "")
             for column in table.columns
         }
         lacking = sorted(name for name in names - columns if not setup.is_bound(name))
@@ -47,31 +51,44 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
             found(
                 f"'{getattr(item, tag)}' names the coordinates by paths: OpenSim's inverse dynamics does not know "
                 "these, and computes the moments of the default pose; osimlite knows them",
-                item, tag=tag,
-            )  # fmt: skip
+                item,
+                tag=tag,
+            )
         elif not names & columns:
-            found(f"'{getattr(item, tag)}' has no column of a coordinate of the model", item, tag=tag, severity=ERROR)
+            found(
+                f"'{getattr(item, tag)}' has no column of a coordinate of the model",
+                item,
+                tag=tag,
+                severity=ERROR,
+            )
         elif lacking:
             found(
                 f"'{getattr(item, tag)}' has no column {listed(map(repr, lacking))}: OpenSim takes "
                 f"{'0' if is_a(item, 'AbstractTool') else 'the default value'}{meant(lacking, columns - names)}",
-                item, tag=tag,
-            )  # fmt: skip
+                item,
+                tag=tag,
+            )
     for item in setup.named("AbstractTool"):
         states = setup.table(getattr(item, "states_file", ""))
-        unknown = [column for column in states.columns if not _is_state(setup, column)] if states is not None else []
+        unknown = (
+            [column for column in states.columns if not _is_state(setup, column)]
+            if states is not None
+            else []
+        )
         if unknown and setup.tree is not None:
             found(
                 f"the model has no state {listed(map(repr, unknown))} of '{item.states_file}': "
                 "OpenSim leaves the column out",
-                item, tag="states_file",
-            )  # fmt: skip
+                item,
+                tag="states_file",
+            )
         lacking = _lacking_states(setup, states) if states is not None and states.labels else []
         if lacking:
             found(
                 f"'{item.states_file}' has no column for {listed(lacking)}: OpenSim takes the default value",
-                item, tag="states_file",
-            )  # fmt: skip
+                item,
+                tag="states_file",
+            )
     for user in setup.having("ik_task_set"):
         for task in members(user.ik_task_set, "IKCoordinateTask"):
             if task.apply and task.value_type == "from_file":
@@ -86,8 +103,11 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
                 elif values is not None and values.labels and task.name not in values.columns:
                     found(
                         f"'{user.coordinate_file}' has no column '{task.name}': OpenSim refuses it",
-                        task, attribute="name", severity=ERROR, suggestion=nearest_name(task.name, values.columns),
-                    )  # fmt: skip
+                        task,
+                        attribute="name",
+                        severity=ERROR,
+                        suggestion=nearest_name(task.name, values.columns),
+                    )
 
 
 def _find_names_in_paths(table: Table) -> set[str]:
@@ -103,7 +123,8 @@ def _is_state(setup: Setup, column: str) -> bool:
     if column.startswith("/"):
         path = column.rpartition("/")[0]
         return (
-            setup.tree.walk(path, "", "Component").target is not None or path.rpartition("/")[2] in setup.tree.by_name
+            setup.tree.walk(path, "", "Component").target is not None
+            or path.rpartition("/")[2] in setup.tree.by_name
         )
     return column.partition(".")[0].removesuffix("_u") in setup.tree.by_name
 

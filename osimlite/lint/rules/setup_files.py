@@ -26,13 +26,13 @@ _SHARED = {
 def missing_input(setup: Setup, found: FindingSink) -> None:
     """A file that a setup reads is not there, or is not named.
 
-    Looks for every file that a setup reads where OpenSim does: beside the setup, if OpenSim is started there. What
-    another setup of the project writes need not be there yet. Points out names in other letter case and names with
-    backslashes, which only Windows understands.
+    Looks for every file that a setup reads where OpenSim does: beside the setup, if OpenSim is
+    started there. What another setup of the project writes need not be there yet. Points out names
+    in other letter case and names with backslashes, which only Windows understands.
 
-    OpenSim refuses the setup; where the model is missing, inverse kinematics crashes. A missing file of controls is
-    told in the log only, and the tool runs without controls. A setup that names no file is a warning: it may be meant
-    for a program that gives it one.
+    OpenSim refuses the setup; where the model is missing, inverse kinematics crashes. A missing
+    file of controls is told in the log only, and the tool runs without controls. A setup that names
+    no file is a warning: it may be meant for a program that gives it one.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -54,20 +54,30 @@ def missing_input(setup: Setup, found: FindingSink) -> None:
         fate = "OpenSim goes on without" if goes_on else "OpenSim refuses the setup"
         found(
             f"the file '{naming.name}' of {called(naming.item)} is not there{why}: {fate}",
-            naming.item, tag=naming.spec.tag, word=naming.name if naming.spec.tag == "force_set_files" else None,
-            suggestion=twin, certain=True,
-        )  # fmt: skip
+            naming.item,
+            tag=naming.spec.tag,
+            word=naming.name if naming.spec.tag == "force_set_files" else None,
+            suggestion=twin,
+            certain=True,
+        )
     for maker in setup.having("marker_set_file"):
         if "marker_set_file" in maker.model_fields_set and not maker.marker_set_file.strip():
             found(
                 f"marker_set_file of {called(maker)} is empty, and OpenSim refuses the setup; leave it out, or write "
                 "Unassigned",
-                maker, tag="marker_set_file", suggestion="Unassigned",
-            )  # fmt: skip
+                maker,
+                tag="marker_set_file",
+                suggestion="Unassigned",
+            )
     for item in setup.items:
         for spec in file_specs(type(item), "file"):
             if spec.reference.required and not is_given(getattr(item, spec.name)):
-                found(f"{called(item)} names no {spec.tag}: {UNGIVEN}", item, tag=spec.tag, severity=WARNING)
+                found(
+                    f"{called(item)} names no {spec.tag}: {UNGIVEN}",
+                    item,
+                    tag=spec.tag,
+                    severity=WARNING,
+                )
         if (
             is_a(item, "MocoPhase")
             and item is not setup.top
@@ -75,18 +85,36 @@ def missing_input(setup: Setup, found: FindingSink) -> None:
         ):
             found(f"{called(item)} has no model: {UNGIVEN}", item, severity=WARNING)
         if is_a(item, "AnalyzeTool"):
-            given = [tag for tag in ("states_file", "coordinates_file") if is_given(getattr(item, tag))]
+            given = [
+                tag for tag in ("states_file", "coordinates_file") if is_given(getattr(item, tag))
+            ]
             if len(given) != 1:
-                what = "both a states_file and a coordinates_file" if given else "neither states nor coordinates"
+                what = (
+                    "both a states_file and a coordinates_file"
+                    if given
+                    else "neither states nor coordinates"
+                )
                 severity = ERROR if given else WARNING
                 fate = "OpenSim refuses it" if given else UNGIVEN
-                found(f"{called(item)} names {what}: {fate}", item, tag="coordinates_file", severity=severity)
+                found(
+                    f"{called(item)} names {what}: {fate}",
+                    item,
+                    tag="coordinates_file",
+                    severity=severity,
+                )
 
 
 def _in_other_case(naming: Naming) -> str | None:
     folder, last = os.path.split(naming.path)
     try:
-        twin = next((name for name in os.listdir(folder or ".") if name.lower() == last.lower() and name != last), None)
+        twin = next(
+            (
+                name
+                for name in os.listdir(folder or ".")
+                if name.lower() == last.lower() and name != last
+            ),
+            None,
+        )
     except OSError:
         return None
     return None if twin is None else naming.name[: len(naming.name) - len(last)] + twin
@@ -96,8 +124,8 @@ def _in_other_case(naming: Naming) -> str | None:
 def input_of_another_kind(setup: Setup, found: FindingSink) -> None:
     """A file that a setup reads holds something else than is needed.
 
-    Compares the ending of a table, and the class at the top of a document, with what the property needs: a set of
-    forces is no set of external loads.
+    Compares the ending of a table, and the class at the top of a document, with what the property
+    needs: a set of forces is no set of external loads.
 
     OpenSim refuses the file.
 
@@ -119,24 +147,26 @@ def input_of_another_kind(setup: Setup, found: FindingSink) -> None:
             if not naming.name.lower().endswith(_ENDINGS[wanted]):
                 found(
                     f"{naming.spec.tag} of {called(naming.item)} must be a table ({', '.join(_ENDINGS[wanted])})",
-                    naming.item, tag=naming.spec.tag,
-                )  # fmt: skip
+                    naming.item,
+                    tag=naming.spec.tag,
+                )
         elif wanted[:1].isupper():
             top = None if is_table(naming.name) else setup.document(naming.name)
             held = "a table" if top is None else a(type(top).__name__)
             if is_table(naming.name) or (top is not None and not is_a(top, wanted)):
                 found(
                     f"{naming.spec.tag} of {called(naming.item)} must hold a {wanted}, '{naming.name}' holds {held}",
-                    naming.item, tag=naming.spec.tag,
-                )  # fmt: skip
+                    naming.item,
+                    tag=naming.spec.tag,
+                )
 
 
 @rule("OSIM823", "lost-output", severity=WARNING, mends="both", about="document")
 def lost_output(setup: Setup, found: FindingSink) -> None:
     """Results would be lost, or land in another place.
 
-    Looks at the folder for results, of which OpenSim makes the last part only, at folders of output files that are not
-    there, and at output files without a name.
+    Looks at the folder for results, of which OpenSim makes the last part only, at folders of output
+    files that are not there, and at output files without a name.
 
     The tool runs to its end and its results are lost, with a line in the log at most.
 
@@ -156,13 +186,16 @@ def lost_output(setup: Setup, found: FindingSink) -> None:
         if not os.path.isdir(above):
             found(
                 f"of '{naming.name}' OpenSim makes the last folder only: its results are lost",
-                naming.item, tag=naming.spec.tag,
-            )  # fmt: skip
+                naming.item,
+                tag=naming.spec.tag,
+            )
         elif os.path.isabs(naming.name) and not os.path.isdir(naming.name):
             found(
-                f"'{naming.name}' is not there: if OpenSim may not make it, the results are lost", naming.item,
-                tag=naming.spec.tag, severity=INFO,
-            )  # fmt: skip
+                f"'{naming.name}' is not there: if OpenSim may not make it, the results are lost",
+                naming.item,
+                tag=naming.spec.tag,
+                severity=INFO,
+            )
     # A tool makes its own folder before it writes.
     made = {os.path.normpath(naming.name) for naming in setup.named_files("output-folder")}
     for naming in setup.named_files("output-file"):
@@ -171,9 +204,16 @@ def lost_output(setup: Setup, found: FindingSink) -> None:
             if folder:
                 found(
                     f"OpenSim leaves the folder of '{naming.name}' out and writes into results_directory",
-                    naming.item, tag=naming.spec.tag, suggestion=os.path.basename(naming.name), certain=True,
-                )  # fmt: skip
-        elif folder and not os.path.isdir(os.path.join(setup.folder, folder)) and os.path.normpath(folder) not in made:
+                    naming.item,
+                    tag=naming.spec.tag,
+                    suggestion=os.path.basename(naming.name),
+                    certain=True,
+                )
+        elif (
+            folder
+            and not os.path.isdir(os.path.join(setup.folder, folder))
+            and os.path.normpath(folder) not in made
+        ):
             found(
                 f"the folder of '{naming.name}' is not there: OpenSim does not make it",
                 naming.item,
@@ -183,24 +223,31 @@ def lost_output(setup: Setup, found: FindingSink) -> None:
         folder, name = os.path.normpath(tool.results_directory or "."), tool.output_motion_file
         if folder != "." and name and not os.path.dirname(name):
             found(
-                f"'{name}' is written beside the setup: results_directory does not count for it", tool,
-                tag="output_motion_file", severity=INFO, suggestion=f"{folder}/{name}",
-            )  # fmt: skip
+                f"'{name}' is written beside the setup: results_directory does not count for it",
+                tool,
+                tag="output_motion_file",
+                severity=INFO,
+                suggestion=f"{folder}/{name}",
+            )
     for item in setup.items:
         for spec in file_specs(type(item), "output-file"):
             if spec.reference.required and not getattr(item, spec.name).strip():
-                found(f"{called(item)} names no {spec.tag}: its results get no proper file", item, tag=spec.tag)
+                found(
+                    f"{called(item)} names no {spec.tag}: its results get no proper file",
+                    item,
+                    tag=spec.tag,
+                )
 
 
 @rule("OSIM824", "tools-differ", severity=INFO, about="document")
 def tools_differ(setup: Setup, found: FindingSink) -> None:
     """A tool leaves out what another tool takes into account for the same motion.
 
-    Compares a tool with all others in its folder that are given the same file of coordinates: whether they have
-    measured loads, and whether they filter the motion.
+    Compares a tool with all others in its folder that are given the same file of coordinates:
+    whether they have measured loads, and whether they filter the motion.
 
-    Joint moments without the ground, or muscle forces from a motion that is not filtered, are results like any others,
-    and do not fit those of the other tool.
+    Joint moments without the ground, or muscle forces from a motion that is not filtered, are
+    results like any others, and do not fit those of the other tool.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -217,16 +264,27 @@ def tools_differ(setup: Setup, found: FindingSink) -> None:
     told: set[str] = set()
     for file, other in setup.neighbours:
         place = os.path.realpath(file)
-        if place == here or os.path.dirname(place) != os.path.dirname(here) or motion_of(file, other) != mine:
+        if (
+            place == here
+            or os.path.dirname(place) != os.path.dirname(here)
+            or motion_of(file, other) != mine
+        ):
             continue
         for tag, what in _SHARED.items():
             one, two = (getattr(tool, tag, None) for tool in (setup.top, other))
-            if one is not None and two is not None and _says(two) and not _says(one) and tag not in told:
+            if (
+                one is not None
+                and two is not None
+                and _says(two)
+                and not _says(one)
+                and tag not in told
+            ):
                 told.add(tag)
                 found(
                     f"'{os.path.basename(file)}' {what.format(two)} for the same motion, this tool does not",
-                    setup.top, tag=tag,
-                )  # fmt: skip
+                    setup.top,
+                    tag=tag,
+                )
 
 
 def _says(value: str | float) -> bool:

@@ -30,11 +30,13 @@ _SIDES = (("R", "L"), ("r", "l"), ("Right", "Left"), ("right", "left"), ("RIGHT"
 def scale_factor(setup: Setup, found: FindingSink) -> None:
     """A body would be scaled by an implausible factor.
 
-    Looks for factors given by hand, and for measurements, that make a body less than half or more than twice as large.
-    A measurement is the distance of its markers in the data over that in the model, in its default pose.
+    Looks for factors given by hand, and for measurements, that make a body less than half or more
+    than twice as large. A measurement is the distance of its markers in the data over that in the
+    model, in its default pose.
 
-    A label at another place, units that are not those of the header, or a pair of markers that the pose of the subject
-    moves apart, make a model that is no longer that of a person; OpenSim says nothing.
+    A label at another place, units that are not those of the header, or a pair of markers that the
+    pose of the subject moves apart, make a model that is no longer that of a person; OpenSim says
+    nothing.
 
     ```setup
       <ScaleSet name="factors">
@@ -53,35 +55,46 @@ def scale_factor(setup: Setup, found: FindingSink) -> None:
         if setup.tree is None or not scaler.apply or "measurements" not in scaler.scaling_order:
             continue
         said = table.entries.get("Units")
-        places, unit = marker_places(setup), METRES.get(said.value.text, math.nan) if said else math.nan
+        places, unit = (
+            marker_places(setup),
+            METRES.get(said.value.text, math.nan) if said else math.nan,
+        )
         rows, columns = list(rows_between(table, scaler.time_range)), dict(cells_of(table))
         for measurement in members(scaler.measurement_set, "Measurement") if rows else ():
             pairs = members(measurement.marker_pair_set, "MarkerPair") if measurement.apply else ()
             for pair in pairs:
-                one, other = (str(name) for name in pair.markers) if len(pair.markers) == 2 else ("", "")
+                one, other = (
+                    (str(name) for name in pair.markers) if len(pair.markers) == 2 else ("", "")
+                )
                 if {one, other} <= columns.keys() & places.keys() and one != other:
-                    apart = sum(math.dist(row[columns[one]], row[columns[other]]) for row in rows) * unit / len(rows)
+                    apart = (
+                        sum(math.dist(row[columns[one]], row[columns[other]]) for row in rows)
+                        * unit
+                        / len(rows)
+                    )
                     before = math.dist(places[one], places[other])
                     factor = apart / before if before else math.inf
                     if factor < _LEAST or factor > _MOST:
                         found(
                             f"{one} and {other} are {apart:.3g} m apart in '{scaler.marker_file}', and {before:.3g} m "
                             f"in the model: {called(measurement)} scales by {factor:.3g}",
-                            pair, tag="markers",
-                        )  # fmt: skip
+                            pair,
+                            tag="markers",
+                        )
 
 
 @rule("OSIM856", "swapped-sides", severity=WARNING, about="document")
 def swapped_sides(setup: Setup, found: FindingSink) -> None:
     """A marker of the right side was measured on the left, and its fellow on the right.
 
-    Compares, for each two markers whose names differ by the side alone, the way from the left one to the right one with
-    that of all other such pairs, in the data and in the model. A pair that is the other way round in four rows of five
-    is reported. Pairs that are more than half a metre apart in the model are left out: arms may be crossed. Only rows
-    within the times of the tool count, and a marker at 0 0 0 is taken for one that was not seen.
+    Compares, for each two markers whose names differ by the side alone, the way from the left one
+    to the right one with that of all other such pairs, in the data and in the model. A pair that is
+    the other way round in four rows of five is reported. Pairs that are more than half a metre
+    apart in the model are left out: arms may be crossed. Only rows within the times of the tool
+    count, and a marker at 0 0 0 is taken for one that was not seen.
 
-    Inverse kinematics twists legs and pelvis to bring the markers as near as it can; the errors that it reports are
-    spread over all markers.
+    Inverse kinematics twists legs and pelvis to bring the markers as near as it can; the errors
+    that it reports are spread over all markers.
 
     ```setup
       <InverseKinematicsTool name="ik">
@@ -109,7 +122,9 @@ def swapped_sides(setup: Setup, found: FindingSink) -> None:
         turned = [0] * len(pairs)
         for row in _rows_of_tool(user, table):
             row = row + [math.nan] * (2 + 3 * len(columns) - len(row))
-            ways = [_way(_seen(row[columns[left]]), _seen(row[columns[right]])) for right, left in pairs]
+            ways = [
+                _way(_seen(row[columns[left]]), _seen(row[columns[right]])) for right, left in pairs
+            ]
             for number, agreement in enumerate(_agreement(ways)):
                 seen[number] += agreement == agreement
                 turned[number] += agreement * model[number] < -0.3
@@ -119,8 +134,10 @@ def swapped_sides(setup: Setup, found: FindingSink) -> None:
                 found(
                     f"in {wrong} of {counted(rows, 'row')} of '{user.marker_file}' that were looked at, '{right}' and "
                     f"'{left}' are the other way round than other markers of both sides: are they swapped?",
-                    task or user, tag=None if task else "marker_file", attribute="name" if task else None,
-                )  # fmt: skip
+                    task or user,
+                    tag=None if task else "marker_file",
+                    attribute="name" if task else None,
+                )
 
 
 def _rows_of_tool(user: Any, table: Table) -> list[list[float]]:
@@ -129,7 +146,9 @@ def _rows_of_tool(user: Any, table: Table) -> list[list[float]]:
     if len(span) != 2 or not span[0] <= span[1]:
         return list(table.rows.samples)
     within = [row for row in table.rows.samples if len(row) > 1 and span[0] <= row[1] <= span[1]]
-    return within if len(within) >= _FEW_ROWS else list(islice(rows_between(table, span), _MOST_ROWS))
+    return (
+        within if len(within) >= _FEW_ROWS else list(islice(rows_between(table, span), _MOST_ROWS))
+    )
 
 
 def _seen(point: Sequence[float]) -> Sequence[float]:
@@ -145,7 +164,11 @@ def _fellow(name: str, names: Set[str]) -> str:
             name.removesuffix(right) + left,
             name.replace(f"_{right}_", f"_{left}_"),
         ):
-            if len(fellow) == len(name) - len(right) + len(left) and fellow != name and fellow in names:
+            if (
+                len(fellow) == len(name) - len(right) + len(left)
+                and fellow != name
+                and fellow in names
+            ):
                 return fellow
     return ""
 
@@ -165,5 +188,7 @@ def _agreement(ways: list[list[float]]) -> list[float]:
         rest = [total - part for total, part in zip(whole, way, strict=True)]
         length = math.hypot(*rest)
         agree = len(known) > 3 and length > 0.5 * (len(known) - 1)
-        result.append(sum(a * b for a, b in zip(way, rest, strict=True)) / length if agree else math.nan)
+        result.append(
+            sum(a * b for a, b in zip(way, rest, strict=True)) / length if agree else math.nan
+        )
     return result

@@ -28,12 +28,13 @@ docs/public-projects.md that measure gaits none is farther than 0.275 from the o
 def load_columns(setup: Setup, found: FindingSink) -> None:
     """The columns of a measured force are not in the data.
 
-    Looks for the columns whose labels begin with the identifiers of an external force: there must be three of each.
-    Points out a force without a point (it acts at the origin of the body), columns that are not in the order x, y, z
-    (OpenSim takes them in the order of the file), and forces without an identifier.
+    Looks for the columns whose labels begin with the identifiers of an external force: there must
+    be three of each. Points out a force without a point (it acts at the origin of the body),
+    columns that are not in the order x, y, z (OpenSim takes them in the order of the file), and
+    forces without an identifier.
 
-    OpenSim refuses loads of which it does not find three columns, and swaps the axes of those in another order without
-    a word.
+    OpenSim refuses loads of which it does not find three columns, and swaps the axes of those in
+    another order without a word.
 
     ```setup
       <ExternalLoads name="loads">
@@ -56,19 +57,36 @@ def load_columns(setup: Setup, found: FindingSink) -> None:
         names = [force.name for force in forces]
         for index, force in enumerate(forces):
             if force.name in names[:index]:
-                found(f"a force is called '{force.name}' already", force, attribute="name", severity=WARNING)
+                found(
+                    f"a force is called '{force.name}' already",
+                    force,
+                    attribute="name",
+                    severity=WARNING,
+                )
             if not str(force.applied_to_body):
-                found(f"{called(force)} acts on no body: OpenSim refuses it", force, tag="applied_to_body")
+                found(
+                    f"{called(force)} acts on no body: OpenSim refuses it",
+                    force,
+                    tag="applied_to_body",
+                )
             if not force.appliesForce:
                 found(f"{called(force)} does not act", force, tag="appliesForce", severity=INFO)
                 continue
-            if not force.force_identifier and (force.point_identifier or not force.torque_identifier):
-                found(f"{called(force)} names no columns of a force: OpenSim refuses it", force, tag="force_identifier")
+            if not force.force_identifier and (
+                force.point_identifier or not force.torque_identifier
+            ):
+                found(
+                    f"{called(force)} names no columns of a force: OpenSim refuses it",
+                    force,
+                    tag="force_identifier",
+                )
             elif force.force_identifier and not force.point_identifier:
                 found(
                     f"{called(force)} has no point: OpenSim lets it act at the origin of {force.applied_to_body}",
-                    force, tag="point_identifier", severity=WARNING,
-                )  # fmt: skip
+                    force,
+                    tag="point_identifier",
+                    severity=WARNING,
+                )
             for tag in ("force_identifier", "point_identifier", "torque_identifier"):
                 prefix = getattr(force, tag)
                 if not prefix:
@@ -79,32 +97,37 @@ def load_columns(setup: Setup, found: FindingSink) -> None:
                     found(
                         f"'{loads.datafile}' must have three columns that begin with '{prefix}' ({tag} of "
                         f"{called(force)}), it has {what}: OpenSim refuses the loads",
-                        force, tag=tag, suggestion=None if len(own) > 3 else nearest_name(prefix, prefixes),
-                    )  # fmt: skip
+                        force,
+                        tag=tag,
+                        suggestion=None if len(own) > 3 else nearest_name(prefix, prefixes),
+                    )
                 elif [column[-1:].lower() for column in own] != ["x", "y", "z"] and {
                     column[-1:].lower() for column in own
                 } == {"x", "y", "z"}:
                     found(
                         f"'{loads.datafile}' has {listed(own)} in this order: OpenSim takes the first for x",
-                        force, tag=tag, severity=WARNING,
-                    )  # fmt: skip
+                        force,
+                        tag=tag,
+                        severity=WARNING,
+                    )
 
 
 @rule("OSIM849", "load-place", severity=WARNING, about="document")
 def load_place(setup: Setup, found: FindingSink) -> None:
     """A measured force acts far away from its body, or is expressed in another frame than its setup says.
 
-    Puts the model into poses of the motion that the tool is given, and looks where measured forces act: at more than
-    40 cm from the origin, the mass centre, the joints, the markers and the contact surfaces of their body nothing of a
-    foot or a hand is, also where foot and shank are one body. Where a force is expressed in a body, it looks
-    whether the numbers, as they are, point up more than they do when they are turned with that body. Torques are
-    compared with what the force would do 40 cm farther away, and the sum of all forces, if it is as large as half the
-    weight of the model, must point up.
+    Puts the model into poses of the motion that the tool is given, and looks where measured forces
+    act: at more than 40 cm from the origin, the mass centre, the joints, the markers and the
+    contact surfaces of their body nothing of a foot or a hand is, also where foot and shank are one
+    body. Where a force is expressed in a body, it looks whether the numbers, as they are, point up
+    more than they do when they are turned with that body. Torques are compared with what the force
+    would do 40 cm farther away, and the sum of all forces, if it is as large as half the weight of
+    the model, must point up.
 
-    OpenSim applies the force wherever it is told to: joint moments are wrong by the force times that distance, without
-    a word. Feet that were taken for one another, points in millimetres, torques in newton millimetres, axes of the
-    laboratory that are not those of the model, forces on the ground for those on the foot, and loads of another trial
-    are found so.
+    OpenSim applies the force wherever it is told to: joint moments are wrong by the force times
+    that distance, without a word. Feet that were taken for one another, points in millimetres,
+    torques in newton millimetres, axes of the laboratory that are not those of the model, forces on
+    the ground for those on the foot, and loads of another trial are found so.
 
     ```setup
       <ExternalLoads name="loads">
@@ -137,42 +160,51 @@ def load_place(setup: Setup, found: FindingSink) -> None:
         for force in members(loads, "ExternalForce") if table is not None else ():
             acting = _acting(setup, force, table, motion)
             for push in acting:
-                whole = [total + push.size * part / _TIMES for total, part in zip(whole, push.direction, strict=True)]
+                whole = [
+                    total + push.size * part / _TIMES
+                    for total, part in zip(whole, push.direction, strict=True)
+                ]
             far = [push.away for push in acting if push.away > _NEAR]
             if len(far) > max(2, len(acting) // 4):
                 found(
                     f"at {len(far)} of {len(acting)} times {called(force)} acts more than {_NEAR:g} m from "
                     f"{force.applied_to_body}, by up to {max(far):.3g} m: is it another body's, or are its points in "
                     "another frame or other units?",
-                    force, tag="applied_to_body",
-                )  # fmt: skip
+                    force,
+                    tag="applied_to_body",
+                )
             elif sum(push.twist > _NEAR for push in acting) > max(2, len(acting) // 4):
                 found(
                     f"the torque of {called(force)} is that of its force {max(push.twist for push in acting):.3g} m "
                     "farther: is it in newton millimetres, or about another point?",
-                    force, tag="torque_identifier",
-                )  # fmt: skip
+                    force,
+                    tag="torque_identifier",
+                )
             lifted = [
-                dot(push.written, up) - dot(push.direction, up) for push in acting if push.written != push.direction
+                dot(push.written, up) - dot(push.direction, up)
+                for push in acting
+                if push.written != push.direction
             ]
             if len(lifted) > 2 and max(lifted) > 0.03 and min(lifted) > -0.02:
                 found(
                     f"{called(force)} is expressed in {force.force_expressed_in_body}, and its numbers look like those "
                     "of ground: they point up as they are",
-                    force, tag="force_expressed_in_body",
-                )  # fmt: skip
+                    force,
+                    tag="force_expressed_in_body",
+                )
         lift = sum(part * share for part, share in zip(whole, up, strict=True))
         if math.hypot(*whole) > max(0.5 * mass * weight, 2.0 * lift):
             found(
                 f"together these forces push with {math.hypot(*whole):.0f} N ({', '.join(f'{n:.0f}' for n in whole)}) "
                 "on the average, and that is not up: are their axes or signs other ones?",
-                loads, tag="datafile",
-            )  # fmt: skip
+                loads,
+                tag="datafile",
+            )
 
 
 class _Push(NamedTuple):
-    """What a force does at a time: how far from the origin of its body, m, and what its torque adds to that, m; its
-    size, N, and its direction, as it is written and in ground.
+    """What a force does at a time: how far from the origin of its body, m, and what its torque adds
+    to that, m; its size, N, and its direction, as it is written and in ground.
     """
 
     away: float
@@ -188,7 +220,11 @@ def _acting(setup: Setup, force: Any, table: Table | None, motion: Table) -> lis
         return []
     bodies = setup.tree.members("/bodyset", "Body")
     places = [
-        [place for place, label in enumerate(table.columns, 1) if prefix and label.startswith(prefix)]
+        [
+            place
+            for place, label in enumerate(table.columns, 1)
+            if prefix and label.startswith(prefix)
+        ]
         for prefix in (force.force_identifier, force.point_identifier, force.torque_identifier)
     ]
     first, last = max(table.span[0], motion.span[0]), min(table.span[1], motion.span[1])
@@ -202,16 +238,30 @@ def _acting(setup: Setup, force: Any, table: Table | None, motion: Table) -> lis
         if size > max(20.0, 0.2 * max(sizes)):
             poses = poses_in(setup, motion, row[0])
             (x, y, z), (px, py, pz), torque = ([row[place] for place in part] for part in places)
-            frames = (force.applied_to_body, force.force_expressed_in_body, force.point_expressed_in_body)
+            frames = (
+                force.applied_to_body,
+                force.force_expressed_in_body,
+                force.point_expressed_in_body,
+            )
             names = [str(frame).rpartition("/")[2] for frame in frames]
-            within = [Pose() if name == "ground" else poses.get(id(bodies.get(name))) for name in names]
+            within = [
+                Pose() if name == "ground" else poses.get(id(bodies.get(name))) for name in names
+            ]
             body, of_force, of_point = within
             if body is not None and of_force is not None and of_point is not None:
                 direction = (x / size, y / size, z / size)
                 point = of_point.of((px, py, pz))
                 known = _points_of(setup).get(names[0], [])
                 away = min(math.dist(body.of(place), point) for place in [(0.0, 0.0, 0.0), *known])
-                result.append(_Push(away, math.hypot(*torque) / size, size, direction, of_force.turned(direction)))
+                result.append(
+                    _Push(
+                        away,
+                        math.hypot(*torque) / size,
+                        size,
+                        direction,
+                        of_force.turned(direction),
+                    )
+                )
     return result
 
 

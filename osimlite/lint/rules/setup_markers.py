@@ -24,13 +24,13 @@ def marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
 def marker_not_measured(setup: Setup, found: FindingSink) -> None:
     """A marker that is to be fitted is not in the data.
 
-    Looks up each marker of the tasks, and of pairs that measure lengths, among the labels of the data, and of pairs in
-    each row that is averaged. If none is in both model and data, it is an error. Counts whether the markers are enough
-    for the coordinates of the model.
+    Looks up each marker of the tasks, and of pairs that measure lengths, among the labels of the
+    data, and of pairs in each row that is averaged. If none is in both model and data, it is an
+    error. Counts whether the markers are enough for the coordinates of the model.
 
-    OpenSim leaves the marker out without a word; with no marker at all in common it crashes. A measurement one of whose
-    markers is missing, in one row, does not count: its bodies keep their size. Coordinates that too few markers tell of
-    stay where they are, or drift.
+    OpenSim leaves the marker out without a word; with no marker at all in common it crashes. A
+    measurement one of whose markers is missing, in one row, does not count: its bodies keep their
+    size. Coordinates that too few markers tell of stay where they are, or drift.
 
     ```setup
       <InverseKinematicsTool name="ik">
@@ -49,18 +49,27 @@ def marker_not_measured(setup: Setup, found: FindingSink) -> None:
     """
     for user, table in marker_users(setup):
         labels = table.columns
-        tasks = [task for task in members(user.ik_task_set, "IKMarkerTask") if task.apply and task.name]
+        tasks = [
+            task for task in members(user.ik_task_set, "IKMarkerTask") if task.apply and task.name
+        ]
         model = setup.names_of("Marker")
         both = [task for task in tasks if task.name in labels and task.name in model]
         if tasks and model and not both:
             found(
                 f"no marker of the tasks is in both the model and '{user.marker_file}': OpenSim crashes",
-                user, tag="marker_file", severity=ERROR,
-            )  # fmt: skip
+                user,
+                tag="marker_file",
+                severity=ERROR,
+            )
         if setup.tree is not None and not model:
             maker = next(setup.named("GenericModelMaker"), None)
             tag = "model_file" if maker is None else "marker_set_file"
-            found("the model has no markers: OpenSim refuses the tool", maker or user, tag=tag, severity=ERROR)
+            found(
+                "the model has no markers: OpenSim refuses the tool",
+                maker or user,
+                tag=tag,
+                severity=ERROR,
+            )
         free = 0
         if setup.tree is not None and both:
             free = sum(not setup.is_bound(name) for name in setup.tree.of_class("Coordinate"))
@@ -70,36 +79,50 @@ def marker_not_measured(setup: Setup, found: FindingSink) -> None:
                 f"{counted(len(both), 'marker')} and {counted(others, 'coordinate task')} cannot tell the {free} free "
                 "coordinates of the model",
                 user.ik_task_set,
-            )  # fmt: skip
+            )
         for task in tasks:
             if task.name not in labels:
                 found(
                     f"'{user.marker_file}' has no marker '{task.name}': OpenSim leaves the task out",
-                    task, attribute="name", suggestion=nearest_name(task.name, labels),
-                )  # fmt: skip
+                    task,
+                    attribute="name",
+                    suggestion=nearest_name(task.name, labels),
+                )
     for scaler, static in setup.with_tables(setup.named("ModelScaler"), "marker_file"):
         gone = _unseen(static, scaler.time_range)
         for measurement in members(scaler.measurement_set, "Measurement") if scaler.apply else ():
-            for pair in members(measurement.marker_pair_set, "MarkerPair") if measurement.apply else ():
+            for pair in (
+                members(measurement.marker_pair_set, "MarkerPair") if measurement.apply else ()
+            ):
                 for name in pair.markers:
                     if name not in static.columns:
                         found(
                             f"'{scaler.marker_file}' has no marker '{name}': OpenSim leaves the whole measurement "
                             f"'{measurement.name}' out",
-                            pair, tag="markers", word=str(name), suggestion=nearest_name(str(name), static.columns),
-                        )  # fmt: skip
+                            pair,
+                            tag="markers",
+                            word=str(name),
+                            suggestion=nearest_name(str(name), static.columns),
+                        )
                     elif name in gone:
                         found(
                             f"'{name}' is not seen in every row of '{scaler.marker_file}' that is averaged: OpenSim "
                             f"leaves the whole measurement '{measurement.name}' out",
-                            pair, tag="markers", word=str(name),
-                        )  # fmt: skip
+                            pair,
+                            tag="markers",
+                            word=str(name),
+                        )
 
 
 def _unseen(table: Table, span: tuple[float, ...]) -> set[str]:
     """The markers that a row between two times lacks."""
     places = cells_of(table)
-    return {label for row in rows_between(table, span) for label, place in places if any(map(math.isnan, row[place]))}
+    return {
+        label
+        for row in rows_between(table, span)
+        for label, place in places
+        if any(map(math.isnan, row[place]))
+    }
 
 
 def rows_between(table: Table, span: tuple[float, ...]) -> Iterator[list[float]]:
@@ -114,4 +137,6 @@ def rows_between(table: Table, span: tuple[float, ...]) -> Iterator[list[float]]
 
 def cells_of(table: Table) -> list[tuple[str, slice]]:
     """The markers of a table, each with its cells in a row."""
-    return [(label, slice(2 + 3 * number, 5 + 3 * number)) for number, label in enumerate(table.columns)]
+    return [
+        (label, slice(2 + 3 * number, 5 + 3 * number)) for number, label in enumerate(table.columns)
+    ]

@@ -30,12 +30,14 @@ _PLACES = {"Marker": "/markerset", "Force": "/forceset", "Controller": "/control
 def unknown_name(setup: Setup, found: FindingSink) -> None:
     """A setup names what the model of its tool does not have.
 
-    Looks up every marker, coordinate, body, joint, muscle and actuator that a setup, or a set that a setup reads, names
-    in the model of the tool, with the sets of forces and markers that the tool adds to it. In studies of Moco also
-    states, controls and outputs, by their paths or by patterns of them.
+    Looks up every marker, coordinate, body, joint, muscle and actuator that a setup, or a set that
+    a setup reads, names in the model of the tool, with the sets of forces and markers that the tool
+    adds to it. In studies of Moco also states, controls and outputs, by their paths or by patterns
+    of them.
 
-    Most tools refuse the setup, some crash. Tasks of markers, scale factors of bodies, muscles of an analysis that are
-    not there are left out without a word, and so are patterns that nothing matches (warnings).
+    Most tools refuse the setup, some crash. Tasks of markers, scale factors of bodies, muscles of
+    an analysis that are not there are left out without a word, and so are patterns that nothing
+    matches (warnings).
 
     ```setup
       <AnalyzeTool name="analyze">
@@ -63,7 +65,12 @@ def unknown_name(setup: Setup, found: FindingSink) -> None:
             for item in items if what else ():
                 if getattr(item, spec.name) in ("", None) and counts(item):
                     fate, severity = _FATES[kind.fate]
-                    found(f"{called(item)} names no {what}: {fate}", item, tag=spec.tag, severity=severity)
+                    found(
+                        f"{called(item)} names no {what}: {fate}",
+                        item,
+                        tag=spec.tag,
+                        severity=severity,
+                    )
     unknown = {item.name for item in tree.by_class.get(Unknown, ())}
 
     @cache
@@ -72,7 +79,11 @@ def unknown_name(setup: Setup, found: FindingSink) -> None:
             return set(variables(tree, what))
         if what == "Actuator":
             return {*variables(tree, what), *(f"/forceset/{name}" for name in setup.names_of(what))}
-        return set() if what == "component" else setup.names_of({"frame": "Body"}.get(what, what.capitalize()))
+        return (
+            set()
+            if what == "component"
+            else setup.names_of({"frame": "Body"}.get(what, what.capitalize()))
+        )
 
     for use in setup.uses:
         item, kind, text = use.holder, use.reference, str(use.value).strip()
@@ -86,8 +97,11 @@ def unknown_name(setup: Setup, found: FindingSink) -> None:
         names = known(what, kind.rule)
         if text in names or not unknown.isdisjoint(text.split("/")) or _is_made(setup, text):
             continue
-        # Of names in the older <actuator_list> only those are missed that are to have a function each.
-        is_lost = kind.rule == "socket" and what == "actuator" and not is_a(item, "PrescribedController")
+        # Of names in the older <actuator_list> only those are missed that are to have a function
+        # each.
+        is_lost = (
+            kind.rule == "socket" and what == "actuator" and not is_a(item, "PrescribedController")
+        )
         fate, severity = _FATES["left out" if is_lost else kind.fate]
         more = "; it is written in small letters" if text.lower() in kind.words else ""
         where: Where = {"tag": use.spec.tag, "word": text}
@@ -95,9 +109,12 @@ def unknown_name(setup: Setup, found: FindingSink) -> None:
             where = {"attribute": "name"}
             names = names.difference(other.name for other in setup.by_class[type(item)])
         found(
-            f"the model has no {what} '{text}', which {called(item)} names: {fate}{more}", item, **where,
-            severity=severity, suggestion=text.lower() if more else nearest_name(text, sorted(names)),
-        )  # fmt: skip
+            f"the model has no {what} '{text}', which {called(item)} names: {fate}{more}",
+            item,
+            **where,
+            severity=severity,
+            suggestion=text.lower() if more else nearest_name(text, sorted(names)),
+        )
     if setup.tool is not None and is_a(setup.tool[1], "AbstractTool"):
         _look_up_controls(setup, setup.tool[1], setup.names_of("Actuator") | unknown, found)
 
@@ -108,14 +125,18 @@ def _what(kind: Reference) -> str | None:
     return kind.target if kind.rule in _PATHS else next(by_rule, None)
 
 
-def _looked_up(setup: Setup, tree: Tree, use: Use, text: str) -> tuple[str | None, str, Component | None]:
+def _looked_up(
+    setup: Setup, tree: Tree, use: Use, text: str
+) -> tuple[str | None, str, Component | None]:
     """What a text should name, if that is in the model, the text as it is looked up, and what it leads to."""
     item, kind, what = use.holder, use.reference, _what(use.reference)
     if kind.rule == "socket" and kind.target == "Actuator" and setup.upgraded:
         # A name, that OpenSim looks for everywhere.
         return "actuator", text.rpartition("/")[2], None
     if kind.rule == "socket" and kind.target.endswith(("Frame", "Actuator")):
-        place = next((f"{path}/{item.name}" for cls, path in _PLACES.items() if is_a(item, cls)), "")
+        place = next(
+            (f"{path}/{item.name}" for cls, path in _PLACES.items() if is_a(item, cls)), ""
+        )
         named = kind.target if kind.target == "Actuator" else "component"
         what = named if place or text.startswith("/") else None
         return what, text, tree.walk(text, place, kind.target).target
@@ -139,27 +160,38 @@ def _look_up_controls(setup: Setup, tool: Object, plain: set[str], found: Findin
     for control in controls:
         if control.name not in actuators:
             found(
-                f"the model has no actuator for {called(control)}: {fate}", control, attribute="name",
-                severity=severity, suggestion=nearest_name(control.name, free),
-            )  # fmt: skip
+                f"the model has no actuator for {called(control)}: {fate}",
+                control,
+                attribute="name",
+                severity=severity,
+                suggestion=nearest_name(control.name, free),
+            )
         elif not follows and getattr(control, "x_nodes", None) == []:
             found(f"{called(control)} has no nodes: OpenSim fails", control, tag="x_nodes")
         elif follows and not control.is_model_control:
-            found(f"{called(control)} bounds no control of the model: OpenSim fails", control, tag="is_model_control")
-    for controller, table in setup.with_tables(setup.named("ControlSetController"), "controls_file"):
+            found(
+                f"{called(control)} bounds no control of the model: OpenSim fails",
+                control,
+                tag="is_model_control",
+            )
+    for controller, table in setup.with_tables(
+        setup.named("ControlSetController"), "controls_file"
+    ):
         if lost := [column for column in table.columns if column not in actuators]:
             found(
                 f"the model has no actuator for the columns {listed(map(repr, lost))} of "
                 f"'{controller.controls_file}': OpenSim refuses it",
-                controller, tag="controls_file",
-            )  # fmt: skip
+                controller,
+                tag="controls_file",
+            )
 
 
 def _is_made(setup: Setup, text: str) -> bool:
     """Whether the operators that a study lets loose on its model may make what has this path."""
     makes = {type(operator).__name__ for operator in setup.named("ModelOperator")}
     return ("ModOpAddReserves" in makes and "/reserve_" in text) or (
-        "ModOpReplaceMusclesWithDeGrooteFregly2016" in makes and text.endswith("/normalized_tendon_force")
+        "ModOpReplaceMusclesWithDeGrooteFregly2016" in makes
+        and text.endswith("/normalized_tendon_force")
     )
 
 
@@ -167,9 +199,10 @@ def _is_made(setup: Setup, text: str) -> bool:
 def excluded_force(setup: Setup, found: FindingSink) -> None:
     """Inverse dynamics is told to leave out a force that there is not.
 
-    Compares `forces_to_exclude` with the words OpenSim knows (ALL, ACTUATORS, MUSCLES), the groups of the model's
-    forces, and, where there is no group, with the names of the forces: of a model with groups OpenSim looks at groups
-    alone. An empty list is pointed out where the model has muscles.
+    Compares `forces_to_exclude` with the words OpenSim knows (ALL, ACTUATORS, MUSCLES), the groups
+    of the model's forces, and, where there is no group, with the names of the forces: of a model
+    with groups OpenSim looks at groups alone. An empty list is pointed out where the model has
+    muscles.
 
     The force takes part: moments of the joints are without what the passive muscles give.
 
@@ -190,15 +223,27 @@ def excluded_force(setup: Setup, found: FindingSink) -> None:
     names = [force.name for force in forces.objects]
     for tool in setup.named("InverseDynamicsTool"):
         if not tool.forces_to_exclude and any(is_a(force, "Muscle") for force in forces.objects):
-            found(f"{called(tool)} leaves out no force: muscles take part", tool, tag="forces_to_exclude")
+            found(
+                f"{called(tool)} leaves out no force: muscles take part",
+                tool,
+                tag="forces_to_exclude",
+            )
     for use in setup.uses:
         word = str(use.value)
-        if use.spec.tag != "forces_to_exclude" or use.reference.takes(word) or word in (groups or names):
+        if (
+            use.spec.tag != "forces_to_exclude"
+            or use.reference.takes(word)
+            or word in (groups or names)
+        ):
             continue
         why = "; the model has groups, and of forces with groups OpenSim looks at the groups alone"
         found(
             f"the model has no force or group of forces '{word}'{why if word in names else ''}: OpenSim leaves "
             "nothing out for it",
-            use.holder, tag="forces_to_exclude", word=word,
-            suggestion=nearest_name(word, [*use.reference.words, *groups, *([] if groups else names)]),
-        )  # fmt: skip
+            use.holder,
+            tag="forces_to_exclude",
+            word=word,
+            suggestion=nearest_name(
+                word, [*use.reference.words, *groups, *([] if groups else names)]
+            ),
+        )

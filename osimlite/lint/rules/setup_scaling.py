@@ -91,16 +91,22 @@ frame. OpenSim fails; repeat the frame at a later time.
 def scale_setting(setup: Setup, found: FindingSink) -> None:
     """A setting of the scale tool has no effect, or makes it fail.
 
-    Looks at the mass, the order of scaling, measurements, axes, steps that are left out, and times that are averaged.
+    Looks at the mass, the order of scaling, measurements, axes, steps that are left out, and times
+    that are averaged.
 
-    A measurement with one marker makes OpenSim crash. What it does not know in `axes` it leaves out without a word, and
-    the body keeps its size.
+    A measurement with one marker makes OpenSim crash. What it does not know in `axes` it leaves out
+    without a word, and the body keeps its size.
     """
     for tool in setup.named("ScaleTool"):
         scaler = tool.model_scaler
-        if tool.mass == 0.0 or (tool.mass < 0.0 and scaler.apply and scaler.preserve_mass_distribution):
+        if tool.mass == 0.0 or (
+            tool.mass < 0.0 and scaler.apply and scaler.preserve_mass_distribution
+        ):
             found(
-                f"a mass of {tool.mass:g}: OpenSim leaves the mass as it is", tool, tag="mass", fault="mass-not-scaled"
+                f"a mass of {tool.mass:g}: OpenSim leaves the mass as it is",
+                tool,
+                tag="mass",
+                fault="mass-not-scaled",
             )
     for scaler in setup.named("ModelScaler"):
         if not scaler.apply:
@@ -110,20 +116,27 @@ def scale_setting(setup: Setup, found: FindingSink) -> None:
             if word not in ("measurements", "manualScale"):
                 found(
                     f"'{word}' is no way of scaling: OpenSim refuses it",
-                    scaler, tag="scaling_order", word=word,
-                    suggestion=nearest_name(word, ["measurements", "manualScale"]), fault="unknown-scaling",
-                )  # fmt: skip
+                    scaler,
+                    tag="scaling_order",
+                    word=word,
+                    suggestion=nearest_name(word, ["measurements", "manualScale"]),
+                    fault="unknown-scaling",
+                )
         measures = "measurements" in scaler.scaling_order
         if scaler.scaling_order[:1] == ("manualScale",) and measures:
             found(
                 "measurements come last and overwrite what is scaled by hand",
-                scaler, tag="scaling_order", fault="manual-scale-overwritten",
-            )  # fmt: skip
+                scaler,
+                tag="scaling_order",
+                fault="manual-scale-overwritten",
+            )
         if measures and scaler.measurement_set.objects and not is_given(scaler.marker_file):
             found(
                 f"{called(scaler)} measures, and names no marker_file: {UNGIVEN}",
-                scaler, tag="marker_file", fault="measured-without-markers",
-            )  # fmt: skip
+                scaler,
+                tag="marker_file",
+                fault="measured-without-markers",
+            )
     for measurement in setup.named("Measurement"):
         if not measurement.apply:
             continue
@@ -131,43 +144,57 @@ def scale_setting(setup: Setup, found: FindingSink) -> None:
         if not pairs:
             found(
                 f"{called(measurement)} has no pair of markers: it measures nothing",
-                measurement, fault="measurement-without-pair",
-            )  # fmt: skip
+                measurement,
+                fault="measurement-without-pair",
+            )
         for pair in pairs:
             if len(pair.markers) != 2:
                 found(
                     f"a pair has two markers, this one {len(pair.markers)}: OpenSim crashes",
-                    pair, tag="markers", fault="marker-pair-count",
-                )  # fmt: skip
+                    pair,
+                    tag="markers",
+                    fault="marker-pair-count",
+                )
             elif pair.markers[0] == pair.markers[1]:
                 found(
                     f"both markers of a pair are '{pair.markers[0]}': OpenSim leaves {called(measurement)} out",
-                    pair, tag="markers", fault="marker-paired-with-itself",
-                )  # fmt: skip
+                    pair,
+                    tag="markers",
+                    fault="marker-paired-with-itself",
+                )
     for scale in setup.named("BodyScale"):
         for axis in scale.axes:
             if axis not in ("X", "Y", "Z"):
                 found(
                     f"'{axis}' is none of the axes X, Y and Z: OpenSim leaves it out",
-                    scale, tag="axes", word=axis,
-                    suggestion=axis.upper() if axis.upper() in ("X", "Y", "Z") else None, fault="unknown-scale-axis",
-                )  # fmt: skip
+                    scale,
+                    tag="axes",
+                    word=axis,
+                    suggestion=axis.upper() if axis.upper() in ("X", "Y", "Z") else None,
+                    fault="unknown-scale-axis",
+                )
     for placer in setup.named("MarkerPlacer"):
         if not placer.apply:
             found(
                 "the markers are not placed, and the tool says that it failed",
-                placer, tag="apply", fault="markers-not-placed",
-            )  # fmt: skip
+                placer,
+                tag="apply",
+                fault="markers-not-placed",
+            )
         elif not is_given(placer.output_model_file):
             found(
                 "the model with its markers placed is not written",
-                placer, tag="output_model_file", fault="placed-model-not-written",
-            )  # fmt: skip
+                placer,
+                tag="output_model_file",
+                fault="placed-model-not-written",
+            )
         if placer.apply and placer.time_range and not placer.time_range[0] < placer.time_range[-1]:
             found(
                 f"times from {placer.time_range[0]:g} to {placer.time_range[-1]:g} s cannot be averaged: OpenSim fails",
-                placer, tag="time_range", fault="static-times",
-            )  # fmt: skip
+                placer,
+                tag="time_range",
+                fault="static-times",
+            )
         elif placer.apply and len(placer.time_range) == 2 and is_given(placer.marker_file):
             _check_static_times(setup, placer, found)
 
@@ -184,11 +211,15 @@ def _check_static_times(setup: Setup, placer: Any, found: FindingSink) -> None:
         found(
             f"'{placer.marker_file}' has one frame, at {table.span[0]:g} s, and OpenSim averages over a range of "
             "times: it fails; repeat the row at a later time",
-            placer, tag="marker_file", fault="static-times",
-        )  # fmt: skip
+            placer,
+            tag="marker_file",
+            fault="static-times",
+        )
     else:
         found(
             f"'{placer.marker_file}' goes from {table.span[0]:g} to {table.span[1]:g} s, of which the times of the "
             "tool hold no two: OpenSim fails",
-            placer, tag="time_range", fault="static-times",
-        )  # fmt: skip
+            placer,
+            tag="time_range",
+            fault="static-times",
+        )

@@ -26,12 +26,13 @@ def _orientations(setup: Setup) -> Iterator[tuple[Any, str, str, Table]]:
 def sensor_without_frame(setup: Setup, found: FindingSink) -> None:
     """A measured sensor has no frame in the model, or a sensor that a tool names was not measured.
 
-    Compares the columns of measured orientations with the frames of the model: inverse kinematics takes those that are
-    called as a frame is, the placer of sensors those that are called as a frame with the ending `_imu`. Looks for the
-    sensors that the tool names among the columns. The table must be one of quaternions.
+    Compares the columns of measured orientations with the frames of the model: inverse kinematics
+    takes those that are called as a frame is, the placer of sensors those that are called as a
+    frame with the ending `_imu`. Looks for the sensors that the tool names among the columns. The
+    table must be one of quaternions.
 
-    OpenSim leaves out sensors without a frame, with no more than the number of those that are left; if none is left, it
-    refuses the table.
+    OpenSim leaves out sensors without a frame, with no more than the number of those that are left;
+    if none is left, it refuses the table.
 
     ```setup
       <IMUPlacer name="placer">
@@ -49,19 +50,29 @@ def sensor_without_frame(setup: Setup, found: FindingSink) -> None:
         # OpenSim takes any key that has this in it.
         held = [entry.value.text for key, entry in table.entries.items() if "DataType" in key]
         if held[:1] != ["Quaternion"]:
-            found(f"'{file}' must say DataType=Quaternion: OpenSim refuses it", item, tag=tag, severity=ERROR)
+            found(
+                f"'{file}' must say DataType=Quaternion: OpenSim refuses it",
+                item,
+                tag=tag,
+                severity=ERROR,
+            )
         base = getattr(item, "base_imu_label", "")
         if base and base not in table.columns:
             found(
-                f"'{file}' has no sensor '{base}': OpenSim refuses the setup", item, tag="base_imu_label",
-                severity=ERROR, suggestion=nearest_name(base, table.columns),
-            )  # fmt: skip
+                f"'{file}' has no sensor '{base}': OpenSim refuses the setup",
+                item,
+                tag="base_imu_label",
+                severity=ERROR,
+                suggestion=nearest_name(base, table.columns),
+            )
         for weight in getattr(getattr(item, "orientation_weights", None), "objects", ()):
             if weight.name not in table.columns:
                 found(
-                    f"'{file}' has no sensor '{weight.name}': {called(weight)} is the weight of none", weight,
-                    attribute="name", suggestion=nearest_name(weight.name, table.columns),
-                )  # fmt: skip
+                    f"'{file}' has no sensor '{weight.name}': {called(weight)} is the weight of none",
+                    weight,
+                    attribute="name",
+                    suggestion=nearest_name(weight.name, table.columns),
+                )
         frames = {name + ending for name in setup.names_of("PhysicalFrame")}
         lost = [column for column in table.columns if column not in frames]
         if not frames:
@@ -78,5 +89,6 @@ def sensor_without_frame(setup: Setup, found: FindingSink) -> None:
             found(
                 f"the model has no frame for {listed(map(repr, lost))} of '{file}': OpenSim leaves them out"
                 f"{meant(lost, frames)}",
-                item, tag=tag,
-            )  # fmt: skip
+                item,
+                tag=tag,
+            )

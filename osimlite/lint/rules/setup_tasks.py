@@ -18,11 +18,12 @@ from osimlite.schema.tree import is_a
 def task_weight(setup: Setup, found: FindingSink) -> None:
     """The weights of tasks make no sense.
 
-    Looks for weights that are negative or no number, for tasks without weight (their default is 0), for markers and
-    coordinates that have two tasks, and for sets of which no task applies.
+    Looks for weights that are negative or no number, for tasks without weight (their default is 0),
+    for markers and coordinates that have two tasks, and for sets of which no task applies.
 
-    OpenSim refuses negative weights. A task without weight is not tracked, but counted in the error; a weight of 0 that
-    is given may be meant so, and is an information. If no task applies, all markers count the same.
+    OpenSim refuses negative weights. A task without weight is not tracked, but counted in the
+    error; a weight of 0 that is given may be meant so, and is an information. If no task applies,
+    all markers count the same.
 
     ```setup
       <IKTaskSet name="tasks">
@@ -35,38 +36,57 @@ def task_weight(setup: Setup, found: FindingSink) -> None:
         applied = [task for task in members(tasks, "IKTask") if task.apply]
         if tasks.objects and not applied:
             found(
-                "no task of this set applies: OpenSim takes all markers, each with the weight 1", tasks,
+                "no task of this set applies: OpenSim takes all markers, each with the weight 1",
+                tasks,
                 severity=WARNING,
-            )  # fmt: skip
+            )
         seen: Counter[tuple[str, str]] = Counter()
         for task in applied:
             seen[type(task).__name__, task.name] += 1
             if seen[type(task).__name__, task.name] == 2:
-                found(f"'{task.name}' has a task already: one of them counts", task, attribute="name", severity=WARNING)
+                found(
+                    f"'{task.name}' has a task already: one of them counts",
+                    task,
+                    attribute="name",
+                    severity=WARNING,
+                )
             if task.weight < 0:
-                found(f"the weight of {called(task)} is {task.weight:g}: OpenSim refuses it", task, tag="weight")
+                found(
+                    f"the weight of {called(task)} is {task.weight:g}: OpenSim refuses it",
+                    task,
+                    tag="weight",
+                )
             elif task.weight == 0:
                 given = setup.element_of(task, "weight") is not None
                 what = "weighs 0" if given else "has no weight, and the default is 0"
                 found(
-                    f"{called(task)} {what}: it is not tracked", task, tag="weight", severity=INFO if given else WARNING
+                    f"{called(task)} {what}: it is not tracked",
+                    task,
+                    tag="weight",
+                    severity=INFO if given else WARNING,
                 )
-            if is_a(task, "IKCoordinateTask") and task.value_type == "manual_value" and abs(task.value) > 6.3:
+            if (
+                is_a(task, "IKCoordinateTask")
+                and task.value_type == "manual_value"
+                and abs(task.value) > 6.3
+            ):
                 found(
-                    f"the value of {called(task)} is {task.value:g}, and is in radians or metres", task, tag="value",
+                    f"the value of {called(task)} is {task.value:g}, and is in radians or metres",
+                    task,
+                    tag="value",
                     severity=WARNING,
-                )  # fmt: skip
+                )
 
 
 @rule("OSIM854", "unreachable-task", severity=WARNING, about="document")
 def unreachable_task(setup: Setup, found: FindingSink) -> None:
     """A coordinate that is to be fitted cannot move, or cannot reach its value.
 
-    Looks for tasks of locked coordinates, for values of which most are outside the range of a clamped coordinate, and
-    for locked coordinates that move in the file of values.
+    Looks for tasks of locked coordinates, for values of which most are outside the range of a
+    clamped coordinate, and for locked coordinates that move in the file of values.
 
-    Inverse kinematics keeps a locked coordinate where the model has it, and a clamped one in its range, without a word:
-    knees stay straight, and other joints bend in their place.
+    Inverse kinematics keeps a locked coordinate where the model has it, and a clamped one in its
+    range, without a word: knees stay straight, and other joints bend in their place.
 
     ```setup
       <InverseKinematicsTool name="ik">
@@ -95,30 +115,43 @@ def unreachable_task(setup: Setup, found: FindingSink) -> None:
             # Whatever the header says, this file is taken to be in degrees.
             turn = math.pi / 180.0 if column in angles else 1.0
             rows = table.rows.samples if table is not None else []
-            given[column] = [row[index] * turn for row in rows if index < len(row) and row[index] == row[index]]
+            given[column] = [
+                row[index] * turn for row in rows if index < len(row) and row[index] == row[index]
+            ]
         for task in user.ik_task_set.objects:
             coordinate = coordinates.get(task.name)
             if coordinate is None or not is_a(task, "IKCoordinateTask") or not task.apply:
                 continue
-            values = {"manual_value": [task.value], "from_file": given.pop(task.name, [])}.get(task.value_type, [])
+            values = {"manual_value": [task.value], "from_file": given.pop(task.name, [])}.get(
+                task.value_type, []
+            )
             low, high = coordinate.range
             outside = sum(not low - 0.01 <= value <= high + 0.01 for value in values)
             if coordinate.locked:
-                found(f"{called(coordinate)} is locked: the task moves nothing", task, attribute="name")
+                found(
+                    f"{called(coordinate)} is locked: the task moves nothing",
+                    task,
+                    attribute="name",
+                )
             elif coordinate.clamped and 2 * outside > len(values):
                 found(
                     f"most values for {called(coordinate)} are outside the range from {low:.4g} to {high:.4g} that it "
                     "is clamped to",
-                    task, attribute="name",
-                )  # fmt: skip
+                    task,
+                    attribute="name",
+                )
         still = [
             name
             for name, values in given.items()
-            if values and name in coordinates and coordinates[name].locked and max(values) - min(values) > 0.1
+            if values
+            and name in coordinates
+            and coordinates[name].locked
+            and max(values) - min(values) > 0.1
         ]
         if still:
             found(
                 f"{listed(still)} {'is' if len(still) == 1 else 'are'} locked in the model, and moves in "
                 f"'{user.coordinate_file}'",
-                user, tag="coordinate_file",
-            )  # fmt: skip
+                user,
+                tag="coordinate_file",
+            )

@@ -29,7 +29,9 @@ _USUAL_WINDOW = 0.01
 _WHOLE = '<{0} name="run">\n    <model_file>leg.osim</model_file>\n    {{}}\n    {1}\n</{0}>'
 _FRAMES = {
     "ik": _WHOLE.format("InverseKinematicsTool", "<output_motion_file>ik.mot</output_motion_file>"),
-    "dynamics": _WHOLE.format("InverseDynamicsTool", "<coordinates_file>leg.mot</coordinates_file>"),
+    "dynamics": _WHOLE.format(
+        "InverseDynamicsTool", "<coordinates_file>leg.mot</coordinates_file>"
+    ),
     "any": _WHOLE.format("InverseDynamicsTool", "<time_range>0 0.05</time_range>"),
     "control": _WHOLE.format(
         "CMCTool",
@@ -79,12 +81,13 @@ others before, as a spline does.
 def time_outside_data(setup: Setup, found: FindingSink) -> None:
     """A tool runs over times that its data do not have, or that make no sense.
 
-    Compares the times of a tool with those of the tables that it reads: markers, coordinates, sensors. Computed muscle
-    control needs 0.03 s and the time of one window.
+    Compares the times of a tool with those of the tables that it reads: markers, coordinates,
+    sensors. Computed muscle control needs 0.03 s and the time of one window.
 
-    Inverse kinematics cuts the times to the data without a word. Without a time range it stops at 2 s: OpenSim 4.6
-    means to take all there is, and does not. Loads that end before the motion go on as their spline leaves them. Times
-    in the wrong order, or wholly outside the data (an error), make the tools fail or crash.
+    Inverse kinematics cuts the times to the data without a word. Without a time range it stops at 2
+    s: OpenSim 4.6 means to take all there is, and does not. Loads that end before the motion go on
+    as their spline leaves them. Times in the wrong order, or wholly outside the data (an error),
+    make the tools fail or crash.
     """
     for item in setup.having("time_range"):
         count = len(item.time_range)
@@ -92,41 +95,62 @@ def time_outside_data(setup: Setup, found: FindingSink) -> None:
             fate, severity = ("fails", ERROR) if count < 2 else ("takes the first two", WARNING)
             found(
                 f"a range has two times, this one {count}: OpenSim {fate}",
-                item, tag="time_range", severity=severity, fault="time-count",
-            )  # fmt: skip
+                item,
+                tag="time_range",
+                severity=severity,
+                fault="time-count",
+            )
     for item, tag, motion in motions(setup):
         if 0 < motion.rows.count < 6:
             found(
                 f"'{getattr(item, tag)}' has {motion.rows.count} rows: OpenSim lays a spline through six at least",
-                item, tag=tag, fault="few-rows",
-            )  # fmt: skip
+                item,
+                tag=tag,
+                fault="few-rows",
+            )
     for item, tags, first, last in _ranges(setup):
         if any(number != number for number in (first, last)):
             fate, severity = (
-                ("takes all times", WARNING) if is_a(item, "IMUInverseKinematicsTool") else ("refuses it", ERROR)
+                ("takes all times", WARNING)
+                if is_a(item, "IMUInverseKinematicsTool")
+                else ("refuses it", ERROR)
             )
             tag = tags[0] if first != first else tags[-1]
             found(
                 f"a time of {called(item)} is no number: OpenSim {fate}",
-                item, tag=tag, severity=severity, fault="impossible-times",
-            )  # fmt: skip
+                item,
+                tag=tag,
+                severity=severity,
+                fault="impossible-times",
+            )
             continue
-        if first > last or (first == last and is_a(item, "AbstractTool") and not is_a(item, "AnalyzeTool")):
+        if first > last or (
+            first == last and is_a(item, "AbstractTool") and not is_a(item, "AnalyzeTool")
+        ):
             # Nobody knows which of the two is wrong.
-            fate, severity = ("goes by the tool's times", WARNING) if is_a(item, "Analysis") else ("fails", ERROR)
+            fate, severity = (
+                ("goes by the tool's times", WARNING)
+                if is_a(item, "Analysis")
+                else ("fails", ERROR)
+            )
             for tag in tags:
                 found(
                     f"{called(item)} begins at {first:g} s and ends at {last:g} s: OpenSim {fate}",
-                    item, tag=tag, severity=severity, fault="impossible-times",
-                )  # fmt: skip
+                    item,
+                    tag=tag,
+                    severity=severity,
+                    fault="impossible-times",
+                )
             continue
         window = getattr(item, "cmc_time_window", math.nan)
         if last - first < _FIRST_STATES + window:
             found(
                 f"{called(item)} runs for {last - first:.4g} s and needs {_FIRST_STATES + window:g} s for its first "
                 "controls: OpenSim fails",
-                item, tag="cmc_time_window" if window > _USUAL_WINDOW else tags[-1], fault="too-short-for-control",
-            )  # fmt: skip
+                item,
+                tag="cmc_time_window" if window > _USUAL_WINDOW else tags[-1],
+                fault="too-short-for-control",
+            )
         for name, kind in _data_of(item):
             table = setup.table(name)
             span = table.span if table is not None and not table.rows.of("order", "time") else None
@@ -136,27 +160,38 @@ def time_outside_data(setup: Setup, found: FindingSink) -> None:
             if first > span[1] + slack or last < span[0] - slack:
                 found(
                     f"{called(item)} runs from {first:g} to {last:g} s, '{name}' has {span[0]:g} to {span[1]:g} s",
-                    item, tag=tags[0] if first > span[1] else tags[-1], fault="no-data-at-times",
-                )  # fmt: skip
+                    item,
+                    tag=tags[0] if first > span[1] else tags[-1],
+                    fault="no-data-at-times",
+                )
                 continue
             specs = field_specs(type(item))
-            said = [setup.element_of(item, tag) is not None and not setup.noted(item, specs[tag]) for tag in tags]
+            said = [
+                setup.element_of(item, tag) is not None and not setup.noted(item, specs[tag])
+                for tag in tags
+            ]
             if not said[-1] and last < span[1] - slack:
                 found(
                     f"{called(item)} has no {tags[-1]}: OpenSim stops at {last:g} s, and '{name}' goes on to "
                     f"{span[1]:g} s",
-                    item, tag=tags[-1], fault="stops-at-default",
-                )  # fmt: skip
+                    item,
+                    tag=tags[-1],
+                    fault="stops-at-default",
+                )
             if said[-1] and math.isfinite(last) and last > span[1] + slack:
                 found(
                     f"'{name}' ends at {span[1]:g} s, before {last:g} s{kind}",
-                    item, tag=tags[-1], fault="data-end-early",
-                )  # fmt: skip
+                    item,
+                    tag=tags[-1],
+                    fault="data-end-early",
+                )
             if said[0] and math.isfinite(first) and first < span[0] - slack:
                 found(
                     f"'{name}' begins at {span[0]:g} s, after {first:g} s{kind}",
-                    item, tag=tags[0], fault="data-begin-late",
-                )  # fmt: skip
+                    item,
+                    tag=tags[0],
+                    fault="data-begin-late",
+                )
 
 
 def _ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, float]]:
@@ -174,7 +209,13 @@ def _ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, floa
 
 def _data_of(item: Any) -> Iterator[tuple[str, str]]:
     """The tables that a tool reads over its times, with what happens where they end."""
-    for tag in ("marker_file", "coordinates_file", "desired_kinematics_file", "coordinate_file", "orientations_file"):
+    for tag in (
+        "marker_file",
+        "coordinates_file",
+        "desired_kinematics_file",
+        "coordinate_file",
+        "orientations_file",
+    ):
         if is_a(item, "ForwardTool") or (tag == "coordinate_file" and is_a(item, "MarkerPlacer")):
             continue
         yield (
@@ -187,10 +228,11 @@ def _data_of(item: Any) -> Iterator[tuple[str, str]]:
 def loads_end_early(setup: Setup, found: FindingSink) -> None:
     """Measured loads do not last as long as the run of the tool.
 
-    Compares the times of the data of external loads with those of the tool, or of the motion that the tool is given.
+    Compares the times of the data of external loads with those of the tool, or of the motion that
+    the tool is given.
 
-    Before the first and after the last row OpenSim goes straight on, without a word: forces grow to thousands of
-    newtons.
+    Before the first and after the last row OpenSim goes straight on, without a word: forces grow to
+    thousands of newtons.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -220,21 +262,25 @@ def loads_end_early(setup: Setup, found: FindingSink) -> None:
                 # It may be written yet, and is not known to last longer than the loads.
                 first, last = -math.inf, math.inf
         slack = max(table.step, 1e-9) * 1.01
-        if (math.isfinite(last) and last > span[1] + slack) or (math.isfinite(first) and first < span[0] - slack):
+        if (math.isfinite(last) and last > span[1] + slack) or (
+            math.isfinite(first) and first < span[0] - slack
+        ):
             found(
                 f"the loads are measured from {span[0]:g} to {span[1]:g} s, the tool runs from {first:g} to {last:g} s",
-                item, tag="external_loads_file",
-            )  # fmt: skip
+                item,
+                tag="external_loads_file",
+            )
 
 
 @rule("OSIM846", "filter-frequency", severity=WARNING, about="document")
 def filter_frequency(setup: Setup, found: FindingSink) -> None:
     """A filter does not fit how often the data were measured.
 
-    Compares the cut-off frequency with half the frequency of the rows, and points out a cut-off of 0.
+    Compares the cut-off frequency with half the frequency of the rows, and points out a cut-off of
+    0.
 
-    A filter above half the sampling frequency cannot be made: OpenSim takes another one. With 0, nothing is left of
-    the motion.
+    A filter above half the sampling frequency cannot be made: OpenSim takes another one. With 0,
+    nothing is left of the motion.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -254,17 +300,18 @@ def filter_frequency(setup: Setup, found: FindingSink) -> None:
                 found(
                     f"{called(item)} filters at {cutoff:g} Hz, and '{getattr(item, tag)}' has {1.0 / table.step:.4g} "
                     f"rows a second, of which {0.5 / table.step:.4g} Hz is the highest that can be filtered",
-                    item, tag=filter_tag,
-                )  # fmt: skip
+                    item,
+                    tag=filter_tag,
+                )
 
 
 @rule("OSIM847", "motion-in-degrees", severity=WARNING, about="document")
 def motion_in_degrees(setup: Setup, found: FindingSink) -> None:
     """Angles of a motion are in degrees, and OpenSim takes them for radians, or the other way round.
 
-    Looks at the columns of rotational coordinates of a motion without `inDegrees=yes`: an angle of more than 10 is no
-    angle in radians that a joint takes. Of a motion that says so, the largest angle of many joints is more than 3
-    degrees.
+    Looks at the columns of rotational coordinates of a motion without `inDegrees=yes`: an angle of
+    more than 10 is no angle in radians that a joint takes. Of a motion that says so, the largest
+    angle of many joints is more than 3 degrees.
 
     Joint moments of hundreds of thousands, without a word.
 
@@ -281,32 +328,46 @@ def motion_in_degrees(setup: Setup, found: FindingSink) -> None:
         if isinstance(header, MarkerHeader) or setup.tree is None:
             continue
         angles = angles_of(setup)
-        places = [place for place, column in enumerate(table.columns, 1) if coordinate_of(column) in angles]
+        places = [
+            place
+            for place, column in enumerate(table.columns, 1)
+            if coordinate_of(column) in angles
+        ]
         largest, place = _largest(table, places)
         label = table.labels[place].text
         if header.in_degrees and 0.0 < largest < math.pi and len(places) >= _SEVERAL:
             found(
                 f"'{getattr(item, tag)}' has inDegrees=yes, and its largest angle is {largest:.3g}: is it in radians?",
-                item, tag=tag,
-            )  # fmt: skip
+                item,
+                tag=tag,
+            )
         elif largest > 10.0 and not header.in_degrees:
             found(
                 f"'{getattr(item, tag)}' does not say inDegrees=yes, and '{label}' is {largest:.4g} in it: OpenSim "
                 "takes it for radians",
-                item, tag=tag, severity=ERROR,
-            )  # fmt: skip
-    for user, values in setup.with_tables(setup.having("ik_task_set", "coordinate_file"), "coordinate_file"):
+                item,
+                tag=tag,
+                severity=ERROR,
+            )
+    for user, values in setup.with_tables(
+        setup.having("ik_task_set", "coordinate_file"), "coordinate_file"
+    ):
         if isinstance(values.header, MarkerHeader) or values.header.in_degrees:
             continue
         tasks = members(user.ik_task_set, "IKCoordinateTask")
-        read = {task.name for task in tasks if task.apply and task.value_type == "from_file"} & angles_of(setup)
-        largest, place = _largest(values, [k for k, column in enumerate(values.columns, 1) if column in read])
+        read = {
+            task.name for task in tasks if task.apply and task.value_type == "from_file"
+        } & angles_of(setup)
+        largest, place = _largest(
+            values, [k for k, column in enumerate(values.columns, 1) if column in read]
+        )
         if 0.0 < largest < math.pi:
             found(
                 f"'{user.coordinate_file}' does not say inDegrees=yes, and '{values.labels[place].text}' is at most "
                 f"{largest:.3g} in it: inverse kinematics takes it for degrees, whatever the header says",
-                user, tag="coordinate_file",
-            )  # fmt: skip
+                user,
+                tag="coordinate_file",
+            )
 
 
 def _largest(table: Table, places: list[int]) -> tuple[float, int]:

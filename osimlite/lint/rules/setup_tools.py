@@ -45,7 +45,13 @@ def _analysis(start: str, end: str = "", model: str = "leg.osim") -> str:
     objects = f"        <objects>\n            {inside}\n        </objects>"
     analyses = f'<AnalysisSet name="analyses">\n{objects}\n    </AnalysisSet>'
     settled = "<solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>"
-    return _tool("AnalyzeTool", "<coordinates_file>leg.mot</coordinates_file>", settled, analyses, model=model)
+    return _tool(
+        "AnalyzeTool",
+        "<coordinates_file>leg.mot</coordinates_file>",
+        settled,
+        analyses,
+        model=model,
+    )
 
 
 _TRACKING = (
@@ -61,9 +67,13 @@ FRAMES = {
     "analyses": _analysis("", model="muscle.osim"),
     "optimization": _analysis('<StaticOptimization name="optimization">', "</StaticOptimization>"),
     "kinematics": _analysis('<Kinematics name="kinematics">', "</Kinematics>"),
-    "point": _analysis('<PointKinematics name="point"> <body_name>shank</body_name>', "</PointKinematics>"),
+    "point": _analysis(
+        '<PointKinematics name="point"> <body_name>shank</body_name>', "</PointKinematics>"
+    ),
     "muscles": _analysis('<MuscleAnalysis name="muscles">', "</MuscleAnalysis>"),
-    "reaction": _analysis('<JointReaction name="loads"> <joint_names>hip knee</joint_names>', "</JointReaction>"),
+    "reaction": _analysis(
+        '<JointReaction name="loads"> <joint_names>hip knee</joint_names>', "</JointReaction>"
+    ),
     "forces": '```setup\n<ForceSet name="forces">\n    <objects>\n        {}\n    </objects>\n</ForceSet>\n```',
 }
 """What the examples of OSIM852 stand in."""
@@ -169,7 +179,8 @@ that.
 def tool_setting(setup: Setup, found: FindingSink) -> None:
     """A tool has a setting with which it cannot work.
 
-    Looks at accuracies and tolerances, steps, analyses, forces that are left out or replaced, and what is off.
+    Looks at accuracies and tolerances, steps, analyses, forces that are left out or replaced, and
+    what is off.
 
     Some make OpenSim crash or run for ever, some give other results without a word.
     """
@@ -182,30 +193,44 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
         if not (tool.integrator_error_tolerance > 0.0 or is_a(tool, "AnalyzeTool")):
             found(
                 f"an error tolerance of {tool.integrator_error_tolerance:g} is never met: OpenSim runs for ever",
-                tool, tag="integrator_error_tolerance", severity=None if is_a(tool, "ForwardTool") else WARNING,
+                tool,
+                tag="integrator_error_tolerance",
+                severity=None if is_a(tool, "ForwardTool") else WARNING,
                 fault="integrator-error-tolerance",
-            )  # fmt: skip
+            )
         if is_a(tool, "RRATool") and not tool.force_set_files:
             found(
                 f"{called(tool)} is given no forces that it could control: OpenSim fails",
-                tool, tag="force_set_files", fault="no-residual-forces",
-            )  # fmt: skip
+                tool,
+                tag="force_set_files",
+                fault="no-residual-forces",
+            )
         if tool.replace_force_set and not is_a(tool, "RRATool"):
             found(
                 "the forces of force_set_files replace those of the model: its muscles are gone",
-                tool, tag="replace_force_set", fault="replaced-forces",
-            )  # fmt: skip
+                tool,
+                tag="replace_force_set",
+                fault="replaced-forces",
+            )
         if is_a(tool, "RRATool") and not tool.replace_force_set and setup.names_of("Muscle"):
             found(
                 "the muscles of the model are left in it, and OpenSim crashes: the forces of force_set_files are to "
                 "replace them",
-                tool, tag="replace_force_set", fault="muscles-left-in-model",
-            )  # fmt: skip
-        if is_a(tool, "RRATool") and tool.adjust_com_to_reduce_residuals and not str(tool.adjusted_com_body).strip():
+                tool,
+                tag="replace_force_set",
+                fault="muscles-left-in-model",
+            )
+        if (
+            is_a(tool, "RRATool")
+            and tool.adjust_com_to_reduce_residuals
+            and not str(tool.adjusted_com_body).strip()
+        ):
             found(
                 f"{called(tool)} is to move a center of mass, and adjusted_com_body names no body: OpenSim refuses it",
-                tool, tag="adjusted_com_body", fault="no-adjusted-body",
-            )  # fmt: skip
+                tool,
+                tag="adjusted_com_body",
+                fault="no-adjusted-body",
+            )
         if is_a(tool, "AnalyzeTool") and not tool.analysis_set.objects:
             found(f"{called(tool)} has no analysis: OpenSim refuses it", tool, fault="no-analysis")
     names = Counter(item.name for item in setup.named("Analysis"))
@@ -216,47 +241,68 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
             names[analysis.name] = 0
             found(
                 f"two analyses are called '{analysis.name}', and write to the same files",
-                analysis, attribute="name", fault="analyses-of-one-name",
-            )  # fmt: skip
+                analysis,
+                attribute="name",
+                fault="analyses-of-one-name",
+            )
         if is_a(analysis, "StaticOptimization"):
             carrying = _carried_by_none(setup)
             if carrying:
                 found(
                     f"no actuator moves {listed(carrying)}: without residual actuators the optimizer fails",
-                    analysis, fault="unactuated-root",
-                )  # fmt: skip
+                    analysis,
+                    fault="unactuated-root",
+                )
         for tag, what in (("bodies", "body"), ("coordinates", "coordinate")):
             if getattr(analysis, tag, None) == ():
                 found(
                     f"{called(analysis)} names no {what}: nothing is written",
-                    analysis, tag=tag, fault="nothing-analyzed",
-                )  # fmt: skip
+                    analysis,
+                    tag=tag,
+                    fault="nothing-analyzed",
+                )
         if is_a(analysis, "MuscleAnalysis") and analysis.on:
             for tool in setup.named("AnalyzeTool"):
-                if is_given(tool.coordinates_file) and not tool.solve_for_equilibrium_for_auxiliary_states:
+                if (
+                    is_given(tool.coordinates_file)
+                    and not tool.solve_for_equilibrium_for_auxiliary_states
+                ):
                     found(
                         "coordinates tell nothing of fibers, which stay at their default lengths: "
                         "solve_for_equilibrium_for_auxiliary_states is false",
-                        tool, tag="solve_for_equilibrium_for_auxiliary_states", fault="fibers-not-in-equilibrium",
-                    )  # fmt: skip
-        if is_a(analysis, "MuscleAnalysis") and analysis.compute_moments and not analysis.moment_arm_coordinate_list:
+                        tool,
+                        tag="solve_for_equilibrium_for_auxiliary_states",
+                        fault="fibers-not-in-equilibrium",
+                    )
+        if (
+            is_a(analysis, "MuscleAnalysis")
+            and analysis.compute_moments
+            and not analysis.moment_arm_coordinate_list
+        ):
             found(
                 "no coordinate for moment arms: OpenSim fails",
-                analysis, tag="moment_arm_coordinate_list", fault="no-moment-arm-coordinate",
-            )  # fmt: skip
+                analysis,
+                tag="moment_arm_coordinate_list",
+                fault="no-moment-arm-coordinate",
+            )
         if is_a(analysis, "JointReaction"):
             for word in analysis.apply_on_bodies:
                 if word.lower() not in ("child", "parent"):
                     found(
                         f"'{word}' is neither child nor parent: OpenSim refuses it",
-                        analysis, tag="apply_on_bodies", word=word,
-                        suggestion=nearest_name(word, ["child", "parent"]), fault="reaction-on-neither",
-                    )  # fmt: skip
+                        analysis,
+                        tag="apply_on_bodies",
+                        word=word,
+                        suggestion=nearest_name(word, ["child", "parent"]),
+                        fault="reaction-on-neither",
+                    )
             if len(analysis.apply_on_bodies) not in (0, 1, len(analysis.joint_names)):
                 found(
                     f"{len(analysis.apply_on_bodies)} words for {len(analysis.joint_names)} joints: OpenSim refuses it",
-                    analysis, tag="apply_on_bodies", fault="reaction-count",
-                )  # fmt: skip
+                    analysis,
+                    tag="apply_on_bodies",
+                    fault="reaction-count",
+                )
     user = setup.tool[1] if setup.tool is not None else None
     if setup.tree is not None and getattr(user, "replace_force_set", True) is False:
         present = {force.name for force in setup.tree.model.force_set.objects}
@@ -264,8 +310,10 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
             if force.name in present:
                 found(
                     f"the model has a force '{force.name}' already, whose place this one takes",
-                    force, attribute="name", fault="force-of-one-name",
-                )  # fmt: skip
+                    force,
+                    attribute="name",
+                    fault="force-of-one-name",
+                )
     for forces in setup.named("ForceSet"):
         for force in members(forces, "Force"):
             if not force.appliesForce:
@@ -283,11 +331,26 @@ def _carried_by_none(setup: Setup) -> list[str]:
     if any(len(tool.force_set_files) > len(setup.added) for tool in files):
         return []
     added = [force for _, top in setup.added for force in top.walk() if is_a(force, "Actuator")]
-    if any(not is_a(force, "PathActuator") for force in (*setup.tree.of_class("Actuator").values(), *added)):
+    if any(
+        not is_a(force, "PathActuator")
+        for force in (*setup.tree.of_class("Actuator").values(), *added)
+    ):
         return []
     parts: list[Any] = setup.tree.components
-    if any(is_a(part, "AbstractPathPoint") and str(part.socket_parent_frame) == "/ground" for part in parts):
+    if any(
+        is_a(part, "AbstractPathPoint") and str(part.socket_parent_frame) == "/ground"
+        for part in parts
+    ):
         return []
     joints: Any = setup.tree.of_class("Joint").values()
-    on_ground = (joint for joint in joints if str(joint.socket_parent_frame).rpartition("/")[2].startswith("ground"))
-    return [item.name for joint in on_ground for item in joint.coordinates if not setup.is_bound(item.name)]
+    on_ground = (
+        joint
+        for joint in joints
+        if str(joint.socket_parent_frame).rpartition("/")[2].startswith("ground")
+    )
+    return [
+        item.name
+        for joint in on_ground
+        for item in joint.coordinates
+        if not setup.is_bound(item.name)
+    ]

@@ -34,12 +34,12 @@ _WEIGHTS = 0.2, 10.0
 def marker_size(setup: Setup, found: FindingSink) -> None:
     """The measured markers are spread over another size than those of the model.
 
-    Compares the box around the markers of a frame, in the units that the file declares, with the box around the same
-    markers of the model in its default pose. If these differ by more than a factor of three, and in other units they
-    would not, the rule names these units.
+    Compares the box around the markers of a frame, in the units that the file declares, with the
+    box around the same markers of the model in its default pose. If these differ by more than a
+    factor of three, and in other units they would not, the rule names these units.
 
-    OpenSim reads centimetres that are declared as millimetres without a word: inverse kinematics ends with errors of
-    decimetres, and a scaled model has a tenth of the size.
+    OpenSim reads centimetres that are declared as millimetres without a word: inverse kinematics
+    ends with errors of decimetres, and a scaled model has a tenth of the size.
 
     ```setup
       <InverseKinematicsTool name="ik">
@@ -64,7 +64,11 @@ def marker_size(setup: Setup, found: FindingSink) -> None:
         sizes = []
         for row in islice(rows_between(table, user.time_range), _ROWS):
             seen = {name: row[columns[name]] for name in names}
-            seen = {name: cells for name, cells in seen.items() if not any(map(math.isnan, cells)) and any(cells)}
+            seen = {
+                name: cells
+                for name, cells in seen.items()
+                if not any(map(math.isnan, cells)) and any(cells)
+            }
             if len(seen) >= _FEWEST and (own := _size([places[name] for name in seen])):
                 sizes.append(_size([*seen.values()]) / own)
         if not sizes:
@@ -76,8 +80,9 @@ def marker_size(setup: Setup, found: FindingSink) -> None:
             found(
                 f"the markers of '{user.marker_file}' are spread over {ratio * unit:.3g} of the size that they have in "
                 f"the model if the units are '{units.value.text}', as the file says: are they in {better[0]}?",
-                user, tag="marker_file",
-            )  # fmt: skip
+                user,
+                tag="marker_file",
+            )
 
 
 def _size(points: Sequence[Sequence[float]]) -> float:
@@ -89,12 +94,12 @@ def _size(points: Sequence[Sequence[float]]) -> float:
 def load_units(setup: Setup, found: FindingSink) -> None:
     """Measured loads are too small for the model, as if they were in kilonewtons.
 
-    Adds up the sizes of all measured forces in each row, and compares the largest sum with the weight of the model. If
-    it is less than 2 % of that, and a thousand times as much would be right for forces of the ground, the rule reports
-    it.
+    Adds up the sizes of all measured forces in each row, and compares the largest sum with the
+    weight of the model. If it is less than 2 % of that, and a thousand times as much would be right
+    for forces of the ground, the rule reports it.
 
-    OpenSim takes all forces for newtons, whatever the header of the file says: the residual forces of inverse dynamics
-    are then the whole weight.
+    OpenSim takes all forces for newtons, whatever the header of the file says: the residual forces
+    of inverse dynamics are then the whole weight.
 
     ```setup
       <ExternalLoads name="loads">
@@ -116,21 +121,25 @@ def load_units(setup: Setup, found: FindingSink) -> None:
     mass = sum(body.mass for body in setup.tree.members("/bodyset", "Body").values())
     weight = mass * math.hypot(*model.gravity)
     for loads, table in setup.with_tables(setup.named("ExternalLoads"), "datafile"):
-        largest = _largest_load([force for force in members(loads, "ExternalForce") if force.appliesForce], table)
+        largest = _largest_load(
+            [force for force in members(loads, "ExternalForce") if force.appliesForce], table
+        )
         low, high = _WEIGHTS
         if 0.0 < largest < _SLIGHT * weight and low <= 1000.0 * largest / weight <= high:
             found(
                 f"the forces of '{loads.datafile}' are never larger than {largest:.3g} N together, and the model "
                 f"weighs {weight:.0f} N: are they in kilonewtons?",
-                loads, tag="datafile",
-            )  # fmt: skip
+                loads,
+                tag="datafile",
+            )
 
 
 def _largest_load(forces: Sequence[Any], table: Table) -> float:
     """The largest sum, N, of the sizes of some forces in a row of their table."""
     prefixes = [str(force.force_identifier) for force in forces if force.force_identifier]
     places = [
-        [place for place, label in enumerate(table.columns, 1) if label.startswith(prefix)] for prefix in prefixes
+        [place for place, label in enumerate(table.columns, 1) if label.startswith(prefix)]
+        for prefix in prefixes
     ]
     places = [own for own in places if len(own) == 3]
     sums = (
@@ -145,11 +154,11 @@ def _largest_load(forces: Sequence[Any], table: Table) -> float:
 def ground_twice(setup: Setup, found: FindingSink) -> None:
     """A contact of the model and a measured load both push a body from the ground.
 
-    Looks for measured forces on bodies that have contact surfaces, and for contact forces of the model between such a
-    surface and one that is fixed to ground, which the tool does not exclude.
+    Looks for measured forces on bodies that have contact surfaces, and for contact forces of the
+    model between such a surface and one that is fixed to ground, which the tool does not exclude.
 
-    OpenSim lets both act: the ground pushes twice, and the residual forces are as large as the weight. Exclude the
-    contact forces by `forces_to_exclude`, or switch them off in the model.
+    OpenSim lets both act: the ground pushes twice, and the residual forces are as large as the
+    weight. Exclude the contact forces by `forces_to_exclude`, or switch them off in the model.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -185,12 +194,15 @@ def ground_twice(setup: Setup, found: FindingSink) -> None:
         if twice:
             names = listed([f"'{force.name}'" for force, _ in twice], most=3)
             bodies = listed(sorted({body for _, body in twice}), most=3)
-            tag = "forces_to_exclude" if hasattr(tool, "forces_to_exclude") else "external_loads_file"
+            tag = (
+                "forces_to_exclude" if hasattr(tool, "forces_to_exclude") else "external_loads_file"
+            )
             found(
                 f"{names} of the model and the loads of '{tool.external_loads_file}' both push {bodies} from the "
                 "ground: exclude the contact forces, or the ground counts twice",
-                tool, tag=tag,
-            )  # fmt: skip
+                tool,
+                tag=tag,
+            )
 
 
 def _ground_contacts(setup: Setup) -> Iterator[tuple[Any, set[str]]]:

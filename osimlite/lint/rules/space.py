@@ -31,10 +31,12 @@ POINTS = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_p
 def degenerate_frame(subject: Subject, found: FindingSink) -> None:
     """The points of a frame do not make a frame.
 
-    Reports frames laid through stations of which two of the three that give the axes are in the same place, or which
-    are fixed to different bodies; and offset frames that are fixed to themselves, or to each other in a circle.
+    Reports frames laid through stations of which two of the three that give the axes are in the
+    same place, or which are fixed to different bodies; and offset frames that are fixed to
+    themselves, or to each other in a circle.
 
-    OpenSim refuses the model. It never comes to an end with several frames on each other to which a joint leads.
+    OpenSim refuses the model. It never comes to an end with several frames on each other to which a
+    joint leads.
 
     ```xml
       <ComponentSet>
@@ -73,15 +75,27 @@ def degenerate_frame(subject: Subject, found: FindingSink) -> None:
     circles = _on_circles(subject, laid)
     for frame in laid:
         if id(frame) in circles:
-            found(f"{called(frame)} is laid through a point on itself: OpenSim never comes to an end", frame)
+            found(
+                f"{called(frame)} is laid through a point on itself: OpenSim never comes to an end",
+                frame,
+            )
             continue
         points = [subject.target_of(frame, tag) for tag in POINTS]
         stations = [point for point in points if isinstance(point, Station)]
-        places = [on_base(subject, subject.target_of(station, "socket_parent_frame")) for station in stations]
+        places = [
+            on_base(subject, subject.target_of(station, "socket_parent_frame"))
+            for station in stations
+        ]
         if len(stations) < 4:
             continue
-        fixed_to = [base_of(subject, subject.target_of(station, "socket_parent_frame")) for station in stations]
-        stray = next((n for n, base in enumerate(fixed_to) if base is not None and base is not fixed_to[0]), None)
+        fixed_to = [
+            base_of(subject, subject.target_of(station, "socket_parent_frame"))
+            for station in stations
+        ]
+        stray = next(
+            (n for n, base in enumerate(fixed_to) if base is not None and base is not fixed_to[0]),
+            None,
+        )
         if fixed_to[0] is not None and stray is not None:
             found(
                 f"{called(stations[stray])} of {called(frame)} is fixed to {called(fixed_to[stray] or frame)}, "
@@ -91,7 +105,8 @@ def degenerate_frame(subject: Subject, found: FindingSink) -> None:
             )
             continue
         spots = [
-            place[1].of(station.location) if place else None for place, station in zip(places, stations, strict=True)
+            place[1].of(station.location) if place else None
+            for place, station in zip(places, stations, strict=True)
         ]
         for one, other in combinations(range(3), 2):
             if spots[one] is not None and spots[one] == spots[other]:
@@ -124,7 +139,9 @@ def _fate_of_circle(subject: Subject, circle: Sequence[PhysicalOffsetFrame]) -> 
 
 
 DEPTH = Threshold("contact-depth", 1e-3, "m", "surfaces may start this deep inside each other")
-DEPTH_SHARE = Threshold("contact-depth-share", 0.1, "of the radius", "a sphere may start this deep inside a surface")
+DEPTH_SHARE = Threshold(
+    "contact-depth-share", 0.1, "of the radius", "a sphere may start this deep inside a surface"
+)
 LENGTH = Threshold("largest-length", 10.0, "m", "nothing on a body is longer")
 
 
@@ -132,13 +149,14 @@ LENGTH = Threshold("largest-length", 10.0, "m", "nothing on a body is longer")
 def starts_in_contact(subject: Subject, found: FindingSink) -> None:
     """Contact surfaces are inside each other in the default pose.
 
-    Puts the model in its default pose and reports balls that start inside a half-space or another ball of their
-    contact force, by more than 1 mm and a tenth of the radius. It is a warning if the middle of the ball is inside.
-    Only bodies whose place plain arithmetic tells are looked at: those that hang on joints made of plain rotations and
-    translations, or on custom joints without a GCVSpline. Meshes and other shapes are left out.
+    Puts the model in its default pose and reports balls that start inside a half-space or another
+    ball of their contact force, by more than 1 mm and a tenth of the radius. It is a warning if the
+    middle of the ball is inside. Only bodies whose place plain arithmetic tells are looked at:
+    those that hang on joints made of plain rotations and translations, or on custom joints without
+    a GCVSpline. Meshes and other shapes are left out.
 
-    The contact pushes with full force from the first instant: the model is thrown up, and the integrator takes tiny
-    steps. Often the floor or a default value is in the wrong place.
+    The contact pushes with full force from the first instant: the model is thrown up, and the
+    integrator takes tiny steps. Often the floor or a default value is in the wrong place.
 
     ```xml
       <ContactSphere name="heel">
@@ -159,7 +177,11 @@ def starts_in_contact(subject: Subject, found: FindingSink) -> None:
             sunk = isinstance(against, ContactHalfSpace) and depth > ball.radius
             found(
                 f"{called(ball)} starts {quantity(1000 * depth, 'mm')} deep in {called(against)} of {called(force)}"
-                + (f"; its middle is inside, its radius is {quantity(1000 * ball.radius, 'mm')}" if sunk else ""),
+                + (
+                    f"; its middle is inside, its radius is {quantity(1000 * ball.radius, 'mm')}"
+                    if sunk
+                    else ""
+                ),
                 ball,
                 attribute="name",
                 severity=WARNING if sunk else None,
@@ -170,11 +192,11 @@ def starts_in_contact(subject: Subject, found: FindingSink) -> None:
 def lengths_in_millimetres(subject: Subject, found: FindingSink) -> None:
     """A length on a body is longer than ten metres.
 
-    Reports lengths and places, given in the frame of a body, beyond 10 m. What is fixed to ground may be far away, and
-    prescribed or infinite values are not looked at.
+    Reports lengths and places, given in the frame of a body, beyond 10 m. What is fixed to ground
+    may be far away, and prescribed or infinite values are not looked at.
 
-    OpenSim works in metres. A place in millimetres is a thousand times too far out, and what is fixed there has a
-    lever arm to match.
+    OpenSim works in metres. A place in millimetres is a thousand times too far out, and what is
+    fixed there has a lever arm to match.
 
     ```xml
       <Marker name="asis">
@@ -189,11 +211,19 @@ def lengths_in_millimetres(subject: Subject, found: FindingSink) -> None:
         for item in items if specs else ():
             for spec in specs:
                 value = item.__dict__[spec.name]
-                numbers = value if isinstance(value, tuple) else (value,) if isinstance(value, float) else ()
+                numbers = (
+                    value
+                    if isinstance(value, tuple)
+                    else (value,)
+                    if isinstance(value, float)
+                    else ()
+                )
                 # Almost all are small; with NaN among them no comparison need be true.
                 if not numbers or (-longest <= min(numbers) and max(numbers) <= longest):
                     continue
-                if not any(longest < abs(number) < math.inf for number in numbers) or not _on_body(subject, item):
+                if not any(longest < abs(number) < math.inf for number in numbers) or not _on_body(
+                    subject, item
+                ):
                     continue
                 better = " ".join(f"{number / 1000:.6g}" for number in numbers)
                 found(
@@ -218,10 +248,12 @@ def _lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
 def no_direction(subject: Subject, found: FindingSink) -> None:
     """A direction has no length.
 
-    Reports lines, axes and directions of constraints and actuators that are 0 0 0. The line of a PointOnLineConstraint
-    is so if nobody gives it. Of an actuator with `appliesForce` false it is a warning.
+    Reports lines, axes and directions of constraints and actuators that are 0 0 0. The line of a
+    PointOnLineConstraint is so if nobody gives it. Of an actuator with `appliesForce` false it is a
+    warning.
 
-    OpenSim makes NaN of a direction without length, whatever the force: every acceleration is NaN, without a message.
+    OpenSim makes NaN of a direction without length, whatever the force: every acceleration is NaN,
+    without a message.
 
     ```xml
       <PointActuator name="push">
@@ -238,7 +270,9 @@ def no_direction(subject: Subject, found: FindingSink) -> None:
         for item in subject.named(cls):
             if not any(getattr(item, tag)):
                 is_off = not getattr(item, "appliesForce", True)
-                fate = "it does not act" if is_off else "accelerations become NaN, without a message"
+                fate = (
+                    "it does not act" if is_off else "accelerations become NaN, without a message"
+                )
                 found(
                     f"{subject.titled(item, type(item).field_specs()[tag])} is 0 0 0: {fate}",
                     item,
@@ -268,7 +302,9 @@ def _on_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
                 open_ids.add(here)
                 pending.append((entering, _below(subject, entering)))
             owner, below = pending[-1]
-            entering = next((item for item in below if id(item) not in number or id(item) in open_ids), None)
+            entering = next(
+                (item for item in below if id(item) not in number or id(item) in open_ids), None
+            )
             if entering is not None and id(entering) in open_ids:
                 lowest[id(owner)] = min(lowest[id(owner)], number[id(entering)])
                 result |= {id(owner)} if entering is owner else set()
@@ -316,7 +352,9 @@ def _on_body(subject: Subject, item: Object) -> bool:
 def _contact_groups(subject: Subject) -> Iterator[tuple[Component, list[ContactGeometry]]]:
     """The surfaces that each contact force sets against each other."""
     forces = {
-        id(force) for kind in ("HuntCrossleyForce", "SmoothSphereHalfSpaceForce") for force in subject.named(kind)
+        id(force)
+        for kind in ("HuntCrossleyForce", "SmoothSphereHalfSpaceForce")
+        for force in subject.named(kind)
     }
     groups: dict[int, tuple[Component, list[ContactGeometry]]] = {}
     for use in subject.uses if forces else ():

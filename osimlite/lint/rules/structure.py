@@ -29,15 +29,17 @@ from osimlite.schema.specs import FieldSpec, field_specs
 def unknown_tag(subject: Subject, found: FindingSink) -> None:
     """An element is no property of the object it stands in.
 
-    Reports child elements that their class does not have: misspelt, in the wrong case, of another class, or of another
-    version. Names the nearest right tag.
+    Reports child elements that their class does not have: misspelt, in the wrong case, of another
+    class, or of another version. Names the nearest right tag.
 
-    OpenSim drops such an element without a word and keeps the default. A misspelt `<stiffness>` of a contact is 0, and
-    the motion becomes NaN; a misspelt `<ForceSet>` is a model without forces. A setup may hold what older versions
-    understood: that is a warning, or an information if the element is empty or switches off what is off anyway. A
-    misspelt element that says what the default is anyway is a warning too, as is one that no version has read, such as
-    the `<location>` of a MovingPathPoint. A `<Comment>` is an information. Of several elements of one tag the first is
-    reported, with the number of the others.
+    OpenSim drops such an element without a word and keeps the default. A misspelt `<stiffness>` of
+    a contact is 0, and the motion becomes NaN; a misspelt `<ForceSet>` is a model without forces. A
+    setup may hold what older versions
+    understood: that is a warning, or an information if the element is empty or switches off what is
+    off anyway. A misspelt element that says what the default is anyway is a warning too, as is one
+    that no version has read, such as the `<location>` of a MovingPathPoint. A `<Comment>` is an
+    information. Of several elements of one tag the first is reported, with the number of the
+    others.
 
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
@@ -96,7 +98,11 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _Unknown:
     message = f"{called(owner)} has no property <{note.word}>; OpenSim ignores it"
     if suggestion is not None:
         kept = _default_of(specs[suggestion])
-        message += f" and keeps the default of {suggestion}{kept}" if suggestion not in _present(owner) else ""
+        message += (
+            f" and keeps the default of {suggestion}{kept}"
+            if suggestion not in _present(owner)
+            else ""
+        )
     elif note.value is not None:
         message += f": {a(note.word)} cannot stand in {a(type(owner).tag)}"
         home = set_for(note.value)
@@ -165,7 +171,9 @@ def _is_said_again(subject: Subject, owner: Object, number: int) -> bool:
     return False
 
 
-def _report_old(subject: Subject, found: FindingSink, note: Note, owner: Object, old: Successor) -> None:
+def _report_old(
+    subject: Subject, found: FindingSink, note: Note, owner: Object, old: Successor
+) -> None:
     """Say that a tag is one of an older format."""
     instead = f"write <{old.tag}>" if old.tag is not None else ""
     words = "; " + ", ".join(part for part in (instead, old.hint) if part)
@@ -185,8 +193,8 @@ def duplicate_tag(subject: Subject, found: FindingSink) -> None:
 
     Reports every element after the first of the same property in one object.
 
-    OpenSim takes the first and ignores the rest, while a reader expects the last one to hold. One that says the same
-    as the first is a warning.
+    OpenSim takes the first and ignores the rest, while a reader expects the last one to hold. One
+    that says the same as the first is a warning.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <mass>9</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -219,9 +227,9 @@ def duplicate_tag(subject: Subject, found: FindingSink) -> None:
 def element_in_value(subject: Subject, found: FindingSink) -> None:
     """A value has an element inside.
 
-    Reports elements inside a number, a switch, a text or a reference, and comments, instructions and CDATA sections in
-    the middle of one. A comment before or after it does no harm. A CDATA section must be all of a value, and have no
-    white space around a name or a number.
+    Reports elements inside a number, a switch, a text or a reference, and comments, instructions
+    and CDATA sections in the middle of one. A comment before or after it does no harm. A CDATA
+    section must be all of a value, and have no white space around a name or a number.
 
     OpenSim refuses to load the file.
 
@@ -293,7 +301,11 @@ def _report_cdata(subject: Subject, source: Source, number: int, report: Finding
                 "OpenSim takes the white space in this CDATA section for a part of the name, and refuses the model",
                 at=place,
             )
-        elif isinstance(spec.kind, Value) and spec.kind.shape == "single" and spec.kind.scalar != "string":
+        elif (
+            isinstance(spec.kind, Value)
+            and spec.kind.shape == "single"
+            and spec.kind.scalar != "string"
+        ):
             report(
                 "OpenSim does not read a value with white space around it in a CDATA section: it keeps the default, "
                 "or refuses the model",
@@ -304,7 +316,9 @@ def _report_cdata(subject: Subject, source: Source, number: int, report: Finding
 def _property_of(subject: Subject, source: Source, number: int) -> FieldSpec | None:
     """Return the property that OpenSim reads from an element; None if it reads none."""
     span = source.spans[number]
-    above = next((index for index in range(number - 1, -1, -1) if span.end <= source.spans[index].end), None)
+    above = next(
+        (index for index in range(number - 1, -1, -1) if span.end <= source.spans[index].end), None
+    )
     if above is None:
         return None
     for items in subject.by_class.values():
@@ -326,7 +340,11 @@ _FORMER = {"enable_controller": "enabled"}
 
 
 def _present(owner: Object) -> set[str]:
-    return {spec.tag for spec in field_specs(type(owner)).values() if spec.name in owner.model_fields_set}
+    return {
+        spec.tag
+        for spec in field_specs(type(owner)).values()
+        if spec.name in owner.model_fields_set
+    }
 
 
 def _default_of(spec: FieldSpec) -> str:

@@ -18,7 +18,8 @@ def no_rows(table: Table, found: FindingSink) -> None:
 
     Reports tables without any row.
 
-    OpenSim refuses a storage file without rows; of a marker file it looks for the first row for ever.
+    OpenSim refuses a storage file without rows; of a marker file it looks for the first row for
+    ever.
 
     ```sto
       knee
@@ -31,7 +32,12 @@ def no_rows(table: Table, found: FindingSink) -> None:
     + 0.0 0.5
     ```
     """
-    if table.labels and "," not in table.labels[0].text and not table.rows.count and not table.rows.faults:
+    if (
+        table.labels
+        and "," not in table.labels[0].text
+        and not table.rows.count
+        and not table.rows.faults
+    ):
         fate = "looks for one for ever" if table.is_markers else "refuses the table"
         found(f"there are no rows: OpenSim {fate}", at=Position(table.header.label_line, 1))
 
@@ -40,11 +46,12 @@ def no_rows(table: Table, found: FindingSink) -> None:
 def ragged_row(table: Table, found: FindingSink) -> None:
     """A row of a table is no row of numbers, or has too many or too few.
 
-    Compares the cells of each row with the labels, and points out lines between the rows that are blank or remarks.
+    Compares the cells of each row with the labels, and points out lines between the rows that are
+    blank or remarks.
 
-    OpenSim's older reader goes on in the next line for what a row lacks: from there on all numbers are in wrong
-    columns. The newer one refuses the file. In marker files and tables of version 2 and 3 a blank line ends the table,
-    and the rows behind it are lost without a word.
+    OpenSim's older reader goes on in the next line for what a row lacks: from there on all numbers
+    are in wrong columns. The newer one refuses the file. In marker files and tables of version 2
+    and 3 a blank line ends the table, and the rows behind it are lost without a word.
 
     ```sto
       knee
@@ -63,20 +70,33 @@ def ragged_row(table: Table, found: FindingSink) -> None:
     for fault in rows.of("row", "comment", "blank"):
         at = Position(fault.line, fault.column, fault.length)
         if fault.kind == "row":
-            fix = _without_last_tabs(table, rows.cells) if table.is_markers and fault.number > rows.cells else None
+            fix = (
+                _without_last_tabs(table, rows.cells)
+                if table.is_markers and fault.number > rows.cells
+                else None
+            )
             has = counted(fault.number, "cell")
-            found(f"the row has {has} and needs {rows.cells}{fault.text}{fault.more()}", at=at, fix=fix)
+            found(
+                f"the row has {has} and needs {rows.cells}{fault.text}{fault.more()}",
+                at=at,
+                fix=fix,
+            )
         elif fault.kind == "comment":
             found(f"OpenSim knows no remarks among the rows{fault.more('line')}", at=at)
         elif rows.count and fault.line <= rows.line_of(rows.count - 1):
             if table.is_markers or table.is_strict:
                 lost = rows.line_of(rows.count - 1) - fault.line
                 found(
-                    f"a blank line ends the table for OpenSim: {counted(lost, 'row')} behind it are lost", at=at,
+                    f"a blank line ends the table for OpenSim: {counted(lost, 'row')} behind it are lost",
+                    at=at,
                     fix=_without_blank_lines(table, fault.line),
-                )  # fmt: skip
+                )
             else:
-                found(f"there is a blank line among the rows{fault.more('line')}", at=at, severity=INFO)
+                found(
+                    f"there is a blank line among the rows{fault.more('line')}",
+                    at=at,
+                    severity=INFO,
+                )
 
 
 _LAST_TABS = re.compile(rb"\t+(?=\r?(\n|\Z))")
@@ -104,11 +124,13 @@ def _without_blank_lines(table: Table, first: int) -> Fix:
 def not_a_number(table: Table, found: FindingSink) -> None:
     """A cell of a table is no number.
 
-    Finds words, NaN, infinity, decimal commas and whatever else is no number: once for each column, with the number of
-    rows in which it is so. In marker files a marker that was not seen has three empty cells, or NaN in all three.
+    Finds words, NaN, infinity, decimal commas and whatever else is no number: once for each column,
+    with the number of rows in which it is so. In marker files a marker that was not seen has three
+    empty cells, or NaN in all three.
 
-    At the first such cell OpenSim's older reader (version 1 or none) stops: the cell becomes 0, the rest of its row is
-    that of the row before, and all later rows are lost, without a word. The newer one takes NaN for it (a warning).
+    At the first such cell OpenSim's older reader (version 1 or none) stops: the cell becomes 0, the
+    rest of its row is that of the row before, and all later rows are lost, without a word. The
+    newer one takes NaN for it (a warning).
 
     ```sto
       knee
@@ -138,7 +160,9 @@ def not_a_number(table: Table, found: FindingSink) -> None:
         found(
             f"{what} (column '{label}'): {fate}{fault.more()}",
             at=Position(fault.line, fault.column, max(1, fault.length)),
-            severity=WARNING if fault.kind == "cell" and (table.is_markers or table.is_strict) else None,
+            severity=WARNING
+            if fault.kind == "cell" and (table.is_markers or table.is_strict)
+            else None,
         )
 
 
@@ -148,9 +172,10 @@ def time_order(table: Table, found: FindingSink) -> None:
 
     Finds rows with the time of the row before, and rows that go back in time.
 
-    Of two rows with one time OpenSim keeps the second, without a word; where time goes back the rows before are lost,
-    or the tool stops. A marker file is refused for either. One time twice in a storage file is a warning, and in the
-    last row an information: so OpenSim ends some of its results.
+    Of two rows with one time OpenSim keeps the second, without a word; where time goes back the
+    rows before are lost, or the tool stops. A marker file is refused for either. One time twice in
+    a storage file is a warning, and in the last row an information: so OpenSim ends some of its
+    results.
 
     ```sto
       knee
@@ -171,8 +196,14 @@ def time_order(table: Table, found: FindingSink) -> None:
     last = table.rows.line_of(table.rows.count - 1) if table.rows.count else None
     for fault in table.rows.of("order"):
         time, before = fault.text.split()
-        what = f"goes back from {before} to {time}" if fault.number else f"{time} is that of the row before, too"
-        severity = None if fault.number or table.is_markers else INFO if fault.line == last else WARNING
+        what = (
+            f"goes back from {before} to {time}"
+            if fault.number
+            else f"{time} is that of the row before, too"
+        )
+        severity = (
+            None if fault.number or table.is_markers else INFO if fault.line == last else WARNING
+        )
         at = Position(fault.line, fault.column, fault.length)
         found(f"the time {what}{fault.more()}", at=at, severity=severity)
 
@@ -181,9 +212,11 @@ def time_order(table: Table, found: FindingSink) -> None:
 def time_gap(table: Table, found: FindingSink) -> None:
     """Rows are missing in a table of even times.
 
-    Finds steps that are at least half as long again as the usual one, in tables in which nearly all steps are alike.
+    Finds steps that are at least half as long again as the usual one, in tables in which nearly all
+    steps are alike.
 
-    Rows were lost. OpenSim draws a spline through the gap; with a filter it does so at the smallest step.
+    Rows were lost. OpenSim draws a spline through the gap; with a filter it does so at the smallest
+    step.
 
     ```sto
       knee
@@ -215,7 +248,11 @@ def time_gap(table: Table, found: FindingSink) -> None:
     if len(gaps) <= max(1, len(steps) // 50) and even + len(gaps) >= 0.95 * len(steps):
         for row in gaps[:20]:
             missing = steps[row - 1] / table.step - 1
-            lost = f": {counted(round(missing), 'row')} seem to be missing" if 0.5 <= missing < 1e9 else ""
+            lost = (
+                f": {counted(round(missing), 'row')} seem to be missing"
+                if 0.5 <= missing < 1e9
+                else ""
+            )
             found(
                 f"from one row to the next {steps[row - 1]:.6g} s pass, usually {table.step:.6g} s{lost}",
                 at=table.time_at(rows.line_of(row)),

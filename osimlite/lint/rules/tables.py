@@ -21,9 +21,10 @@ _TO_THE_END = 1_000_000
 def table_header(table: Table, found: FindingSink) -> None:
     """The header of a table is not as OpenSim needs it.
 
-    Looks for the line `endheader` of a storage file, in small letters, and for `nRows` and `nColumns` where the older
-    reader takes the file (version 1 or none). A marker file must start with `PathFileType`, without a byte order mark,
-    and name all eight keys of its second line in their order, each with a value.
+    Looks for the line `endheader` of a storage file, in small letters, and for `nRows` and
+    `nColumns` where the older reader takes the file (version 1 or none). A marker file must start
+    with `PathFileType`, without a byte order mark, and name all eight keys of its second line in
+    their order, each with a value.
 
     OpenSim refuses the file; of a storage file it says no more than that an index is out of bounds.
 
@@ -49,53 +50,76 @@ def table_header(table: Table, found: FindingSink) -> None:
         if words.startswith(b"PathFileType"):
             found("these are markers over time; a file of them is called .trc", at=start)
         elif header.end.at.line == 1:
-            ends = "; its lines end with CR alone" if b"\r" in table.data[:1000] and b"\n" not in table.data else ""
+            ends = (
+                "; its lines end with CR alone"
+                if b"\r" in table.data[:1000] and b"\n" not in table.data
+                else ""
+            )
             found(
                 f"there is no line 'endheader' in this file, so it is no storage file: OpenSim refuses it{ends}",
                 at=start,
-            )  # fmt: skip
+            )
         elif header.end.text:
             found(
                 "the header must end with 'endheader' in small letters: OpenSim takes all that follows for header",
-                at=header.end.at, suggestion="endheader",
-            )  # fmt: skip
+                at=header.end.at,
+                suggestion="endheader",
+            )
         else:
             found(
-                "no line 'endheader' stands before the labels: OpenSim refuses the table", at=header.end.at,
+                "no line 'endheader' stands before the labels: OpenSim refuses the table",
+                at=header.end.at,
                 fix=table.inserting(header.label_line, "endheader"),
-            )  # fmt: skip
+            )
     elif not table.is_strict:
         for key, count in (("nRows", table.rows.count), ("nColumns", len(table.labels))):
             if key not in table.entries:
                 near = nearest(key, table.entries, cutoff=75)
                 entry = table.entries[near] if near else None
                 at = entry.key.at if entry else header.end.at
-                fix = _saying(table, entry, key, count) if entry else table.inserting(at.line, f"{key}={count}")
+                fix = (
+                    _saying(table, entry, key, count)
+                    if entry
+                    else table.inserting(at.line, f"{key}={count}")
+                )
                 found(
                     f"the header does not say '{key}': OpenSim refuses the table",
-                    at=at, suggestion=near and key, fix=fix,
+                    at=at,
+                    suggestion=near and key,
+                    fix=fix,
                     # What is written for the newer reader is taken by it without a version too.
                     severity=WARNING if "DataType" in table.entries else None,
-                )  # fmt: skip
+                )
 
 
 def _saying(table: Table, entry: Entry, key: str, count: int) -> Fix | None:
     """The mend that makes a line of a header say a count: the key alone if a value is there."""
     if entry.value.text:
         return table.replacing(entry.key.at, None, key, certain=True)
-    return table.replacing(entry.key.at._replace(length=_TO_THE_END), None, f"{key}={count}", certain=True)
+    return table.replacing(
+        entry.key.at._replace(length=_TO_THE_END), None, f"{key}={count}", certain=True
+    )
 
 
 def _marker_header(table: Table, header: MarkerHeader, found: FindingSink) -> None:
     if not table.data.startswith(b"PathFileType"):
         mark = table.data.startswith(b"\xef\xbb\xbf")
-        why = "starts with a byte order mark; save it as UTF-8 without one" if mark else "must start with PathFileType"
+        why = (
+            "starts with a byte order mark; save it as UTF-8 without one"
+            if mark
+            else "must start with PathFileType"
+        )
         found(
-            f"a marker file {why}: OpenSim refuses it", at=Position(1, 1), fix=Fix((Edit(0, 3, ""),)) if mark else None
+            f"a marker file {why}: OpenSim refuses it",
+            at=Position(1, 1),
+            fix=Fix((Edit(0, 3, ""),)) if mark else None,
         )
     if len(header.lines) < 4:
         ends = ": its lines end with CR alone" if b"\r" in table.data else ""
-        found(f"a marker file has five lines before its rows, this has {len(header.lines)}{ends}", at=Position(1, 1))
+        found(
+            f"a marker file has five lines before its rows, this has {len(header.lines)}{ends}",
+            at=Position(1, 1),
+        )
         return
     keys, values = header.words(2), header.words(3)
     for key, right in zip(keys, MARKER_KEYS, strict=False):
@@ -103,12 +127,17 @@ def _marker_header(table: Table, header: MarkerHeader, found: FindingSink) -> No
             meant = right if len(keys) == len(MARKER_KEYS) else None
             found(
                 f"the header says '{key.text}' where OpenSim wants '{right}'",
-                at=key.at, suggestion=meant, certain=True,
-            )  # fmt: skip
+                at=key.at,
+                suggestion=meant,
+                certain=True,
+            )
             break
     else:
         if len(keys) < len(MARKER_KEYS):
-            found(f"the header does not say '{MARKER_KEYS[len(keys)]}': OpenSim refuses the file", at=Position(2, 1))
+            found(
+                f"the header does not say '{MARKER_KEYS[len(keys)]}': OpenSim refuses the file",
+                at=Position(2, 1),
+            )
         elif len(values) != len(keys):
             found(
                 f"there are {len(values)} values of the {len(keys)} keys above them: OpenSim refuses the file",
@@ -125,20 +154,27 @@ def _marker_header(table: Table, header: MarkerHeader, found: FindingSink) -> No
         fix = None
         if len(subscripts) == len(wanted) and all(word[:1] in "XYZ" for word in subscripts):
             fix = table.replacing(Position(5, 1, len(fifth.rstrip())), None, line, certain=True)
-        elif (fifth[:1].isdigit() or not fifth.strip()) and [word.text for word in values[3:4]] == [str(count)]:
+        elif (fifth[:1].isdigit() or not fifth.strip()) and [word.text for word in values[3:4]] == [
+            str(count)
+        ]:
             fix = table.inserting(5, line)
-        found(f"the fifth line must say '{wanted[wrong]}' here: OpenSim refuses the file", at=place, fix=fix)
+        found(
+            f"the fifth line must say '{wanted[wrong]}' here: OpenSim refuses the file",
+            at=place,
+            fix=fix,
+        )
 
 
 @rule("OSIM802", "table-count", severity=ERROR, mends="safe", about="table")
 def table_count(table: Table, found: FindingSink) -> None:
     """A count in the header of a table is not that of the table.
 
-    Compares `nRows` and `nColumns`, or `NumFrames` and `NumMarkers`, with the rows and the labels that there are.
+    Compares `nRows` and `nColumns`, or `NumFrames` and `NumMarkers`, with the rows and the labels
+    that there are.
 
-    Of a storage file of version 1 OpenSim reads as many rows as the header says, and takes numbers by `nColumns` from
-    one line to the next. A marker file with another number of labels is refused. Where OpenSim does not look at a
-    count, it is a warning.
+    Of a storage file of version 1 OpenSim reads as many rows as the header says, and takes numbers
+    by `nColumns` from one line to the next. A marker file with another number of labels is refused.
+    Where OpenSim does not look at a count, it is a warning.
 
     ```sto
       knee
@@ -155,7 +191,10 @@ def table_count(table: Table, found: FindingSink) -> None:
     rows = table.rows
     labels = len(table.labels)
     if table.is_markers:
-        counts = (("NumFrames", rows.count, "frames", WARNING), ("NumMarkers", labels, "labels", ERROR))
+        counts = (
+            ("NumFrames", rows.count, "frames", WARNING),
+            ("NumMarkers", labels, "labels", ERROR),
+        )
     else:
         known = WARNING if table.is_strict else ERROR
         counts = (("nRows", rows.count, "rows", known), ("nColumns", labels, "labels", known))
@@ -171,28 +210,38 @@ def table_count(table: Table, found: FindingSink) -> None:
         fate = ""
         if severity is ERROR and what == "rows" and number == number:
             lost = count - number
-            severity, fate = (ERROR, f": OpenSim leaves out the last {lost:g}") if lost > 0 else (WARNING, "")
+            severity, fate = (
+                (ERROR, f": OpenSim leaves out the last {lost:g}") if lost > 0 else (WARNING, "")
+            )
         elif severity is ERROR:
-            fate = ": OpenSim refuses the file" if table.is_markers else ": OpenSim puts numbers into the wrong columns"
+            fate = (
+                ": OpenSim refuses the file"
+                if table.is_markers
+                else ": OpenSim puts numbers into the wrong columns"
+            )
         # Where a row has as many cells as the header says, it is a label that is wrong.
         in_rows = {"nColumns": rows.cells, "NumMarkers": (rows.cells - 2) // 3}.get(key, count)
         is_right = not odd_rows and rows.count > 0 and in_rows == count
         found(
             f"'{entry.key.text}' is '{said}', and there are {count} {what}{fate}",
-            at=entry.value.at, severity=severity, suggestion=str(count) if is_right else None, certain=True,
+            at=entry.value.at,
+            severity=severity,
+            suggestion=str(count) if is_right else None,
+            certain=True,
             fix=_saying(table, entry, key, count) if is_right and not said else None,
-        )  # fmt: skip
+        )
 
 
 @rule("OSIM803", "table-setting", severity=ERROR, mends="safe", about="table")
 def table_setting(table: Table, found: FindingSink) -> None:
     """A setting in the header of a table has a value that OpenSim does not know.
 
-    Looks at `inDegrees`, which is `yes` or `no`, at the letters that keys are written in, at `version`, `DataType`,
-    and of marker files at `Units` (m, cm, mm) and `DataRate`, which is compared with the times (for information).
+    Looks at `inDegrees`, which is `yes` or `no`, at the letters that keys are written in, at
+    `version`, `DataType`, and of marker files at `Units` (m, cm, mm) and `DataRate`, which is
+    compared with the times (for information).
 
-    For OpenSim `inDegrees=true` is no: the angles are taken for radians without a word. Unknown units make it refuse
-    the file.
+    For OpenSim `inDegrees=true` is no: the angles are taken for radians without a word. Unknown
+    units make it refuse the file.
 
     ```sto
       knee
@@ -211,41 +260,73 @@ def table_setting(table: Table, found: FindingSink) -> None:
     if table.is_markers:
         units = entries.get("Units")
         if units is not None and units.value.text not in ("m", "mm", "cm", "km"):
-            near = {"millimetre": "mm", "millimeter": "mm", "metre": "m", "meter": "m", "centimeter": "cm"}
+            near = {
+                "millimetre": "mm",
+                "millimeter": "mm",
+                "metre": "m",
+                "meter": "m",
+                "centimeter": "cm",
+            }
             right = near.get(units.value.text.lower().rstrip("s"), units.value.text.lower())
             found(
                 f"OpenSim does not know the units '{units.value.text}' and refuses the file",
-                at=units.value.at, suggestion=right if right in ("m", "mm", "cm") else None, certain=True,
-            )  # fmt: skip
+                at=units.value.at,
+                suggestion=right if right in ("m", "mm", "cm") else None,
+                certain=True,
+            )
         rate = entries.get("DataRate")
         if rate is not None and not _is_positive(rate.value.text):
-            found(f"'DataRate' is '{rate.value.text}' and no frequency", at=rate.value.at, severity=WARNING)
-        elif rate is not None and table.step > 0 and not 0.9 < float(rate.value.text) * table.step < 1.1:
+            found(
+                f"'DataRate' is '{rate.value.text}' and no frequency",
+                at=rate.value.at,
+                severity=WARNING,
+            )
+        elif (
+            rate is not None
+            and table.step > 0
+            and not 0.9 < float(rate.value.text) * table.step < 1.1
+        ):
             found(
                 f"'DataRate' is '{rate.value.text}', and by the times of the frames it is {1 / table.step:.6g}",
-                at=rate.value.at, severity=INFO,
-            )  # fmt: skip
+                at=rate.value.at,
+                severity=INFO,
+            )
         return
     for key, entry in entries.items():
-        right = next((known for known in ("inDegrees", "version", *COUNTS) if known.lower() == key.lower()), key)
+        right = next(
+            (known for known in ("inDegrees", "version", *COUNTS) if known.lower() == key.lower()),
+            key,
+        )
         if right != key and right not in entries:
             # Without a version a table is read as one of version 1.
             severity = WARNING if right == "version" else None
             found(
-                f"OpenSim does not know '{key}' and leaves it out", at=entry.key.at, suggestion=right, severity=severity
+                f"OpenSim does not know '{key}' and leaves it out",
+                at=entry.key.at,
+                suggestion=right,
+                severity=severity,
             )
     degrees = entries.get("inDegrees")
     if degrees is not None and degrees.value.text.lower() not in ("yes", "y", "no", "n"):
-        meant = {"true": "yes", "1": "yes", "false": "no", "0": "no"}.get(degrees.value.text.lower())
+        meant = {"true": "yes", "1": "yes", "false": "no", "0": "no"}.get(
+            degrees.value.text.lower()
+        )
         harmless = meant == "no"
         found(
             f"'inDegrees' is 'yes' or 'no'; of '{degrees.value.text}' OpenSim makes no: it takes angles for radians",
-            at=degrees.value.at, suggestion=meant, certain=True, severity=WARNING if harmless else None,
-        )  # fmt: skip
+            at=degrees.value.at,
+            suggestion=meant,
+            certain=True,
+            severity=WARNING if harmless else None,
+        )
     _cells(table, found)
     version = entries.get("version")
     if version is not None and not version.value.text.isdecimal():
-        found(f"the version is a whole number, not '{version.value.text}'", at=version.value.at, severity=WARNING)
+        found(
+            f"the version is a whole number, not '{version.value.text}'",
+            at=version.value.at,
+            severity=WARNING,
+        )
 
 
 def _cells(table: Table, found: FindingSink) -> None:
@@ -253,16 +334,21 @@ def _cells(table: Table, found: FindingSink) -> None:
     kind = table.entries.get("DataType")
     if kind is not None and kind.value.text and kind.value.text not in SUFFIXES:
         found(
-            f"OpenSim knows no tables of '{kind.value.text}', and refuses the file", at=kind.value.at,
-            suggestion=nearest(kind.value.text, SUFFIXES), severity=None if table.is_strict else WARNING,
-        )  # fmt: skip
+            f"OpenSim knows no tables of '{kind.value.text}', and refuses the file",
+            at=kind.value.at,
+            suggestion=nearest(kind.value.text, SUFFIXES),
+            severity=None if table.is_strict else WARNING,
+        )
     for key, entry in table.entries.items() if table.is_strict else ():
-        behind = table.header.lines[entry.key.at.line - 1][entry.key.at.column - 1 + entry.key.at.length :]
+        behind = table.header.lines[entry.key.at.line - 1][
+            entry.key.at.column - 1 + entry.key.at.length :
+        ]
         if key != "version" and "=" in behind and not behind.startswith(f"={entry.value.text}"):
             found(
                 f"OpenSim's newer reader takes the blanks beside '=' for parts of '{key}' and of its value",
-                at=entry.key.at, severity=ERROR if key == "DataType" else WARNING,
-            )  # fmt: skip
+                at=entry.key.at,
+                severity=ERROR if key == "DataType" else WARNING,
+            )
 
 
 def _is_positive(text: str) -> bool:
@@ -340,13 +426,14 @@ refuses the file.
 def column_label(table: Table, found: FindingSink) -> None:
     """A label of a table is missing, stands there twice, or is not as OpenSim needs it.
 
-    The first column of a storage file is `time`, in small letters. Every column has a label of its own. Labels of
-    markers have no blanks, every marker has one, and the time and the frame before them are called `Time` and `Frame#`.
-    In a storage file of version 2 or 3 tabs separate the labels (a warning).
+    The first column of a storage file is `time`, in small letters. Every column has a label of its
+    own. Labels of markers have no blanks, every marker has one, and the time and the frame before
+    them are called `Time` and `Frame#`. In a storage file of version 2 or 3 tabs separate the
+    labels (a warning).
 
-    Without a column `time` OpenSim refuses the table. Of two columns with one label it finds the first (a warning), and
-    takes no loads from them; of two markers with one name it refuses the file. A blank makes two labels of one, so that
-    all that follow name the wrong columns.
+    Without a column `time` OpenSim refuses the table. Of two columns with one label it finds the
+    first (a warning), and takes no loads from them; of two markers with one name it refuses the
+    file. A blank makes two labels of one, so that all that follow name the wrong columns.
     """
     labels, header = table.labels, table.header
     if isinstance(header, MarkerHeader):
@@ -354,22 +441,26 @@ def column_label(table: Table, found: FindingSink) -> None:
             if word.text != right:
                 found(
                     f"the label '{word.text}' must be '{right}': OpenSim refuses the file",
-                    at=word.at, suggestion=nearest(word.text, [right], cutoff=60), certain=True,
+                    at=word.at,
+                    suggestion=nearest(word.text, [right], cutoff=60),
+                    certain=True,
                     fault="frame-and-time-label",
-                )  # fmt: skip
+                )
         cells = header.lines[3].split("\t") if header.lines[3:] else []
         empty = [index for index in range(2, len(cells) - 2, 3) if not cells[index].strip()]
         if empty and len(labels) < len(cells[2:]) // 3:
             found(
                 "a marker has no label: OpenSim refuses the file",
-                at=Position(4, len("\t".join(cells[: empty[0]])) + 2), fault="marker-label",
-            )  # fmt: skip
+                at=Position(4, len("\t".join(cells[: empty[0]])) + 2),
+                fault="marker-label",
+            )
         for label in labels:
             if " " in label.text:
                 found(
                     f"the marker '{label.text}' has a blank in its name, which no marker of a model has",
-                    at=label.at, fault="marker-label",
-                )  # fmt: skip
+                    at=label.at,
+                    fault="marker-label",
+                )
     elif not labels:
         if header.end.text:
             found("the table ends before its labels", at=header.end.at, fault="no-labels")
@@ -380,29 +471,44 @@ def column_label(table: Table, found: FindingSink) -> None:
         if "," in first:
             found(
                 "tabs or blanks separate the columns of a storage file, not commas: OpenSim refuses it",
-                at=at, fault="commas-between-labels",
-            )  # fmt: skip
+                at=at,
+                fault="commas-between-labels",
+            )
         elif all(label.text not in ("time", "range") for label in labels):
             found(
                 f"the first column is '{first}': OpenSim needs one called 'time'",
-                at=at, suggestion=near, certain=True, fault="no-time-column",
-            )  # fmt: skip
+                at=at,
+                suggestion=near,
+                certain=True,
+                fault="no-time-column",
+            )
         else:
-            found(f"the first column is '{first}': OpenSim takes it for the time", at=at, fault="time-not-first")
+            found(
+                f"the first column is '{first}': OpenSim takes it for the time",
+                at=at,
+                fault="time-not-first",
+            )
     elif header.is_strict and labels[1:] and not header.has_tabs:
         found(
             f"blanks separate the columns of a table of version {header.form}: OpenSim's newer tools refuse it",
-            at=labels[1].at, fault="blanks-between-labels",
-        )  # fmt: skip
+            at=labels[1].at,
+            fault="blanks-between-labels",
+        )
     places: dict[str, list[Position]] = {}
     for label in labels:
         places.setdefault(label.text, []).append(label.at)
     for name, (_, *again) in places.items():
         if again:
             fate = "refuses the file" if table.is_markers else "does not find this one by its name"
-            more = f"; there are {counted(len(again) - 1, 'more column')} of this name" if again[1:] else ""
+            more = (
+                f"; there are {counted(len(again) - 1, 'more column')} of this name"
+                if again[1:]
+                else ""
+            )
             severity = ERROR if table.is_markers else None
             found(
                 f"a column is called '{name}' already: OpenSim {fate}{more}",
-                at=again[0], severity=severity, fault="label-twice",
-            )  # fmt: skip
+                at=again[0],
+                severity=severity,
+                fault="label-twice",
+            )

@@ -21,7 +21,10 @@ _SOCKET = re.compile(r"<(socket_\w+)>")
 _LATE: Final = (
     (re.compile(r"\w+Joint"), ("socket_parent_frame", "socket_child_frame")),
     (re.compile("Marker"), ("socket_parent_frame",)),
-    (re.compile("(?:Conditional|Moving)PathPoint"), ("socket_coordinate", *(f"socket_{x}_coordinate" for x in "xyz"))),
+    (
+        re.compile("(?:Conditional|Moving)PathPoint"),
+        ("socket_coordinate", *(f"socket_{x}_coordinate" for x in "xyz")),
+    ),
     (re.compile(r"Contact(?:HalfSpace|Sphere|Mesh)"), ("socket_frame",)),
     (re.compile(r"\w*BushingForce|WeldConstraint"), ("socket_frame1", "socket_frame2")),
     (re.compile("(?:Point|ConstantDistance)Constraint"), ("socket_body_1", "socket_body_2")),
@@ -34,10 +37,12 @@ _LATE: Final = (
 def syntax_error(subject: Subject, found: FindingSink) -> None:
     """The text is not well-formed XML.
 
-    Reports where the XML parser gave up: a tag that is not closed, a stray `<` or `&`, a file that was cut off.
+    Reports where the XML parser gave up: a tag that is not closed, a stray `<` or `&`, a file that
+    was cut off.
 
-    OpenSim cannot load the file. The tags and values before the place are still checked; what follows is not, since
-    nobody can tell which element it belongs to, nor are references, which may lead there.
+    OpenSim cannot load the file. The tags and values before the place are still checked; what
+    follows is not, since nobody can tell which element it belongs to, nor are references, which may
+    lead there.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
@@ -48,7 +53,13 @@ def syntax_error(subject: Subject, found: FindingSink) -> None:
         return
     for fault in subject.faults:
         if isinstance(fault, NotWellFormedError):
-            _found_at(subject.source, found, f"{fault.message}; {_checked(subject)}", fault.line, fault.column)
+            _found_at(
+                subject.source,
+                found,
+                f"{fault.message}; {_checked(subject)}",
+                fault.line,
+                fault.column,
+            )
 
 
 def _checked(subject: Subject) -> str:
@@ -62,9 +73,10 @@ def _checked(subject: Subject) -> str:
 def unused_ignore(subject: Subject, found: FindingSink) -> None:
     """A comment ignores what is not there.
 
-    Reports `<!-- osimlite: ignore CODE -->` for each code of which nothing is found in its place. Such a comment speaks
-    of its own line, or alone on a line of the element that follows, or before the root element of the whole file. A
-    line `osimlite: ignore CODE` in the header of a table speaks of the whole table.
+    Reports `<!-- osimlite: ignore CODE -->` for each code of which nothing is found in its place.
+    Such a comment speaks of its own line, or alone on a line of the element that follows, or before
+    the root element of the whole file. A line `osimlite: ignore CODE` in the header of a table
+    speaks of the whole table.
 
     The fault was mended and the comment was forgotten; it would hide the next one.
 
@@ -83,11 +95,12 @@ def unused_ignore(subject: Subject, found: FindingSink) -> None:
 def encoding(subject: Subject, found: FindingSink) -> None:
     """The bytes are not in the encoding that the file declares.
 
-    Reports the first byte that is no UTF-8 (or whatever the XML declaration says). The file is then read as Windows
-    text (cp1252). A file in UTF-16 or UTF-32 is an error.
+    Reports the first byte that is no UTF-8 (or whatever the XML declaration says). The file is then
+    read as Windows text (cp1252). A file in UTF-16 or UTF-32 is an error.
 
-    OpenSim copies the bytes unseen, but every other XML reader refuses the file, and names with accents differ
-    between programs. Of two bytes for a letter it understands none, and cannot load the file. Save it as UTF-8.
+    OpenSim copies the bytes unseen, but every other XML reader refuses the file, and names with
+    accents differ between programs. Of two bytes for a letter it understands none, and cannot load
+    the file. Save it as UTF-8.
 
     ```document
     - <?xml version="1.0" encoding="US-ASCII" ?>
@@ -117,18 +130,21 @@ def encoding(subject: Subject, found: FindingSink) -> None:
             at=source.position(len(before)),
         )
     except LookupError:
-        found(f"the encoding '{name}' is not known; the text is read as {source.encoding}", at=source.position(0))
+        found(
+            f"the encoding '{name}' is not known; the text is read as {source.encoding}",
+            at=source.position(0),
+        )
 
 
 @rule("OSIM003", "not-a-model", severity=ERROR, mends="unsafe")
 def not_a_model(subject: Subject, found: FindingSink) -> None:
     """The document is XML, but no OpenSim model.
 
-    Reports a root element other than `<OpenSimDocument>`, with the right spelling where that is known, and a document
-    that holds something else than a `<Model>`. In a folder, XML is OpenSim's if its root is nearly called so, or if it
-    holds a class of OpenSim with its properties; other XML is passed over and counted. What is no ordinary file (a
-    pipe, a device) is reported, too, and a file of more than 100 MB, or what the setting `largest-file` allows: neither
-    is read.
+    Reports a root element other than `<OpenSimDocument>`, with the right spelling where that is
+    known, and a document that holds something else than a `<Model>`. In a folder, XML is OpenSim's
+    if its root is nearly called so, or if it holds a class of OpenSim with its properties; other
+    XML is passed over and counted. What is no ordinary file (a pipe, a device) is reported, too,
+    and a file of more than 100 MB, or what the setting `largest-file` allows: neither is read.
 
     OpenSim fails with a message about a missing node, or makes an empty model without a word.
 
@@ -159,11 +175,12 @@ def not_a_model(subject: Subject, found: FindingSink) -> None:
 def document_version(subject: Subject, found: FindingSink) -> None:
     """The document has no version, or none that is read.
 
-    Reports a `Version` that is missing, no whole number, too old to be read here, newer than OpenSim 4.6 writes, or
-    older than a socket in the document that OpenSim takes in newer ones only.
+    Reports a `Version` that is missing, no whole number, too old to be read here, newer than
+    OpenSim 4.6 writes, or older than a socket in the document that OpenSim takes in newer ones
+    only.
 
-    OpenSim reads each file by the rules of its version. Without one it fails; from a version it does not know it
-    silently takes what it happens to understand (a warning).
+    OpenSim reads each file by the rules of its version. Without one it fails; from a version it
+    does not know it silently takes what it happens to understand (a warning).
 
     ```document
     - <OpenSimDocument>
@@ -250,7 +267,8 @@ def merge_conflict(subject: Subject, found: FindingSink) -> None:
     if subject.source is not None:
         for start, end in _conflicts(subject.source):
             found(
-                "unfinished merge: keep one side and take the marks out", at=subject.source.position(start, end - start)
+                "unfinished merge: keep one side and take the marks out",
+                at=subject.source.position(start, end - start),
             )
 
 
@@ -292,11 +310,15 @@ def second_object(subject: Subject, found: FindingSink) -> None:
     """
     for note in subject.notes:
         if note.kind == "second-object":
-            found(f"OpenSim reads one object of a document and ignores this <{note.word}>", number=note.number)
+            found(
+                f"OpenSim reads one object of a document and ignores this <{note.word}>",
+                number=note.number,
+            )
 
 
 def _conflicts(source: Source) -> list[tuple[int, int]]:
-    # In well-formed XML only a comment can hold the first marker, and it then holds the last one too.
+    # In well-formed XML only a comment can hold the first marker, and it then holds the last one
+    # too.
     if source.well_formed and not (source.remarks and ">>>>>>>" in source.text):
         return []
     if "<<<<<<<" not in source.text and ">>>>>>>" not in source.text:
@@ -304,7 +326,9 @@ def _conflicts(source: Source) -> list[tuple[int, int]]:
     return [match.span() for match in _CONFLICT.finditer(source.text)]
 
 
-def _found_at(source: Source, found: FindingSink, message: str, line: int | None, column: int | None) -> None:
+def _found_at(
+    source: Source, found: FindingSink, message: str, line: int | None, column: int | None
+) -> None:
     found(message, at=source.position(_offset(source, line, column)))
 
 
@@ -314,4 +338,6 @@ def _offset(source: Source, line: int | None, column: int | None) -> int:
     lines = source.lines
     if line > len(lines):
         return len(source.text)
-    return source.line_start(line) + min(max((column or 1) - 1, 0), max(0, len(lines[line - 1]) - 1))
+    return source.line_start(line) + min(
+        max((column or 1) - 1, 0), max(0, len(lines[line - 1]) - 1)
+    )

@@ -22,9 +22,9 @@ def unconnected_body(subject: Subject, found: FindingSink) -> None:
 
     Reports bodies that no chain of joints connects to ground.
 
-    OpenSim adds a free joint to ground, and the body falls freely, which the file does not say (a warning). If it
-    has no mass, OpenSim refuses the model; so it does, or crashes, if an offset frame or a joint is on a body that
-    comes before the last such joint in the tree.
+    OpenSim adds a free joint to ground, and the body falls freely, which the file does not say (a
+    warning). If it has no mass, OpenSim refuses the model; so it does, or crashes, if an offset
+    frame or a joint is on a body that comes before the last such joint in the tree.
 
     ```xml
       <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>
@@ -60,7 +60,12 @@ def unconnected_body(subject: Subject, found: FindingSink) -> None:
         elif bones.of(body):
             message = f"{called(body)} is not connected to ground, only with itself"
         fate = "adds a FreeJoint to ground" if not fails else "refuses the model"
-        found(f"{message}; OpenSim {fate}", body, attribute="name", severity=None if fails else WARNING)
+        found(
+            f"{message}; OpenSim {fate}",
+            body,
+            attribute="name",
+            severity=None if fails else WARNING,
+        )
 
 
 @rule("OSIM403", "closed-loop", severity=ERROR)
@@ -69,10 +74,11 @@ def closed_loop(subject: Subject, found: FindingSink) -> None:
 
     Reports each joint that connects bodies which earlier joints have connected already.
 
-    OpenSim cuts the loop: it splits a body and welds the halves with a constraint. That adds coordinates and
-    multipliers that the file does not mention, and the halves together have another mass or inertia than the body, so
-    the model moves otherwise than it says even where the loop closes. Where it does not close in the default pose, or
-    the joint is a CustomJoint, OpenSim refuses the model. Say what is meant with a constraint.
+    OpenSim cuts the loop: it splits a body and welds the halves with a constraint. That adds
+    coordinates and multipliers that the file does not mention, and the halves together have another
+    mass or inertia than the body, so the model moves otherwise than it says even where the loop
+    closes. Where it does not close in the default pose, or the joint is a CustomJoint, OpenSim
+    refuses the model. Say what is meant with a constraint.
 
     ```xml
     - <WeldJoint name="strut">
@@ -89,7 +95,11 @@ def closed_loop(subject: Subject, found: FindingSink) -> None:
     pairs = Counter(map(_ends, bones.links))
     for link in growth(subject).loops:
         if pairs[_ends(link)] == 1 and link.child_base is not None:
-            others = (other.joint for other in bones.links if other is not link and other.child_base is link.child_base)
+            others = (
+                other.joint
+                for other in bones.links
+                if other is not link and other.child_base is link.child_base
+            )
             before = next(others, None)
             other = f", which {called(before)} has placed already" if before is not None else ""
             found(
@@ -105,10 +115,11 @@ def parallel_joints(subject: Subject, found: FindingSink) -> None:
 
     Reports the second joint between one pair of bodies.
 
-    OpenSim splits the child, lets each joint carry one half, and welds the halves with a constraint: more coordinates
-    than move, and inertias that the file does not say. Of a WeldJoint it makes a constraint, of a FreeJoint nothing,
-    but counts the child's mass twice. It refuses the model if the second joint is a CustomJoint, if its child is
-    ground, or if it is a WeldJoint or a FreeJoint to ground.
+    OpenSim splits the child, lets each joint carry one half, and welds the halves with a
+    constraint: more coordinates than move, and inertias that the file does not say. Of a WeldJoint
+    it makes a constraint, of a FreeJoint nothing, but counts the child's mass twice. It refuses the
+    model if the second joint is a CustomJoint, if its child is ground, or if it is a WeldJoint or a
+    FreeJoint to ground.
 
     ```xml
     - <PinJoint name="hip_again">
@@ -143,8 +154,9 @@ def massless_leaf(subject: Subject, found: FindingSink) -> None:
 
     Reports bodies of mass 0 that move and carry nothing with mass.
 
-    A force on such a body would accelerate it without bounds: the mass matrix is singular, and OpenSim refuses the
-    model, or (at a CustomJoint) computes NaN. Between two bodies with mass, or welded to one, a massless body is fine.
+    A force on such a body would accelerate it without bounds: the mass matrix is singular, and
+    OpenSim refuses the model, or (at a CustomJoint) computes NaN. Between two bodies with mass, or
+    welded to one, a massless body is fine.
 
     ```xml
     - <Body name="shank"> <mass>0</mass> </Body>
@@ -155,7 +167,11 @@ def massless_leaf(subject: Subject, found: FindingSink) -> None:
     if not bones.complete or has_unknown_joints(subject):
         return
     for body, members, joint in _massless_leaves(bones):
-        welded = f" with the bodies welded to it ({listed(item.name for item in members)})" if members else ""
+        welded = (
+            f" with the bodies welded to it ({listed(item.name for item in members)})"
+            if members
+            else ""
+        )
         fate = "computes NaN" if isinstance(joint, CustomJoint) else "refuses the model"
         found(
             f"{called(body)}{welded} is massless and the end of its chain: OpenSim {fate}",
@@ -218,7 +234,8 @@ def _massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body], Joint]
             link
             for link in bones.links
             if not isinstance(link.joint, WeldJoint)
-            and key in {groups.of(base) for base in (link.parent_base, link.child_base) if base is not None}
+            and key
+            in {groups.of(base) for base in (link.parent_base, link.child_base) if base is not None}
         ]
         if len(moving) == 1:
             yield bodies[0], bodies[1:], moving[0].joint

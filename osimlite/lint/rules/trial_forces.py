@@ -7,23 +7,38 @@ from osimlite.lint.engine import WARNING, FindingSink, rule
 from osimlite.lint.trial import CHECKLIST, HICKS, OPENSIM, OURS, TRIAL, Trial
 
 _BOTH = f"{OPENSIM}; {HICKS}"
-FORCE_SHARE = Threshold("residual-force-share", 5.0, "%", "of the largest external force: a residual force at most")
+FORCE_SHARE = Threshold(
+    "residual-force-share", 5.0, "%", "of the largest external force: a residual force at most"
+)
 FORCE_GOOD = Threshold("residual-force-good", 10.0, "N", "residual force that is good")
 FORCE_BAD = Threshold("residual-force-bad", 25.0, "N", "and from which on it is bad")
-FORCE_RMS_GOOD = Threshold("residual-force-rms-good", 5.0, "N", "root mean square of a residual force that is good")
+FORCE_RMS_GOOD = Threshold(
+    "residual-force-rms-good", 5.0, "N", "root mean square of a residual force that is good"
+)
 FORCE_RMS_BAD = Threshold("residual-force-rms-bad", 10.0, "N", "and from which on it is bad")
 MOMENT_SHARE = Threshold(
-    "residual-moment-share", 1.0, "%", "of the largest external force times the height of the mass centre"
+    "residual-moment-share",
+    1.0,
+    "%",
+    "of the largest external force times the height of the mass centre",
 )
 MOMENT_GOOD = Threshold("residual-moment-good", 50.0, "N m", "residual moment that is good")
 MOMENT_BAD = Threshold("residual-moment-bad", 75.0, "N m", "and from which on it is bad")
-MOMENT_RMS_GOOD = Threshold("residual-moment-rms-good", 30.0, "N m", "root mean square of one that is good")
+MOMENT_RMS_GOOD = Threshold(
+    "residual-moment-rms-good", 30.0, "N m", "root mean square of one that is good"
+)
 MOMENT_RMS_BAD = Threshold("residual-moment-rms-bad", 50.0, "N m", "and from which on it is bad")
-RESERVE_GOOD = Threshold("reserve-good", 5.0, "%", "of the moment at a joint that its reserve actuator may give")
+RESERVE_GOOD = Threshold(
+    "reserve-good", 5.0, "%", "of the moment at a joint that its reserve actuator may give"
+)
 RESERVE_BAD = Threshold("reserve-bad", 10.0, "%", "and from which on that is bad")
-ERROR_GOOD = Threshold("tracking-error-good", 2.0, "deg", "by which (cm for translations) a tool may miss its motion")
+ERROR_GOOD = Threshold(
+    "tracking-error-good", 2.0, "deg", "by which (cm for translations) a tool may miss its motion"
+)
 ERROR_BAD = Threshold("tracking-error-bad", 5.0, "deg", "and from which on that is bad")
-ERROR_RMS_BAD = Threshold("tracking-error-rms-bad", 4.0, "cm", "root mean square of a translation's that is bad")
+ERROR_RMS_BAD = Threshold(
+    "tracking-error-rms-bad", 4.0, "cm", "root mean square of a translation's that is bad"
+)
 FULL_GOOD = Threshold("full-activation", 5.0, "%", "of the time that a muscle may be fully active")
 FULL_BAD = Threshold("full-activation-bad", 25.0, "%", "and from which on that is bad")
 PASSIVE_GOOD = Threshold(
@@ -39,14 +54,16 @@ PASSIVE_BAD = Threshold("passive-force-bad", 100.0, "%", "and from which on that
 def residual_force(trial: Trial, found: FindingSink) -> None:
     """A force that nothing gives a body in life pushes the model.
 
-    Looks at the forces at the joint to ground: those of inverse dynamics, and of the residual actuators of RRA, CMC and
-    StaticOptimization. A peak of up to 10 N is good and one of more than 25 N bad, a root mean square up to 5 N and
-    more than 10 N (the table in OpenSim's best practices,
-    https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686); Hicks and others advise peaks of at
-    most 5 % of the largest external force (2015, Is my model good enough?, https://doi.org/10.1115/1.4029304). A peak
-    that is within one of both limits is okay. Residuals of inverse dynamics count as an info where RRA or CMC follow.
+    Looks at the forces at the joint to ground: those of inverse dynamics, and of the residual
+    actuators of RRA, CMC and StaticOptimization. A peak of up to 10 N is good and one of more than
+    25 N bad, a root mean square up to 5 N and more than 10 N (the table in OpenSim's best
+    practices, https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686); Hicks
+    and others advise peaks of at most 5 % of the largest external force (2015, Is my model good
+    enough?, https://doi.org/10.1115/1.4029304). A peak that is within one of both limits is okay.
+    Residuals of inverse dynamics count as an info where RRA or CMC follow.
 
-    Motion, masses and measured loads contradict each other. Whatever makes up for it pushes in the place of muscles.
+    Motion, masses and measured loads contradict each other. Whatever makes up for it pushes in the
+    place of muscles.
 
     ```trial
     - peak of FY of RRA: 61 N, with loads of 850 N
@@ -65,14 +82,15 @@ def residual_force(trial: Trial, found: FindingSink) -> None:
 def residual_moment(trial: Trial, found: FindingSink) -> None:
     """A moment that nothing gives a body in life turns the model.
 
-    As residual-force. A peak of up to 50 N m is good and one of more than 75 N m bad, a root mean square up to 30 N m
-    and more than 50 N m (the table in OpenSim's best practices,
-    https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686); Hicks and others advise at most 1 % of
-    the largest external force times the height of the mass centre (2015, Is my model good enough?,
-    https://doi.org/10.1115/1.4029304), which is much less: what is within OpenSim's limit alone is okay.
+    As residual-force. A peak of up to 50 N m is good and one of more than 75 N m bad, a root mean
+    square up to 30 N m and more than 50 N m (the table in OpenSim's best practices,
+    https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686); Hicks and others
+    advise at most 1 % of the largest external force times the height of the mass centre (2015, Is
+    my model good enough?, https://doi.org/10.1115/1.4029304), which is much less: what is within
+    OpenSim's limit alone is okay.
 
-    The trunk is where most of the mass is, and its mass centre is hard to measure: the residual moments show that it is
-    off, or that the loads act in another place.
+    The trunk is where most of the mass is, and its mass centre is hard to measure: the residual
+    moments show that it is off, or that the loads act in another place.
 
     ```trial
     - peak of MZ of RRA: 96 N m, with loads times height of 800 N m
@@ -84,37 +102,49 @@ def residual_moment(trial: Trial, found: FindingSink) -> None:
     trial.judge(found, [MOMENT_RMS_GOOD, MOMENT_RMS_BAD], OPENSIM, advice, "rms")
 
 
-@rule("OSIM913", "reserve-moment", severity=WARNING, thresholds=(RESERVE_GOOD, RESERVE_BAD), about=TRIAL)
+@rule(
+    "OSIM913",
+    "reserve-moment",
+    severity=WARNING,
+    thresholds=(RESERVE_GOOD, RESERVE_BAD),
+    about=TRIAL,
+)
 def reserve_moment(trial: Trial, found: FindingSink) -> None:
     """Reserve actuators do what muscles cannot.
 
-    Compares the reserve actuators of CMC and StaticOptimization, of coordinates that muscles cross, with the moments
-    that the motion takes there, peak with peak and root mean square with root mean square: up to 5 % is good (Hicks and
-    others 2015, Is my model good enough?, https://doi.org/10.1115/1.4029304), and more than 10 % is bad (OpenSim's
-    checklist, https://simtk-confluence.stanford.edu:8443/plugins/viewsource/viewpagesrc.action?pageId=3376337). What
-    is below 1 N m is not looked at.
+    Compares the reserve actuators of CMC and StaticOptimization, of coordinates that muscles cross,
+    with the moments that the motion takes there, peak with peak and root mean square with root mean
+    square: up to 5 % is good (Hicks and others 2015, Is my model good enough?,
+    https://doi.org/10.1115/1.4029304), and more than 10 % is bad (OpenSim's checklist,
+    https://simtk-confluence.stanford.edu:8443/plugins/viewsource/viewpagesrc.action?pageId=3376337).
+    What is below 1 N m is not looked at.
 
-    The muscles are too weak for the motion, or their paths are wrong; the forces of all muscles there are too small.
+    The muscles are too weak for the motion, or their paths are wrong; the forces of all muscles
+    there are too small.
 
     ```trial
     - peak of the reserve of 'ankle_angle_r', of its joint moment: 34 %
     + peak of the reserve of 'ankle_angle_r', of its joint moment: 2 %
     ```
     """
-    advice = (
-        "look at strength and paths of the muscles there, at passive forces of those against them, and at the moment"
-    )
+    advice = "look at strength and paths of the muscles there, at passive forces of those against them, and at the moment"
     for kind in ("peak", "rms"):
         trial.judge(found, [RESERVE_GOOD, RESERVE_BAD], f"{HICKS}; {CHECKLIST}", advice, kind)
 
 
-@rule("OSIM914", "tracking-error", severity=WARNING, thresholds=(ERROR_GOOD, ERROR_BAD, ERROR_RMS_BAD), about=TRIAL)
+@rule(
+    "OSIM914",
+    "tracking-error",
+    severity=WARNING,
+    thresholds=(ERROR_GOOD, ERROR_BAD, ERROR_RMS_BAD),
+    about=TRIAL,
+)
 def tracking_error(trial: Trial, found: FindingSink) -> None:
     """RRA or CMC misses the motion that it was to follow.
 
-    Looks at the errors that both tools write (`_pErr.sto`): up to 2 degrees or 2 cm are good, more than 5 are bad, of
-    the root mean square of a translation more than 4 cm (the table in OpenSim's best practices,
-    https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686).
+    Looks at the errors that both tools write (`_pErr.sto`): up to 2 degrees or 2 cm are good, more
+    than 5 are bad, of the root mean square of a translation more than 4 cm (the table in OpenSim's
+    best practices, https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686).
 
     The motion whose forces are computed is not that of the subject.
 
@@ -135,10 +165,10 @@ def full_activation(trial: Trial, found: FindingSink) -> None:
 
     Looks in the activations of StaticOptimization and CMC for muscles of 0.99 and more.
 
-    A muscle that cannot give more leaves the rest to others and to reserve actuators; in daily life none is fully
-    active for long. OpenSim's best practices
-    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) ask to compare activations with
-    measured ones, and give no limit: this one is ours.
+    A muscle that cannot give more leaves the rest to others and to reserve actuators; in daily life
+    none is fully active for long. OpenSim's best practices
+    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) ask to compare
+    activations with measured ones, and give no limit: this one is ours.
 
     ```trial
     - share of the time that 'tib_ant_r' is fully active: 40 %
@@ -149,17 +179,24 @@ def full_activation(trial: Trial, found: FindingSink) -> None:
     trial.judge(found, [FULL_GOOD, FULL_BAD], OURS, advice, "share")
 
 
-@rule("OSIM916", "passive-force", severity=WARNING, thresholds=(PASSIVE_GOOD, PASSIVE_BAD), about=TRIAL)
+@rule(
+    "OSIM916",
+    "passive-force",
+    severity=WARNING,
+    thresholds=(PASSIVE_GOOD, PASSIVE_BAD),
+    about=TRIAL,
+)
 def passive_force(trial: Trial, found: FindingSink) -> None:
     """The passive fibers of a muscle pull hard.
 
-    Computes the passive forces of the muscles along the states of CMC, or along the motion of a StaticOptimization with
-    fibers in equilibrium, and compares them with `max_isometric_force`. OpenSim's best practices
-    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) ask to look at them and give no limit:
-    this one is ours.
+    Computes the passive forces of the muscles along the states of CMC, or along the motion of a
+    StaticOptimization with fibers in equilibrium, and compares them with `max_isometric_force`.
+    OpenSim's best practices
+    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) ask to look at them
+    and give no limit: this one is ours.
 
-    Nothing controls passive forces. Muscles on the other side have to pull against them, which nobody's do; static
-    optimization leaves them out, and is wrong by them.
+    Nothing controls passive forces. Muscles on the other side have to pull against them, which
+    nobody's do; static optimization leaves them out, and is wrong by them.
 
     ```trial
     - peak of the passive force of 'rect_fem_r', of its strength: 130 %

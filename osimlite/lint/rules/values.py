@@ -24,12 +24,12 @@ KEEPS_DEFAULT = "OpenSim keeps the default"
 def unreadable_value(subject: Subject, found: FindingSink) -> None:
     """A value is no number, no switch, or not written as OpenSim reads it.
 
-    Reports text that OpenSim cannot read: words where a number belongs, `yes` for a switch, commas or brackets
-    between the numbers of a vector.
+    Reports text that OpenSim cannot read: words where a number belongs, `yes` for a switch, commas
+    or brackets between the numbers of a vector.
 
-    OpenSim writes a line to its log, drops the value and keeps the default. A locked coordinate comes loose, a
-    contact sphere sits at the origin. Where OpenSim takes what was plainly meant all the same, as false for `no`, it
-    is a warning.
+    OpenSim writes a line to its log, drops the value and keeps the default. A locked coordinate
+    comes loose, a contact sphere sits at the origin. Where OpenSim takes what was plainly meant all
+    the same, as false for `no`, it is a warning.
 
     ```xml
     - <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <location>0, -0.2, 0</location>
@@ -37,7 +37,9 @@ def unreadable_value(subject: Subject, found: FindingSink) -> None:
           <radius>0.05</radius> </ContactSphere>
     ```
     """
-    for note, owner, spec, kind in _value_notes(subject, "unreadable", "ignored", "too-few", "too-many"):
+    for note, owner, spec, kind in _value_notes(
+        subject, "unreadable", "ignored", "too-few", "too-many"
+    ):
         if note.kind.startswith("too-") and _all_read(note.word, kind):
             continue
         text = _text(owner, spec)
@@ -50,7 +52,9 @@ def unreadable_value(subject: Subject, found: FindingSink) -> None:
             number=note.number,
             word=note.word,
             suggestion=better,
-            fix=replaced(subject.source, subject.position(owner, tag=spec.tag), better) if "\n" not in text else None,
+            fix=replaced(subject.source, subject.position(owner, tag=spec.tag), better)
+            if "\n" not in text
+            else None,
             severity=WARNING if better is not None and reads_as(better, kind, taken) else None,
         )
 
@@ -61,7 +65,8 @@ def wrong_count(subject: Subject, found: FindingSink) -> None:
 
     Reports vectors and lists with another count than the property has.
 
-    Of too few numbers OpenSim keeps none and takes the default; of too many it takes the first ones, or none.
+    Of too few numbers OpenSim keeps none and takes the default; of too many it takes the first
+    ones, or none.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02</inertia> </Body>
@@ -83,10 +88,11 @@ def wrong_count(subject: Subject, found: FindingSink) -> None:
 def cut_number(subject: Subject, found: FindingSink) -> None:
     """OpenSim reads only the beginning of a number.
 
-    Reports numbers with something behind them: a decimal comma (`1,5`), a unit (`5kg`), a fraction (`1/3`), hexadecimal
-    digits (`0x10`), Fortran's exponent (`1d3`).
+    Reports numbers with something behind them: a decimal comma (`1,5`), a unit (`5kg`), a fraction
+    (`1/3`), hexadecimal digits (`0x10`), Fortran's exponent (`1d3`).
 
-    OpenSim takes the longest beginning that is a number and ignores the rest in silence: `1,5` is 1, `0x10` is 0.
+    OpenSim takes the longest beginning that is a number and ignores the rest in silence: `1,5` is
+    1, `0x10` is 0.
 
     ```xml
     - <Body name="thigh"> <mass>8,5</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -100,7 +106,12 @@ def cut_number(subject: Subject, found: FindingSink) -> None:
             number=note.number,
             word=note.word,
             suggestion=(better := _whole_number(note.word)),
-            fix=replaced(subject.source, subject.position(owner, tag=spec.tag, word=note.word), better, safe=False),
+            fix=replaced(
+                subject.source,
+                subject.position(owner, tag=spec.tag, word=note.word),
+                better,
+                safe=False,
+            ),
         )
 
 
@@ -108,12 +119,13 @@ def cut_number(subject: Subject, found: FindingSink) -> None:
 def empty_value(subject: Subject, found: FindingSink) -> None:
     """An element that should hold a value is empty.
 
-    Reports empty numbers, vectors and switches, and elements in which an object should stand. Properties that may be
-    left out may also be empty.
+    Reports empty numbers, vectors and switches, and elements in which an object should stand.
+    Properties that may be left out may also be empty.
 
-    OpenSim writes a line to its log and keeps the default: that is a warning. The mass of a body has no default, nor
-    have numbers of setups of older classes, as `initial_time` of AnalyzeTool: OpenSim refuses the file. Where an object
-    should stand OpenSim then has none, and fails as soon as it needs one. Both are errors.
+    OpenSim writes a line to its log and keeps the default: that is a warning. The mass of a body
+    has no default, nor have numbers of setups of older classes, as `initial_time` of AnalyzeTool:
+    OpenSim refuses the file. Where an object should stand OpenSim then has none, and fails as soon
+    as it needs one. Both are errors.
 
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
@@ -132,7 +144,12 @@ def empty_value(subject: Subject, found: FindingSink) -> None:
             )
     for note in subject.notes:
         held = note.spec
-        if note.kind == "empty" and note.owner is not None and held is not None and held.accepts is not None:
+        if (
+            note.kind == "empty"
+            and note.owner is not None
+            and held is not None
+            and held.accepts is not None
+        ):
             found(
                 f"<{held.tag}> of {called(note.owner)} is empty: OpenSim then has no {held.accepts.tag} there, not "
                 "even the default, and fails where it needs one; leave the element out",
@@ -142,7 +159,8 @@ def empty_value(subject: Subject, found: FindingSink) -> None:
 
 
 def _value_notes(subject: Subject, *kinds: str) -> Iterator[tuple[Note, Object, FieldSpec, Value]]:
-    # What is left of a value with elements inside means nothing, and what OpenSim refuses has no default.
+    # What is left of a value with elements inside means nothing, and what OpenSim refuses has no
+    # default.
     broken = {note.number for note in subject.notes if note.kind == "child-in-value"}
     broken.update(refusal.number for refusal in subject.refusals)
     for note in subject.notes:
@@ -162,7 +180,12 @@ def _beginning(word: str) -> object:
 
 def _all_read(text: str, kind: Value) -> bool:
     """Whether every word is one of its kind, so that only their count is wrong."""
-    readers: dict[str, Callable[[str], object]] = {"double": real, "int": whole, "bool": flag, "string": str}
+    readers: dict[str, Callable[[str], object]] = {
+        "double": real,
+        "int": whole,
+        "bool": flag,
+        "string": str,
+    }
     reads = readers[kind.scalar]
     try:
         for word in split(text):
@@ -179,7 +202,9 @@ def _text(owner: Object, spec: FieldSpec) -> str:
 
 def _is_refused(note: Note, spec: FieldSpec, kind: Value) -> bool:
     """Return whether OpenSim refuses to load a file for a value that it cannot read."""
-    return note.value is None and (kind.legacy or (spec.tag == "mass" and spec.default != spec.default))
+    return note.value is None and (
+        kind.legacy or (spec.tag == "mass" and spec.default != spec.default)
+    )
 
 
 def _kept(note: Note, owner: Object, spec: FieldSpec, kind: Value) -> str:
@@ -215,7 +240,9 @@ def _readable(text: str, kind: Value) -> str | None:
             numbers = [float(word) for word in words]
         except ValueError:
             return None
-        if (len(words) > 1 or not text.isascii()) and (kind.size is None or len(numbers) == kind.size):
+        if (len(words) > 1 or not text.isascii()) and (
+            kind.size is None or len(numbers) == kind.size
+        ):
             return " ".join(words)
     return None
 
@@ -224,7 +251,9 @@ def _plain_digits(text: str) -> str:
     """The text with minus signs and digits of word processors and other scripts as ASCII has them."""
     import unicodedata
 
-    return unicodedata.normalize("NFKC", text).translate(dict.fromkeys((0x2010, 0x2011, 0x2012, 0x2013, 0x2212), "-"))
+    return unicodedata.normalize("NFKC", text).translate(
+        dict.fromkeys((0x2010, 0x2011, 0x2012, 0x2013, 0x2212), "-")
+    )
 
 
 def _whole_number(word: str) -> str | None:

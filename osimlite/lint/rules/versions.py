@@ -15,14 +15,15 @@ from osimlite.schema.specs import FieldSpec
 def newer_class(subject: Subject, found: FindingSink) -> None:
     """OpenSim has a class or a property only after the version that is aimed at.
 
-    Reports objects of classes, and properties, that OpenSim has only after 4.6, or after the version that the setting
-    `target-version`, or the option `--target-version`, names: one of 4.0 to 4.6. Says which version has them first, and
-    what a property was called before. Properties that say no more than the default are told for information, and so is
-    a number of the format that is too new: no OpenSim refuses a file for it.
+    Reports objects of classes, and properties, that OpenSim has only after 4.6, or after the
+    version that the setting `target-version`, or the option `--target-version`, names: one of 4.0
+    to 4.6. Says which version has them first, and what a property was called before. Properties
+    that say no more than the default are told for information, and so is a number of the format
+    that is too new: no OpenSim refuses a file for it.
 
-    In a set (bodies, joints, forces ...) OpenSim refuses to load an object of an unknown class; elsewhere it leaves the
-    object out. Unknown properties it drops without a word. The number of the format hardly tells: from 4.0 to 4.4 and
-    from 4.5.1 to 4.6 it is the same.
+    In a set (bodies, joints, forces ...) OpenSim refuses to load an object of an unknown class;
+    elsewhere it leaves the object out. Unknown properties it drops without a word. The number of
+    the format hardly tells: from 4.0 to 4.4 and from 4.5.1 to 4.6 it is the same.
 
     ```xml
     - <CoordinateLinearStopForce name="stop">
@@ -39,8 +40,10 @@ def newer_class(subject: Subject, found: FindingSink) -> None:
     if subject.source is not None and later.format < (subject.version or 0) <= CURRENT_VERSION:
         found(
             f"the file has the format {subject.version}, OpenSim {target} writes {later.format} and takes it for that",
-            number=0, attribute="Version", severity=INFO,
-        )  # fmt: skip
+            number=0,
+            attribute="Version",
+            severity=INFO,
+        )
     for cls, items in subject.by_class.items():
         first = cls.since or later.classes.get(cls.tag)
         if first:
@@ -48,7 +51,8 @@ def newer_class(subject: Subject, found: FindingSink) -> None:
                 # What is there by default stands in no file.
                 if subject.source is None or item._index is not None:
                     found(
-                        f"{called(item)}: OpenSim has {a(cls.tag)} from version {first} on; {target} refuses it", item
+                        f"{called(item)}: OpenSim has {a(cls.tag)} from version {first} on; {target} refuses it",
+                        item,
                     )
             continue
         for spec, version, before in new_properties(cls, target):
@@ -59,8 +63,10 @@ def newer_class(subject: Subject, found: FindingSink) -> None:
                 is_default = spec.factory is None and getattr(item, spec.name) == spec.default
                 found(
                     f"{called(item)}: OpenSim has {spec.tag} from version {version} on; {target} drops it{was}",
-                    item, tag=spec.tag, severity=INFO if is_default else None,
-                )  # fmt: skip
+                    item,
+                    tag=spec.tag,
+                    severity=INFO if is_default else None,
+                )
 
 
 def _is_given(subject: Subject, item: Object, spec: FieldSpec) -> bool:

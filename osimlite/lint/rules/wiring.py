@@ -21,11 +21,11 @@ from osimlite.schema.tree import Use, normalised
 def control_function_count(subject: Subject, found: FindingSink) -> None:
     """A prescribed controller has not one function for each of its actuators.
 
-    Compares the number of control functions with the number of actuators. Controllers that read their controls from a
-    file are left out.
+    Compares the number of control functions with the number of actuators. Controllers that read
+    their controls from a file are left out.
 
-    The first function drives the first actuator, and so on; names play no part. OpenSim refuses the model where the
-    numbers differ.
+    The first function drives the first actuator, and so on; names play no part. OpenSim refuses the
+    model where the numbers differ.
 
     ```xml
       <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
@@ -41,11 +41,16 @@ def control_function_count(subject: Subject, found: FindingSink) -> None:
     for controller in subject.named("PrescribedController"):
         if isinstance(controller.ControlFunctions, Unknown):
             continue
-        functions, actuators = len(controller.ControlFunctions.objects), len(controller.socket_actuators)
+        functions, actuators = (
+            len(controller.ControlFunctions.objects),
+            len(controller.socket_actuators),
+        )
         if subject.version is not None and subject.version < 40600:
             # There OpenSim drops a name that no actuator has.
             actuators = sum(
-                1 for use in subject.uses if use.holder is controller and subject.resolution(use).target is not None
+                1
+                for use in subject.uses
+                if use.holder is controller and subject.resolution(use).target is not None
             )
         if controller.controls_file is None and functions != actuators:
             found(
@@ -59,11 +64,11 @@ def control_function_count(subject: Subject, found: FindingSink) -> None:
 def broken_input(subject: Subject, found: FindingSink) -> None:
     """An input names an output that does not exist.
 
-    Follows the inputs of reporters, controllers and geometry: the path of a component, a bar, and one of its outputs
-    of the type that the input takes.
+    Follows the inputs of reporters, controllers and geometry: the path of a component, a bar, and
+    one of its outputs of the type that the input takes.
 
-    OpenSim refuses the model when it is connected. Paths are absolute or begin at the component with the input. It
-    also refuses an input of a geometry that a frame draws.
+    OpenSim refuses the model when it is connected. Paths are absolute or begin at the component
+    with the input. It also refuses an input of a geometry that a frame draws.
 
     ```xml
       <components>
@@ -139,8 +144,11 @@ class _Fault(NamedTuple):
     suggestion: str | None = None
 
 
-# The path of a component, a bar, an output, a channel of it and another name for it; the last two may be left out.
-_INPUT = re.compile(r"(?:(?P<path>.*)\|)?(?P<output>[^|:(]*)(?::(?P<channel>[^(]*))?(?:\((?P<alias>.*)\))?")
+# The path of a component, a bar, an output, a channel of it and another name for it; the last two
+# may be left out.
+_INPUT = re.compile(
+    r"(?:(?P<path>.*)\|)?(?P<output>[^|:(]*)(?::(?P<channel>[^(]*))?(?:\((?P<alias>.*)\))?"
+)
 
 
 def _fault_of(subject: Subject, use: Use, text: str) -> _Fault | None:
@@ -154,15 +162,21 @@ def _fault_of(subject: Subject, use: Use, text: str) -> _Fault | None:
     if component is None:
         if subject.has_unknown:
             return None
-        right = nearest(path, [known for known, item in tree.by_path.items() if outputs_of(type(item))])
-        return _Fault(f", but there is no component '{path}'", text.replace(path, right, 1) if right else None)
+        right = nearest(
+            path, [known for known, item in tree.by_path.items() if outputs_of(type(item))]
+        )
+        return _Fault(
+            f", but there is no component '{path}'", text.replace(path, right, 1) if right else None
+        )
     if isinstance(component, Unknown):
         return None
     outputs = outputs_of(type(component))
     kind = use.reference.target
     known = outputs.get(match["output"])
     if known is None:
-        right = nearest(match["output"], [name for name, output in outputs.items() if output.type == kind])
+        right = nearest(
+            match["output"], [name for name, output in outputs.items() if output.type == kind]
+        )
         suggestion = None if right is None else f"{path}|{right}" + text[match.end("output") :]
         return _Fault(f", but {called(component)} has no output '{match['output']}'", suggestion)
     if known.type != kind:
@@ -172,7 +186,13 @@ def _fault_of(subject: Subject, use: Use, text: str) -> _Fault | None:
     parent = tree.parent_of(use.owner)
     if isinstance(use.owner, Geometry) and isinstance(parent, Frame):
         held = any(item is use.owner for item in parent.subcomponents)
-        return None if held else _Fault(f"; {called(parent)} draws it and moves it already: OpenSim refuses the model")
+        return (
+            None
+            if held
+            else _Fault(
+                f"; {called(parent)} draws it and moves it already: OpenSim refuses the model"
+            )
+        )
     return None
 
 

@@ -24,11 +24,12 @@ def _wraps(path: GeometryPath) -> list[PathWrap]:
 def swallowed_point(subject: Subject, found: FindingSink) -> None:
     """A point of a path lies inside a surface that the path wraps around.
 
-    Reports points fixed to the body of a cylinder (which has no ends here), a sphere or an ellipsoid, and inside it,
-    within the `range` of the wrap.
+    Reports points fixed to the body of a cylinder (which has no ends here), a sphere or an
+    ellipsoid, and inside it, within the `range` of the wrap.
 
-    OpenSim lets no piece of a path wrap that begins or ends inside: the path goes straight through the surface, in
-    every pose and without a message. A point may be inside by less than a millimetre, after scaling for instance.
+    OpenSim lets no piece of a path wrap that begins or ends inside: the path goes straight through
+    the surface, in every pose and without a message. A point may be inside by less than a
+    millimetre, after scaling for instance.
 
     ```xml
       <PathPoint name="band_a"> <location>0.02 0 0.02</location> </PathPoint>
@@ -40,7 +41,11 @@ def swallowed_point(subject: Subject, found: FindingSink) -> None:
         points = path.path_point_set.objects
         for wrap in _wraps(path):
             surface = subject.target_of(wrap, "wrap_object")
-            base = _base(subject, surface) if isinstance(surface, WrapObject) and surface.active else None
+            base = (
+                _base(subject, surface)
+                if isinstance(surface, WrapObject) and surface.active
+                else None
+            )
             if base is None:
                 continue
             assert isinstance(surface, WrapObject)
@@ -65,13 +70,14 @@ def swallowed_point(subject: Subject, found: FindingSink) -> None:
 def wrap_range(subject: Subject, found: FindingSink) -> None:
     """The range of a wrap holds no piece of the path.
 
-    Reports wraps whose `range` ends at the point where it begins, or before it. A range that ends beyond the last
-    point is an error.
+    Reports wraps whose `range` ends at the point where it begins, or before it. A range that ends
+    beyond the last point is an error.
 
-    The path never wraps around the surface; where the range ends before it begins, OpenSim leaves out all wraps of the
-    path that follow as well. Beyond the last point it fails as soon as it computes a length, and its message names no
-    wrap; only in poses where an earlier wrap has none of its conditional points it does not get there. Points count
-    from 1, and -1 stands for either end.
+    The path never wraps around the surface; where the range ends before it begins, OpenSim leaves
+    out all wraps of the path that follow as well. Beyond the last point it fails as soon as it
+    computes a length, and its message names no wrap; only in poses where an earlier wrap has none
+    of its conditional points it does not get there. Points count from 1, and -1 stands for either
+    end.
 
     ```xml
     - <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>2 1</range> </PathWrap>
@@ -96,21 +102,34 @@ def wrap_range(subject: Subject, found: FindingSink) -> None:
                     wrap,
                     tag="range",
                     # Nobody asks for the length of a force that is off.
-                    severity=WARNING if may_leave or getattr(owner, "appliesForce", True) is False else ERROR,
+                    severity=WARNING
+                    if may_leave or getattr(owner, "appliesForce", True) is False
+                    else ERROR,
                 )
             elif start >= end or end > count:
-                others = " and OpenSim leaves out the wraps after it" if start > end and not is_off else ""
-                found(f"{tells} holds no piece of the path: it never wraps{others}", wrap, tag="range")
+                others = (
+                    " and OpenSim leaves out the wraps after it"
+                    if start > end and not is_off
+                    else ""
+                )
+                found(
+                    f"{tells} holds no piece of the path: it never wraps{others}", wrap, tag="range"
+                )
             is_left = is_left or (start > end and not is_off)
             held = points[start - 1 : end]
-            may_leave = may_leave or not (is_off or any(not isinstance(point, ConditionalPathPoint) for point in held))
+            may_leave = may_leave or not (
+                is_off or any(not isinstance(point, ConditionalPathPoint) for point in held)
+            )
 
 
 def _base(subject: Subject, surface: WrapObject) -> tuple[Component, Pose] | None:
     """The body that a surface is fixed to, and where it is on it."""
     holder = subject.tree.parent_of(surface)
     placed = on_base(subject, subject.tree.parent_of(holder) if holder is not None else None)
-    return placed and (placed[0], placed[1].then(fixed(surface.xyz_body_rotation, surface.translation)))
+    return placed and (
+        placed[0],
+        placed[1].then(fixed(surface.xyz_body_rotation, surface.translation)),
+    )
 
 
 def _depth(surface: WrapObject, place: Vector) -> float:
@@ -122,7 +141,9 @@ def _depth(surface: WrapObject, place: Vector) -> float:
         case WrapSphere():
             return surface.radius - math.hypot(x, y, z)
         case WrapEllipsoid() if min(surface.dimensions) > 0:
-            size = math.hypot(*(part / half for part, half in zip(place, surface.dimensions, strict=True)))
+            size = math.hypot(
+                *(part / half for part, half in zip(place, surface.dimensions, strict=True))
+            )
             if size * size < 1 - 1e-4:
                 return math.hypot(x, y, z) * (1 / size - 1) if size > 0 else min(surface.dimensions)
     return 0.0

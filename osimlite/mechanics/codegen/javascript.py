@@ -1,8 +1,9 @@
 """Kernels as JavaScript: a page computes poses and paths by the very functions that simulations run.
 
-Vectors are typed arrays, of which `at` gives the rest from a place on; a law has its number in a list `laws` for its
-address. JavaScript has one type of numbers, so that results differ from Python's in the sign of an integer zero and in
-the last digits of mathematical functions only. Integers beyond 53 bits have no counterpart.
+Vectors are typed arrays, of which `at` gives the rest from a place on; a law has its number in a
+list `laws` for its address. JavaScript has one type of numbers, so that results differ from
+Python's in the sign of an integer zero and in the last digits of mathematical functions only.
+Integers beyond 53 bits have no counterpart.
 """
 
 from __future__ import annotations
@@ -25,7 +26,14 @@ FUNCTIONS: dict[type[ast.operator], str] = {
     ast.Pow: "power",
 }
 """Operators that mean something else in JavaScript, by the function of the runtime."""
-COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+COMPARISONS = {
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+}
 SIGNS = {ast.USub: "-", ast.UAdd: "+"}
 CALLED: dict[Any, str] = {
     abs: "Math.abs",
@@ -150,7 +158,9 @@ def _write_function(function: Function) -> _Writer:
 
 def _write_record(record: Any) -> str:
     """Return a class of named tuples as an array whose items have names too."""
-    getters = " ".join(f"get ${name}() {{ return this[{k}]; }}" for k, name in enumerate(record._fields))
+    getters = " ".join(
+        f"get ${name}() {{ return this[{k}]; }}" for k, name in enumerate(record._fields)
+    )
     return f"class {_record_name(record)} extends Array {{ {getters} }}"
 
 
@@ -215,7 +225,8 @@ class _Writer(Kernel):
             case ast.While(test=test, body=body, orelse=[]):
                 return [f"while ({self.condition(test)}) {{", *self.block(body), "}"]
             case ast.For(target=ast.Name(id=name), iter=iterated, body=body, orelse=[]):
-                # As in Python, what the body stores in the variable makes no difference to the next round.
+                # As in Python, what the body stores in the variable makes no difference to the next
+                # round.
                 counter = self.temporary()
                 store = f"{_local(name)} = {counter};"
                 return [f"for ({self.loop(counter, iterated)}) {{", store, *self.block(body), "}"]
@@ -232,20 +243,28 @@ class _Writer(Kernel):
         if isinstance(value, ast.Tuple) and all(map(_has_separate_items, (value, *targets))):
             # All items are computed before any of them is stored.
             held = [self.temporary() for _ in value.elts]
-            lines = [f"{name} = {self.expression(part)};" for name, part in zip(held, value.elts, strict=True)]
+            lines = [
+                f"{name} = {self.expression(part)};"
+                for name, part in zip(held, value.elts, strict=True)
+            ]
             return lines + [line for target in targets for line in self.store(target, held)]
         # JavaScript would evaluate the place before the value.
         whole = self.temporary()
         lines = [f"{whole} = {self.expression(value)};"]
         for target in targets:
             parts = len(target.elts) if isinstance(target, ast.Tuple) else 0
-            lines += self.store(target, [f"{whole}[{k}]" for k in range(parts)] if parts else [whole])
+            lines += self.store(
+                target, [f"{whole}[{k}]" for k in range(parts)] if parts else [whole]
+            )
         return lines
 
     def store(self, target: ast.expr, values: Sequence[str]) -> list[str]:
         """Return the lines that store values in a target, or in its items."""
         targets = target.elts if isinstance(target, ast.Tuple) else [target]
-        return [f"{self.expression(part)} = {value};" for part, value in zip(targets, values, strict=True)]
+        return [
+            f"{self.expression(part)} = {value};"
+            for part, value in zip(targets, values, strict=True)
+        ]
 
     def temporary(self) -> str:
         """Return the name of a new variable."""
@@ -256,7 +275,9 @@ class _Writer(Kernel):
         """Return the head of a loop."""
         if not (isinstance(iterated, ast.Call) and self.value(iterated.func) is range):
             if not isinstance(iterated, ast.Tuple):
-                raise self.refuse(iterated, "a loop is over range() or over a tuple that is written out")
+                raise self.refuse(
+                    iterated, "a loop is over range() or over a tuple that is written out"
+                )
             return f"{name} of {self.expression(iterated)}"
         bounds = [self.expression(part) for part in iterated.args]
         first, stop, step = ["0", *bounds, "1"] if len(bounds) == 1 else [*bounds, "1"][:3]
@@ -291,18 +312,24 @@ class _Writer(Kernel):
             case ast.Compare():
                 return self.compare(node)
             case ast.IfExp(test=test, body=body, orelse=other):
-                return f"({self.condition(test)} ? {self.expression(body)} : {self.expression(other)})"
+                return (
+                    f"({self.condition(test)} ? {self.expression(body)} : {self.expression(other)})"
+                )
             case ast.Tuple(elts=parts):
                 return f"[{', '.join(map(self.expression, parts))}]"
             case ast.Subscript(value=value, slice=index) if not isinstance(index, ast.Slice):
                 owner_text, text = self.expression(value), self.expression(index)
                 # Only a tuple has a last item.
-                return f"{owner_text}.at({text})" if text.startswith("(-") else f"{owner_text}[{text}]"
+                return (
+                    f"{owner_text}.at({text})" if text.startswith("(-") else f"{owner_text}[{text}]"
+                )
             case ast.Starred(value=value):
                 return f"...{self.expression(value)}"
             case ast.Call(func=function, args=arguments, keywords=[]):
                 called = self.value(function) if not self._is_local(function) else None
-                return self.call(called, function, [self.expression(part) for part in arguments], node)
+                return self.call(
+                    called, function, [self.expression(part) for part in arguments], node
+                )
         raise self.refuse(node)
 
     def _is_local(self, node: ast.expr) -> bool:
@@ -321,7 +348,9 @@ class _Writer(Kernel):
             return f"({left} {OPERATORS[type(op)]} {right})"
         if type(op) in FUNCTIONS:
             return f"{FUNCTIONS[type(op)]}({left}, {right})"
-        if isinstance(op, ast.BitAnd) and any(text.isdigit() and int(text) <= LARGEST_MASK for text in (left, right)):
+        if isinstance(op, ast.BitAnd) and any(
+            text.isdigit() and int(text) <= LARGEST_MASK for text in (left, right)
+        ):
             return f"({left} & {right})"
         raise self.refuse(node, "JavaScript has no integers of 64 bits")
 
@@ -355,7 +384,11 @@ class _Writer(Kernel):
             return self.expression(first)
         held, rest = self.temporary(), self.either(op, others)
         test = f"({held} = {self.expression(first)}) != 0"
-        return f"({test} ? {rest} : {held})" if isinstance(op, ast.And) else f"({test} ? {held} : {rest})"
+        return (
+            f"({test} ? {rest} : {held})"
+            if isinstance(op, ast.And)
+            else f"({test} ? {held} : {rest})"
+        )
 
     def compare(self, node: ast.Compare) -> str:
         """Return the text of a chain of comparisons, whose operands are evaluated once."""
@@ -376,7 +409,9 @@ class _Writer(Kernel):
             before = after
         return f"({' && '.join(tests)})"
 
-    def call(self, called: Any, function: ast.expr, arguments: Sequence[str], node: ast.expr) -> str:
+    def call(
+        self, called: Any, function: ast.expr, arguments: Sequence[str], node: ast.expr
+    ) -> str:
         """Return the text of a call."""
         if self._is_local(function):
             return f"{self.expression(function)}({', '.join(arguments)})"
@@ -396,12 +431,20 @@ class _Writer(Kernel):
         self.records.append(record)
         is_complete = any(text.startswith("...") for text in arguments)
         missing = () if is_complete else record._fields[len(arguments) :]
-        defaults = [_number(record._field_defaults[name]) for name in missing if name in record._field_defaults]
+        defaults = [
+            _number(record._field_defaults[name])
+            for name in missing
+            if name in record._field_defaults
+        ]
         return f"{_record_name(record)}.of({', '.join((*arguments, *defaults))})"
 
     def constant(self, node: ast.Name | ast.Attribute) -> str:
         """Return the text of a value of a module."""
-        value = getattr(self.value(node.value), node.attr) if isinstance(node, ast.Attribute) else self.value(node)
+        value = (
+            getattr(self.value(node.value), node.attr)
+            if isinstance(node, ast.Attribute)
+            else self.value(node)
+        )
         if isinstance(value, FunctionType):
             self.functions.append(value)
             return name_of(value)
@@ -411,7 +454,9 @@ class _Writer(Kernel):
 
 
 def _has_separate_items(node: ast.expr) -> bool:
-    return isinstance(node, ast.Tuple) and not any(isinstance(part, ast.Starred) for part in node.elts)
+    return isinstance(node, ast.Tuple) and not any(
+        isinstance(part, ast.Starred) for part in node.elts
+    )
 
 
 def _local(name: str) -> str:

@@ -1,7 +1,8 @@
 """The Python that kernels and laws are written in: functions of floats, integers, vectors and tuples of these.
 
-A writer of another language starts from a `Kernel`, which has the text of one function and knows what the names in it
-stand for. It meets a few kinds of statements and expressions only; what else there is, is an error that names it.
+A writer of another language starts from a `Kernel`, which has the text of one function and knows
+what the names in it stand for. It meets a few kinds of statements and expressions only; what else
+there is, is an error that names it.
 """
 
 from __future__ import annotations
@@ -61,8 +62,12 @@ class Kernel:
     def value(self, node: ast.expr) -> Any:
         """Return what a global name, or an attribute of a record or module, stands for; None if nothing."""
         if isinstance(node, ast.Attribute):
-            owner = self.value(node.value) if isinstance(node.value, ast.Name | ast.Attribute) else None
-            return getattr(owner, node.attr, None) if isinstance(owner, Record | ModuleType) else None
+            owner = (
+                self.value(node.value) if isinstance(node.value, ast.Name | ast.Attribute) else None
+            )
+            return (
+                getattr(owner, node.attr, None) if isinstance(owner, Record | ModuleType) else None
+            )
         name = node.id if isinstance(node, ast.Name) else ""
         scope = self.function.__globals__
         return scope[name] if name in scope else getattr(builtins, name, None)
@@ -105,12 +110,16 @@ def find_tree(function: Function) -> ast.FunctionDef:
     lines = linecache.getlines(file, function.__globals__)
     if file not in _parsed or _parsed[file][0] is not lines:
         trees = list_functions(ast.parse("".join(lines)))
-        starts = [min([tree.lineno, *(part.lineno for part in tree.decorator_list)]) for tree in trees]
+        starts = [
+            min([tree.lineno, *(part.lineno for part in tree.decorator_list)]) for tree in trees
+        ]
         found = {(start, tree.name): tree for start, tree in zip(starts, trees, strict=True)}
         _parsed[file] = lines, found
     key = function.__code__.co_firstlineno, function.__code__.co_name
     if key not in _parsed[file][1]:
-        raise OSError(f"{file} has no function {key[1]} in line {key[0]}: it has changed, or its text is not kept")
+        raise OSError(
+            f"{file} has no function {key[1]} in line {key[0]}: it has changed, or its text is not kept"
+        )
     return _parsed[file][1][key]
 
 
@@ -133,7 +142,8 @@ Node = TypeVar("Node", bound=ast.AST)
 def copy_tree(node: Node) -> Node:
     """Return a copy of a tree that shares what has no parts, such as operators.
 
-    It is made ten times as fast as by `copy.deepcopy`, which a small study would spend a tenth of its time in.
+    It is made ten times as fast as by `copy.deepcopy`, which a small study would spend a tenth of
+    its time in.
     """
     result = type(node).__new__(type(node))
     state = vars(result)
@@ -159,4 +169,8 @@ def name_of(function: Function) -> str:
 def stored(*trees: ast.AST) -> list[str]:
     """Return the names of the variables that some code assigns, each once."""
     nodes = (node for tree in trees for node in ast.walk(tree))
-    return list(dict.fromkeys(n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)))
+    return list(
+        dict.fromkeys(
+            n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+        )
+    )

@@ -1,8 +1,9 @@
 """Which functions a kernel consists of, and a digest of their code.
 
-A kernel consists of its own function and of all functions of this package that it calls. Two states of the sources
-that compile to the same code have the same digest: comments, docstrings and line numbers do not count. Every version of
-Python computes the same digest, because one compiled library serves them all.
+A kernel consists of its own function and of all functions of this package that it calls. Two states
+of the sources that compile to the same code have the same digest: comments, docstrings and line
+numbers do not count. Every version of Python computes the same digest, because one compiled library
+serves them all.
 """
 
 from __future__ import annotations
@@ -69,7 +70,9 @@ def _normalize_source(function: FunctionType) -> str:
 def _global_values(function: FunctionType) -> list[tuple[str, Any]]:
     """Return the global names that a function uses, with their values."""
     scope = function.__globals__
-    return [(name, scope[name]) for name in dict.fromkeys(function.__code__.co_names) if name in scope]
+    return [
+        (name, scope[name]) for name in dict.fromkeys(function.__code__.co_names) if name in scope
+    ]
 
 
 def _is_local(value: object) -> bool:
@@ -80,9 +83,15 @@ def _is_local(value: object) -> bool:
 def _describe_value(value: Any) -> Any:
     """Return the part of a global value that compiled code depends on, equal in every process."""
     if isinstance(value, Record):
-        return value.__qualname__, {name: number for name, number in vars(value).items() if name.isupper()}
+        return value.__qualname__, {
+            name: number for name, number in vars(value).items() if name.isupper()
+        }
     if isinstance(value, type):
-        return value.__qualname__, getattr(value, "_fields", ()), getattr(value, "_field_defaults", {})
+        return (
+            value.__qualname__,
+            getattr(value, "_fields", ()),
+            getattr(value, "_field_defaults", {}),
+        )
     if isinstance(value, int | float | str | tuple):
         return value
     return getattr(value, "__qualname__", type(value).__name__)

@@ -13,7 +13,8 @@ from typing import NamedTuple
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.codegen.processor import machine_name
 
-# `shutil` and `subprocess` are imported where a compiler runs: simulations need only the names of targets.
+# `shutil` and `subprocess` are imported where a compiler runs: simulations need only the names of
+# targets.
 
 PROGRAMS = ("clang++", "g++", "c++", "clang-cl")
 """Compilers in the order of preference: clang compiles kernels faster than g++."""
@@ -29,7 +30,8 @@ COMMON = (
     "-std=c++17", "-fPIC", "-fvisibility=hidden", "-fno-exceptions", "-fno-rtti", "-w",
     # Results are those of Python to the last bit: no fused operations, no rearranged sums.
     "-fno-fast-math", "-ffp-contract=off",
-    # Kernels read neither errno nor the floating-point exceptions, and both prevent vectorised loops.
+    # Kernels read neither errno nor the floating-point exceptions, and both prevent vectorised
+    # loops.
     "-fno-math-errno", "-fno-trapping-math",
 )  # fmt: skip
 
@@ -37,13 +39,14 @@ GCC = (
     # With g++'s own limits on inlining an evaluation takes 1.4 to 1.6 times as long.
     "--param=max-inline-insns-single=1000", "--param=max-inline-insns-auto=300",
     "--param=inline-unit-growth=300", "--param=large-function-growth=1000",
-    # Vectors of a difference beside a sum (c x - s y, s x + c y) are fused by g++ 12 in spite of -ffp-contract=off.
+    # Vectors of a difference beside a sum (c x - s y, s x + c y) are fused by g++ 12 in spite of
+    # -ffp-contract=off.
     "-fno-tree-slp-vectorize",
 )  # fmt: skip
 
 CLANG = (
-    # Clang inlines functions with several callers less. With its default limit an evaluation of gait2392 takes 16.1
-    # instead of 13.9 us; compiling takes a tenth longer with this one.
+    # Clang inlines functions with several callers less. With its default limit an evaluation of
+    # gait2392 takes 16.1 instead of 13.9 us; compiling takes a tenth longer with this one.
     "-mllvm", "-inline-threshold=500",
 )  # fmt: skip
 
@@ -73,7 +76,8 @@ class Compiler(NamedTuple):
 
     def flags(self, target: str = NATIVE) -> list[str]:
         """Return the options that decide the machine code."""
-        # On x86-64 the baseline is for processors of before 2013: it is compiled in a third of the time.
+        # On x86-64 the baseline is for processors of before 2013: it is compiled in a third of the
+        # time.
         is_quick = target == BASELINE and self.machine == "x86_64"
         flags = [*COMMON, "-O2" if is_quick else "-O3"]
         if not is_quick and "ziglang" not in self.command:
@@ -165,8 +169,8 @@ def find_compiler() -> Compiler | None:
 def find_cross_compiler(platform: str) -> Compiler | None:
     """Return the compiler of the variable CXX, which compiles for another platform.
 
-    Args:
-        platform: as in the tag of a wheel, such as "manylinux_2_17_x86_64", "macosx_11_0_arm64" or "win_amd64".
+    Args: platform: as in the tag of a wheel, such as "manylinux_2_17_x86_64", "macosx_11_0_arm64"
+        or "win_amd64".
     """
     compiler = find_compiler()
     if compiler is None:

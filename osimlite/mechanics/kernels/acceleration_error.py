@@ -10,18 +10,23 @@ from osimlite.mechanics.kernels.states import copy
 from osimlite.mechanics.laws.vectors import ZERO, along, cross, minus, times, vector
 
 SIGN, COORDINATES, TURNS = 0, 1, 3
-"""Of its integers: -1 if it is passed backwards, else 1; the degrees of freedom of the first two coordinates of the
-joint, and the operations that are the three turns, -1 for what does not move."""
+"""Of its integers: -1 if it is passed backwards, else 1; the degrees of freedom of the first two
+coordinates of the joint, and the operations that are the three turns, -1 for what does not move.
+"""
 
 
-def place_drift(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
+def place_drift(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
+) -> int:
     """Nothing moves."""
     kept, frame = operation_work(model, data, operation), at(data, WORK.SCRATCH)
     copy(12, frame, kept)
     return OUTCOME.OK
 
 
-def move_drift(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
+def move_drift(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
+) -> int:
     """Velocity and own acceleration in SCRATCH; what turns the joint forwards stays in the operation."""
     own = at(model, operation_ints(model, operation)[OPERATION.ARGUMENTS])
     kept, result, u = (
@@ -34,7 +39,8 @@ def move_drift(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, o
         last = own[TURNS + row]
         if last < 0:
             continue
-        # What Simbody takes for the rates of the angles before this one turns its axis, and should not.
+        # What Simbody takes for the rates of the angles before this one turns its axis, and should
+        # not.
         drift = ZERO
         for turn in range(3):
             number = own[TURNS + turn]
@@ -47,7 +53,9 @@ def move_drift(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, o
                     wrong += share(model, data, number, freedom) * u[freedom]
             if turn < row:
                 wrong -= rate(model, data, u, number)
-            drift = along(drift, wrong, vector(operation_work(model, data, number), OPERATION_WORK.AXIS))
+            drift = along(
+                drift, wrong, vector(operation_work(model, data, number), OPERATION_WORK.AXIS)
+            )
         axis = vector(operation_work(model, data, last), OPERATION_WORK.AXIS)
         total = along(total, -rate(model, data, u, last), cross(axis, drift))
     kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE], kept[OPERATION_WORK.CURVATURE] = total
@@ -60,7 +68,9 @@ def move_drift(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, o
 def rate(model: Ints, data: Floats, u: Floats, operation: int) -> float:
     """Of the amount of an operation."""
     freedom = operation_ints(model, operation)[OPERATION.DOF]
-    return u[freedom] if freedom >= 0 else operation_work(model, data, operation)[OPERATION_WORK.RATE]
+    return (
+        u[freedom] if freedom >= 0 else operation_work(model, data, operation)[OPERATION_WORK.RATE]
+    )
 
 
 def share(model: Ints, data: Floats, operation: int, freedom: int) -> float:

@@ -1,9 +1,10 @@
 """Assembly of poses: the pose nearest to a given one that fulfils the constraints, for many poses in one call.
 
-The search is that of :mod:`osimlite.mechanics.multibody.assembly`: a projection onto the constraints by Newton's method, then
-minimisation of half the sum of squared changes of the coordinates along the constraints (J. Nocedal, S. Wright,
-Numerical Optimization, 2006, chapter 15.3). The step is that of Newton's method without the curvature of the
-constraints while that converges quickly, else with it.
+The search is that of :mod:`osimlite.mechanics.multibody.assembly`: a projection onto the
+constraints by Newton's method, then minimisation of half the sum of squared changes of the
+coordinates along the constraints (J. Nocedal, S. Wright, Numerical Optimization, 2006, chapter
+15.3). The step is that of Newton's method without the curvature of the constraints while that
+converges quickly, else with it.
 """
 
 from __future__ import annotations
@@ -28,8 +29,9 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.projection import position_errors, rows_by_values
 from osimlite.mechanics.kernels.states import copy, is_finite
 
-# Integers: the head, then what each degree of freedom is, three arrays (n,), room for a list (n,) of those that are
-# free, and of each coupler the degree of freedom that depends on others and its equation.
+# Integers: the head, then what each degree of freedom is, three arrays (n,), room for a list (n,)
+# of those that are free, and of each coupler the degree of freedom that depends on others and its
+# equation.
 MOVES_LINKS = 0
 """Offset of 1 if the equations need positions of links, 0 if they need coordinates only."""
 COUPLERS = 1
@@ -102,7 +104,14 @@ class Assembly(NamedTuple):
 
 def assembly_work_size(count: int, size: int) -> int:
     """Return the length of the work vector for `count` equations and `size` degrees of freedom."""
-    return 7 * size + 3 * count + 2 * count * size + factor_room(count, size) + count * count + 5 * size * size
+    return (
+        7 * size
+        + 3 * count
+        + 2 * count * size
+        + factor_room(count, size)
+        + count * count
+        + 5 * size * size
+    )
 
 
 def assemble_poses(
@@ -153,7 +162,8 @@ def assemble_pose(a: Assembly, wanted: Floats, q: Floats) -> bool:
                     worst, most = k, outside
         if worst < 0:
             return True
-        # Fix the coordinate that leaves its range furthest at the end of it; then the others may fit.
+        # Fix the coordinate that leaves its range furthest at the end of it; then the others may
+        # fit.
         held[worst] = HELD_AT_END
         given[worst] = min(max(q[worst], ranges[2 * worst]), ranges[2 * worst + 1])
 
@@ -336,11 +346,9 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
 def find_step(a: Assembly, wanted: Floats, q: Floats, has_curvature: bool) -> float:
     """Find Newton's step in the null space of the linearized equations.
 
-    Args:
-        a: the assembly; its work vector gets the step of every degree of freedom (rad or m).
-        wanted: desired values of the coordinates (n,).
-        q: present values (n,).
-        has_curvature: whether the Hessian contains the equations times their multipliers, besides the cost.
+    Args: a: the assembly; its work vector gets the step of every degree of freedom (rad or m).
+        wanted: desired values of the coordinates (n,). q: present values (n,). has_curvature:
+        whether the Hessian contains the equations times their multipliers, besides the cost.
 
     Returns:
         The largest change of a coordinate (rad or m).
@@ -348,7 +356,10 @@ def find_step(a: Assembly, wanted: Floats, q: Floats, has_curvature: bool) -> fl
     size, count = a.model[MODEL.DOFS], count_equations(a)
     held, factor, step = at(a.p, ASSEMBLY_HEAD), factor_of(a), at(a.w, size)
     counted, places = at(held, COUNTED * size), at(held, FREE * size)
-    gradient, along = at(a.w, 5 * size), at(factor, factor_room(count, size) + count * size + count * count)
+    gradient, along = (
+        at(a.w, 5 * size),
+        at(factor, factor_room(count, size) + count * size + count * count),
+    )
     evaluate_equations(a, q)
     free = list_freed(a)
     rank = factorise_rows(a, free, False)
@@ -392,11 +403,17 @@ def find_step(a: Assembly, wanted: Floats, q: Floats, has_curvature: bool) -> fl
     return largest
 
 
-def add_curvature(a: Assembly, q: Floats, free: int, left: int, along: Floats, curvature: Floats) -> None:
+def add_curvature(
+    a: Assembly, q: Floats, free: int, left: int, along: Floats, curvature: Floats
+) -> None:
     """Add the second derivatives of the equations times their multipliers, by central differences."""
     size, count = a.model[MODEL.DOFS], count_equations(a)
     factor, gradient = factor_of(a), at(a.w, 5 * size)
-    rows, lengths, multipliers = rows_of(a), at(a.w, 7 * size + count), at(a.w, 7 * size + 2 * count)
+    rows, lengths, multipliers = (
+        rows_of(a),
+        at(a.w, 7 * size + count),
+        at(a.w, 7 * size + 2 * count),
+    )
     places, trial = at(a.p, ASSEMBLY_HEAD + FREE * size), at(a.w, 3 * size)
     unit = at(factor, factor_room(count, size))
     normal, bent = at(unit, count * size), at(along, 2 * size * size)

@@ -33,7 +33,9 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 
-def place_ball(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
+def place_ball(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
+) -> int:
     """Pass the frame in SCRATCH on by the motion."""
     j = operation_ints(model, operation)
     kept, frame, radii = (
@@ -49,7 +51,11 @@ def place_ball(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, o
     end = elementwise(vector(radii, 0), turned_by[2])
     if j[OPERATION.MOTION] == MOTION.BALL:
         copy(12, frame, kept)
-        set_frame(frame, turned_axes(axes, turned_by), plus(vector(frame, LINK_WORK.POSITION), along_axes(axes, end)))
+        set_frame(
+            frame,
+            turned_axes(axes, turned_by),
+            plus(vector(frame, LINK_WORK.POSITION), along_axes(axes, end)),
+        )
     else:
         axes = turned_axes(axes, transposed(turned_by))
         set_frame(frame, axes, minus(vector(frame, LINK_WORK.POSITION), along_axes(axes, end)))
@@ -57,7 +63,9 @@ def place_ball(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, o
     return OUTCOME.OK
 
 
-def move_ball(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
+def move_ball(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
+) -> int:
     """Columns of the three speeds, rates of the angles; velocity and own acceleration in SCRATCH."""
     j = operation_ints(model, operation)
     kept, result, radii = (
@@ -68,7 +76,10 @@ def move_ball(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, op
     angles, u = at(model, j[OPERATION.ARGUMENTS]), at(y, model[MODEL.DOFS])
     sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
     n, far = last_axis(y, angles), vector(radii, 0)
-    arm, spin = minus(vector(kept, OPERATION_WORK.POINT), vector(result, 0)), (u[angles[0]], u[angles[1]], u[angles[2]])
+    arm, spin = (
+        minus(vector(kept, OPERATION_WORK.POINT), vector(result, 0)),
+        (u[angles[0]], u[angles[1]], u[angles[2]]),
+    )
     turn = shift = ZERO
     for k in range(3):
         axis = replaced(ZERO, k, 1.0)

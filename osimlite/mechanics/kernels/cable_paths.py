@@ -1,16 +1,16 @@
 """Cables: paths over obstacles, as in Simbody's CableSpan with the algorithm of Scholz et al.
 
-Between two points of a cable all geodesics are corrected at once: each has four numbers, by which its start is moved
-along it and across it, and turned, and by which it gets longer. They are those that would take away what is not smooth
-where geodesics and lines meet, if that changed linearly, while lengths change little. This ends at 1e-5 rad. Obstacles
-are left, and met, on the way.
+Between two points of a cable all geodesics are corrected at once: each has four numbers, by which
+its start is moved along it and across it, and turned, and by which it gets longer. They are those
+that would take away what is not smooth where geodesics and lines meet, if that changed linearly,
+while lengths change little. This ends at 1e-5 rad. Obstacles are left, and met, on the way.
 
-Simbody starts each search from the path that it found last. Here all start from the path of the default pose, as in
-OpenSim right after initSystem: what is found depends on the pose alone. So in a motion directions differ from OpenSim's
-by what both may be wrong by, 1e-5 rad.
+Simbody starts each search from the path that it found last. Here all start from the path of the
+default pose, as in OpenSim right after initSystem: what is found depends on the pose alone. So in a
+motion directions differ from OpenSim's by what both may be wrong by, 1e-5 rad.
 
-Source: A. Scholz, M. Sherman, I. Stavness, S. Delp, A. Kecskemethy, A fast multi-obstacle muscle wrapping method using
-natural geodesic variations, Multibody System Dynamics 36, 2016.
+Source: A. Scholz, M. Sherman, I. Stavness, S. Delp, A. Kecskemethy, A fast multi-obstacle muscle
+wrapping method using natural geodesic variations, Multibody System Dynamics 36, 2016.
 """
 
 from __future__ import annotations
@@ -64,8 +64,9 @@ COUNT, SOLVER, ELEMENTS = ITEM.OWN + 1, ITEM.OWN + 2, ITEM.OWN + 3
 """Integers of a cable: how many elements it has, where in its record room for the search is, and the elements."""
 ELEMENT_INTS = 4
 IS_OBSTACLE, LINK, AT, KEPT = 0, 1, 2, 3
-"""Integers of an element of a cable: whether it is an obstacle or a point; its link; where its numbers and its part of
-the record are."""
+"""Integers of an element of a cable: whether it is an obstacle or a point; its link; where its
+numbers and its part of the record are.
+"""
 FIRST = 3
 """Where the parts of the record begin."""
 
@@ -76,13 +77,19 @@ BEFORE, AFTER = 3, 6
 POINT_WORK = 9
 
 STATE, TRACKED, GEODESIC = 0, 1, 4
-"""How a cable is on an obstacle: whether it touches; the point of a line that was nearest to the surface, or that of a
-guess; the geodesic."""
+"""How a cable is on an obstacle: whether it touches; the point of a line that was nearest to the
+surface, or that of a guess; the geodesic.
+"""
 TOUCH_NUMBERS = GEODESIC + GEODESIC_NUMBERS
 POSE, BEGIN, SURFACE = 0, 12, 12 + TOUCH_NUMBERS
-"""Numbers of an obstacle: its rotation in the link by rows and its place; how the cable is on it before the search; the
-surface."""
-IN_GROUND, GROUND_START, GROUND_END = TOUCH_NUMBERS, TOUCH_NUMBERS + 12, TOUCH_NUMBERS + 12 + END_NUMBERS
+"""Numbers of an obstacle: its rotation in the link by rows and its place; how the cable is on it
+before the search; the surface.
+"""
+IN_GROUND, GROUND_START, GROUND_END = (
+    TOUCH_NUMBERS,
+    TOUCH_NUMBERS + 12,
+    TOUCH_NUMBERS + 12 + END_NUMBERS,
+)
 """Its part of the record, after how the cable is on it: its pose in ground, and the ends of the geodesic in ground."""
 OBSTACLE_WORK = GROUND_END + END_NUMBERS
 TOUCHES, GUESSED, LIFTED = 0.0, 1.0, 2.0
@@ -161,7 +168,9 @@ def span(elements: Ints, p: Floats, found: Floats, first: int, last: int, room: 
     return length
 
 
-def touch(elements: Ints, p: Floats, found: Floats, first: int, number: int, last: int, room: Floats) -> bool:
+def touch(
+    elements: Ints, p: Floats, found: Floats, first: int, number: int, last: int, room: Floats
+) -> bool:
     """Tell whether the cable touches an obstacle now, and where; whether no neighbour is inside it."""
     element = at(elements, ELEMENT_INTS * number)
     own, kept = at(p, element[AT]), at(found, element[KEPT])
@@ -194,7 +203,9 @@ def touch(elements: Ints, p: Floats, found: Floats, first: int, number: int, las
     return True
 
 
-def neighbour(elements: Ints, found: Floats, pose: Floats, number: int, step: int, limit: int) -> Vector:
+def neighbour(
+    elements: Ints, found: Floats, pose: Floats, number: int, step: int, limit: int
+) -> Vector:
     """The next end of the cable before (-1) or after (1) an obstacle, as this sees it."""
     k = number + step
     while k != limit and found[elements[ELEMENT_INTS * k + KEPT] + STATE] == LIFTED:
@@ -203,7 +214,9 @@ def neighbour(elements: Ints, found: Floats, pose: Floats, number: int, step: in
     if k == limit:
         point = vector(kept, 0)
     else:
-        point = to_ground(at(kept, IN_GROUND), vector(kept, GEODESIC + (END if step < 0 else START) + POINT))
+        point = to_ground(
+            at(kept, IN_GROUND), vector(kept, GEODESIC + (END if step < 0 else START) + POINT)
+        )
     return turned_back(pose, minus(point, vector(pose, 9)))
 
 
@@ -232,7 +245,9 @@ def draw_lines(elements: Ints, found: Floats, first: int, last: int, lines: Floa
     return count
 
 
-def roughness(elements: Ints, found: Floats, first: int, last: int, lines: Floats, values: Floats) -> float:
+def roughness(
+    elements: Ints, found: Floats, first: int, last: int, lines: Floats, values: Floats
+) -> float:
     """Fill in how far the lines are from the tangent of each end, towards the normal and sideways; returns the most."""
     most, number = 0.0, 0
     for k in range(first + 1, last):
@@ -251,7 +266,14 @@ def roughness(elements: Ints, found: Floats, first: int, last: int, lines: Float
 
 
 def correct(
-    elements: Ints, p: Floats, found: Floats, first: int, last: int, count: int, rough: float, room: Floats
+    elements: Ints,
+    p: Floats,
+    found: Floats,
+    first: int,
+    last: int,
+    count: int,
+    rough: float,
+    room: Floats,
 ) -> bool:
     """Correct all geodesics once; whether there are such."""
     size, equations = UNKNOWNS * count, EQUATIONS * count
@@ -265,12 +287,18 @@ def correct(
     for k in range(first + 1, last):
         kept = at(found, elements[ELEMENT_INTS * k + KEPT])
         if kept[STATE] == TOUCHES:
-            line, next_line, row = at(lines, 4 * number), at(lines, 4 * number + 4), at(a, 4 * number * size)
+            line, next_line, row = (
+                at(lines, 4 * number),
+                at(lines, 4 * number + 4),
+                at(a, 4 * number * size),
+            )
             set_rows(kept, GROUND_START, line, at(row, 4 * number), size)
             set_rows(kept, GROUND_END, next_line, at(row, 2 * size + 4 * number), size)
             if number > 0:
                 other = at(found, elements[ELEMENT_INTS * before + KEPT])
-                set_far_rows(kept, GROUND_START, line, other, GROUND_END, at(row, 4 * number - 4), size)
+                set_far_rows(
+                    kept, GROUND_START, line, other, GROUND_END, at(row, 4 * number - 4), size
+                )
                 back = at(a, (4 * number - 2) * size + 4 * number)
                 set_far_rows(other, GROUND_END, line, kept, GROUND_START, back, size)
             # Lengths are to change little as long as the path is rough.
@@ -295,7 +323,9 @@ def correct(
         kept = at(found, element[KEPT])
         if kept[STATE] == TOUCHES:
             surface = at(p, element[AT] + SURFACE)
-            if not shoot_again(surface, at(kept, GEODESIC), at(corrections, 4 * number), step, room):
+            if not shoot_again(
+                surface, at(kept, GEODESIC), at(corrections, 4 * number), step, room
+            ):
                 return False
             number += 1
     return True
@@ -310,7 +340,9 @@ def set_rows(kept: Floats, end: int, line: Floats, rows: Floats, size: int) -> N
         vary(kept, end, shift, cross(a, e), at(rows, k * size))
 
 
-def set_far_rows(kept: Floats, end: int, line: Floats, other: Floats, far: int, rows: Floats, size: int) -> None:
+def set_far_rows(
+    kept: Floats, end: int, line: Floats, other: Floats, far: int, rows: Floats, size: int
+) -> None:
     """The derivatives of both errors at an end of a geodesic by the numbers of that at the far end of the line."""
     e = vector(line, 0)
     for k in range(2):
@@ -364,7 +396,9 @@ def largest(a: Vector) -> float:
     return max(abs(x), abs(y), abs(z))
 
 
-def shoot_again(surface: Floats, geodesic: Floats, corrections: Floats, step: float, room: Floats) -> bool:
+def shoot_again(
+    surface: Floats, geodesic: Floats, corrections: Floats, step: float, room: Floats
+) -> bool:
     """Correct a geodesic by a part of its corrections; whether there is such."""
     forwards, sideways, turn = step * corrections[0], step * corrections[1], step * corrections[2]
     length = geodesic[ARC] + step * corrections[3]
@@ -417,6 +451,8 @@ def pull_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
                 apply_force(model, data, link, place, times(tension, vector(kept, AFTER)))
         elif kept[STATE] == TOUCHES:
             start, end = at(kept, GROUND_START), at(kept, GROUND_END)
-            apply_force(model, data, link, vector(start, POINT), times(-tension, vector(start, ALONG)))
+            apply_force(
+                model, data, link, vector(start, POINT), times(-tension, vector(start, ALONG))
+            )
             apply_force(model, data, link, vector(end, POINT), times(tension, vector(end, ALONG)))
     return OUTCOME.OK

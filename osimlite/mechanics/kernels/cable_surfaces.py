@@ -1,11 +1,12 @@
 """Surfaces that a cable runs over, and geodesics on them, as in Simbody's CableSpan.
 
-A surface is where a function of the place is 0, which is positive inside. A geodesic on a sphere or a cylinder is
-known; on other surfaces it is integrated, in Simbody's very steps, since these tell to which digits the path is found.
-By how much its end moves sideways as its start is shifted sideways by 1, or turned, are A and R of its Jacobi fields.
+A surface is where a function of the place is 0, which is positive inside. A geodesic on a sphere or
+a cylinder is known; on other surfaces it is integrated, in Simbody's very steps, since these tell
+to which digits the path is found. By how much its end moves sideways as its start is shifted
+sideways by 1, or turned, are A and R of its Jacobi fields.
 
-Source: A. Scholz, M. Sherman, I. Stavness, S. Delp, A. Kecskemethy, A fast multi-obstacle muscle wrapping method using
-natural geodesic variations, Multibody System Dynamics 36, 2016.
+Source: A. Scholz, M. Sherman, I. Stavness, S. Delp, A. Kecskemethy, A fast multi-obstacle muscle
+wrapping method using natural geodesic variations, Multibody System Dynamics 36, 2016.
 """
 
 from __future__ import annotations
@@ -30,18 +31,23 @@ from osimlite.mechanics.laws.vectors import (
 
 SPHERE, CYLINDER, ELLIPSOID, TORUS = 0.0, 1.0, 2.0, 3.0
 KIND, RADIUS, SQUARE, WEIGHTS, TUBE = 0, 1, 2, 3, 2
-"""Numbers of a surface: what it is; its radius, or that of the ring of a torus; then the radius of the tube of a torus,
-or a square and weights: the surface is where the square is the weighted sum of the squares of the coordinates."""
+"""Numbers of a surface: what it is; its radius, or that of the ring of a torus; then the radius of
+the tube of a torus, or a square and weights: the surface is where the square is the weighted sum of
+the squares of the coordinates.
+"""
 SURFACE_NUMBERS = 6
 
 POINT, ALONG, NORMAL, ACROSS, ALONG_BENDS, ACROSS_BENDS, TORSION = 0, 3, 6, 9, 12, 13, 14
-"""Numbers of an end of a geodesic: where it is; its direction along the geodesic, out of the surface, and across both;
-the curvatures along and across, and the torsion."""
+"""Numbers of an end of a geodesic: where it is; its direction along the geodesic, out of the
+surface, and across both; the curvatures along and across, and the torsion.
+"""
 END_NUMBERS = 15
 
 START, END, A, R, A_RATE, R_RATE, ARC, STEP = 0, 15, 30, 31, 32, 33, 34, 35
-"""Numbers of a geodesic: its ends; the Jacobi fields at the end, and their derivatives; its length, m; the step of the
-integration to begin with, m; 0 to integrate by extrapolation, as exactly as may be."""
+"""Numbers of a geodesic: its ends; the Jacobi fields at the end, and their derivatives; its length,
+m; the step of the integration to begin with, m; 0 to integrate by extrapolation, as exactly as may
+be.
+"""
 GEODESIC_NUMBERS = 36
 
 SIZE = 10
@@ -52,8 +58,9 @@ GEODESIC_ROOM = (3 + COLUMNS) * SIZE
 ACCURACY, CONSTRAINT, SMALLEST = 1e-10, 1e-9, 2.0**-45.5
 """Of a step, of what the surface demands, and the smallest step, m."""
 EXACT, ROUNDED = 1e-12, 1e-15
-"""By this the last column of an extrapolation may move the end, m; it is better than that by far. So near to 0 the
-function of the surface is then; moment arms need that."""
+"""By this the last column of an extrapolation may move the end, m; it is better than that by far.
+So near to 0 the function of the surface is then; moment arms need that.
+"""
 MOST_STEPS, MOST_CORRECTIONS = 10_000, 10
 LEAST, MOST, SAFETY, STRETCH, LESS, MORE = 0.1, 5.0, 0.9, 0.1, 0.9, 1.2
 """How step sizes change, as in Simbody's GeodesicIntegrator."""
@@ -85,7 +92,12 @@ def hessian(p: Floats, a: Vector) -> tuple[float, float, float, float]:
         x, y, _ = a
         scale, square = -2.0 / (p[TUBE] * p[TUBE]), x * x + y * y
         ring = p[RADIUS] / (square * sqrt(square))
-        return scale * (1.0 - ring * y * y), scale * (1.0 - ring * x * x), scale, scale * ring * x * y
+        return (
+            scale * (1.0 - ring * y * y),
+            scale * (1.0 - ring * x * x),
+            scale,
+            scale * ring * x * y,
+        )
     xx, yy, zz = times(-2.0, vector(p, WEIGHTS))
     return xx, yy, zz, 0.0
 
@@ -100,7 +112,8 @@ def hessian_times(p: Floats, a: Vector, b: Vector) -> Vector:
 def nearest_on_line(p: Floats, a: Vector, b: Vector, start: Vector) -> tuple[bool, Vector]:
     """Whether a line between two points goes below the surface, and where; else its point nearest to the surface.
 
-    As Simbody finds it from the point nearest to a start; it is the start if the search did not come to an end.
+    As Simbody finds it from the point nearest to a start; it is the start if the search did not
+    come to an end.
     """
     way = minus(b, a)
     square = dot(way, way)
@@ -120,7 +133,9 @@ def nearest_on_line(p: Floats, a: Vector, b: Vector, start: Vector) -> tuple[boo
     return False, start
 
 
-def shoot(p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, room: Floats) -> bool:
+def shoot(
+    p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, room: Floats
+) -> bool:
     """Find a geodesic from near a point in about a direction; whether there is one."""
     geodesic[ARC] = length
     if p[KIND] == SPHERE:
@@ -166,7 +181,9 @@ def set_end(p: Floats, point: Vector, direction: Vector, end: Floats) -> None:
     end[TORSION] = -dot(bent, cross(g, tangent)) / dot(g, g)
 
 
-def integrate(p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, room: Floats) -> bool:
+def integrate(
+    p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, room: Floats
+) -> bool:
     """Integrate a geodesic by the method of Merson, with steps as Simbody's GeodesicIntegrator takes them."""
     y, rates, trial = room, at(room, SIZE), at(room, 2 * SIZE)
     put(y, 0, point)
@@ -214,7 +231,9 @@ def integrate(p: Floats, point: Vector, direction: Vector, length: float, geodes
     return True
 
 
-def extrapolate(p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, room: Floats) -> bool:
+def extrapolate(
+    p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, room: Floats
+) -> bool:
     """Integrate a geodesic by the method of Gragg, Bulirsch and Stoer, in steps as long as that may take."""
     y = room
     put(y, 0, point)
@@ -251,7 +270,8 @@ def leap(p: Floats, step: float, room: Floats) -> bool:
             slope(p, new, f)
             for k in range(SIZE):
                 old[k], new[k] = new[k], old[k] + 2.0 * h * f[k]
-        # Neville's scheme towards h = 0: each row takes the place of the one before, from its end on.
+        # Neville's scheme towards h = 0: each row takes the place of the one before, from its end
+        # on.
         error = 0.0
         for other in range(column - 1, -1, -1):
             row, last, ratio = (
@@ -274,14 +294,17 @@ def leap(p: Floats, step: float, room: Floats) -> bool:
 def slope(p: Floats, y: Floats, f: Floats) -> None:
     """The derivative of the state of a geodesic.
 
-    Its acceleration is normal to the surface, and the Jacobi fields change with the Gaussian curvature.
+    Its acceleration is normal to the surface, and the Jacobi fields change with the Gaussian
+    curvature.
     """
     point, velocity = vector(y, 0), vector(y, 5)
     g = gradient(p, point)
     xx, yy, zz, xy = hessian(p, point)
     gx, gy, gz = g
     square = dot(g, g)
-    adjoint = (gx * gx * yy + gy * gy * xx - 2.0 * gx * gy * xy) * zz + gz * gz * (xx * yy - xy * xy)
+    adjoint = (gx * gx * yy + gy * gy * xx - 2.0 * gx * gy * xy) * zz + gz * gz * (
+        xx * yy - xy * xy
+    )
     gaussian = adjoint / (square * square)
     put(f, 0, velocity)
     put(f, 5, times(-dot(velocity, hessian_times(p, point, velocity)) / square, g))

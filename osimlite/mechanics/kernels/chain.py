@@ -1,9 +1,9 @@
 """Accelerations from the mass matrix and the bias of another program, whose joints have one axis each.
 
-The joints follow the coordinates; with the generalized speeds u their rates are J u, and their accelerations
-J udot + b. So the equations of motion of the coordinates are those of the joints, projected: the mass matrix is Jᵀ M J,
-and the bias is Jᵀ of the forces that the joints need at accelerations b. An entry of J that may differ from zero is a
-share.
+The joints follow the coordinates; with the generalized speeds u their rates are J u, and their
+accelerations J udot + b. So the equations of motion of the coordinates are those of the joints,
+projected: the mass matrix is Jᵀ M J, and the bias is Jᵀ of the forces that the joints need at
+accelerations b. An entry of J that may differ from zero is a share.
 """
 
 from __future__ import annotations
@@ -28,14 +28,19 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.laws.vectors import ZERO, cross, dot, put, replaced, times, vector
 
 
-def chain_dynamics(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int) -> int:
+def chain_dynamics(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int
+) -> int:
     """Mass matrix, and the bias taken off the generalized forces; f has the rates and these before."""
     h, right = at(model, model[MODEL.CHAIN]), at(f, model[MODEL.DOFS])
     move_joints(model, reals, data, y, f)
     status = call(h[CHAIN.SUPPLY], model, reals, data, y, f, 0)
     if status != OUTCOME.OK:
         return status
-    forces, shares = at(data, h[CHAIN.WORK_JOINTS] + 3 * h[CHAIN.JOINTS]), at(data, h[CHAIN.WORK_SHARES])
+    forces, shares = (
+        at(data, h[CHAIN.WORK_JOINTS] + 3 * h[CHAIN.JOINTS]),
+        at(data, h[CHAIN.WORK_SHARES]),
+    )
     matrix = at(forces, h[CHAIN.JOINTS])
     for k in range(h[CHAIN.SHARES]):
         share = at(model, h[CHAIN.SHARE_AT] + SHARE.SIZE * k)
@@ -47,7 +52,9 @@ def chain_dynamics(model: Ints, reals: Floats, data: Floats, y: Floats, f: Float
     for k in range(h[CHAIN.PRODUCTS]):
         product = at(model, h[CHAIN.PRODUCT_AT] + PRODUCT.SIZE * k)
         data[product[PRODUCT.PLACE]] += (
-            shares[product[PRODUCT.ONE]] * shares[product[PRODUCT.TWO]] * matrix[product[PRODUCT.ENTRY]]
+            shares[product[PRODUCT.ONE]]
+            * shares[product[PRODUCT.TWO]]
+            * matrix[product[PRODUCT.ENTRY]]
         )
     for k in range(h[CHAIN.EXCESSES]):
         excess = at(model, h[CHAIN.EXCESS_AT] + EXCESS.SIZE * k)
@@ -62,7 +69,9 @@ def chain_dynamics(model: Ints, reals: Floats, data: Floats, y: Floats, f: Float
     return OUTCOME.OK
 
 
-def take_off(model: Ints, data: Floats, moment: float, freedom: int, acceleration: Floats, right: Floats) -> None:
+def take_off(
+    model: Ints, data: Floats, moment: float, freedom: int, acceleration: Floats, right: Floats
+) -> None:
     """Take an inertia off that is the same about every axis, so that no speed alone makes it resist.
 
     Args:
@@ -75,8 +84,15 @@ def take_off(model: Ints, data: Floats, moment: float, freedom: int, acceleratio
     """
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     while freedom >= 0:
-        a, row, other, place = at(columns, 6 * freedom), at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
-        right[freedom] += moment * (a[0] * acceleration[0] + a[1] * acceleration[1] + a[2] * acceleration[2])
+        a, row, other, place = (
+            at(columns, 6 * freedom),
+            at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]),
+            freedom,
+            0,
+        )
+        right[freedom] += moment * (
+            a[0] * acceleration[0] + a[1] * acceleration[1] + a[2] * acceleration[2]
+        )
         while other >= 0:
             b = at(columns, 6 * other)
             row[place] -= moment * (a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
@@ -90,7 +106,10 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
     h = at(model, model[MODEL.CHAIN])
     count = h[CHAIN.JOINTS]
     for number in range(count):
-        joint, moves = at(model, h[CHAIN.JOINT_AT] + JOINT.SIZE * number), at(data, h[CHAIN.WORK_JOINTS] + number)
+        joint, moves = (
+            at(model, h[CHAIN.JOINT_AT] + JOINT.SIZE * number),
+            at(data, h[CHAIN.WORK_JOINTS] + number),
+        )
         kind, source, part, shares = (
             joint[JOINT.KIND],
             joint[JOINT.SOURCE],
@@ -142,7 +161,9 @@ def move_angle(angles: Ints, y: Floats, f: Floats, part: int, row: Floats) -> fl
     return angle_drift(y, f, angles, vector(row, 0))
 
 
-def move_end(angles: Ints, y: Floats, u: Floats, part: int, radius: float, row: Floats) -> tuple[float, float, float]:
+def move_end(
+    angles: Ints, y: Floats, u: Floats, part: int, radius: float, row: Floats
+) -> tuple[float, float, float]:
     """Value, rate and acceleration without udot of a component of r n, n the last axis of a ball; fills its row."""
     n, spin = last_axis(y, angles), (u[angles[0]], u[angles[1]], u[angles[2]])
     # n moves by u x n, and that by u x (u x n).

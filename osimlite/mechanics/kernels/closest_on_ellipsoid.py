@@ -1,7 +1,9 @@
 """The points of an ellipsoid that are closest to given ones.
 
-Source: J. C. Hart, Distance to an ellipsoid, in P. Heckbert (ed.), Graphics Gems IV, 1994, as OpenSim 4.6 has it in
-WrapEllipsoid: Newton's method stops where the polynomial is small, so the points are those of its very steps.
+Source: J. C. Hart, Distance to an ellipsoid, in P. Heckbert (ed.), Graphics Gems IV, 1994, as
+    OpenSim 4.6 has it in
+WrapEllipsoid: Newton's method stops where the polynomial is small, so the points are those of its
+    very steps.
 """
 
 from __future__ import annotations
@@ -31,7 +33,9 @@ def closest_point(radii: Vector, point: Vector) -> Vector:
     """
     axis = -1
     for k in range(3):
-        if abs(component(point, k)) <= FLAT and (axis < 0 or component(radii, k) > component(radii, axis)):
+        if abs(component(point, k)) <= FLAT and (
+            axis < 0 or component(radii, k) > component(radii, axis)
+        ):
             axis = k
     if axis >= 0:
         return closest_in_plane(radii, point, axis)
@@ -50,7 +54,9 @@ def closest_point(radii: Vector, point: Vector) -> Vector:
     return aa * u / (t + aa), bb * v / (t + bb), cc * w / (t + cc)
 
 
-def polynomial(P: float, Q: float, R: float, aauu: float, bbvv: float, ccww: float) -> tuple[float, float]:
+def polynomial(
+    P: float, Q: float, R: float, aauu: float, bbvv: float, ccww: float
+) -> tuple[float, float]:
     """What is zero if (a a u / P, b b v / Q, c c w / R) is the point closest to (u, v, w), and its derivative by t.
 
     Args:
@@ -124,13 +130,18 @@ def fan(radii: Vector, start: Vector, chord: Vector, room: Floats) -> Vector:
             u, v, w = sx + part * dx, sy + part * dy, sz + part * dz
             aauu, bbvv, ccww = aa * (u * u), bb * (v * v), cc * (w * w)
             value, slope = polynomial(aa, bb, cc, aauu, bbvv, ccww)
-            room[PART + k], room[MULTIPLIER + k] = part, -value / slope if abs(value) >= SMALL else 0.0
+            room[PART + k], room[MULTIPLIER + k] = (
+                part,
+                -value / slope if abs(value) >= SMALL else 0.0,
+            )
             room[X + k], room[Y + k], room[Z + k] = aauu, bbvv, ccww
         for _ in range(STEPS):
             going = 0
             for k in range(LANES):
                 t = room[MULTIPLIER + k]
-                value, slope = polynomial(t + aa, t + bb, t + cc, room[X + k], room[Y + k], room[Z + k])
+                value, slope = polynomial(
+                    t + aa, t + bb, t + cc, room[X + k], room[Y + k], room[Z + k]
+                )
                 if abs(value) >= SMALL:
                     t -= value / slope
                     going += 1

@@ -1,13 +1,15 @@
 """The linear equations of implicit integrators, of which only those of the speeds are solved together.
 
-An implicit method solves (1 - c J) d = r over and over, J being the derivative of the rates of a state (q, u, z) by it.
-Here J is what muscles, springs and stops make of it: each pushes along one displacement, with a force and with rates of
-its states that depend on that displacement, its speed and these states only. So its states are eliminated by
-themselves, as internal variables of a material are in finite elements, and so are the coordinates, whose rates count
-as the speeds. What is left is of the size of the speeds: the mass matrix, and of each force a stiffness along its
-generalized force of 1 N. The equations of constraints count as heavy masses along them. Contacts of half spaces and
-spheres are three such forces, along the normal and across it; friction grows with the depth. All else (gravity,
-Coriolis forces, how levers change) is left out of J: iterations converge without it, and W-methods keep their order.
+An implicit method solves (1 - c J) d = r over and over, J being the derivative of the rates of a
+state (q, u, z) by it. Here J is what muscles, springs and stops make of it: each pushes along one
+displacement, with a force and with rates of its states that depend on that displacement, its speed
+and these states only. So its states are eliminated by themselves, as internal variables of a
+material are in finite elements, and so are the coordinates, whose rates count as the speeds. What
+is left is of the size of the speeds: the mass matrix, and of each force a stiffness along its
+generalized force of 1 N. The equations of constraints count as heavy masses along them. Contacts of
+half spaces and spheres are three such forces, along the normal and across it; friction grows with
+the depth. All else (gravity, Coriolis forces, how levers change) is left out of J: iterations
+converge without it, and W-methods keep their order.
 """
 
 from __future__ import annotations
@@ -68,13 +70,20 @@ WIDTH = 2 + MOST_STATES
 INVERSE = (1 + MOST_STATES) * WIDTH
 GAINS = INVERSE + MOST_STATES * MOST_STATES
 PULLS, RIGHT = GAINS + MOST_STATES, GAINS + 2 * MOST_STATES
-FIRST, END, RESPONSE_WORK = GAINS + 3 * MOST_STATES, GAINS + 3 * MOST_STATES + 1, GAINS + 3 * MOST_STATES + 2
-"""What is known of a force besides the generalized force of 1 N: the derivatives; the inverse of 1 - c J of the states;
-what a speed does to them, and they to the force; their right sides; the first degree of freedom that it moves, and the
-one after the last."""
+FIRST, END, RESPONSE_WORK = (
+    GAINS + 3 * MOST_STATES,
+    GAINS + 3 * MOST_STATES + 1,
+    GAINS + 3 * MOST_STATES + 2,
+)
+"""What is known of a force besides the generalized force of 1 N: the derivatives; the inverse of 1
+- c J of the states; what a speed does to them, and they to the force; their right sides; the first
+degree of freedom that it moves, and the one after the last.
+"""
 SYSTEM, STIFFNESS, DAMPING, LEVERS, RIGHT_AT = range(1, 6)
-"""Matrices (n, n) in the room, behind that of the masses: that to be solved; how generalized forces change with
-coordinates and with speeds while states stay; how with coordinates while states follow. A right side is behind them."""
+"""Matrices (n, n) in the room, behind that of the masses: that to be solved; how generalized forces
+change with coordinates and with speeds while states stay; how with coordinates while states follow.
+A right side is behind them.
+"""
 
 LOAD = 12
 """How many numbers the loads of a link are."""
@@ -93,7 +102,15 @@ def condensation_room(size: int, responses: int) -> int:
     return RIGHT_AT * size * size + size + responses * (size + RESPONSE_WORK)
 
 
-def linearise(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, room: Floats, is_evaluated: float) -> int:
+def linearise(
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    y: Floats,
+    f: Floats,
+    room: Floats,
+    is_evaluated: float,
+) -> int:
     """Fill the room with masses, generalized forces and derivatives at a state; f is room for its rates.
 
     If `is_evaluated` is not 0, the last evaluation was that of this state.
@@ -114,7 +131,10 @@ def linearise(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, ro
         stiffness[k] = damping[k] = 0.0
     turn_levers(model, reals, data, stiffness)
     for number in range(model[MODEL.RESPONSES]):
-        response, known = at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(model, room, number)
+        response, known = (
+            at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
+            known_of(model, room, number),
+        )
         clear_wrenches(model, data)
         for k in range(size):
             f[k] = right[k] = 0.0
@@ -134,9 +154,15 @@ def linearise(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, ro
                 first, end = min(first, k), k + 1
         known[size + FIRST], known[size + END] = first, end
         if changes:
-            sense, by_displacement, by_speed = response[RESPONSE.SENSE], known[size], known[size + 1]
+            sense, by_displacement, by_speed = (
+                response[RESPONSE.SENSE],
+                known[size],
+                known[size + 1],
+            )
             add_product(size, 1.0, known, first, end, f, 0, size, stiffness)
-            add_product(size, sense * by_displacement, known, first, end, known, first, end, stiffness)
+            add_product(
+                size, sense * by_displacement, known, first, end, known, first, end, stiffness
+            )
             add_product(size, sense * by_speed, known, first, end, known, first, end, damping)
     return OUTCOME.OK
 
@@ -172,16 +198,22 @@ def masses(model: Ints, data: Floats, mass: Floats) -> None:
 def turn_levers(model: Ints, reals: Floats, data: Floats, levers: Floats) -> None:
     """Add how generalized forces of weights and of contacts change as coordinates move their points, to (n, n).
 
-    They are what is left of the inertias, which have served: of each link the force on it and on all that it carries,
-    and the sum of products of places (from the origin of the spatial vectors) with forces, by rows.
+    They are what is left of the inertias, which have served: of each link the force on it and on
+    all that it carries, and the sum of products of places (from the origin of the spatial vectors)
+    with forces, by rows.
     """
     size = model[MODEL.DOFS]
     for link in range(model[MODEL.LINKS]):
-        b, load = at(reals, INERTIA_AT + INERTIA.SIZE * link), at(link_work(model, data, link), LINK_WORK.INERTIA)
+        b, load = (
+            at(reals, INERTIA_AT + INERTIA.SIZE * link),
+            at(link_work(model, data, link), LINK_WORK.INERTIA),
+        )
         for k in range(LOAD):
             load[k] = 0.0
         weight = times(b[INERTIA.MASS], vector(reals, GRAVITY_AT))
-        add_load(model, data, link, station(model, data, link, vector(b, INERTIA.CENTER)), weight, ZERO)
+        add_load(
+            model, data, link, station(model, data, link, vector(b, INERTIA.CENTER)), weight, ZERO
+        )
     for pair in range(model[MODEL.CONTACTS]):
         i = at(model, model[model[MODEL.CONTACT_AT] + pair])
         contact = at(data, model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
@@ -204,7 +236,9 @@ def turn_levers(model: Ints, reals: Floats, data: Floats, levers: Floats) -> Non
             while within >= 0:
                 other = operation_ints(model, inner)
                 if other[OPERATION.DOF] >= 0 and other[OPERATION.MOTION] == MOTION.TURN:
-                    change = dot(moved, vector(operation_work(model, data, inner), OPERATION_WORK.AXIS))
+                    change = dot(
+                        moved, vector(operation_work(model, data, inner), OPERATION_WORK.AXIS)
+                    )
                     levers[size * j[OPERATION.DOF] + other[OPERATION.DOF]] += change
                     if inner != operation:
                         levers[size * other[OPERATION.DOF] + j[OPERATION.DOF]] += change
@@ -218,18 +252,32 @@ def turn_levers(model: Ints, reals: Floats, data: Floats, levers: Floats) -> Non
                 below[n] += load[n]
 
 
-def add_load(model: Ints, data: Floats, link: int, point: Vector, force: Vector, off: Vector) -> None:
+def add_load(
+    model: Ints, data: Floats, link: int, point: Vector, force: Vector, off: Vector
+) -> None:
     """Add a force on a link at a point, which moves as does that of the link that is so far off."""
     if link >= 0:
         here = link_work(model, data, link)
         load, arm = at(here, LINK_WORK.INERTIA), minus(point, vector(here, LINK_WORK.ORIGIN))
         put(load, 0, plus(vector(load, 0), force))
         for k in range(3):
-            put(load, 3 + 3 * k, plus(vector(load, 3 + 3 * k), plus(times(arm[k], force), times(force[k], off))))
+            put(
+                load,
+                3 + 3 * k,
+                plus(vector(load, 3 + 3 * k), plus(times(arm[k], force), times(force[k], off))),
+            )
 
 
 def add_product(
-    size: int, factor: float, a: Floats, first: int, end: int, b: Floats, start: int, last: int, matrix: Floats
+    size: int,
+    factor: float,
+    a: Floats,
+    first: int,
+    end: int,
+    b: Floats,
+    start: int,
+    last: int,
+    matrix: Floats,
 ) -> None:
     """Add a multiple of the product of two rows, each from an entry up to another."""
     for i in range(first, end):
@@ -248,7 +296,10 @@ def condense(model: Ints, c: float, room: Floats) -> bool:
         system[k] = room[k] - c * (damping[k] + c * stiffness[k])
         levers[k] = stiffness[k]
     for number in range(model[MODEL.RESPONSES]):
-        response, known = at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(model, room, number)
+        response, known = (
+            at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
+            known_of(model, room, number),
+        )
         count, a = response[RESPONSE.STATES], at(known, size)
         places = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
         if count == 0:
@@ -323,15 +374,26 @@ def invert(size: int, a: Floats) -> None:
 def correct(model: Ints, c: float, room: Floats, d: Floats) -> None:
     """Solve (1 - c J) d = r in place, after `condense` with the same c."""
     size = model[MODEL.DOFS]
-    du, system, right = at(d, size), at(room, SYSTEM * size * size), at(room, RIGHT_AT * size * size)
+    du, system, right = (
+        at(d, size),
+        at(room, SYSTEM * size * size),
+        at(room, RIGHT_AT * size * size),
+    )
     levers = at(room, LEVERS * size * size)
     for i in range(size):
         right[i] = 0.0
         for k in range(size):
             right[i] += room[size * i + k] * du[k] + c * levers[size * i + k] * d[k]
     for number in range(model[MODEL.RESPONSES]):
-        response, known = at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(model, room, number)
-        places, a, force = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE]), at(known, size), 0.0
+        response, known = (
+            at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
+            known_of(model, room, number),
+        )
+        places, a, force = (
+            at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE]),
+            at(known, size),
+            0.0,
+        )
         for k in range(response[RESPONSE.STATES]):
             if places[k] >= 0:
                 force += c * a[PULLS + k] * d[places[k]]
@@ -340,7 +402,10 @@ def correct(model: Ints, c: float, room: Floats, d: Floats) -> None:
                 right[k] += force * known[k]
     substitute(size, system, right)
     for number in range(model[MODEL.RESPONSES]):
-        response, known = at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(model, room, number)
+        response, known = (
+            at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
+            known_of(model, room, number),
+        )
         count, a = response[RESPONSE.STATES], at(known, size)
         places = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
         if count == 0:
@@ -349,10 +414,14 @@ def correct(model: Ints, c: float, room: Floats, d: Floats) -> None:
         displacement = response[RESPONSE.SENSE] * product(first, end, known, d)
         speed = response[RESPONSE.SENSE] * product(first, end, known, right)
         for i in range(count):
-            a[RIGHT + i] = d[places[i]] + c * a[WIDTH * (1 + i)] * displacement if places[i] >= 0 else 0.0
+            a[RIGHT + i] = (
+                d[places[i]] + c * a[WIDTH * (1 + i)] * displacement if places[i] >= 0 else 0.0
+            )
         for i in range(count):
             if places[i] >= 0:
-                d[places[i]] = a[GAINS + i] * speed + product(0, count, at(a, INVERSE + count * i), at(a, RIGHT))
+                d[places[i]] = a[GAINS + i] * speed + product(
+                    0, count, at(a, INVERSE + count * i), at(a, RIGHT)
+                )
     for k in range(size):
         du[k] = right[k]
         d[k] += c * right[k]

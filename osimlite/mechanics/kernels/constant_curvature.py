@@ -9,17 +9,25 @@ from osimlite.mechanics.kernels.parts import operation_ints, operation_work
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 
 COMPONENT, LENGTH, NEUTRAL, TERMS, SERIES = 2, 3, 4, 6, 7
-"""Of the table: the component, the length, the two angles where the arguments are zero, the number of terms of each
-series by the square of the angle, and the terms of (sin θ) / θ and (1 - cos θ) / θ²."""
+"""Of the table: the component, the length, the two angles where the arguments are zero, the number
+of terms of each series by the square of the angle, and the terms of (sin θ) / θ and (1 - cos θ) /
+θ².
+"""
 
 
-def amount_by_arc(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
+def amount_by_arc(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
+) -> int:
     """Amount of an operation by the bending of a rod in two angles, with its derivatives."""
     j, kept = (
         operation_ints(model, operation),
         operation_work(model, data, operation),
     )
-    one, two, p = model[j[OPERATION.ARGUMENTS]], model[j[OPERATION.ARGUMENTS] + 1], at(reals, j[OPERATION.EXTRA])
+    one, two, p = (
+        model[j[OPERATION.ARGUMENTS]],
+        model[j[OPERATION.ARGUMENTS] + 1],
+        at(reals, j[OPERATION.EXTRA]),
+    )
     table, u = at(p, 2), at(y, model[MODEL.DOFS])
     a = (y[one] if one >= 0 else p[0]) + table[NEUTRAL]
     b = (y[two] if two >= 0 else p[1]) + table[NEUTRAL + 1]
@@ -38,7 +46,11 @@ def arc_at(table: Floats, a: float, b: float) -> tuple[float, float, float, floa
     c, ga, gb, haa, hab, hbb = ca * cb, -sa * cb, -ca * sb, -ca * cb, sa * sb, -ca * cb
     component = int(table[COMPONENT])
     share, first, second = along_the_arc(table, c) if component == 1 else across_the_arc(table, c)
-    oaa, oab, obb = first * haa + second * ga * ga, first * hab + second * ga * gb, first * hbb + second * gb * gb
+    oaa, oab, obb = (
+        first * haa + second * ga * ga,
+        first * hab + second * ga * gb,
+        first * hbb + second * gb * gb,
+    )
     oa, ob = first * ga, first * gb
     # Times the direction in which it bends.
     v, va, vb, vaa, vab, vbb = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -87,7 +99,9 @@ def series(terms: Floats, count: int, square: float) -> tuple[float, float, floa
     return value, slope, 2.0 * bend
 
 
-def by_cosine(value: float, first: float, second: float, h: float, h1: float) -> tuple[float, float, float]:
+def by_cosine(
+    value: float, first: float, second: float, h: float, h1: float
+) -> tuple[float, float, float]:
     """From derivatives by θ² to derivatives by cos θ, whose rate is -sin θ / (2 θ)."""
     rate, rate1 = -2.0 / h, 2.0 * h1 / (h * h)
     return value, rate * first, rate * (rate1 * first + rate * second)

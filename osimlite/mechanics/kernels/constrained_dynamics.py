@@ -1,8 +1,8 @@
 """Accelerations under constraints: M udot + Gᵀ λ = f and G udot = b.
 
-Where M alone is well conditioned, udot is eliminated: the tree's own factor of M gives what each equation's force does.
-Otherwise the motion is solved for along the directions that the equations leave free. Equations that contradict each
-other are fulfilled as well as can be.
+Where M alone is well conditioned, udot is eliminated: the tree's own factor of M gives what each
+equation's force does. Otherwise the motion is solved for along the directions that the equations
+leave free. Equations that contradict each other are fulfilled as well as can be.
 """
 
 from __future__ import annotations
@@ -26,17 +26,24 @@ from osimlite.mechanics.laws.carried import is_nothing
 SAFE_MASS = 1e-10
 """What each speed must move, as part of its inertia, for the mass matrix to be divided by."""
 SLIGHT = 2.0**-19.5
-"""Times the root of their number: equations whose forces move this part of what the strongest one's do are left out, as
-in Simbody: its complete orthogonal factorization of G M⁻¹ Gᵀ has the square of it as tolerance."""
+"""Times the root of their number: equations whose forces move this part of what the strongest one's
+do are left out, as in Simbody: its complete orthogonal factorization of G M⁻¹ Gᵀ has the square of
+it as tolerance.
+"""
 
 
-def constrained_dynamics(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int) -> int:
+def constrained_dynamics(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int
+) -> int:
     """Solve for the accelerations: the second half of f has the generalized forces before."""
     h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
     right = at(f, size)
     bind(model, reals, data, y, f)
     # Of the mass matrix and the forces, nothing is left when they have been solved for.
-    system, matrix = at(data, h[CONSTRAINED.WORK_SYSTEM]), at(data, model[model[MODEL.DOF_AT] + DOF.ROW])
+    system, matrix = (
+        at(data, h[CONSTRAINED.WORK_SYSTEM]),
+        at(data, model[model[MODEL.DOF_AT] + DOF.ROW]),
+    )
     for k in range(h[CONSTRAINED.ENTRIES]):
         system[k] = matrix[k]
     forces = at(system, h[CONSTRAINED.ENTRIES])
@@ -63,7 +70,8 @@ def bind(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None
 def by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats) -> bool:
     """From the accelerations without constraints to those with them, if M is well conditioned; room for 2 (n + m).
 
-    With M = Uᵀ D U the equations of what U and D make of udot have as their shortest solution the multipliers' push.
+    With M = Uᵀ D U the equations of what U and D make of udot have as their shortest solution the
+    multipliers' push.
     """
     h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
     count, freedoms, pivots = (
@@ -71,7 +79,12 @@ def by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats) -> bo
         at(model, model[MODEL.DOF_AT]),
         at(data, model[MODEL.WORK_PIVOT]),
     )
-    scales, push, values, spare = room, at(room, size), at(room, 2 * size), at(room, 2 * size + count)
+    scales, push, values, spare = (
+        room,
+        at(room, size),
+        at(room, 2 * size),
+        at(room, 2 * size + count),
+    )
     for k in range(size):
         pivot = data[freedoms[DOF.SIZE * k + DOF.ROW]]
         if not pivot > SAFE_MASS * pivots[k]:
@@ -133,7 +146,9 @@ def away_from_ground(model: Ints, data: Floats, right: Floats) -> None:
         right[k] = total
 
 
-def by_directions(model: Ints, data: Floats, matrix: Floats, forces: Floats, right: Floats, room: Floats) -> int:
+def by_directions(
+    model: Ints, data: Floats, matrix: Floats, forces: Floats, right: Floats, room: Floats
+) -> int:
     """The accelerations by the null space of the equations; room for 2 n (n + 1) numbers, or 2 m more than that."""
     h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
     count, rows, drifts, equations = (
@@ -159,7 +174,11 @@ def by_directions(model: Ints, data: Floats, matrix: Floats, forces: Floats, rig
     rank = factored(model, data, count, equations, REDUNDANT)
     free = size - rank
     solved(model, count, equations, values, spare, right)
-    pushed, reduced, basis = at(spare, count), at(spare, count + 2 * size), at(spare, count + 2 * size + size * size)
+    pushed, reduced, basis = (
+        at(spare, count),
+        at(spare, count + 2 * size),
+        at(spare, count + 2 * size + size * size),
+    )
     rest = at(pushed, size)
     times_mass(model, matrix, right, pushed)
     for k in range(size):

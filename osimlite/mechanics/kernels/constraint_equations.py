@@ -1,8 +1,9 @@
 """Constraints as equations: rows of the matrix G, errors of the positions, and what G u and G udot are to be.
 
-Each law here fills in the equations of one constraint, after the velocities of the links are known. Those between
-bodies are made of two kinds of vectors: an axis fixed in a link, and an arm from a point of one link to one of another.
-What a unit of a vector's rate takes of the speeds is what a force along it would do to their coordinates.
+Each law here fills in the equations of one constraint, after the velocities of the links are known.
+Those between bodies are made of two kinds of vectors: an axis fixed in a link, and an arm from a
+point of one link to one of another. What a unit of a vector's rate takes of the speeds is what a
+force along it would do to their coordinates.
 """
 
 from __future__ import annotations
@@ -44,24 +45,33 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 AXIS, ARM, MEETING = 0, 1, 2
-"""Kinds of vectors; that of a meeting is an arm whose rate is how fast its end leaves the point of its first link that
-is there."""
+"""Kinds of vectors; that of a meeting is an arm whose rate is how fast its end leaves the point of
+its first link that is there.
+"""
 PRODUCT, DISTANCE, SLIP = 0, 1, 2
-"""Kinds of equations between bodies: the product of two vectors has a certain value; the second has a certain length;
-the end of the second is a roller whose point at its start moves along with that, as far as the first tells."""
+"""Kinds of equations between bodies: the product of two vectors has a certain value; the second has
+a certain length; the end of the second is a roller whose point at its start moves along with that,
+as far as the first tells.
+"""
 VECTOR_INTS, EQUATION_INTS, EQUATION_NUMBERS = 3, 7, 13
-"""Of a vector its kind and two links (an axis has the first); of an equation its kind and two vectors; and for each
-vector six numbers, of an axis or two points in their links, and the wanted value."""
+"""Of a vector its kind and two links (an axis has the first); of an equation its kind and two
+vectors; and for each vector six numbers, of an axis or two points in their links, and the wanted
+value.
+"""
 
 
-def prescribe(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int) -> int:
+def prescribe(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int
+) -> int:
     """A coordinate follows a function of time, whose table is all its numbers."""
     i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
     row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
     value, slope, curvature = value_at(at(reals, i[CONSTRAINT.NUMBERS]), data[WORK.TIME])
     data[h[CONSTRAINED.WORK_ERRORS] + row] = y[own[0]] - value
     data[h[CONSTRAINED.WORK_RATES] + row] = slope
-    bias = add_coordinate(model, y, f, own, 1.0, at(data, h[CONSTRAINED.WORK_ROWS] + model[MODEL.DOFS] * row))
+    bias = add_coordinate(
+        model, y, f, own, 1.0, at(data, h[CONSTRAINED.WORK_ROWS] + model[MODEL.DOFS] * row)
+    )
     data[h[CONSTRAINED.WORK_DRIFTS] + row] = curvature - bias
     return OUTCOME.OK
 
@@ -69,9 +79,9 @@ def prescribe(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, co
 def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int) -> int:
     """A coordinate is a function of others.
 
-    Its integers are the dependent coordinate, the place of room for the gradient, the count of the others, their
-    degrees of freedom, and each coordinate again in full; its numbers the values of coordinates at rest, the dependent
-    one first, and the table of the function.
+    Its integers are the dependent coordinate, the place of room for the gradient, the count of the
+    others, their degrees of freedom, and each coordinate again in full; its numbers the values of
+    coordinates at rest, the dependent one first, and the table of the function.
     """
     i, h, p = (
         at(model, constraint),
@@ -100,7 +110,9 @@ def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, const
     return OUTCOME.OK
 
 
-def add_coordinate(model: Ints, y: Floats, f: Floats, coordinate: Ints, factor: float, row: Floats) -> float:
+def add_coordinate(
+    model: Ints, y: Floats, f: Floats, coordinate: Ints, factor: float, row: Floats
+) -> float:
     """Add a multiple of the rate of a coordinate to a row; returns that of what it changes by while no speed does."""
     freedom, ball = coordinate[COORDINATE.DOF], coordinate[COORDINATE.BALL]
     if freedom < 0:
@@ -117,7 +129,9 @@ def add_coordinate(model: Ints, y: Floats, f: Floats, coordinate: Ints, factor: 
     return factor * angle_drift(y, f, angles, n)
 
 
-def bind_bodies(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int) -> int:
+def bind_bodies(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int
+) -> int:
     """Some equations between bodies; its integers and numbers are theirs."""
     i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
     first, size = i[CONSTRAINT.FIRST_EQUATION], model[MODEL.DOFS]
@@ -156,23 +170,37 @@ def bind_bodies(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
             )
             drift = dot(a_rate, minus(b_rate, cross(turning, b)))
             drift += dot(a, minus(minus(b_bias, cross(turning_bias, b)), cross(turning, b_rate)))
-        data[h[CONSTRAINED.WORK_ERRORS] + row], data[h[CONSTRAINED.WORK_DRIFTS] + row] = error, -drift
+        data[h[CONSTRAINED.WORK_ERRORS] + row], data[h[CONSTRAINED.WORK_DRIFTS] + row] = (
+            error,
+            -drift,
+        )
     return OUTCOME.OK
 
 
-def follow(model: Ints, reals: Floats, data: Floats, kind: Ints, p: Floats) -> tuple[Vector, Vector, Vector]:
+def follow(
+    model: Ints, reals: Floats, data: Floats, kind: Ints, p: Floats
+) -> tuple[Vector, Vector, Vector]:
     """A vector, its rate, and its second derivative while no speed changes."""
     one, two = kind[1], kind[2]
     if kind[0] == AXIS:
-        axis, turning = direction(model, data, one, vector(p, 0)), angular_velocity(model, data, one)
+        axis, turning = (
+            direction(model, data, one, vector(p, 0)),
+            angular_velocity(model, data, one),
+        )
         rate = cross(turning, axis)
-        return axis, rate, plus(cross(angular_acceleration_bias(model, data, one), axis), cross(turning, rate))
+        return (
+            axis,
+            rate,
+            plus(cross(angular_acceleration_bias(model, data, one), axis), cross(turning, rate)),
+        )
     start, end = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 3))
     arm = minus(end, start)
     if kind[0] == MEETING:
         start = end
     rate = minus(velocity(model, data, two, end), velocity(model, data, one, start))
-    bias = minus(acceleration(model, reals, data, two, end), acceleration(model, reals, data, one, start))
+    bias = minus(
+        acceleration(model, reals, data, two, end), acceleration(model, reals, data, one, start)
+    )
     if kind[0] == MEETING:
         # As what carries both sees it.
         while one != two:
@@ -188,7 +216,9 @@ def lean(model: Ints, data: Floats, kind: Ints, p: Floats, on: Vector, row: Floa
     """Add to a row what the speeds do to a vector along a direction."""
     one, two = kind[1], kind[2]
     if kind[0] == AXIS:
-        add_wrench(model, data, one, cross(direction(model, data, one, vector(p, 0)), on), ZERO, row)
+        add_wrench(
+            model, data, one, cross(direction(model, data, one, vector(p, 0)), on), ZERO, row
+        )
         return
     start, end = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 3))
     if kind[0] == MEETING:
@@ -197,17 +227,23 @@ def lean(model: Ints, data: Floats, kind: Ints, p: Floats, on: Vector, row: Floa
     add_force(model, data, two, end, on, row)
 
 
-def add_force(model: Ints, data: Floats, link: int, point: Vector, force: Vector, row: Floats) -> None:
+def add_force(
+    model: Ints, data: Floats, link: int, point: Vector, force: Vector, row: Floats
+) -> None:
     """Add what a force at a point of ground on a link does to the coordinates."""
     if link >= 0:
         arm = minus(point, vector(link_work(model, data, link), LINK_WORK.ORIGIN))
         add_wrench(model, data, link, cross(arm, force), force, row)
 
 
-def add_wrench(model: Ints, data: Floats, link: int, torque: Vector, force: Vector, row: Floats) -> None:
+def add_wrench(
+    model: Ints, data: Floats, link: int, torque: Vector, force: Vector, row: Floats
+) -> None:
     """Add what a wrench about the origin of the spatial vectors does to the coordinates."""
     # Welded bodies may be links of their own.
-    while link >= 0 and link_ints(model, link)[LINK.FIRST_DOF] == link_ints(model, link)[LINK.END_DOF]:
+    while (
+        link >= 0 and link_ints(model, link)[LINK.FIRST_DOF] == link_ints(model, link)[LINK.END_DOF]
+    ):
         link = link_ints(model, link)[LINK.PARENT]
     if link < 0:
         return

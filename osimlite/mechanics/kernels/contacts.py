@@ -1,7 +1,7 @@
 """Hunt-Crossley contact of half spaces, spheres and ellipsoids.
 
-The numbers of a pair are the centre and the normal of surface 1 in its link, its radius, centre and radius of surface
-2, and k, a, c, us, ud, uv, vt of the law.
+The numbers of a pair are the centre and the normal of surface 1 in its link, its radius, centre and
+radius of surface 2, and k, a, c, us, ud, uv, vt of the law.
 """
 
 from __future__ import annotations
@@ -56,7 +56,9 @@ SMOOTH = 9
 """How many numbers the law of smooth contact has."""
 
 
-def touch_half_space(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+def touch_half_space(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
+) -> int:
     """A sphere on a half space."""
     d, radius, n, point = on_half_space(model, reals, data, item)
     if d > 0.0:
@@ -72,7 +74,9 @@ def touch_spheres(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
     return OUTCOME.OK
 
 
-def on_half_space(model: Ints, reals: Floats, data: Floats, item: int) -> tuple[float, float, Vector, Vector]:
+def on_half_space(
+    model: Ints, reals: Floats, data: Floats, item: int
+) -> tuple[float, float, Vector, Vector]:
     """Depth, effective radius, normal and point of a sphere on a half space."""
     i = at(model, item)
     one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
@@ -81,41 +85,60 @@ def on_half_space(model: Ints, reals: Floats, data: Floats, item: int) -> tuple[
     return d, p[10], n, point
 
 
-def on_sphere(model: Ints, reals: Floats, data: Floats, item: int) -> tuple[float, float, Vector, Vector]:
+def on_sphere(
+    model: Ints, reals: Floats, data: Floats, item: int
+) -> tuple[float, float, Vector, Vector]:
     """Depth, effective radius, normal and point of two spheres."""
     i = at(model, item)
     p = at(reals, i[ITEM.NUMBERS])
-    one, two = station(model, data, i[ITEM.OWN], vector(p, 0)), station(model, data, i[ITEM.OWN + 1], vector(p, 7))
+    one, two = (
+        station(model, data, i[ITEM.OWN], vector(p, 0)),
+        station(model, data, i[ITEM.OWN + 1], vector(p, 7)),
+    )
     return sphere_sphere(one, p[6], two, p[10], p[12])
 
 
-def contact_response(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+def contact_response(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
+) -> int:
     """Apply 1 N along the normal of a contact or across it, and leave in SCRATCH how its force there changes.
 
-    The integers of the item are how far before it that of the contact is, 0 along the normal, 1 and 2 across it, and
-    whether surface 1 is a half space. Friction grows with the force along the normal, and that as the depth to 1.5.
+    The integers of the item are how far before it that of the contact is, 0 along the normal, 1 and
+    2 across it, and whether surface 1 is a half space. Friction grows with the force along the
+    normal, and that as the depth to 1.5.
     """
     i, change = at(model, item), at(data, WORK.SCRATCH)
     pair, axis = item - i[ITEM.OWN], i[ITEM.OWN + 1]
     for k in range(INVERSE):
         change[k] = 0.0
     d, radius, n, point = (
-        on_half_space(model, reals, data, pair) if i[ITEM.OWN + 2] > 0 else on_sphere(model, reals, data, pair)
+        on_half_space(model, reals, data, pair)
+        if i[ITEM.OWN + 2] > 0
+        else on_sphere(model, reals, data, pair)
     )
     if d > 0.0:
-        one, two, p = model[pair + ITEM.OWN], model[pair + ITEM.OWN + 1], at(reals, model[pair + ITEM.NUMBERS])
+        one, two, p = (
+            model[pair + ITEM.OWN],
+            model[pair + ITEM.OWN + 1],
+            at(reals, model[pair + ITEM.NUMBERS]),
+        )
         v = minus(velocity(model, data, one, point), velocity(model, data, two, point))
         changes = contact_derivatives(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
         center = station(model, data, two, vector(p, CENTER))
-        respond(model, data, y, f, one, two, axis, point, center, n, v, 1.0 - p[12], changes, 1.5 / d)
+        respond(
+            model, data, y, f, one, two, axis, point, center, n, v, 1.0 - p[12], changes, 1.5 / d
+        )
     return OUTCOME.OK
 
 
-def smooth_contact_response(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+def smooth_contact_response(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
+) -> int:
     """The same of a smooth contact of a sphere with a half space.
 
-    The integers of the item are how far behind it that of the contact is, and the direction. The numbers of that are
-    those of the law, and of the sphere on the plane (:mod:`osimlite.simulation.elements.geometries.sphere_on_plane`).
+    The integers of the item are how far behind it that of the contact is, and the direction. The
+    numbers of that are those of the law, and of the sphere on the plane
+    (:mod:`osimlite.simulation.elements.geometries.sphere_on_plane`).
     """
     i, change = at(model, item), at(data, WORK.SCRATCH)
     for k in range(INVERSE):
@@ -123,7 +146,10 @@ def smooth_contact_response(model: Ints, reals: Floats, data: Floats, y: Floats,
     contact = item + i[ITEM.OWN]
     p, g = at(reals, model[contact + ITEM.NUMBERS]), at(model, contact + ITEM.OWN)
     place = at(p, SMOOTH)
-    n, center = direction(model, data, g[0], vector(place, 3)), station(model, data, g[1], vector(place, 6))
+    n, center = (
+        direction(model, data, g[0], vector(place, 3)),
+        station(model, data, g[1], vector(place, 6)),
+    )
     d = place[9] - dot(minus(center, station(model, data, g[0], vector(place, 0))), n)
     point = along(center, 0.5 * d - place[9], n)
     v = minus(velocity(model, data, g[0], point), velocity(model, data, g[1], point))
@@ -132,7 +158,22 @@ def smooth_contact_response(model: Ints, reals: Floats, data: Floats, y: Floats,
     )
     if growth != 0.0:
         changes = pressed, damped, dragged
-        respond(model, data, y, f, g[0], g[1], i[ITEM.OWN + 1], point, center, n, v, 0.5, changes, growth)
+        respond(
+            model,
+            data,
+            y,
+            f,
+            g[0],
+            g[1],
+            i[ITEM.OWN + 1],
+            point,
+            center,
+            n,
+            v,
+            0.5,
+            changes,
+            growth,
+        )
     return OUTCOME.OK
 
 
@@ -154,15 +195,11 @@ def respond(
 ) -> None:
     """Push two links apart, and leave in SCRATCH how the force of their contact changes.
 
-    Args:
-        one, two: the links.
-        axis: 0 along the normal, 1 and 2 across it.
-        point: where they touch.
-        center: of the second, with which the point moves but for a part `sinks` of what that moves along the normal.
-        n: the normal, from one to two.
-        v: velocity of one relative to two.
-        changes: derivatives along the normal by depth and approach, and force across it over the slip.
-        growth: by what part the force grows with the depth.
+    Args: one, two: the links. axis: 0 along the normal, 1 and 2 across it. point: where they touch.
+        center: of the second, with which the point moves but for a part `sinks` of what that moves
+        along the normal. n: the normal, from one to two. v: velocity of one relative to two.
+        changes: derivatives along the normal by depth and approach, and force across it over the
+        slip. growth: by what part the force grows with the depth.
     """
     change, (pressed, damped, dragged) = at(data, WORK.SCRATCH), changes
     way, by_depth = n, 0.0
@@ -179,8 +216,32 @@ def respond(
         change[0], change[1] = -pressed, -damped
     apply_force(model, data, two, point, way)
     apply_force(model, data, one, point, times(-1.0, way))
-    turns(model, data, y, f, two, point, center, n, times(sinks, n), times(by_depth, n), times(change[1], way))
-    turns(model, data, y, f, one, point, point, n, times(sinks, n), times(-by_depth, n), times(-change[1], way))
+    turns(
+        model,
+        data,
+        y,
+        f,
+        two,
+        point,
+        center,
+        n,
+        times(sinks, n),
+        times(by_depth, n),
+        times(change[1], way),
+    )
+    turns(
+        model,
+        data,
+        y,
+        f,
+        one,
+        point,
+        point,
+        n,
+        times(sinks, n),
+        times(-by_depth, n),
+        times(-change[1], way),
+    )
 
 
 def turns(
@@ -216,7 +277,10 @@ def turns(
             if j[OPERATION.DOF] >= 0:
                 moved = plus(shift, cross(turn, minus(center, origin)))
                 moved = minus(moved, times(dot(n, moved), sinks))
-                swept = plus(plus(cross(turn, shifting), cross(shift, turning)), cross(cross(turn, turning), arm))
+                swept = plus(
+                    plus(cross(turn, shifting), cross(shift, turning)),
+                    cross(cross(turn, turning), arm),
+                )
                 placed = dot(by_place, plus(shift, cross(turn, arm)))
                 row[j[OPERATION.DOF]] += placed + dot(by_motion, plus(swept, cross(spin, moved)))
                 rate = y[model[MODEL.DOFS] + j[OPERATION.DOF]]
@@ -225,11 +289,23 @@ def turns(
 
 
 def press(
-    model: Ints, reals: Floats, data: Floats, item: int, d: float, radius: float, n: Vector, point: Vector
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    item: int,
+    d: float,
+    radius: float,
+    n: Vector,
+    point: Vector,
 ) -> None:
     """The force of a contact of a depth at a point, on both surfaces and in the record."""
     i = at(model, item)
-    one, two, p, result = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])
+    one, two, p, result = (
+        i[ITEM.OWN],
+        i[ITEM.OWN + 1],
+        at(reals, i[ITEM.NUMBERS]),
+        at(data, i[ITEM.RECORD]),
+    )
     v = minus(velocity(model, data, one, point), velocity(model, data, two, point))
     force = contact_force(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
     put(result, 0, force)

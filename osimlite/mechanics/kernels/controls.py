@@ -10,8 +10,8 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 def set_controls(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Each control is the sum of some functions of time.
 
-    Of the record, from OWN on, the integers are the count of the controls, for each of them how many functions there
-    are up to it, and the places of the functions' tables among the numbers.
+    Of the record, from OWN on, the integers are the count of the controls, for each of them how
+    many functions there are up to it, and the places of the functions' tables among the numbers.
     """
     i = at(model, item)
     count, numbers, values = i[ITEM.OWN], at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])

@@ -1,7 +1,8 @@
 """What a walk is judged by: SCONE's measures, noted after each control step.
 
-The integers are the count of the criteria, and of each `CRITERION`. Its numbers are the times between which it counts
-(s), and those of its kind; its room begins as `NOTED` says, that of a gait as `GAIT_NOTED`, behind which there are the
+The integers are the count of the criteria, and of each `CRITERION`. Its numbers are the times
+between which it counts (s), and those of its kind; its room begins as `NOTED` says, that of a gait
+as `GAIT_NOTED`, behind which there are the
 steps: the time (s) of each, and how far it led (m).
 """
 
@@ -14,8 +15,9 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.senses import SENSED, SENSES, foot
 
 GAIT, JUMP, NUMBER, LARGEST_LOAD, WHOLE_LOAD, POWERS, TENSIONS, WANG = range(8)
-"""Kinds: steps; a jump; how far a number of a row, the load of a leg or that of both are beyond a range; what
-muscles take."""
+"""Kinds: steps; a jump; how far a number of a row, the load of a leg or that of both are beyond a
+range; what muscles take.
+"""
 QUARTER = 0.5 * pi
 PREPARES, TAKES_OFF, FLIES, COMES_DOWN = range(4)
 """What a jumper does."""
@@ -30,10 +32,12 @@ class CRITERION(metaclass=Record):
 
 
 class CRITERION_NUMBERS(metaclass=Record):
-    """Of all; of a range what follows: a factor of the number, least and largest, penalties of what is beyond and of
-    its square; of a gait: least height of the mass centre over that at the start, load of a foot that touches, shortest
-    time of a step; of a jump: least height likewise, time to prepare (s), whether it ends at the peak; of Wang's
-    effort: part of slow fibers, and of each muscle the mass (kg)."""
+    """Of all; of a range what follows: a factor of the number, least and largest, penalties of what
+    is beyond and of its square; of a gait: least height of the mass centre over that at the start,
+    load of a foot that touches, shortest time of a step; of a jump: least height likewise, time to
+    prepare (s), whether it ends at the peak; of Wang's
+    effort: part of slow fibers, and of each muscle the mass (kg).
+    """
 
     START, STOP, FACTOR, LOW, HIGH, LINEAR, SQUARED = range(7)
     HEIGHT, LOAD, SHORTEST = 2, 3, 4
@@ -42,22 +46,25 @@ class CRITERION_NUMBERS(metaclass=Record):
 
 
 class NOTED(metaclass=Record):
-    """Whether there is a sample, its time and value; integral over time, time of that, largest and smallest value; how
-    far the mass centre was along x at the start, and is."""
+    """Whether there is a sample, its time and value; integral over time, time of that, largest and
+    smallest value; how far the mass centre was along x at the start, and is.
+    """
 
     BEGUN, TIME, VALUE, TOTAL, SPAN, HIGHEST, LOWEST, START, HERE, SIZE = range(10)
 
 
 class GAIT_NOTED(metaclass=Record):
-    """How far the walker was at the last step, and is; height of the mass centre at the start; whether it has fallen;
-    count of steps; whether each foot touches, -1 if that is not known."""
+    """How far the walker was at the last step, and is; height of the mass centre at the start;
+    whether it has fallen; count of steps; whether each foot touches, -1 if that is not known.
+    """
 
     BEFORE, HERE, HEIGHT, FALLEN, COUNT, TOUCHES, STEPS = 0, 1, 2, 3, 4, 5, 7
 
 
 class JUMP_NOTED(metaclass=Record):
-    """Height of the mass centre at the start, now, at the highest and when the jumper began to take off (m); whether it
-    has sunk or come down, see PREPARES."""
+    """Height of the mass centre at the start, now, at the highest and when the jumper began to take
+    off (m); whether it has sunk or come down, see PREPARES.
+    """
 
     START, HERE, PEAK, PREPARED, ENDED, DOES = range(6)
 
@@ -82,7 +89,9 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
             noted[NOTED.START] = noted[NOTED.HERE] = row[centre]
 
 
-def judged(senses: Ints, known: Floats, i: Ints, p: Floats, t: float, row: Floats, u: Floats, room: Floats) -> bool:
+def judged(
+    senses: Ints, known: Floats, i: Ints, p: Floats, t: float, row: Floats, u: Floats, room: Floats
+) -> bool:
     """Note a row, and tell whether the walker has fallen, or its jump has ended.
 
     Args:
@@ -144,7 +153,10 @@ def distance(senses: Ints, row: Floats) -> float:
 def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
     """Whether the mass centre has sunk, and a step if a foot has touched the ground."""
     noted[GAIT_NOTED.HERE] = distance(senses, row)
-    if row[senses[SENSES.CENTRE] + 1] < numbers[CRITERION_NUMBERS.HEIGHT] * noted[GAIT_NOTED.HEIGHT]:
+    if (
+        row[senses[SENSES.CENTRE] + 1]
+        < numbers[CRITERION_NUMBERS.HEIGHT] * noted[GAIT_NOTED.HEIGHT]
+    ):
         noted[GAIT_NOTED.FALLEN] = 1.0
     has_touched = False
     for leg in range(2):
@@ -153,7 +165,11 @@ def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
         noted[GAIT_NOTED.TOUCHES + leg] = touches
     count = int(noted[GAIT_NOTED.COUNT])
     last = noted[GAIT_NOTED.STEPS + 2 * (count - 1)] if count > 0 else 0.0
-    if has_touched and noted[GAIT_NOTED.FALLEN] == 0.0 and t - last > numbers[CRITERION_NUMBERS.SHORTEST]:
+    if (
+        has_touched
+        and noted[GAIT_NOTED.FALLEN] == 0.0
+        and t - last > numbers[CRITERION_NUMBERS.SHORTEST]
+    ):
         step = at(noted, GAIT_NOTED.STEPS + 2 * count)
         step[0], step[1] = t, noted[GAIT_NOTED.HERE] - noted[GAIT_NOTED.BEFORE]
         noted[GAIT_NOTED.BEFORE] = noted[GAIT_NOTED.HERE]
@@ -161,9 +177,14 @@ def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
 
 
 def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
-    """Follow the height of the mass centre, and what the jumper does: it takes off once it rises after its time to
-    prepare, and comes down when it sinks, or is on the ground after a flight."""
-    height, rise, does = row[senses[SENSES.CENTRE] + 1], row[senses[SENSES.RISE]], noted[JUMP_NOTED.DOES]
+    """Follow the height of the mass centre, and what the jumper does: it takes off once it rises
+    after its time to prepare, and comes down when it sinks, or is on the ground after a flight.
+    """
+    height, rise, does = (
+        row[senses[SENSES.CENTRE] + 1],
+        row[senses[SENSES.RISE]],
+        noted[JUMP_NOTED.DOES],
+    )
     has_load = row[senses[SENSES.LOADS]] + row[senses[SENSES.LOADS] + 1] > 0.0
     noted[JUMP_NOTED.HERE], noted[JUMP_NOTED.PEAK] = height, max(noted[JUMP_NOTED.PEAK], height)
     if height < numbers[CRITERION_NUMBERS.HEIGHT] * noted[JUMP_NOTED.START]:
@@ -174,7 +195,10 @@ def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
     elif does == TAKES_OFF and not has_load:
         noted[JUMP_NOTED.DOES] = FLIES
     elif does < COMES_DOWN and (rise < 0.0 or (does == FLIES and has_load)):
-        noted[JUMP_NOTED.DOES], noted[JUMP_NOTED.ENDED] = COMES_DOWN, numbers[CRITERION_NUMBERS.AT_PEAK]
+        noted[JUMP_NOTED.DOES], noted[JUMP_NOTED.ENDED] = (
+            COMES_DOWN,
+            numbers[CRITERION_NUMBERS.AT_PEAK],
+        )
 
 
 def penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Floats) -> float:
@@ -184,8 +208,12 @@ def penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Floats) -
         one, two = row[senses[SENSES.LOADS]], row[senses[SENSES.LOADS] + 1]
         one, two = (max(one, two), 0.0) if kind == LARGEST_LOAD else (one, two)
     value = numbers[CRITERION_NUMBERS.FACTOR] * (one + two)
-    off = max(numbers[CRITERION_NUMBERS.LOW] - value, 0.0) + max(value - numbers[CRITERION_NUMBERS.HIGH], 0.0)
-    return numbers[CRITERION_NUMBERS.LINEAR] * off + numbers[CRITERION_NUMBERS.SQUARED] * (off * off)
+    off = max(numbers[CRITERION_NUMBERS.LOW] - value, 0.0) + max(
+        value - numbers[CRITERION_NUMBERS.HIGH], 0.0
+    )
+    return numbers[CRITERION_NUMBERS.LINEAR] * off + numbers[CRITERION_NUMBERS.SQUARED] * (
+        off * off
+    )
 
 
 def effort(senses: Ints, known: Floats, kind: int, power: int, row: Floats) -> float:
@@ -216,5 +244,9 @@ def wang(senses: Ints, known: Floats, numbers: Floats, row: Floats, excitations:
         shortens = -row[senses[SENSES.VELOCITIES] + k] * optimal[k]
         heat = max(0.0, 0.25 * row[senses[SENSES.FORCES] + k] * strengths[k] * shortens)
         work = max(0.0, row[senses[SENSES.ACTIVE] + k] * shortens)
-        total += numbers[CRITERION_NUMBERS.MASSES + k] * (of_activation + shape * of_maintenance) + heat + work
+        total += (
+            numbers[CRITERION_NUMBERS.MASSES + k] * (of_activation + shape * of_maintenance)
+            + heat
+            + work
+        )
     return AT_REST * known[SENSED.MASS] + total

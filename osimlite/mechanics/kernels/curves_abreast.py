@@ -1,7 +1,7 @@
 """Many curves of Bezier sections asked at once, as :mod:`osimlite.mechanics.laws.bezier` asks one, to the last bit.
 
-What is asked has a lane each, whose numbers lie side by side: the steps of the search are the same for all lanes, and a
-processor takes as many at a time as it can.
+What is asked has a lane each, whose numbers lie side by side: the steps of the search are the same
+for all lanes, and a processor takes as many at a time as it can.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ LANES = 64
 """So many can be asked at once."""
 COEFFICIENTS = STARTS - X
 VALUE, INSIDE, GOES_ON, REST, U, OF_X, ROWS = 0, 1, 2, 3, 4, 5, 5 + COEFFICIENTS
-"""Rows of the room, each of LANES numbers: the answer; 0 where the argument is outside of the curve, and the answer
-there at once; whether the search has to go on, how far the argument is from the start of its section, the place on
-that, and its coefficients."""
+"""Rows of the room, each of LANES numbers: the answer; 0 where the argument is outside of the
+curve, and the answer there at once; whether the search has to go on, how far the argument is from
+the start of its section, the place on that, and its coefficients.
+"""
 
 
 def ask(x: Floats, room: Floats, number: int, place: int, z: float) -> None:
@@ -52,7 +53,9 @@ def ask(x: Floats, room: Floats, number: int, place: int, z: float) -> None:
         lane[LANES * (OF_X + k)] = c[section + X + k]
 
 
-def ask_sum(x: Floats, room: Floats, number: int, place: int, of_y: float, of_x: float, total: float) -> None:
+def ask_sum(
+    x: Floats, room: Floats, number: int, place: int, of_y: float, of_x: float, total: float
+) -> None:
     """Ask where a sum of a curve and its argument is a total, see :func:`osimlite.mechanics.laws.bezier.value_of_sum`."""
     c: Any = at(x, place)
     lane = at(room, number)
@@ -74,7 +77,9 @@ def ask_sum(x: Floats, room: Floats, number: int, place: int, of_y: float, of_x:
 
 def missed_of(room: Any, number: int) -> float:
     """How far a search has ended from where it was to."""
-    return missed(room, LANES * OF_X + number, LANES, room[LANES * U + number], room[LANES * REST + number])
+    return missed(
+        room, LANES * OF_X + number, LANES, room[LANES * U + number], room[LANES * REST + number]
+    )
 
 
 def value_of(room: Floats, number: int) -> float:

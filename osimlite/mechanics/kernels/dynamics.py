@@ -1,9 +1,10 @@
 """Accelerations of a tree of links under gravity and whatever pushes.
 
-The composite-rigid-body algorithm gives the mass matrix, and a factorisation that keeps its zeros solves for the
-accelerations (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 6.2 and 6.5). Of the row of a degree of
-freedom only the entries of those on its way to ground are there, its own first. The cost grows with the number of
-degrees of freedom times the square of how many of them carry one another.
+The composite-rigid-body algorithm gives the mass matrix, and a factorisation that keeps its zeros
+solves for the accelerations (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 6.2
+and 6.5). Of the row of a degree of freedom only the entries of those on its way to ground are
+there, its own first. The cost grows with the number of degrees of freedom times the square of how
+many of them carry one another.
 """
 
 from __future__ import annotations
@@ -42,8 +43,9 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 SMALLEST_PIVOT = 1e-13
-"""Part of the inertia about a degree of freedom that must remain once the joints further out are free; with less it
-moves no mass."""
+"""Part of the inertia about a degree of freedom that must remain once the joints further out are
+free; with less it moves no mass.
+"""
 
 
 def evaluate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, stage: int) -> int:
@@ -64,7 +66,15 @@ def evaluate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, sta
         status = apply_forces(model, reals, data, y, f)
         generalized_forces(model, data, right)
         if stage == STAGE.ACCELERATION and status == OUTCOME.OK:
-            status = call(model[MODEL.LAWS + model[model[MODEL.CHAIN] + CHAIN.DYNAMICS]], model, reals, data, y, f, 0)
+            status = call(
+                model[MODEL.LAWS + model[model[MODEL.CHAIN] + CHAIN.DYNAMICS]],
+                model,
+                reals,
+                data,
+                y,
+                f,
+                0,
+            )
     else:
         spatial_inertias_and_bias(model, reals, data)
         status = apply_forces(model, reals, data, y, f)
@@ -73,7 +83,13 @@ def evaluate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, sta
         return status
     if model[MODEL.CONSTRAINED] > 0:
         return call(
-            model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.DYNAMICS]], model, reals, data, y, f, 0
+            model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.DYNAMICS]],
+            model,
+            reals,
+            data,
+            y,
+            f,
+            0,
         )
     singular = solve(model, data, right)
     if singular >= 0:
@@ -113,8 +129,8 @@ def inverse(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unus
 def equilibrate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, stage: int) -> int:
     """Bring what can be into equilibrium: changes auxiliary states in y, also after one has failed.
 
-    Returns:
-        OK, or what went wrong; with UNSOLVED, f[0] is the number of the first that has no equilibrium.
+    Returns: OK, or what went wrong; with UNSOLVED, f[0] is the number of the first that has no
+        equilibrium.
     """
     status = call(model[MODEL.LAWS], model, reals, data, y, f, stage)
     if status != OUTCOME.OK:
@@ -166,7 +182,9 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
         i[9] = dot(second, three) - my * cz
         spin, velocity = vector(here, LINK_WORK.VELOCITY), vector(here, LINK_WORK.VELOCITY + 3)
         angular, linear = momentum(i, spin, velocity)
-        torque, force = momentum(i, vector(here, LINK_WORK.ACCELERATION), vector(here, LINK_WORK.ACCELERATION + 3))
+        torque, force = momentum(
+            i, vector(here, LINK_WORK.ACCELERATION), vector(here, LINK_WORK.ACCELERATION + 3)
+        )
         torque = plus(torque, plus(cross(spin, angular), cross(velocity, linear)))
         put(here, LINK_WORK.WRENCH, times(-1.0, torque))
         put(here, LINK_WORK.WRENCH + 3, times(-1.0, plus(force, cross(spin, linear))))
@@ -184,7 +202,10 @@ def accelerate(model: Ints, data: Floats, udot: Floats) -> None:
             turn, shift = vector(above, 0), vector(above, 3)
         for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
-            turn, shift = along(turn, udot[freedom], vector(c, 0)), along(shift, udot[freedom], vector(c, 3))
+            turn, shift = (
+                along(turn, udot[freedom], vector(c, 0)),
+                along(shift, udot[freedom], vector(c, 3)),
+            )
         put(here, LINK_WORK.WRENCH, turn)
         put(here, LINK_WORK.WRENCH + 3, shift)
         put(here, LINK_WORK.ACCELERATION, plus(vector(here, LINK_WORK.ACCELERATION), turn))
@@ -270,7 +291,11 @@ def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
 
 def solve(model: Ints, data: Floats, right: Floats) -> int:
     """Solve for the accelerations in place; returns the degree of freedom that moves no mass, or -1."""
-    size, freedoms, pivots = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_PIVOT])
+    size, freedoms, pivots = (
+        model[MODEL.DOFS],
+        at(model, model[MODEL.DOF_AT]),
+        at(data, model[MODEL.WORK_PIVOT]),
+    )
     for k in range(size):
         pivots[k] = data[freedoms[DOF.SIZE * k + DOF.ROW]]
     for k in range(size - 1, -1, -1):

@@ -1,14 +1,15 @@
 """How actuators share what is needed with the least effort, frame by frame.
 
-Of all x with A x = b and bounds on each, the one with the least sum of |x|ᵖ, p > 1. For p = 2 it is a function of one
-multiplier λ for each equation: x is Aᵀλ within its bounds. The λ at which the equations hold are found by Newton's
-method on the concave dual function, whose second derivative is that of the entries that are at no bound: an active set
-that changes as a whole (L. Qi, J. Sun, Math. Programming 58, 1993). Each frame begins with the multipliers of the one
-before. Other p are reached by Newton's method, each step of which is such a problem with weights.
+Of all x with A x = b and bounds on each, the one with the least sum of |x|ᵖ, p > 1. For p = 2 it is
+a function of one multiplier λ for each equation: x is Aᵀλ within its bounds. The λ at which the
+equations hold are found by Newton's method on the concave dual function, whose second derivative is
+that of the entries that are at no bound: an active set that changes as a whole (L. Qi, J. Sun,
+Math. Programming 58, 1993). Each frame begins with the multipliers of the one before. Other p are
+reached by Newton's method, each step of which is such a problem with weights.
 
-The dual function is made strictly concave by a little of |λ - λ'|², where λ' is what was found before (R. T.
-Rockafellar, Math. Oper. Research 1, 1976). So equations that repeat each other do no harm, and where there is no
-solution, what is missing of b tends to the shortest that is possible.
+The dual function is made strictly concave by a little of |λ - λ'|², where λ' is what was found
+before (R. T. Rockafellar, Math. Oper. Research 1, 1976). So equations that repeat each other do no
+harm, and where there is no solution, what is missing of b tends to the shortest that is possible.
 """
 
 from __future__ import annotations
@@ -20,23 +21,27 @@ from osimlite.mechanics.kernels.least_squares import cholesky, substitute
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 
 FRAMES, EQUATIONS, UNKNOWNS, ENTRIES = 0, 1, 2, 3
-"""Places of the counts; from ENTRIES on room for the places of the entries of a column that are not 0, after their
-count (n, 1 + m)."""
+"""Places of the counts; from ENTRIES on room for the places of the entries of a column that are not
+0, after their count (n, 1 + m).
+"""
 POWER, BOUNDS = 0, 1
 """Places of the exponent, and of the bounds: all lower ones, then all upper ones (2, n)."""
 TIGHTEST, CLOSEST, CLOSE = 1e-15, 1e-13, 1e-10
-"""What may be missing of an equation, as part of its terms: nothing is looked for below the first, a search ends at the
-second, and with the third there is a solution."""
+"""What may be missing of an equation, as part of its terms: nothing is looked for below the first,
+a search ends at the second, and with the third there is a solution.
+"""
 ROUNDING, LEAST = 1e-12, 1e-14
 """What part of the largest entry of a column is none, and of that of all: a force within the body moves no pelvis."""
 SLIGHT, SLOWEST = 1e-9, 0.9
-"""How much of |λ - λ'|² is added, as part of the second derivative; what must be left at most of what was missing at
-the λ' before, to go on."""
+"""How much of |λ - λ'|² is added, as part of the second derivative; what must be left at most of
+what was missing at the λ' before, to go on.
+"""
 CENTRES, ROUNDS, HALVINGS, NEWTON_STEPS, PATIENCE = 30, 100, 60, 200, 20
 """Most λ' of a problem, steps from each, tries along a step, steps to another exponent than 2, steps in vain."""
 SMALLEST, SOFTEST, LEAST_GAIN = 1e-6, 1e-8, 1e-15
-"""Of such a step: the |x| below which |x|ᵖ is bent as there if p < 2, the least bend as part of the largest if p > 2,
-and the part of the effort that a step must save to be worth it."""
+"""Of such a step: the |x| below which |x|ᵖ is bent as there if p < 2, the least bend as part of the
+largest if p > 2, and the part of the effort that a step must save to be worth it.
+"""
 
 
 def effort_room(equations: int, unknowns: int) -> int:
@@ -47,12 +52,10 @@ def effort_room(equations: int, unknowns: int) -> int:
 def least_effort(sizes: Ints, numbers: Floats, given: Floats, found: Floats, room: Floats) -> int:
     """Share out, frame by frame.
 
-    Args:
-        sizes: counts of frames, equations m and unknowns n, and room.
-        numbers: exponent and bounds.
-        given: of each frame the columns of A (n, m) and b (m,); changed.
-        found: of each frame x (n,), what is missing of b (m,), and 1 if there is a solution, else 0.
-        room: for what `effort_room` says.
+    Args: sizes: counts of frames, equations m and unknowns n, and room. numbers: exponent and
+        bounds. given: of each frame the columns of A (n, m) and b (m,); changed. found: of each
+        frame x (n,), what is missing of b (m,), and 1 if there is a solution, else 0. room: for
+        what `effort_room` says.
     """
     m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
     scales, carried, push, own = room, at(room, m), at(room, 2 * m), at(room, 3 * m)
@@ -111,7 +114,9 @@ def scale(sizes: Ints, columns: Floats, scales: Floats) -> None:
         entries[0] = count
 
 
-def newton(sizes: Ints, numbers: Floats, columns: Floats, x: Floats, push: Floats, room: Floats) -> None:
+def newton(
+    sizes: Ints, numbers: Floats, columns: Floats, x: Floats, push: Floats, room: Floats
+) -> None:
     """From a solution to the one with the least sum of |x|ᵖ; x is followed by room for what is missing."""
     m, n, power = sizes[EQUATIONS], sizes[UNKNOWNS], numbers[POWER]
     middles, softness, tried = room, at(room, n), at(room, 4 * n + m * (m + 5))
@@ -164,7 +169,13 @@ def effort(n: int, power: float, unit: float, x: Floats, to: Floats, part: float
 
 
 def share(
-    sizes: Ints, numbers: Floats, columns: Floats, x: Floats, missing: Floats, push: Floats, room: Floats
+    sizes: Ints,
+    numbers: Floats,
+    columns: Floats,
+    x: Floats,
+    missing: Floats,
+    push: Floats,
+    room: Floats,
 ) -> float:
     """Find the x with the least sum of (x - middle)² / softness, from multipliers on.
 
@@ -223,7 +234,13 @@ def share(
 
 
 def mended(
-    sizes: Ints, numbers: Floats, columns: Floats, x: Floats, missing: Floats, push: Floats, room: Floats
+    sizes: Ints,
+    numbers: Floats,
+    columns: Floats,
+    x: Floats,
+    missing: Floats,
+    push: Floats,
+    room: Floats,
 ) -> bool:
     """Change x as little as the equations take, which great softness has left to rounding; whether they hold then."""
     for j in range(sizes[UNKNOWNS]):
@@ -250,7 +267,13 @@ def answer(numbers: Floats, n: int, j: int, room: Floats, y: float) -> float:
 
 
 def answers(
-    sizes: Ints, numbers: Floats, columns: Floats, room: Floats, x: Floats, missing: Floats, terms: Floats
+    sizes: Ints,
+    numbers: Floats,
+    columns: Floats,
+    room: Floats,
+    x: Floats,
+    missing: Floats,
+    terms: Floats,
 ) -> float:
     """Fill in x for what the multipliers pull; returns as `missing_of`."""
     n = sizes[UNKNOWNS]
@@ -296,10 +319,17 @@ def second(sizes: Ints, numbers: Floats, columns: Floats, room: Floats, matrix: 
                 row[entries[g]] += factor * column[entries[g]]
 
 
-def way(sizes: Ints, numbers: Floats, wanted: Floats, step: Floats, push: Floats, room: Floats) -> float:
+def way(
+    sizes: Ints, numbers: Floats, wanted: Floats, step: Floats, push: Floats, room: Floats
+) -> float:
     """The part of a step to take: all of it, or where the dual function rises half as much as at its start at most."""
     m, n, low, high, part, start = sizes[EQUATIONS], sizes[UNKNOWNS], 0.0, 1.0, 0.0, 0.0
-    y, change, centre, slight = at(room, 2 * n), at(room, 3 * n), at(room, 4 * n), at(room, 4 * n + 4 * m)
+    y, change, centre, slight = (
+        at(room, 2 * n),
+        at(room, 3 * n),
+        at(room, 4 * n),
+        at(room, 4 * n + 4 * m),
+    )
     for _ in range(HALVINGS):
         rise = 0.0
         for k in range(m):

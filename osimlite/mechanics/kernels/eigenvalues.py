@@ -17,10 +17,9 @@ NEGLIGIBLE = 1e-32
 def diagonalize(size: int, a: Floats, vectors: Floats) -> None:
     """Turn a symmetric matrix into a diagonal one by rotations.
 
-    Args:
-        size: of the matrix.
-        a: the matrix (size, size); its eigenvalues are on its diagonal then.
-        vectors: filled with the eigenvectors by rows (size, size), orthonormal, in the order of the eigenvalues.
+    Args: size: of the matrix. a: the matrix (size, size); its eigenvalues are on its diagonal then.
+        vectors: filled with the eigenvectors by rows (size, size), orthonormal, in the order of the
+        eigenvalues.
     """
     for i in range(size):
         for j in range(size):
@@ -54,4 +53,7 @@ def rotate(size: int, a: Floats, vectors: Floats, i: int, j: int) -> None:
         one, two = a[size * k + i], a[size * k + j]
         a[size * k + i], a[size * k + j] = cosine * one - sine * two, sine * one + cosine * two
         one, two = vectors[size * i + k], vectors[size * j + k]
-        vectors[size * i + k], vectors[size * j + k] = cosine * one - sine * two, sine * one + cosine * two
+        vectors[size * i + k], vectors[size * j + k] = (
+            cosine * one - sine * two,
+            sine * one + cosine * two,
+        )

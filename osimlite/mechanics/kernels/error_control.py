@@ -30,7 +30,9 @@ def judge(h: Floats, t1: float, error: float, order: float) -> None:
     limit, step, accuracy = h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED]
     # A step cut much shorter tells nothing about the next.
     cut = limit < h[REACHED] + 0.95 * step
-    h[NEXT_STEP] = min(max(next_step_size(step, error, accuracy, cut, order), h[SHORTEST]), h[LONGEST])
+    h[NEXT_STEP] = min(
+        max(next_step_size(step, error, accuracy, cut, order), h[SHORTEST]), h[LONGEST]
+    )
     # The shortest step that is allowed is taken whatever its error, as in Simbody.
     if error <= accuracy or (step <= h[SHORTEST] and error < inf):
         h[REACHED] = t1
@@ -82,7 +84,9 @@ def step_error(
     tolerance = h[ACCEPTED] / 10.0
     for k in range(model[MODEL.STATE_SIZE]):
         errors[k] = abs(errors[k])
-    if not projected(model, reals, data, t1, y1, errors, 1, tolerance, max(2.0 * tolerance, sqrt(tolerance))):
+    if not projected(
+        model, reals, data, t1, y1, errors, 1, tolerance, max(2.0 * tolerance, sqrt(tolerance))
+    ):
         return inf
     return error_norm(model, y0, errors, h, is_strict)
 
@@ -90,8 +94,9 @@ def step_error(
 def error_norm(model: Ints, y0: Floats, errors: Floats, h: Floats, is_strict: int) -> float:
     """Largest of three root mean squares: errors of q as they are, of u and z relative to y0 where |y0| > 1.
 
-    That is Simbody's norm. A fiber among those of many muscles can err much in it. An explicit method brings such a one
-    back, since it has to take short steps; implicit ones may not, and are strict: of z, the largest error counts.
+    That is Simbody's norm. A fiber among those of many muscles can err much in it. An explicit
+    method brings such a one back, since it has to take short steps; implicit ones may not, and are
+    strict: of z, the largest error counts.
 
     Args:
         model: the mechanism.

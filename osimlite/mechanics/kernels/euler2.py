@@ -1,7 +1,8 @@
 """Two half steps of semi-explicit Euler, as Simbody's SemiExplicitEuler2Integrator takes its steps.
 
-Speeds and auxiliary states go on by their rates, and then values by the rates that the new speeds give them where they
-were. What two half steps differ from one whole is the error; the end of the half steps is kept as it is.
+Speeds and auxiliary states go on by their rates, and then values by the rates that the new speeds
+give them where they were. What two half steps differ from one whole is the error; the end of the
+half steps is kept as it is.
 """
 
 from __future__ import annotations
@@ -73,7 +74,15 @@ def halved(
 
 
 def advanced(
-    model: Ints, reals: Floats, data: Floats, t: float, h: float, y: Floats, f: Floats, new: Floats, rates: Floats
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    t: float,
+    h: float,
+    y: Floats,
+    f: Floats,
+    new: Floats,
+    rates: Floats,
 ) -> int:
     """The state `new` after a step h from y with the derivative f, at whose end it is t; `rates` is room."""
     n, size = model[MODEL.DOFS], model[MODEL.STATE_SIZE]

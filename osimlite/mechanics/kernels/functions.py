@@ -9,9 +9,11 @@ from osimlite.mechanics.kernels.parts import operation_ints, operation_work
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 
 PIECES, SINE, STEP, PIECES_OF_OPENSIM, MONOMIALS, MONOMIALS_OF_OPENSIM, ARC = 0, 1, 2, 3, 4, 5, 6
-"""Kinds: polynomials between knots, a sine, a smooth step; from MONOMIALS on those of several arguments, a sum of
-products of their powers, and the end of a bent rod. Those of OpenSim have what OpenSim 4.6 takes for the second
-derivatives of a MultivariatePolynomialFunction, which is the gradient in every column."""
+"""Kinds: polynomials between knots, a sine, a smooth step; from MONOMIALS on those of several
+arguments, a sum of products of their powers, and the end of a bent rod. Those of OpenSim have what
+OpenSim 4.6 takes for the second derivatives of a MultivariatePolynomialFunction, which is the
+gradient in every column.
+"""
 
 
 def value_at(table: Floats, z: float) -> tuple[float, float, float]:
@@ -55,7 +57,9 @@ def pieces_at(table: Floats, z: float, kind: int) -> tuple[float, float, float]:
     return value, slope, slope if kind == PIECES_OF_OPENSIM else 2.0 * curvature
 
 
-def amount_by_one(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
+def amount_by_one(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
+) -> int:
     """Amount of an operation by a function of one coordinate, with its derivatives."""
     j, a = (
         operation_ints(model, operation),
@@ -75,7 +79,9 @@ def amount_by_one(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
     return OUTCOME.OK
 
 
-def amount_by_several(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
+def amount_by_several(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
+) -> int:
     """Amount of an operation by a polynomial of several coordinates, with its derivatives."""
     j, a = (
         operation_ints(model, operation),
@@ -117,7 +123,9 @@ def several_at(
         for one in range(size):
             if powers[one] == 0.0:
                 continue
-            first = coefficient * powers[one] * product(size, arguments, constants, y, powers, one, -1)
+            first = (
+                coefficient * powers[one] * product(size, arguments, constants, y, powers, one, -1)
+            )
             gradient[one] += first
             if arguments[one] < 0:
                 continue
@@ -126,7 +134,12 @@ def several_at(
                 power = powers[two] - (1.0 if one == two else 0.0)
                 if power == 0.0 or arguments[two] < 0:
                     continue
-                second = coefficient * powers[one] * power * product(size, arguments, constants, y, powers, one, two)
+                second = (
+                    coefficient
+                    * powers[one]
+                    * power
+                    * product(size, arguments, constants, y, powers, one, two)
+                )
                 curvature += second * rates[arguments[one]] * rates[arguments[two]]
     if int(table[0]) == MONOMIALS_OF_OPENSIM:
         total = 0.0
@@ -136,7 +149,9 @@ def several_at(
     return value, rate, curvature
 
 
-def product(size: int, arguments: Ints, constants: Floats, y: Floats, powers: Floats, one: int, two: int) -> float:
+def product(
+    size: int, arguments: Ints, constants: Floats, y: Floats, powers: Floats, one: int, two: int
+) -> float:
     """Product of powers of all arguments; the powers of arguments `one` and `two` (-1 for none) are one less."""
     total = 1.0
     for index in range(size):

@@ -56,9 +56,15 @@ from osimlite.mechanics.kernels.wrap_curves import pieces
 from osimlite.mechanics.laws.vectors import Vector, dot, put, turned_back, vector
 
 
-def trace_geodesics(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+def trace_geodesics(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
+) -> int:
     """Write all corners of a path that was measured into f, in ground; returns how many there are."""
-    i, p, result = at(model, item), at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
+    i, p, result = (
+        at(model, item),
+        at(reals, model[item + ITEM.NUMBERS]),
+        at(data, model[item + ITEM.RECORD]),
+    )
     points, wraps = i[POINTS], at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * i[WRAPS]))
     order, work = at(result, ORDER), at(result, ORDER + points + 2 * i[WRAPS])
     slots = at(wraps, WRAP_INTS * i[WRAPS])
@@ -78,13 +84,19 @@ def trace_geodesics(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floa
             point = in_surface(pose, vector(here, PLACE))
             way = turned_back(pose, vector(work, NODE_WORK * int(order[k - 1]) + ALONG))
             length = here[NODE_WORK + SURFACE_LENGTH]
-            count += trace_geodesic(surface, pose, point, way, length, geodesic, room, at(f, 3 * count))
+            count += trace_geodesic(
+                surface, pose, point, way, length, geodesic, room, at(f, 3 * count)
+            )
     return count
 
 
 def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """The same of a cable."""
-    i, p, result = at(model, item), at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
+    i, p, result = (
+        at(model, item),
+        at(reals, model[item + ITEM.NUMBERS]),
+        at(data, model[item + ITEM.RECORD]),
+    )
     count = 0
     for k in range(i[CABLE_COUNT]):
         element = at(i, ELEMENTS + ELEMENT_INTS * k)
@@ -95,10 +107,16 @@ def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         elif kept[STATE] == TOUCHES:
             geodesic = at(kept, GEODESIC)
             point, way = vector(geodesic, START + POINT), vector(geodesic, START + ALONG_GEODESIC)
-            surface, pose, room = at(p, element[AT] + CABLE_SURFACE), at(kept, IN_GROUND), at(result, i[SOLVER])
+            surface, pose, room = (
+                at(p, element[AT] + CABLE_SURFACE),
+                at(kept, IN_GROUND),
+                at(result, i[SOLVER]),
+            )
             put(f, 3 * count, vector(kept, GROUND_START + POINT))
             count += 1
-            count += trace_geodesic(surface, pose, point, way, geodesic[ARC], geodesic, room, at(f, 3 * count))
+            count += trace_geodesic(
+                surface, pose, point, way, geodesic[ARC], geodesic, room, at(f, 3 * count)
+            )
             put(f, 3 * count, vector(kept, GROUND_END + POINT))
             count += 1
     return count

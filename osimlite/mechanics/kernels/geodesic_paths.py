@@ -1,14 +1,15 @@
 """Paths that are the shortest around their surfaces, or at least stationary: what `wrapping="geodesic"` asks for.
 
-Between two neighbouring points each PathWrap whose range holds both bends the path where that touches, whatever it does
-between other points. So its surface stands in the path once for each point that a bent piece may begin at. Of the
-surfaces that a piece goes through, that which turns it most is put into it first; then all geodesics of the piece are
-corrected at once, until it is as short as a string; then it may meet, or leave, another surface. Where open surfaces
-may be passed in several directions all are tried, and the shortest of all ways is taken: so lengths do not jump as
+Between two neighbouring points each PathWrap whose range holds both bends the path where that
+touches, whatever it does between other points. So its surface stands in the path once for each
+point that a bent piece may begin at. Of the surfaces that a piece goes through, that which turns it
+most is put into it first; then all geodesics of the piece are corrected at once, until it is as
+short as a string; then it may meet, or leave, another surface. Where open surfaces may be passed in
+several directions all are tried, and the shortest of all ways is taken: so lengths do not jump as
 another one becomes the shortest. What is found depends on the pose alone.
 
-A surface inside which a point of the piece lies bends it nowhere, as in OpenSim. A piece for which no geodesics are
-found goes straight on; none such is known but where a point lies on a surface.
+A surface inside which a point of the piece lies bends it nowhere, as in OpenSim. A piece for which
+no geodesics are found goes straight on; none such is known but where a point lies on a surface.
 """
 
 from __future__ import annotations
@@ -78,15 +79,18 @@ from osimlite.mechanics.laws.vectors import Vector, cross, minus, norm, put, tim
 
 WRAP_INTS = 4
 PLACES, FIRST, LAST, RANGE = 0, 1, 2, 3
-"""Of a wrap, after the nodes: where its numbers are, see `geodesic_starts`; the point that its piece begins at, the
-last one that it may end at, and the first one of its PathWrap's range."""
+"""Of a wrap, after the nodes: where its numbers are, see `geodesic_starts`; the point that its
+piece begins at, the last one that it may end at, and the first one of its PathWrap's range.
+"""
 CHAIN, BEST, SEARCH, POSES = 0, 1, 2, 3
-"""Integers after the wraps: where in the record the slots are, those of the shortest way so far, room for a search, and
-the poses of the surfaces."""
+"""Integers after the wraps: where in the record the slots are, those of the shortest way so far,
+room for a search, and the poses of the surfaces.
+"""
 HOW, ABOUT, POSE_NUMBERS = 12, 13, 16
 NOT = 0.0
-"""Numbers of the pose of a surface: after its rotation by rows and its place in ground, how it may bend the piece at
-hand, see `start`, and about what axis that turns."""
+"""Numbers of the pose of a surface: after its rotation by rows and its place in ground, how it may
+bend the piece at hand, see `start`, and about what axis that turns.
+"""
 
 TOUCH = 1e-10
 """The angle (rad) by which a piece turns at least around a surface that it is put on."""
@@ -150,7 +154,10 @@ def place_surfaces(model: Ints, data: Floats, i: Ints, p: Floats) -> None:
     size = i[POINTS] + 2 * i[WRAPS]
     poses = at(data, i[ITEM.RECORD] + i[NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS] + POSES])
     for number in range(i[WRAPS]):
-        node, pose = at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * number)), at(poses, POSE_NUMBERS * number)
+        node, pose = (
+            at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * number)),
+            at(poses, POSE_NUMBERS * number),
+        )
         n = at(p, node[AT])
         place_frame(model, data, node[LINK], at(n, TURN), vector(n, STATION), pose)
         pose[HOW] = NOT
@@ -179,8 +186,8 @@ def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
             for k in range(SLOT * (count + 1)):
                 best[k] = chain[k]
         way += step
-        # There need not be a geodesic where one is looked for on an ellipsoid, but a shortest one there is; and there
-        # is none where surfaces cut each other.
+        # There need not be a geodesic where one is looked for on an ellipsoid, but a shortest one
+        # there is; and there is none where surfaces cut each other.
         if way == WAYS and least == inf and stage < ALONE:
             way, stage = 0, stage + 1
     return most
@@ -196,13 +203,21 @@ def chain_length(chain: Floats, count: int) -> float:
 
 
 def settle(
-    i: Ints, p: Floats, found: Floats, one: int, two: int, near: int, way: int, stage: int, least: float
+    i: Ints,
+    p: Floats,
+    found: Floats,
+    one: int,
+    two: int,
+    near: int,
+    way: int,
+    stage: int,
+    least: float,
 ) -> tuple[int, int]:
     """Put into the slots what the piece between two points bends around.
 
-    Returns:
-        How many surfaces these are, -1 if there is no such way that is shorter; by how much the number of the way
-        differs from that of the next one which has another side of a surface that was met.
+    Returns: How many surfaces these are, -1 if there is no such way that is shorter; by how much
+        the number of the way differs from that of the next one which has another side of a surface
+        that was met.
     """
     size, count, step = i[POINTS] + 2 * i[WRAPS], 0, WAYS
     work, wraps = at(found, ORDER + size), at(i, NODES_AT + NODE_INTS * size)
@@ -224,7 +239,10 @@ def settle(
                 return count, step
             waits = False
             if place > 0:
-                numbers, pose = at(p, wraps[WRAP_INTS * number + PLACES]), at(poses, POSE_NUMBERS * number)
+                numbers, pose = (
+                    at(p, wraps[WRAP_INTS * number + PLACES]),
+                    at(poses, POSE_NUMBERS * number),
+                )
                 is_open = numbers[SIDE] == 0.0 and numbers[SURFACE + KIND] != TORUS and step > 1
                 if is_open and norm(vector(pose, ABOUT)) == 0.0:
                     a, b = seen(pose, work, one), seen(pose, work, two)
@@ -235,7 +253,8 @@ def settle(
                         if which > 1:
                             axis = cross(axis, unit(minus(b, a)))
                         put(pose, ABOUT, times(-1.0 if which % 2 == 1 else 1.0, axis))
-                        # Elsewhere than first it waits for what else is met: alone it might slide back.
+                        # Elsewhere than first it waits for what else is met: alone it might slide
+                        # back.
                         waits = which > 0 and stage < ALONE
                 insert(numbers, pose, chain, count, place, number)
                 if not lay(numbers, pose, chain, count + 1, place, stage, room):
@@ -261,14 +280,24 @@ def find_near(i: Ints, p: Floats, found: Floats, slots: Ints, one: int, two: int
             numbers = at(p, own[PLACES])
             surface = at(numbers, SURFACE)
             inside, a, b = INSIDE * surface[SQUARE], seen(pose, work, one), seen(pose, work, two)
-            is_near = two <= own[LAST] and value(surface, a) <= inside and value(surface, b) <= inside
+            is_near = (
+                two <= own[LAST] and value(surface, a) <= inside and value(surface, b) <= inside
+            )
             pose[HOW] = AS_MEANT if is_near else NOT
-            if is_near and own[LAST] - own[RANGE] > 1 and (numbers[SIDE] != 0.0 or surface[KIND] == TORUS):
+            if (
+                is_near
+                and own[LAST] - own[RANGE] > 1
+                and (numbers[SIDE] != 0.0 or surface[KIND] == TORUS)
+            ):
                 deepest = depth(surface, a, b)
                 for k in range(1, int(found[COUNT])):
                     before, after = int(found[ORDER + k - 1]), int(found[ORDER + k])
                     others = own[RANGE] <= before != one and after <= own[LAST]
-                    if others and depth(surface, seen(pose, work, before), seen(pose, work, after)) < deepest:
+                    if (
+                        others
+                        and depth(surface, seen(pose, work, before), seen(pose, work, after))
+                        < deepest
+                    ):
                         pose[HOW] = ANY_SIDE
 
 
@@ -292,7 +321,14 @@ def take_out(chain: Floats, count: int, place: int) -> None:
 
 
 def meet_most(
-    i: Ints, p: Floats, wraps: Ints, poses: Floats, one: int, chain: Floats, count: int, room: Floats
+    i: Ints,
+    p: Floats,
+    wraps: Ints,
+    poses: Floats,
+    one: int,
+    chain: Floats,
+    count: int,
+    room: Floats,
 ) -> tuple[int, int, Vector]:
     """The wrap that turns a line of the chain most, the slot after that line, 0 if there is none, and about what.
 
@@ -306,10 +342,14 @@ def meet_most(
             surface, before = at(numbers, SURFACE), WHOLE if numbers[SIDE] != 0.0 else 0.0
             inside = INSIDE * surface[SQUARE]
             for k in range(count + 1):
-                a, b = in_surface(pose, end_before(chain, k + 1)), in_surface(pose, start_after(chain, k, count))
+                a, b = (
+                    in_surface(pose, end_before(chain, k + 1)),
+                    in_surface(pose, start_after(chain, k, count)),
+                )
                 if value(surface, a) <= inside and value(surface, b) <= inside:
                     turn, point, way, _ = start(numbers, a, b, pose[HOW], (0.0, 0.0, 0.0), room)
-                    # Which line meets it is told by the shorter way; it is met, also if no other way is found.
+                    # Which line meets it is told by the shorter way; it is met, also if no other
+                    # way is found.
                     if turn > TOUCH and norm(about) > 0.0:
                         other, there, onwards, _ = start(numbers, a, b, pose[HOW], about, room)
                         if other > TOUCH:
@@ -331,12 +371,21 @@ def insert(p: Floats, pose: Floats, chain: Floats, count: int, place: int, numbe
         slot[OBSTACLE_WORK + k] = p[SURFACE + k]
 
 
-def lay(p: Floats, pose: Floats, chain: Floats, count: int, k: int, stage: int, room: Floats) -> bool:
+def lay(
+    p: Floats, pose: Floats, chain: Floats, count: int, k: int, stage: int, room: Floats
+) -> bool:
     """Lay the chain around the surface in a slot, as those beside it are; whether it touches that."""
-    first, second = in_surface(pose, end_before(chain, k)), in_surface(pose, start_after(chain, k, count))
+    first, second = (
+        in_surface(pose, end_before(chain, k)),
+        in_surface(pose, start_after(chain, k, count)),
+    )
     about, slot = vector(pose, ABOUT), at(chain, SLOT * k)
-    turn, point, way, arc = start(p, first, second, PULLED if stage == STRING else pose[HOW], about, room)
-    if not (turn > TOUCH and shoot(at(slot, OBSTACLE_WORK), point, way, arc, at(slot, GEODESIC), room)):
+    turn, point, way, arc = start(
+        p, first, second, PULLED if stage == STRING else pose[HOW], about, room
+    )
+    if not (
+        turn > TOUCH and shoot(at(slot, OBSTACLE_WORK), point, way, arc, at(slot, GEODESIC), room)
+    ):
         return False
     if norm(about) > 0.0:
         put(pose, ABOUT, cross(point, way))

@@ -1,16 +1,16 @@
 """Newton's method for all geodesics of a piece of a path at once, by their natural variations.
 
-Each geodesic has four unknowns: its start moves along it and across it, and turns, and it gets longer. Each of its ends
-has two equations: the line there has no part along the normal of the surface, and none across the geodesic. Unlike
-those of a cable they are about whole lines, and not about their directions, so that they stay nearly linear where a
-line is short.
+Each geodesic has four unknowns: its start moves along it and across it, and turns, and it gets
+longer. Each of its ends has two equations: the line there has no part along the normal of the
+surface, and none across the geodesic. Unlike those of a cable they are about whole lines, and not
+about their directions, so that they stay nearly linear where a line is short.
 
-What the ends do across their geodesics changes the length as the equations across tell. So their determinant is
-positive where the length is least, and negative at a saddle; there springs hold the ends until it is positive, and the
-piece slides off towards where it is shorter.
+What the ends do across their geodesics changes the length as the equations across tell. So their
+determinant is positive where the length is least, and negative at a saddle; there springs hold the
+ends until it is positive, and the piece slides off towards where it is shorter.
 
-Source: A. Scholz, M. Sherman, I. Stavness, S. Delp, A. Kecskemethy, A fast multi-obstacle muscle wrapping method using
-natural geodesic variations, Multibody System Dynamics 36, 2016.
+Source: A. Scholz, M. Sherman, I. Stavness, S. Delp, A. Kecskemethy, A fast multi-obstacle muscle
+wrapping method using natural geodesic variations, Multibody System Dynamics 36, 2016.
 """
 
 from __future__ import annotations
@@ -46,17 +46,20 @@ from osimlite.mechanics.laws.vectors import Vector, cross, dot, minus, norm, tim
 
 OWNER = OBSTACLE_WORK + SURFACE_NUMBERS
 SLOT = OWNER + 1
-"""Of a slot: an obstacle of a cable; the surface; whose it is. Of slots in a row the first has the place where a piece
-begins, and the one after those in use the place where it ends."""
+"""Of a slot: an obstacle of a cable; the surface; whose it is. Of slots in a row the first has the
+place where a piece begins, and the one after those in use the place where it ends.
+"""
 
 SMOOTH, STALLED, NEAR = 1e-12, 1e-8, 1e-3
-"""Angles (rad) at which a search ends, and below which it ends if they get no less; lines that are shorter than this
-(m) count as so long."""
+"""Angles (rad) at which a search ends, and below which it ends if they get no less; lines that are
+shorter than this (m) count as so long.
+"""
 STIFF, STIFFER = 1.0, 3.0
 """How stiff springs are at least (N/m) if the string is pulled by 1 N, and how many times stiffer the next ones."""
 ROUNDS, MOST_TURN, LEAST_PART, SHORT = 60, 0.2, 0.1, 1e-6
-"""Of a search: its rounds; by how much (rad) an end of a geodesic may turn in a round; what must be left of a geodesic
-after it, unless that is so short (rad)."""
+"""Of a search: its rounds; by how much (rad) an end of a geodesic may turn in a round; what must be
+left of a geodesic after it, unless that is so short (rad).
+"""
 
 
 def search_room(count: int) -> int:
@@ -109,7 +112,13 @@ def smooth(chain: Floats, count: int, room: Floats) -> bool:
             return step == 0.0
         for k in range(count):
             slot = at(chain, SLOT * (k + 1))
-            if not shoot_again(at(slot, OBSTACLE_WORK), at(slot, GEODESIC), at(corrections, UNKNOWNS * k), step, room):
+            if not shoot_again(
+                at(slot, OBSTACLE_WORK),
+                at(slot, GEODESIC),
+                at(corrections, UNKNOWNS * k),
+                step,
+                room,
+            ):
                 return False
             to_ground(slot)
     return False
@@ -119,7 +128,10 @@ def part_of(slot: Floats, corrections: Floats) -> float:
     """The part of its corrections that a geodesic may take; 0 if it gets shorter than nothing, which it then is."""
     start, arc = at(slot, GROUND_START), slot[GEODESIC + ARC]
     bends = max(abs(start[ALONG_BENDS]), abs(start[ACROSS_BENDS]))
-    turn = max(abs(corrections[2]), bends * max(abs(corrections[0]), abs(corrections[1]), abs(corrections[3])))
+    turn = max(
+        abs(corrections[2]),
+        bends * max(abs(corrections[0]), abs(corrections[1]), abs(corrections[3])),
+    )
     part = MOST_TURN / turn if turn > MOST_TURN else 1.0
     if not arc + part * corrections[3] > LEAST_PART * arc:
         if arc + corrections[3] <= 0.0 and arc * abs(start[ALONG_BENDS]) < SHORT:
@@ -147,9 +159,15 @@ def equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: float
     for k in range(1, count + 1):
         slot = at(chain, SLOT * k)
         for side in range(2):
-            end, sign, other = (GROUND_START, 1.0, k - 1) if side == 0 else (GROUND_END, -1.0, k + 1)
+            end, sign, other = (
+                (GROUND_START, 1.0, k - 1) if side == 0 else (GROUND_END, -1.0, k + 1)
+            )
             here = vector(slot, end + POINT)
-            line = minus(here, end_before(chain, k)) if side == 0 else minus(start_after(chain, k, count), here)
+            line = (
+                minus(here, end_before(chain, k))
+                if side == 0
+                else minus(start_after(chain, k, count), here)
+            )
             distance = max(norm(line), NEAR)
             for across in range(2):
                 axis = vector(slot, end + (ACROSS if across == 1 else NORMAL))
@@ -164,6 +182,9 @@ def equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: float
                     at(a, size * row + UNKNOWNS * (k - 1)),
                 )
                 if 0 < other <= count:
-                    far, of = GROUND_END if side == 0 else GROUND_START, at(a, size * row + UNKNOWNS * (other - 1))
+                    far, of = (
+                        GROUND_END if side == 0 else GROUND_START,
+                        at(a, size * row + UNKNOWNS * (other - 1)),
+                    )
                     vary(at(chain, SLOT * other), far, times(-sign, axis), (0.0, 0.0, 0.0), of)
     return most

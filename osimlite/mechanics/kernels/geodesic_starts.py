@@ -1,18 +1,21 @@
 """Where a path begins to bend around a surface, if it does: exact on cylinders and spheres, near enough on others.
 
-A straight piece of a path bends around a surface that it would go through. On which side is told by the quadrant of the
-surface, of all sides by where the way is shorter:
+A straight piece of a path bends around a surface that it would go through. On which side is told by
+the quadrant of the surface, of all sides by where the way is shorter:
 
-- a cylinder with a side x or y: the path turns so that it lies on the active side, whatever angle that takes, and also
-  where it misses the cylinder but would pass behind it, whenever OpenSim bends it;
-- a sphere or an ellipsoid with a side: a line through it is bent to where it is least deep in the surface; if that is
-  not on the active side, then to the other end of the same plane, if this is nearer to what a mirror shows;
+- a cylinder with a side x or y: the path turns so that it lies on the active side, whatever angle
+  that takes, and also where it misses the cylinder but would pass behind it, whenever OpenSim bends
+  it;
+- a sphere or an ellipsoid with a side: a line through it is bent to where it is least deep in the
+  surface; if that is not on the active side, then to the other end of the same plane, if this is
+  nearer to what a mirror shows;
 - a torus: the path goes through the hole, and never through the plane outside of the ring.
 
-Of several pieces around one cylinder or torus only that which comes nearest to its axis, or its ring, need do so. The
-others bend where they go through it, the shorter way.
+Of several pieces around one cylinder or torus only that which comes nearest to its axis, or its
+ring, need do so. The others bend where they go through it, the shorter way.
 
-All points are in the frame of the surface, in m. Neighbours of a piece that are inside count as on the surface.
+All points are in the frame of the surface, in m. Neighbours of a piece that are inside count as on
+the surface.
 """
 
 from __future__ import annotations
@@ -56,12 +59,14 @@ AXIS, SIDE, HALF_LENGTH, SURFACE = 0, 1, 2, 3
 """Numbers of what a path wraps around: axis and sign of its side, half its length (of a cylinder), the surface."""
 
 Start = tuple[float, Vector, Vector, float]
-"""The angle by which a path turns on a surface, and 0 or less if it does not touch; the point where it meets the
-surface; its direction there; its length on the surface, m."""
+"""The angle by which a path turns on a surface, and 0 or less if it does not touch; the point where
+it meets the surface; its direction there; its length on the surface, m.
+"""
 
 AS_MEANT, ANY_SIDE, PULLED = 1.0, 2.0, 3.0
-"""How a surface may bend a piece: on the side that is meant; on any side where the piece goes through it; around an
-ellipsoid where a string comes to lie."""
+"""How a surface may bend a piece: on the side that is meant; on any side where the piece goes
+through it; around an ellipsoid where a string comes to lie.
+"""
 
 LEAST = 1e-100
 """Denominators are at least this, so that nothing is divided by zero."""
@@ -70,25 +75,25 @@ SAMPLES, STEPS = 16, 6
 NEAR_MIDDLE = 0.3
 """A line goes through near the middle of a sphere if its squared distance, in radii (see `depth`), is less."""
 WAYS, WORTHWHILE = 16, 1.5
-"""So many directions across a line are tried on an ellipsoid; the next best is worth trying if the line is at most so
-much deeper there."""
+"""So many directions across a line are tried on an ellipsoid; the next best is worth trying if the
+line is at most so much deeper there.
+"""
 ASIDE = 0.5
 """A line is bent in the direction that its axis tells, if the cosine with the one where it is least deep is less."""
 BENT, BEADS, PULLS = 0.7, 16, 8
-"""If the cosine between both ends of a path is less than this, a string is pulled tight over an ellipsoid: of so many
-pieces, so often."""
+"""If the cosine between both ends of a path is less than this, a string is pulled tight over an
+ellipsoid: of so many pieces, so often.
+"""
 
 
-def start(p: Floats, first: Vector, second: Vector, how: float, about: Vector, room: Floats) -> Start:
+def start(
+    p: Floats, first: Vector, second: Vector, how: float, about: Vector, room: Floats
+) -> Start:
     """Where a straight piece between two points begins to bend around what the numbers tell of.
 
-    Args:
-        p: the numbers.
-        first: where the piece begins.
-        second: where it ends.
-        how: it may be bent.
-        about: about this axis, as by the right hand, it turns around a surface without a side; zeros if that is open.
-        room: for a string of beads.
+    Args: p: the numbers. first: where the piece begins. second: where it ends. how: it may be bent.
+        about: about this axis, as by the right hand, it turns around a surface without a side;
+        zeros if that is open. room: for a string of beads.
     """
     axis, side, surface = int(p[AXIS]), p[SIDE], at(p, SURFACE)
     if surface[KIND] == TORUS:
@@ -96,15 +101,18 @@ def start(p: Floats, first: Vector, second: Vector, how: float, about: Vector, r
     if surface[KIND] == CYLINDER:
         is_held = how != ANY_SIDE and axis < 2
         side_out = replaced((0.0, 0.0, 0.0), axis, side if is_held else 0.0)
-        return around_cylinder(surface[RADIUS], p[HALF_LENGTH], first, second, side_out, component(about, 2))
+        return around_cylinder(
+            surface[RADIUS], p[HALF_LENGTH], first, second, side_out, component(about, 2)
+        )
     return around_ellipsoid(surface, first, second, axis, side, how, about, room)
 
 
 def ways_past(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
     """In how many directions a line that goes through an open surface is to be bent, to find the shortest way.
 
-    Around a surface alone there is another one only on an ellipsoid. Among others each is passed on either side, and a
-    sphere, on which any direction may be the best, also across these if the line goes through near its middle.
+    Around a surface alone there is another one only on an ellipsoid. Among others each is passed on
+    either side, and a sphere, on which any direction may be the best, also across these if the line
+    goes through near its middle.
     """
     if not is_alone:
         return 4 if p[KIND] == SPHERE and depth(p, first, second) < NEAR_MIDDLE else 2
@@ -113,13 +121,16 @@ def ways_past(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
     way, weights = minus(second, first), vector(p, WEIGHTS)
     part = -dot(elementwise(weights, first), way) / max(dot(elementwise(weights, way), way), LEAST)
     x, y, z = weights
-    out = way_out((sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)), along(first, part, way), way, WORTHWHILE)
+    out = way_out(
+        (sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)), along(first, part, way), way, WORTHWHILE
+    )
     return 2 if dot(out, out) > 0.0 else 1
 
 
 def depth(p: Floats, first: Vector, second: Vector) -> float:
-    """How near a piece comes to the middle: squared, to the axis of a cylinder or the ring of a torus (m^2), or to the
-    centre of a sphere or an ellipsoid (by radii)."""
+    """How near a piece comes to the middle: squared, to the axis of a cylinder or the ring of a
+    torus (m^2), or to the centre of a sphere or an ellipsoid (by radii).
+    """
     if p[KIND] == TORUS:
         return distance_from_ring(nearest_to_ring(p[RADIUS], first, second), p[RADIUS])
     way, weights = minus(second, first), vector(p, WEIGHTS)
@@ -144,15 +155,26 @@ def around_cylinder(
     active = dot(side_out, first) >= 0.0, dot(side_out, second) >= 0.0
     if (
         about == 0.0
-        and (NONE if is_open and not crosses else action(*active, dot(side_out, closest) >= 0.0, crosses)) == NONE
+        and (
+            NONE
+            if is_open and not crosses
+            else action(*active, dot(side_out, closest) >= 0.0, crosses)
+        )
+        == NONE
     ):
         return 0.0, first, second, 0.0
     # Angles from the middle of the active side; or from the first end.
     if is_open:
         ux, uy = px, py
-    one, two = atan2(ux * py - uy * px, ux * px + uy * py), atan2(ux * qy - uy * qx, ux * qx + uy * qy)
+    one, two = (
+        atan2(ux * py - uy * px, ux * px + uy * py),
+        atan2(ux * qy - uy * qx, ux * qx + uy * qy),
+    )
     far1, far2 = sqrt(px * px + py * py), sqrt(qx * qx + qy * qy)
-    line1, line2 = sqrt(max(far1 * far1 - radius * radius, 0.0)), sqrt(max(far2 * far2 - radius * radius, 0.0))
+    line1, line2 = (
+        sqrt(max(far1 * far1 - radius * radius, 0.0)),
+        sqrt(max(far2 * far2 - radius * radius, 0.0)),
+    )
     before, after = atan2(line1, radius), atan2(line2, radius)
     sweep = (two - one) % (2.0 * pi)
     way = 1.0 if (sweep <= pi if is_open else turns_left(one, before, two, after, sweep)) else -1.0
@@ -166,14 +188,20 @@ def around_cylinder(
     z = pz + slope * line1
     if abs(z) > half_length and abs(qz - slope * line2) > half_length:
         turn = 0.0
-    return turn, (radius * nx, radius * ny, z), (-way * ny, way * nx, slope), radius * turn * sqrt(1.0 + slope * slope)
+    return (
+        turn,
+        (radius * nx, radius * ny, z),
+        (-way * ny, way * nx, slope),
+        radius * turn * sqrt(1.0 + slope * slope),
+    )
 
 
 def turns_left(one: float, before: float, two: float, after: float, sweep: float) -> bool:
     """Whether a path turns to the left around a cylinder, so that it stays on the active side as in OpenSim.
 
-    It goes by that tangent of the first end which meets the active side, or if both do or none does, by that of the
-    second; if these do not tell either, the shorter way, but the longer one from behind to behind.
+    It goes by that tangent of the first end which meets the active side, or if both do or none
+    does, by that of the second; if these do not tell either, the shorter way, but the longer one
+    from behind to behind.
 
     Args:
         one: angle of the first end from the middle of the active side.
@@ -203,7 +231,8 @@ def around_ellipsoid(
 ) -> Start:
     """The start on a sphere or an ellipsoid: on a circle, where all is so scaled that the surface is the unit sphere.
 
-    The circle is in the plane of the ends and the direction in which the line is least deep in the surface.
+    The circle is in the plane of the ends and the direction in which the line is least deep in the
+    surface.
     """
     weights = vector(p, WEIGHTS)
     wx, wy, wz = times(1.0 / p[SQUARE], weights)
@@ -219,7 +248,10 @@ def around_ellipsoid(
     if p[KIND] == ELLIPSOID or norm(cross(middle, way)) < LEAST:
         # Of two ways both begin where it is narrow.
         out = way_out(
-            radii, times(0.0 if norm(about) > 0.0 else 1.0, elementwise(radii, middle)), elementwise(radii, way), 0.0
+            radii,
+            times(0.0 if norm(about) > 0.0 else 1.0, elementwise(radii, middle)),
+            elementwise(radii, way),
+            0.0,
         )
     if norm(about) > 0.0:
         out = times(-1.0 if dot(about, cross(out, elementwise(radii, way))) < 0.0 else 1.0, out)
@@ -234,7 +266,9 @@ def around_ellipsoid(
     out = elementwise(scale, out)
     result = on_section(radii, one, two, cross(out, way), room)
     turn, _, sets_out, _ = result
-    is_bent = dot(unit(sets_out), unit(vector(room, 0))) < BENT and (side == 0.0 or dot(out, middle) > 0.0)
+    is_bent = dot(unit(sets_out), unit(vector(room, 0))) < BENT and (
+        side == 0.0 or dot(out, middle) > 0.0
+    )
     if p[KIND] == ELLIPSOID and (is_bent or how == PULLED):
         result = shortened(p, turn, first, second, room)
     return result
@@ -243,12 +277,9 @@ def around_ellipsoid(
 def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector:
     """The direction across a line in which it is least below the widest of an ellipsoid, a unit vector.
 
-    Args:
-        radii: of the ellipsoid.
-        middle: a point of the line.
-        way: along the line.
-        deeper: if positive, return the next direction in which it is less so than in those beside; zeros if there is
-            none, or if the line is so many times deeper there.
+    Args: radii: of the ellipsoid. middle: a point of the line. way: along the line. deeper: if
+        positive, return the next direction in which it is less so than in those beside; zeros if
+        there is none, or if the line is so many times deeper there.
     """
     x, y, z = way
     axis = 0 if abs(x) <= min(abs(y), abs(z)) else (1 if abs(y) <= abs(z) else 2)
@@ -262,7 +293,10 @@ def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector
     for k in range(WAYS):
         after = below(aa, ab, bb, ma, mb, k)
         if here < before and here <= after:
-            result = here, 2.0 * pi / WAYS * (k - 1 + 0.5 * (before - after) / (before - 2.0 * here + after))
+            result = (
+                here,
+                2.0 * pi / WAYS * (k - 1 + 0.5 * (before - after) / (before - 2.0 * here + after)),
+            )
             if here < best[0]:
                 best, second = result, best
             elif here < second[0]:
@@ -293,7 +327,10 @@ def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, room: Fl
     normal = unit(across)
     centre = times(dot(normal, one), normal)
     radius = sqrt(max(1.0 - dot(centre, centre), 0.0))
-    a1, a2 = touching(minus(one, centre), radius, normal, 1.0), touching(minus(two, centre), radius, normal, -1.0)
+    a1, a2 = (
+        touching(minus(one, centre), radius, normal, 1.0),
+        touching(minus(two, centre), radius, normal, -1.0),
+    )
     across = cross(normal, a1)
     turn = atan2(dot(across, a2), dot(a1, a2))
     if turn < -1e-6:
@@ -305,7 +342,12 @@ def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, room: Fl
         c, s = cos(angle), sin(angle)
         length += norm(elementwise(radii, along(times(c, across), -s, a1)))
         put(room, 3 * k, elementwise(radii, along(along(centre, c, a1), s, across)))
-    return turn, elementwise(radii, along(centre, 1.0, a1)), elementwise(radii, across), turn / (BEADS - 1) * length
+    return (
+        turn,
+        elementwise(radii, along(centre, 1.0, a1)),
+        elementwise(radii, across),
+        turn / (BEADS - 1) * length,
+    )
 
 
 def shortened(p: Floats, turn: float, first: Vector, second: Vector, room: Floats) -> Start:
@@ -321,7 +363,9 @@ def shortened(p: Floats, turn: float, first: Vector, second: Vector, room: Float
         for pull in range(PULLS + 1):
             # Those that are new come first.
             for k in range(stride, BEADS, stride if pull > 0 else 2 * stride):
-                bead = times(0.5, plus(vector(room, 3 * (k - stride)), vector(room, 3 * (k + stride))))
+                bead = times(
+                    0.5, plus(vector(room, 3 * (k - stride)), vector(room, 3 * (k + stride)))
+                )
                 if value(p, bead) > 0.0:
                     for _ in range(2):
                         out = elementwise(vector(p, WEIGHTS), bead)
@@ -333,7 +377,9 @@ def shortened(p: Floats, turn: float, first: Vector, second: Vector, room: Float
     if two == 0:
         return 0.0, first, second, 0.0
     begin, end = vector(room, 3 * one - 3), vector(room, 3 * one)
-    length = 0.5 * (norm(minus(end, begin)) + norm(minus(vector(room, 3 * two + 3), vector(room, 3 * two))))
+    length = 0.5 * (
+        norm(minus(end, begin)) + norm(minus(vector(room, 3 * two + 3), vector(room, 3 * two)))
+    )
     for k in range(one, two):
         length += norm(minus(vector(room, 3 * k + 3), vector(room, 3 * k)))
     return turn, times(0.5, plus(begin, end)), minus(end, begin), length
@@ -347,16 +393,28 @@ def touching(point: Vector, radius: float, normal: Vector, way: float) -> Vector
     return along(foot, way * radius * sqrt(1.0 - cosine * cosine) / distance, cross(normal, point))
 
 
-def around_torus(ring: float, tube: float, first: Vector, second: Vector, axis: int, side: float, how: float) -> Start:
+def around_torus(
+    ring: float, tube: float, first: Vector, second: Vector, axis: int, side: float, how: float
+) -> Start:
     """The start on a torus about z: as on a cylinder in the place of the ring that is nearest to the line."""
     x, y, _ = near = nearest_to_ring(ring, first, second)
     if side != 0.0 and not on_side(near, axis, side):
         return 0.0, first, near, 0.0
     rx, ry, _ = inwards = unit((-x, -y, 0.0))
     centre, tangent = times(-ring, inwards), (-ry, rx, 0.0)
-    one, two = seen(minus(first, centre), inwards, tangent), seen(minus(second, centre), inwards, tangent)
-    turn, point, way, length = around_cylinder(tube, inf, one, two, (0.0 if how == ANY_SIDE else 1.0, 0.0, 0.0), 0.0)
-    return turn, along(back(point, inwards, tangent), 1.0, centre), back(way, inwards, tangent), length
+    one, two = (
+        seen(minus(first, centre), inwards, tangent),
+        seen(minus(second, centre), inwards, tangent),
+    )
+    turn, point, way, length = around_cylinder(
+        tube, inf, one, two, (0.0 if how == ANY_SIDE else 1.0, 0.0, 0.0), 0.0
+    )
+    return (
+        turn,
+        along(back(point, inwards, tangent), 1.0, centre),
+        back(way, inwards, tangent),
+        length,
+    )
 
 
 def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
@@ -372,7 +430,11 @@ def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
         square = max(x * x + y * y, LEAST)
         outer, flat = sqrt(square), x * wx + y * wy
         slope = flat * (1.0 - ring / outer) + z * wz
-        bends = (wx * wx + wy * wy) * (1.0 - ring / outer) + ring * flat * flat / (square * outer) + wz * wz
+        bends = (
+            (wx * wx + wy * wy) * (1.0 - ring / outer)
+            + ring * flat * flat / (square * outer)
+            + wz * wz
+        )
         if not bends > 0.0:
             break
         best = min(max(best - slope / bends, 0.0), 1.0)

@@ -1,8 +1,9 @@
 """Linear equations that may repeat or contradict each other, and positive definite ones.
 
-The complete orthogonal decomposition by reflections (G. H. Golub, C. F. Van Loan, Matrix Computations, 1996, chapters
-5.2 and 5.5): the equations are taken in the order of what they say beyond those before them, as long as that is enough,
-and turned into those of as many unknowns; the rest follows from these or contradicts them.
+The complete orthogonal decomposition by reflections (G. H. Golub, C. F. Van Loan, Matrix
+Computations, 1996, chapters 5.2 and 5.5): the equations are taken in the order of what they say
+beyond those before them, as long as that is enough, and turned into those of as many unknowns; the
+rest follows from these or contradicts them.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ REDUNDANT = 1e-9
 ROUNDING = 1e-13
 """What is shorter than this part of the longest equation, or than this at all, is rounding error: in m and rad."""
 
-# A factor of count equations for size unknowns: the turned equations with the reflections (count, size), their diagonal
-# and order (2, count), and if there are more equations than count, these turned once more (count, count) with diagonal;
-# at the end how many equations count.
+# A factor of count equations for size unknowns: the turned equations with the reflections (count,
+# size), their diagonal and order (2, count), and if there are more equations than count, these
+# turned once more (count, count) with diagonal; at the end how many equations count.
 FACTOR_EXTRA = 3
 
 
@@ -32,7 +33,13 @@ def factored(model: Ints, data: Floats, count: int, a: Floats, smallest: float) 
     """Turn equations for all speeds into the factor, see `factorise`; returns how many count."""
     data[WORK.SCRATCH] = smallest
     return call(
-        model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.FACTORISE]], model, data, data, a, a, count
+        model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.FACTORISE]],
+        model,
+        data,
+        data,
+        a,
+        a,
+        count,
     )
 
 
@@ -49,7 +56,9 @@ def solved(model: Ints, count: int, a: Floats, values: Floats, room: Floats, rea
     )
 
 
-def factorise_law(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int) -> int:
+def factorise_law(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int
+) -> int:
     """`factorise` for others to call by its address: the factor f, what counts in SCRATCH."""
     size = model[MODEL.DOFS]
     rank = factorise(count, size, f, data[WORK.SCRATCH])
@@ -57,7 +66,9 @@ def factorise_law(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
     return rank
 
 
-def minimum_norm_law(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int) -> int:
+def minimum_norm_law(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int
+) -> int:
     """`minimum_norm` for others to call by its address: right sides x, room w, factor y, solution f."""
     size = model[MODEL.DOFS]
     rank = int(y[factor_room(count, size) - 1])
@@ -68,7 +79,8 @@ def minimum_norm_law(model: Ints, reals: Floats, data: Floats, y: Floats, f: Flo
 def factorise(count: int, size: int, a: Floats, smallest: float) -> int:
     """Turn equations, whose left sides (count, size) a factor begins with, into the factor.
 
-    What an equation says beyond others counts if it is more than `smallest` times what the strongest one says.
+    What an equation says beyond others counts if it is more than `smallest` times what the
+    strongest one says.
 
     Returns:
         How many equations count.
@@ -138,7 +150,9 @@ def reflect(first: int, end: int, stride: int, v: Floats, apart: int, x: Floats)
         x[apart * k] -= total * v[stride * k]
 
 
-def minimum_norm(count: int, size: int, a: Floats, rank: int, values: Floats, room: Floats, x: Floats) -> None:
+def minimum_norm(
+    count: int, size: int, a: Floats, rank: int, values: Floats, room: Floats, x: Floats
+) -> None:
     """The shortest x (size,) that comes nearest to fulfilling factored equations with right sides (count,).
 
     Args:

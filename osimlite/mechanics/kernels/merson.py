@@ -17,7 +17,10 @@ ORDER = 4.0
 def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
     """Try one step from y0, behind which its derivative stands, to y1."""
     h = at(data, place)
-    errors, stages = at(data, model[MODEL.WORK_STATE] + ERRORS * model[MODEL.STATE_SIZE]), at(h, HEAD)
+    errors, stages = (
+        at(data, model[MODEL.WORK_STATE] + ERRORS * model[MODEL.STATE_SIZE]),
+        at(h, HEAD),
+    )
     t0, t1 = h[REACHED], step_end(h)
     h[EVALUATED], h[HAS_DERIVATIVE] = 4.0, 0.0
     error = inf
@@ -28,7 +31,15 @@ def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, pla
 
 
 def staged(
-    model: Ints, reals: Floats, data: Floats, t0: float, t1: float, y0: Floats, y1: Floats, ya: Floats, stages: Floats
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    t0: float,
+    t1: float,
+    y0: Floats,
+    y1: Floats,
+    ya: Floats,
+    stages: Floats,
 ) -> int:
     """Compute y1 and, in `ya`, its errors."""
     size, h = model[MODEL.STATE_SIZE], t1 - t0
@@ -61,6 +72,7 @@ def staged(
     c = h / 6.0
     for k in range(size):
         y1[k] = y0[k] + c * (f0[k] + 4.0 * fc[k] + fa[k])
-        # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its steps too.
+        # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its
+        # steps too.
         ya[k] = 0.2 * (y1[k] - ya[k])
     return OUTCOME.OK

@@ -29,9 +29,10 @@ MESH_WORK = 10
 def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """A mesh (surface 2) on a half space or a sphere.
 
-    The integers are the links of both, the place of the pair among those of the force, the number of the springs, and
-    whether surface 1 is a half space; the numbers centre, normal and radius of surface 1 in its link, centre and radius
-    of the ball around the mesh in its link, and c, us, ud, uv, vt of the law.
+    The integers are the links of both, the place of the pair among those of the force, the number
+    of the springs, and whether surface 1 is a half space; the numbers centre, normal and radius of
+    surface 1 in its link, centre and radius of the ball around the mesh in its link, and c, us, ud,
+    uv, vt of the law.
     """
     i = at(model, item)
     one, two, count, is_plane = i[ITEM.OWN], i[ITEM.OWN + 1], i[ITEM.OWN + 3], i[ITEM.OWN + 4]
@@ -52,7 +53,9 @@ def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     for k in range(count):
         spring = at(p, SPRINGS + 4 * k)
         middle = station(model, data, two, vector(spring, 1))
-        d, end = spring_in_half_space(o, n, middle) if is_plane else spring_in_sphere(o, p[6], middle)
+        d, end = (
+            spring_in_half_space(o, n, middle) if is_plane else spring_in_sphere(o, p[6], middle)
+        )
         if d > 0.0:
             push, turn, stored = spring_load(
                 spring[0], p[11], p[12], p[13], p[14], p[15], middle, end, about, v, turning
@@ -63,12 +66,23 @@ def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
 
 
 def load_mesh(
-    model: Ints, data: Floats, item: int, about: Vector, force: Vector, torque: Vector, energy: float
+    model: Ints,
+    data: Floats,
+    item: int,
+    about: Vector,
+    force: Vector,
+    torque: Vector,
+    energy: float,
 ) -> None:
     """Apply a force at a point, and a torque, to the mesh, and their opposites to surface 1; fill both records."""
     i = at(model, item)
     one, two, result = i[ITEM.OWN], i[ITEM.OWN + 1], at(data, i[ITEM.RECORD])
-    contact = at(data, model[model[model[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + i[ITEM.OWN + 2]] + ITEM.RECORD])
+    contact = at(
+        data,
+        model[
+            model[model[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + i[ITEM.OWN + 2]] + ITEM.RECORD
+        ],
+    )
     put(result, 0, force)
     put(result, 3, about)
     put(result, 6, torque)

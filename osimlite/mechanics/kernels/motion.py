@@ -53,14 +53,26 @@ def place(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> Non
                 if j[OPERATION.DOF] >= 0:
                     amount = y[j[OPERATION.DOF]]
                 else:
-                    call(model[MODEL.LAWS + j[OPERATION.FUNCTION]], model, reals, data, y, f, operation)
+                    call(
+                        model[MODEL.LAWS + j[OPERATION.FUNCTION]],
+                        model,
+                        reals,
+                        data,
+                        y,
+                        f,
+                        operation,
+                    )
                     amount = a[OPERATION_WORK.AMOUNT]
                 if motion == MOTION.TURN:
                     one, two, three = axes
                     put(a, OPERATION_WORK.AXIS, three)
                     put(a, OPERATION_WORK.POINT, origin)
                     sine, cosine = sine_cosine(amount)
-                    axes = along(times(cosine, one), sine, two), along(times(cosine, two), -sine, one), three
+                    axes = (
+                        along(times(cosine, one), sine, two),
+                        along(times(cosine, two), -sine, one),
+                        three,
+                    )
                 else:
                     axis = along_axes(axes, vector(b, FIXED.AXIS))
                     put(a, OPERATION_WORK.AXIS, axis)
@@ -98,16 +110,29 @@ def move(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
     for freedom in range(size):
         f[freedom] = y[size + freedom]
     for k in range(model[MODEL.SUMMED]):
-        set_row(at(data, model[MODEL.WORK_COLUMN] + 6 * model[model[MODEL.SUMMED_AT] + k]), ZERO, ZERO)
+        set_row(
+            at(data, model[MODEL.WORK_COLUMN] + 6 * model[model[MODEL.SUMMED_AT] + k]), ZERO, ZERO
+        )
     for link in range(model[MODEL.LINKS]):
         i, here = link_ints(model, link), link_work(model, data, link)
         origin = vector(here, LINK_WORK.ORIGIN)
         # Links that are pushed upwards move in one another as under gravity.
-        spin, velocity, spin_rate, acceleration = ZERO, ZERO, ZERO, times(-1.0, vector(reals, GRAVITY_AT))
+        spin, velocity, spin_rate, acceleration = (
+            ZERO,
+            ZERO,
+            ZERO,
+            times(-1.0, vector(reals, GRAVITY_AT)),
+        )
         if i[LINK.PARENT] >= 0:
             parent = link_work(model, data, i[LINK.PARENT])
-            spin, velocity = vector(parent, LINK_WORK.VELOCITY), vector(parent, LINK_WORK.VELOCITY + 3)
-            spin_rate, acceleration = vector(parent, LINK_WORK.ACCELERATION), vector(parent, LINK_WORK.ACCELERATION + 3)
+            spin, velocity = (
+                vector(parent, LINK_WORK.VELOCITY),
+                vector(parent, LINK_WORK.VELOCITY + 3),
+            )
+            spin_rate, acceleration = (
+                vector(parent, LINK_WORK.ACCELERATION),
+                vector(parent, LINK_WORK.ACCELERATION + 3),
+            )
         for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
             j = operation_ints(model, operation)
             a = operation_work(model, data, operation)
@@ -141,10 +166,21 @@ def move(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
                 put(result, 0, origin)
                 status = max(
                     status,
-                    call(model[MODEL.LAWS + j[OPERATION.FUNCTION] + BALL_MOVES], model, reals, data, y, f, operation),
+                    call(
+                        model[MODEL.LAWS + j[OPERATION.FUNCTION] + BALL_MOVES],
+                        model,
+                        reals,
+                        data,
+                        y,
+                        f,
+                        operation,
+                    ),
                 )
                 turn, shift = vector(result, 0), vector(result, 3)
-                acceleration, spin_rate = plus(acceleration, vector(result, 6)), plus(spin_rate, vector(result, 9))
+                acceleration, spin_rate = (
+                    plus(acceleration, vector(result, 6)),
+                    plus(spin_rate, vector(result, 9)),
+                )
             # The axes are carried around by what moved before.
             spin_rate = plus(spin_rate, cross(spin, turn))
             acceleration = plus(acceleration, plus(cross(velocity, turn), cross(spin, shift)))

@@ -1,11 +1,12 @@
 """Multistep methods of variable order and step: backward differentiation formulas, and Adams-Moulton's.
 
-Both keep backward differences, with steps that are equal for a while and orders that change: the numerical
-differentiation formulas of orders 1 to 5 (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput.
-18, 1997) those of the state, Adams' formulas of orders 2 to 8 those of its derivative (E. Hairer, S. P. Norsett,
-G. Wanner, Solving Ordinary Differential Equations I, chapter III.1). These err much less where they are stable; their
-error is estimated as that of the formula of one order less. Both solve c f(y) = psi + d, where d is what y differs from
-its prediction, by Newton's iteration; its linear equations are those of
+Both keep backward differences, with steps that are equal for a while and orders that change: the
+numerical differentiation formulas of orders 1 to 5 (L. F. Shampine, M. W. Reichelt, The MATLAB ODE
+Suite, SIAM J. Sci. Comput. 18, 1997) those of the state, Adams' formulas of orders 2 to 8 those of
+its derivative (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I,
+chapter III.1). These err much less where they are stable; their error is estimated as that of the
+formula of one order less. Both solve c f(y) = psi + d, where d is what y differs from its
+prediction, by Newton's iteration; its linear equations are those of
 :mod:`osimlite.mechanics.kernels.condensation`.
 """
 
@@ -31,9 +32,10 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.states import is_finite
 
 ORDER, STEP, EQUAL, CONDENSED, AGE, REFUSED, MATRICES = range(MEMORY, MEMORY + 7)
-"""Order; step, s; how many steps were equal; c that the linear equations are for, 0 if for none; for how many steps
-their derivatives have served; how many steps were refused in turn; place of three
-matrices (8, 8) that change the step, and of a column."""
+"""Order; step, s; how many steps were equal; c that the linear equations are for, 0 if for none;
+for how many steps their derivatives have served; how many steps were refused in turn; place of
+three matrices (8, 8) that change the step, and of a column.
+"""
 WIDTH = 8
 HEAD = MATRICES + 3 * WIDTH * WIDTH + WIDTH
 
@@ -50,18 +52,26 @@ _SUMS = tuple(sum((1.0 / k for k in range(1, order + 1)), 0.0) for order in rang
 _ADAMS = (1.0, 1 / 2, 5 / 12, 3 / 8, 251 / 720, 95 / 288, 19087 / 60480, 5257 / 17280)
 PREDICTED = (*_ONES, 0.0, *_ADAMS[:-1])
 GIVEN = _SUMS + _ONES
-ALPHA = (*((1.0 - kappa) * total for kappa, total in zip(_KAPPA, _SUMS, strict=True)), *(1.0 / g for g in _ADAMS))
+ALPHA = (
+    *((1.0 - kappa) * total for kappa, total in zip(_KAPPA, _SUMS, strict=True)),
+    *(1.0 / g for g in _ADAMS),
+)
 DIFFERENCE = _ONES + ALPHA[WIDTH:]
 ERROR_CONSTANT = (
-    *(kappa * total + 1.0 / (k + 1.0) for k, (kappa, total) in enumerate(zip(_KAPPA, _SUMS, strict=True))),
+    *(
+        kappa * total + 1.0 / (k + 1.0)
+        for k, (kappa, total) in enumerate(zip(_KAPPA, _SUMS, strict=True))
+    ),
     *(1.0, *(before - g for before, g in pairwise(_ADAMS))),
 )
-"""Constants of both methods: by difference its weight in the prediction, and in psi; by order h / c, the newest
-difference by d, and the error by the newest difference."""
+"""Constants of both methods: by difference its weight in the prediction, and in psi; by order h /
+c, the newest difference by d, and the error by the newest difference.
+"""
 
 ITERATIONS, CONVERGED, SOLVED = 4, 0.05, 1e-3
-"""Newton's steps at most; what the error of an iteration may be, of that of a step; how far off equations may be that
-need no second one."""
+"""Newton's steps at most; what the error of an iteration may be, of that of a step; how far off
+equations may be that need no second one.
+"""
 RENEWED = 20
 """After so many steps the derivatives are computed anew."""
 SAFETY, SHRINK, GROW, WORTH = 0.8, 0.2, 8.0, 1.2
@@ -80,7 +90,9 @@ def adams(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, plac
     return multistep(model, reals, data, y0, y1, place, ADAMS)
 
 
-def multistep(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int, method: int) -> int:
+def multistep(
+    model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int, method: int
+) -> int:
     """The same by either: BDF or ADAMS."""
     size = model[MODEL.STATE_SIZE]
     h = at(data, place)
@@ -139,7 +151,16 @@ def multistep(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, 
         rows[k] = y1[k]
     h[EQUAL] += 1.0
     if h[EQUAL] > order:
-        choose(model, method, h, y0, rows, errors, error, SAFETY * (2 * ITERATIONS + 1) / (2 * ITERATIONS + iterations))
+        choose(
+            model,
+            method,
+            h,
+            y0,
+            rows,
+            errors,
+            error,
+            SAFETY * (2 * ITERATIONS + 1) / (2 * ITERATIONS + iterations),
+        )
     h[NEXT_STEP] = h[STEP]
     return OUTCOME.OK
 
@@ -192,9 +213,9 @@ def newton(
     for iteration in range(ITERATIONS):
         h[EVALUATED] += 1.0
         data[WORK.TIME] = t
-        if call(model[MODEL.LAWS], model, reals, data, y1, f1, STAGE.ACCELERATION) != OUTCOME.OK or not is_finite(
-            size, f1
-        ):
+        if call(
+            model[MODEL.LAWS], model, reals, data, y1, f1, STAGE.ACCELERATION
+        ) != OUTCOME.OK or not is_finite(size, f1):
             return 0
         for k in range(size):
             step[k] = c * f1[k] - psi[k] - d[k]
@@ -206,7 +227,8 @@ def newton(
             d[k] += step[k]
         if residual <= SOLVED * h[ACCEPTED]:
             return iteration + 1
-        # Where derivatives have become far too large, all steps are short: only what they leave tells.
+        # Where derivatives have become far too large, all steps are short: only what they leave
+        # tells.
         if iteration > 0:
             if not (residual < rest and length < before):
                 return 0
@@ -230,7 +252,14 @@ def refuse(size: int, method: int, h: Floats, rows: Floats, excess: float) -> No
 
 
 def choose(
-    model: Ints, method: int, h: Floats, y0: Floats, rows: Floats, errors: Floats, error: float, safety: float
+    model: Ints,
+    method: int,
+    h: Floats,
+    y0: Floats,
+    rows: Floats,
+    errors: Floats,
+    error: float,
+    safety: float,
 ) -> None:
     """Choose order and step for the next steps."""
     size, order, accuracy = model[MODEL.STATE_SIZE], int(h[ORDER]), h[ACCEPTED]
@@ -259,7 +288,11 @@ def rescale(size: int, method: int, h: Floats, rows: Floats, factor: float) -> N
     # Adams' are of the derivative times the step, behind the state.
     order, differing = int(h[ORDER]) - method, at(rows, size * method)
     scale = factor if method == ADAMS else 1.0
-    new, unit, both = at(h, MATRICES), at(h, MATRICES + WIDTH * WIDTH), at(h, MATRICES + 2 * WIDTH * WIDTH)
+    new, unit, both = (
+        at(h, MATRICES),
+        at(h, MATRICES + WIDTH * WIDTH),
+        at(h, MATRICES + 2 * WIDTH * WIDTH),
+    )
     column = at(both, WIDTH * WIDTH)
     differences(order, factor, new)
     differences(order, 1.0, unit)

@@ -1,13 +1,13 @@
 """How a path finds its way around its surfaces, in rounds, as in OpenSim.
 
-A round goes through the PathWraps in their order: the tangent points of each are taken out, and each straight piece of
-the path between the points of its range is bent around its surface. The first piece that must wrap does; else the one
-that gets longer by the least. What a round leaves is where the next one starts, until the length stays as it is.
-Nothing is left for the next evaluation.
+A round goes through the PathWraps in their order: the tangent points of each are taken out, and
+each straight piece of the path between the points of its range is bent around its surface. The
+first piece that must wrap does; else the one that gets longer by the least. What a round leaves is
+where the next one starts, until the length stays as it is. Nothing is left for the next evaluation.
 
-OpenSim keeps where a point is in ground from its first use on, though later rounds move the tangent points: straight
-distances and the directions of forces go by the place that is kept, while the surfaces, velocities and points of
-application go by the newest one. So do they here.
+OpenSim keeps where a point is in ground from its first use on, though later rounds move the tangent
+points: straight distances and the directions of forces go by the place that is kept, while the
+surfaces, velocities and points of application go by the newest one. So do they here.
 """
 
 from __future__ import annotations
@@ -67,8 +67,9 @@ from osimlite.mechanics.laws.vectors import (
 
 WRAP_INTS = 3
 BACK, FIRST, LAST = 0, 1, 2
-"""Of a wrap, after the nodes: how far before the path's item that of the surface stands, 0 if it is not active; the
-first and the last point between which the path may wrap."""
+"""Of a wrap, after the nodes: how far before the path's item that of the surface stands, 0 if it is
+not active; the first and the last point between which the path may wrap.
+"""
 
 ROUNDS, STILL = 8, 0.0005
 """At most so many rounds; a change of length (m) below which there is no other."""
@@ -80,8 +81,9 @@ BEYOND = -3
 """What becomes of one whose range ends beyond the path; OpenSim then fails."""
 
 POSE, BEST = ENDS, ENDS + 12
-"""The record of a surface: after the piece that is tried, its rotation by rows and its origin in ground; what its law
-has found, from FIRST_TANGENT on, for the piece that is bent."""
+"""The record of a surface: after the piece that is tried, its rotation by rows and its origin in
+ground; what its law has found, from FIRST_TANGENT on, for the piece that is bent.
+"""
 SURFACE_WORK = BEST + ROOM - FIRST_TANGENT
 
 
@@ -117,13 +119,19 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
 def place_surfaces(model: Ints, reals: Floats, data: Floats, item: int) -> None:
     """Where the surfaces are; no tangent point is known."""
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
-    nodes, work = i[POINTS] + 2 * i[WRAPS], at(data, i[ITEM.RECORD] + ORDER + i[POINTS] + 2 * i[WRAPS])
+    nodes, work = (
+        i[POINTS] + 2 * i[WRAPS],
+        at(data, i[ITEM.RECORD] + ORDER + i[POINTS] + 2 * i[WRAPS]),
+    )
     for k in range(i[WRAPS]):
         number = i[POINTS] + 2 * k
         at(work, NODE_WORK * number)[IS_KEPT] = at(work, NODE_WORK * (number + 1))[IS_KEPT] = 0.0
         back = i[NODES_AT + NODE_INTS * nodes + WRAP_INTS * k + BACK]
         if back > 0:
-            node, pose = at(i, NODES_AT + NODE_INTS * number), at(data, model[item - back + ITEM.RECORD] + POSE)
+            node, pose = (
+                at(i, NODES_AT + NODE_INTS * number),
+                at(data, model[item - back + ITEM.RECORD] + POSE),
+            )
             n = at(p, node[AT])
             place_frame(model, data, node[LINK], at(n, TURN), vector(n, STATION), pose)
 
@@ -140,7 +148,9 @@ def take_out(model: Ints, data: Floats, item: int, number: int) -> None:
     result[COUNT] = kept
 
 
-def wrap(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int, number: int) -> int:
+def wrap(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int, number: int
+) -> int:
     """Find the way around one surface; returns what became of the last piece that was tried."""
     take_out(model, data, item, number)
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
@@ -177,7 +187,9 @@ def wrap(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: i
         longer = -inf
         if says == WRAPPED:
             p1, p2 = spot(m, a), spot(n, b)
-            longer = norm(minus(p1, r1)) + e[SURFACE_LENGTH] + norm(minus(p2, r2)) - norm(minus(p1, p2))
+            longer = (
+                norm(minus(p1, r1)) + e[SURFACE_LENGTH] + norm(minus(p2, r2)) - norm(minus(p1, p2))
+            )
         if longer < least:
             best, least = k, longer
             put(one, PLACE, r1)

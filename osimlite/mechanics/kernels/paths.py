@@ -1,8 +1,9 @@
 """Paths: what the law of any path leaves in its record, and the laws of those that run from point to point.
 
-A path is an item that other items call: its law finds length and speed, and the law of the item that stands PULL places
-before it applies the tension that was put into the record. Paths through points keep the points in the record, in the
-order in which the path runs through them, so that nothing is computed twice.
+A path is an item that other items call: its law finds length and speed, and the law of the item
+that stands PULL places before it applies the tension that was put into the record. Paths through
+points keep the points in the record, in the order in which the path runs through them, so that
+nothing is computed twice.
 """
 
 from __future__ import annotations
@@ -32,36 +33,45 @@ LENGTH, SPEED, TENSION = 0, 1, 2
 """The record of any path begins with length (m), lengthening speed (m/s) and tension (N)."""
 
 POINTS, WRAPS, NODES_AT = ITEM.OWN + 1, ITEM.OWN + 2, ITEM.OWN + 3
-"""Integers of a path through points: how many points and wraps it has, and the records of its nodes: of the points, and
-then of two tangent points for each wrap."""
+"""Integers of a path through points: how many points and wraps it has, and the records of its
+nodes: of the points, and then of two tangent points for each wrap.
+"""
 
 NODE_INTS = 8
 LINK, BODY, KIND, OF, AT, TABLES = 0, 1, 2, 3, 4, 5
-"""Of a node: its link and body (there is no line that pulls between two nodes of one body); the degree of freedom of
-its coordinate (-1 if that is locked), or the number of the surface that a tangent point is on; place of its numbers,
-and of the tables of its three functions."""
+"""Of a node: its link and body (there is no line that pulls between two nodes of one body); the
+degree of freedom of its coordinate (-1 if that is locked), or the number of the surface that a
+tangent point is on; place of its numbers, and of the tables of its three functions.
+"""
 
 FIXED, CONDITIONAL, MOVING, CLAMPED, TANGENT = 0, 1, 2, 3, 4
 """Kinds of nodes; a clamped one is a moving one that stands still outside its range, as its place does."""
 
 STATION, VALUE, LOW, HIGH, TURN = 0, 3, 4, 5, 6
-"""Numbers of a node: a point of the link (m); value of a locked coordinate, and the range of any; rotation in the link
-of the frame in which the functions give the place, by rows, which then is about that point."""
+"""Numbers of a node: a point of the link (m); value of a locked coordinate, and the range of any;
+rotation in the link of the frame in which the functions give the place, by rows, which then is
+about that point.
+"""
 
 COUNT, ORDER = 3, 4
 """The rest of the record: how many nodes the path runs through, which these are, and what is known of each node."""
 
 NODE_WORK = 12
 PLACE, KEPT, ALONG, GRADIENT, SURFACE, IS_KEPT = 0, 3, 6, 9, 9, 10
-"""Of a node: where it is in ground, and where a tangent point counts as for straight lines, once that is known; unit
-vector to the next node; derivative of the place by the coordinate, in ground; length on the surface before it."""
+"""Of a node: where it is in ground, and where a tangent point counts as for straight lines, once
+that is known; unit vector to the next node; derivative of the place by the coordinate, in ground;
+length on the surface before it.
+"""
 
 COINCIDENT, SIGNIFICANT = 2.0**-52, 2.0 ** (-52.0 * 7.0 / 8.0)
-"""Distances (m) below which two points have no line in OpenSim, for speeds and for forces; these then are NaN
-there, and nothing here."""
+"""Distances (m) below which two points have no line in OpenSim, for speeds and for forces; these
+then are NaN there, and nothing here.
+"""
 
 
-def path_length(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, path: int) -> tuple[float, float]:
+def path_length(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, path: int
+) -> tuple[float, float]:
     """Length and lengthening speed of the path of an item."""
     call(model[path + ITEM.LAW], model, reals, data, y, f, path)
     return known_length(model, data, path)
@@ -73,7 +83,9 @@ def known_length(model: Ints, data: Floats, path: int) -> tuple[float, float]:
     return result[LENGTH], result[SPEED]
 
 
-def pull_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, path: int, tension: float) -> None:
+def pull_path(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, path: int, tension: float
+) -> None:
     """Apply a tension along the path of an item, after its length was found."""
     data[model[path + ITEM.RECORD] + TENSION] = tension
     call(model[path - model[path + PULL] + ITEM.LAW], model, reals, data, y, f, path)
@@ -102,8 +114,8 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
                 if not n[LOW] <= value <= n[HIGH]:
                     continue
             else:
-                # As in OpenSim, the place is that of the clamped coordinate, its derivative that of the coordinate;
-                # of a clamped point that is zero.
+                # As in OpenSim, the place is that of the clamped coordinate, its derivative that of
+                # the coordinate; of a clamped point that is zero.
                 clamped, t = min(max(value, n[LOW]), n[HIGH]), at(n, TURN)
                 qx, dx, _ = value_at(at(p, node[TABLES]), clamped)
                 qy, dy, _ = value_at(at(p, node[TABLES + 1]), clamped)
@@ -125,7 +137,11 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
 def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
     """Length, speed and directions, from the places of the nodes that the path runs through; returns the length."""
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
-    nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
+    nodes, order, work = (
+        at(i, NODES_AT),
+        at(result, ORDER),
+        at(result, ORDER + i[POINTS] + 2 * i[WRAPS]),
+    )
     length = speed = 0.0
     for k in range(1, int(result[COUNT])):
         one, two = int(order[k - 1]), int(order[k])
@@ -169,7 +185,11 @@ def pull_points(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     A moving point works on its coordinate too.
     """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
-    nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
+    nodes, order, work = (
+        at(i, NODES_AT),
+        at(result, ORDER),
+        at(result, ORDER + i[POINTS] + 2 * i[WRAPS]),
+    )
     tension, last = result[TENSION], int(result[COUNT]) - 1
     pull = 0.0, 0.0, 0.0
     for k in range(last + 1):
@@ -186,7 +206,14 @@ def pull_points(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
 
 
 def pull_each(
-    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int, states: Floats, forces: Floats
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    y: Floats,
+    f: Floats,
+    count: int,
+    states: Floats,
+    forces: Floats,
 ) -> int:
     """The generalized forces of 1 N along each item, all of which are paths, in a row each, state by state."""
     size, items = model[MODEL.DOFS], model[MODEL.ITEMS]

@@ -19,8 +19,9 @@ else:
     Floats = Ints = Any
 
 Law = Callable[[Ints, Floats, Floats, Floats, Floats, int], int]
-"""Takes the three vectors of :mod:`osimlite.mechanics.kernels.layout`, a state, room for its derivative, and the
-number of an operation or the place of an item, which the law is about."""
+"""Takes the three vectors of :mod:`osimlite.mechanics.kernels.layout`, a state, room for its
+derivative, and the number of an operation or the place of an item, which the law is about.
+"""
 
 Vector = TypeVar("Vector", "Floats", "Ints")
 
@@ -39,6 +40,8 @@ def at(vector: Vector, place: int) -> Vector:
     return vector[place:]
 
 
-def call(address: int, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, place: int) -> int:
+def call(
+    address: int, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, place: int
+) -> int:
     """Call the law at an address."""
     return laws[address](model, reals, data, y, f, place)

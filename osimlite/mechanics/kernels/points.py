@@ -26,10 +26,14 @@ def direction(model: Ints, data: Floats, link: int, along: Vector) -> Vector:
     return along if link < 0 else turned(link_work(model, data, link), along)
 
 
-def place_frame(model: Ints, data: Floats, link: int, rows: Floats, point: Vector, pose: Floats) -> None:
+def place_frame(
+    model: Ints, data: Floats, link: int, rows: Floats, point: Vector, pose: Floats
+) -> None:
     """Where a frame of a link is in ground, whose rotation there is given by rows: its own by rows, then its origin."""
     for k in range(3):
-        pose[k], pose[3 + k], pose[6 + k] = direction(model, data, link, (rows[k], rows[3 + k], rows[6 + k]))
+        pose[k], pose[3 + k], pose[6 + k] = direction(
+            model, data, link, (rows[k], rows[3 + k], rows[6 + k])
+        )
     put(pose, 9, station(model, data, link, point))
 
 

@@ -73,7 +73,9 @@ def bend_axis(m: Fit, y: Floats, number: int, pull: float) -> None:
         bend[size * second + first] += both
         bend[size * second + second] += far * component((-s2, s1 * c2, -c1 * c2), part)
     elif axis[1] < 0 and j[OPERATION.DOF] < 0 and j[OPERATION.ARGUMENT_COUNT] == 1 and first >= 0:
-        bend[size * first + first] += pull * operation_work(model, m.data, axis[0])[OPERATION_WORK.CURVATURE]
+        bend[size * first + first] += (
+            pull * operation_work(model, m.data, axis[0])[OPERATION_WORK.CURVATURE]
+        )
 
 
 def axis_of(m: Fit, number: int) -> Ints:
@@ -94,12 +96,18 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
         sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
         return ZERO, times(sign, (a[part], a[3 + part], a[6 + part]))
     if axis[1] >= 0:
-        around = vector(data, model[MODEL.WORK_COLUMN] + 6 * model[j[OPERATION.ARGUMENTS] + axis[1]])
-        far = elementwise(vector(m.reals, j[OPERATION.EXTRA]), last_axis(y, at(model, j[OPERATION.ARGUMENTS])))
+        around = vector(
+            data, model[MODEL.WORK_COLUMN] + 6 * model[j[OPERATION.ARGUMENTS] + axis[1]]
+        )
+        far = elementwise(
+            vector(m.reals, j[OPERATION.EXTRA]), last_axis(y, at(model, j[OPERATION.ARGUMENTS]))
+        )
         center = plus(center, turned_by(a, far))
     elif j[OPERATION.MOTION] != MOTION.TURN:
         return ZERO, around
-    return around, cross(minus(center, vector(link_work(model, data, link), LINK_WORK.ORIGIN)), around)
+    return around, cross(
+        minus(center, vector(link_work(model, data, link), LINK_WORK.ORIGIN)), around
+    )
 
 
 def spread(m: Fit, y: Floats, one: int, two: int, amount: float) -> None:
@@ -133,7 +141,9 @@ def argument(m: Fit, y: Floats, number: int, k: int) -> tuple[int, float]:
         s1, c1 = sine_cosine(y[model[j[OPERATION.ARGUMENTS]]])
         s2, c2 = sine_cosine(y[model[j[OPERATION.ARGUMENTS] + 1]])
         slope = (0.0, -c1 * c2, -s1 * c2) if k == 0 else (c2, s1 * s2, -c1 * s2)
-        return model[j[OPERATION.ARGUMENTS] + k], m.reals[j[OPERATION.EXTRA] + part] * component(slope, part)
+        return model[j[OPERATION.ARGUMENTS] + k], m.reals[j[OPERATION.EXTRA] + part] * component(
+            slope, part
+        )
     if axis[1] >= 0:
         return model[j[OPERATION.ARGUMENTS] + axis[1]], 1.0
     if j[OPERATION.DOF] >= 0:

@@ -1,10 +1,11 @@
 """What a pose costs: how far markers, sensors and coordinates are from where they were measured.
 
-The cost is half the weighted sum of squared distances and angles. A marker weighs on its link as a point mass and pulls
-at it as a spring: the gradient is the generalized force of these springs, what the deviations' first derivatives make
-of the second derivative is the mass matrix of these masses, found by the composite-rigid-body algorithm, and the rest
-follows from how the axes of the joints turn one another (R. Featherstone, Rigid Body Dynamics Algorithms, 2008,
-chapters 2.10 and 6.2): a turn about an axis carries the columns of all that it carries.
+The cost is half the weighted sum of squared distances and angles. A marker weighs on its link as a
+point mass and pulls at it as a spring: the gradient is the generalized force of these springs, what
+the deviations' first derivatives make of the second derivative is the mass matrix of these masses,
+found by the composite-rigid-body algorithm, and the rest follows from how the axes of the joints
+turn one another (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 2.10 and 6.2): a
+turn about an axis carries the columns of all that it carries.
 
 Second derivatives leave out how functions of several coordinates are bent.
 """
@@ -111,7 +112,11 @@ def turn_by_angles(m: Fit, y: Floats, angles: Ints) -> None:
     columns = at(m.data, m.model[MODEL.WORK_COLUMN])
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
-    one, two, three = at(columns, 6 * angles[0]), at(columns, 6 * angles[1]), at(columns, 6 * angles[2])
+    one, two, three = (
+        at(columns, 6 * angles[0]),
+        at(columns, 6 * angles[1]),
+        at(columns, 6 * angles[2]),
+    )
     for k in range(6):
         a, b, c = one[k], two[k], three[k]
         two[k] = c1 * b + s1 * c
@@ -131,7 +136,11 @@ def markers_pull(m: Fit) -> float:
         if link < 0:
             continue
         here = link_work(model, data, link)
-        i, load, turned = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH), at(v, p[TURNED] + 9 * link)
+        i, load, turned = (
+            at(here, LINK_WORK.INERTIA),
+            at(here, LINK_WORK.WRENCH),
+            at(v, p[TURNED] + 9 * link),
+        )
         pull, arm = times(weight, off), minus(point, vector(here, LINK_WORK.ORIGIN))
         a, b, c = arm
         mx, my, mz = times(weight, arm)
@@ -161,7 +170,11 @@ def gather(m: Fit, y: Floats) -> None:
     slope, stiffness, bend = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND])
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
         j, here = link_ints(model, link), link_work(model, data, link)
-        i, load, turned = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH), at(v, p[TURNED] + 9 * link)
+        i, load, turned = (
+            at(here, LINK_WORK.INERTIA),
+            at(here, LINK_WORK.WRENCH),
+            at(v, p[TURNED] + 9 * link),
+        )
         if i[0] > 0.0 or i[4] > 0.0:
             for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
                 c = at(columns, 6 * freedom)
@@ -175,7 +188,9 @@ def gather(m: Fit, y: Floats) -> None:
                     entry = dot(vector(c, 0), angular) + dot(vector(c, 3), linear)
                     stiffness[size * freedom + k] = stiffness[size * k + freedom] = entry
                     if k < j[LINK.FIRST_DOF]:
-                        bend[size * freedom + k] = bend[size * k + freedom] = dot(vector(c, 0), carried)
+                        bend[size * freedom + k] = bend[size * k + freedom] = dot(
+                            vector(c, 0), carried
+                        )
                     k = freedoms[DOF.SIZE * k + DOF.ABOVE]
             bend_joint(m, y, link, load, turned)
         if j[LINK.PARENT] >= 0:
@@ -191,7 +206,12 @@ def gather(m: Fit, y: Floats) -> None:
 def follow_couplers(m: Fit, y: Floats) -> None:
     """Make of the derivatives, and of the equations, those by the coordinates that depend on no others."""
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    slope, stiffness, bend, rows = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND]), at(v, p[ROWS])
+    slope, stiffness, bend, rows = (
+        at(v, p[SLOPE]),
+        at(v, p[STIFFNESS]),
+        at(v, p[BEND]),
+        at(v, p[ROWS]),
+    )
     gradient, rates = at(v, p[ROOM]), at(v, p[ROOM] + size)
     for k in range(size):
         rates[k] = 1.0
@@ -219,7 +239,11 @@ def follow_couplers(m: Fit, y: Floats) -> None:
 
 def equations_of(m: Fit) -> int:
     """How many equations bind the positions."""
-    return m.model[m.model[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS] if m.model[MODEL.CONSTRAINED] > 0 else 0
+    return (
+        m.model[m.model[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS]
+        if m.model[MODEL.CONSTRAINED] > 0
+        else 0
+    )
 
 
 def coupled(m: Fit, i: Ints, y: Floats, gradient: Floats, rates: Floats) -> tuple[float, float]:

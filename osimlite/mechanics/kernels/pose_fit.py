@@ -1,9 +1,10 @@
 """The pose that fits measurements best, frame by frame.
 
-Newton's method on what the couplers, the equations and the ends of the ranges leave free (J. Nocedal, S. Wright,
-Numerical Optimization, 2006, chapters 10.3, 16.7 and 18.3). Where the second derivative is no bowl the part of the
-residuals is left out, as Gauss and Newton do, and where that leads nowhere the step is damped, as Levenberg and
-Marquardt do. What nothing measures hardly moves: of all poses that fit alike the nearest is found.
+Newton's method on what the couplers, the equations and the ends of the ranges leave free (J.
+Nocedal, S. Wright, Numerical Optimization, 2006, chapters 10.3, 16.7 and 18.3). Where the second
+derivative is no bowl the part of the residuals is left out, as Gauss and Newton do, and where that
+leads nowhere the step is damped, as Levenberg and Marquardt do. What nothing measures hardly moves:
+of all poses that fit alike the nearest is found.
 """
 
 from __future__ import annotations
@@ -58,16 +59,18 @@ from osimlite.mechanics.kernels.states import copy, is_finite
 from osimlite.mechanics.laws.vectors import put
 
 FITTED, UNSEEN, STUCK, APART = 0.0, 1.0, 2.0, 3.0
-"""What becomes of a frame: the best pose; nothing was seen, the pose before; the search has ended before the best pose
-was reached; no pose near the one before keeps the constraints."""
+"""What becomes of a frame: the best pose; nothing was seen, the pose before; the search has ended
+before the best pose was reached; no pose near the one before keeps the constraints.
+"""
 FINEST = 1e-9
 """What coordinates of a pose may be off, as far as can be told from how the steps shrink (rad or m)."""
 MOST_STEPS = 200
 LIGHTEST, HEAVIEST, FIRST_DAMPING = 1e-10, 1e12, 1e-4
 """Damping of a step: least, most, and that of the first step that is to be short."""
 VAGUE, ALIKE = 1e-7, 1e-7
-"""Least damping where there are poses that look alike; what part of its stiffness a coordinate must keep when all
-others follow, so that this is not so."""
+"""Least damping where there are poses that look alike; what part of its stiffness a coordinate must
+keep when all others follow, so that this is not so.
+"""
 SMALL_STEPS = 1e-2
 """Damping of the first step where the way down is to be followed closely."""
 PATIENCE = 8
@@ -84,25 +87,20 @@ def fit_frames(
 ) -> int:  # fmt: skip
     """Fit some frames, one after the other.
 
-    Args:
-        model: the mechanism.
-        reals: its numbers.
-        data: its work.
-        y: a state, the pose to start from; then the last pose.
-        f: room for another.
-        p: the integers of the fit.
-        c: its numbers.
-        v: its work.
-        frames: of each the places of the markers (m, 3) in ground, the rotations of the sensors (k, 3, 3), the values
-            of the goals, those of what is held.
-        found: of each the values of all degrees of freedom, the places of the markers in the fitted pose (m, 3), the
-            turns of the sensors from where they were measured (k, 3), the cost, the count of the steps, and what became
-            of it.
-        count: of the frames.
+    Args: model: the mechanism. reals: its numbers. data: its work. y: a state, the pose to start
+        from; then the last pose. f: room for another. p: the integers of the fit. c: its numbers.
+        v: its work. frames: of each the places of the markers (m, 3) in ground, the rotations of
+        the sensors (k, 3, 3), the values of the goals, those of what is held. found: of each the
+        values of all degrees of freedom, the places of the markers in the fitted pose (m, 3), the
+        turns of the sensors from where they were measured (k, 3), the cost, the count of the steps,
+        and what became of it. count: of the frames.
     """
     m = Fit(model, reals, data, f, p, c, v)
     size, markers, sensors = model[MODEL.DOFS], p[MARKERS], p[SENSORS]
-    width, given = size + 3 * (markers + sensors) + 3, 3 * markers + 9 * sensors + p[GOALS] + p[HELD]
+    width, given = (
+        size + 3 * (markers + sensors) + 3,
+        3 * markers + 9 * sensors + p[GOALS] + p[HELD],
+    )
     for number in range(count):
         to = at(found, width * number)
         copy(given, at(frames, given * number), at(v, p[MEASURED]))
@@ -157,8 +155,9 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     copy(size, trial, start)
     value, steps, status = descend(m, trial, y, value, lightest, lightest)
     if kept == 0:
-        # From far away there are several ways down; small steps find others than large ones, and what begins away from
-        # the ends of its range is not held there before it is known where it belongs.
+        # From far away there are several ways down; small steps find others than large ones, and
+        # what begins away from the ends of its range is not held there before it is known where it
+        # belongs.
         value, more, status = descend_again(m, start, y, value, status, FIRST_DAMPING, lightest)
         steps += more
         for inwards in range(2):
@@ -167,7 +166,9 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
             steps += more
         for number in range(2 * size):
             if turn_round(m, last, start, number // 2, ROUND if number % 2 == 0 else -ROUND):
-                value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
+                value, more, status = descend_again(
+                    m, start, y, value, status, SMALL_STEPS, lightest
+                )
                 steps += more
     if leave_ends(m, y, start):
         value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
@@ -212,7 +213,11 @@ def note_pattern(m: Fit, y: Floats) -> None:
             resolved[k] = VARIABLE
     cost(m, y)
     for k in range(size):
-        if resolved[k] == VARIABLE and v[p[STIFFNESS] + size * k + k] == 0.0 and v[p[SLOPE] + k] == 0.0:
+        if (
+            resolved[k] == VARIABLE
+            and v[p[STIFFNESS] + size * k + k] == 0.0
+            and v[p[SLOPE] + k] == 0.0
+        ):
             resolved[k] = IDLE
     for k in range(size):
         v[p[STEP] + k] = 0.0
@@ -258,7 +263,9 @@ def weigh(m: Fit) -> bool:
     for k in range(markers):
         weights[k] = c[MARKER_NUMBERS * k + 3] if is_finite(3, at(measured, 3 * k)) else 0.0
     for k in range(sensors):
-        weights[markers + k] = numbers[SENSOR_NUMBERS * k + 9] if is_finite(9, at(rotations, 9 * k)) else 0.0
+        weights[markers + k] = (
+            numbers[SENSOR_NUMBERS * k + 9] if is_finite(9, at(rotations, 9 * k)) else 0.0
+        )
     seen = share(markers, weights)
     seen = share(sensors, at(weights, markers)) or seen
     numbers, goals = at(numbers, SENSOR_NUMBERS * sensors), at(measured, 3 * markers + 9 * sensors)
@@ -310,12 +317,15 @@ def descend(
             copy(size, start, y)
             value = new
             shrinking = length / before if before < inf else 1.0
-            if length <= FINEST or (shrinking < 0.5 and length * shrinking <= FINEST * (1.0 - shrinking)):
+            if length <= FINEST or (
+                shrinking < 0.5 and length * shrinking <= FINEST * (1.0 - shrinking)
+            ):
                 status = FITTED
                 break
             before = length if damping == lightest else inf
             damping = max(0.1 * damping, lightest)
-            # Where poses look alike the whole second derivative comes last: far from the best it leads astray.
+            # Where poses look alike the whole second derivative comes last: far from the best it
+            # leads astray.
             bends = steps >= PATIENCE or (damping < FIRST_DAMPING and lightest == LIGHTEST)
         else:
             if length <= 10.0 * FINEST:

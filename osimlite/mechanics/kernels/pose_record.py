@@ -12,8 +12,9 @@ MARKERS, SENSORS, GOALS, HELD, COUPLERS, BALLS = 0, 1, 2, 3, 4, 5
 MARKER_AT, SENSOR_AT, GOAL_AT, HELD_AT, COUPLER_AT, BALL_AT = 6, 7, 8, 9, 10, 11
 """Places; of a coupler the place of its record, of a ball that of its three degrees of freedom in the structure."""
 AXES_AT = 12
-"""Place of the first axis of each link and of the end, and of the axes: the operation, and which part of a ball or -1;
-those of a ball in the order in which they carry one another."""
+"""Place of the first axis of each link and of the end, and of the axes: the operation, and which
+part of a ball or -1; those of a ball in the order in which they carry one another.
+"""
 SLIDES = 3
 """The first of the parts of a ball that are slides to the ellipsoid, after its turns."""
 RESOLVED_AT, FREE_AT = 13, 14
@@ -23,17 +24,19 @@ VARIABLE, GIVEN, DEPENDENT = 0, 1, 2
 AT_END, IDLE = 3, 4
 """What a free one is while it is at an end of its range, or moves nothing that is seen."""
 DEPENDENT_OF, NUMBERS_OF, COUNT_OF, ARGUMENTS_OF = 0, 1, 2, 3
-"""Of a coupler: the degree of freedom that depends, the place of the numbers, how many it depends on, and these; the
-numbers are the values of those that are locked, and the table of the function."""
+"""Of a coupler: the degree of freedom that depends, the place of the numbers, how many it depends
+on, and these; the numbers are the values of those that are locked, and the table of the function.
+"""
 
-# Numbers: of each marker place and weight, of each sensor the rotation by rows and weight, of each goal the weight, of
-# each degree of freedom the range; the numbers of the couplers.
+# Numbers: of each marker place and weight, of each sensor the rotation by rows and weight, of each
+# goal the weight, of each degree of freedom the range; the numbers of the couplers.
 MARKER_NUMBERS, SENSOR_NUMBERS = 4, 10
 
 # Work: places of what is there, in its integers.
 MEASURED, WEIGHTS, SLOPE, STIFFNESS, BEND, TURNED = 15, 16, 17, 18, 19, 20
-"""What a frame says; the weights in it; gradient (n,) and the two parts of the second derivative (n, n); of each link
-the sum of the pulls times the arms (3, 3)."""
+"""What a frame says; the weights in it; gradient (n,) and the two parts of the second derivative
+(n, n); of each link the sum of the pulls times the arms (3, 3).
+"""
 ROWS, ERRORS, ROOM = 21, 22, 23
 """Equations by the coordinates (m, n), their errors (m,), and room for couplers and solving."""
 HISTORY, TRIAL, STEP = 24, 25, 26

@@ -1,10 +1,11 @@
 """What orientation sensors cost: the squares of the angles by which they are turned from where they were measured.
 
-A sensor is a torsion spring. If phi is the turn from the measured rotation to that of the sensor, along its axis in
-ground and as long as its angle, the half square of the angle changes with the rotation of the link by phi, and phi by
-the inverse of the left Jacobian of the rotations (G. Chirikjian, Stochastic Models, Information Theory, and Lie Groups,
-volume 2, 2012, chapter 10.7): 1 - [phi]/2 + c [phi]², where c is (1 - angle/2 cot(angle/2)) / angle². The even part
-is the moment of inertia of the sensor, the odd part goes where the springs of markers have their pulls times arms.
+A sensor is a torsion spring. If phi is the turn from the measured rotation to that of the sensor,
+along its axis in ground and as long as its angle, the half square of the angle changes with the
+rotation of the link by phi, and phi by the inverse of the left Jacobian of the rotations (G.
+Chirikjian, Stochastic Models, Information Theory, and Lie Groups, volume 2, 2012, chapter 10.7): 1
+- [phi]/2 + c [phi]², where c is (1 - angle/2 cot(angle/2)) / angle². The even part is the moment of
+inertia of the sensor, the odd part goes where the springs of markers have their pulls times arms.
 """
 
 from __future__ import annotations
@@ -62,7 +63,11 @@ def sensors_turn(m: Fit) -> float:
         if link < 0:
             continue
         here = link_work(model, data, link)
-        i, load, turned = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH), at(v, p[TURNED] + 9 * link)
+        i, load, turned = (
+            at(here, LINK_WORK.INERTIA),
+            at(here, LINK_WORK.WRENCH),
+            at(v, p[TURNED] + 9 * link),
+        )
         x, y, z = times(weight * evenness(sqrt(square)), off)
         a, b, c = off
         i[4] += weight - (y * b + z * c)
@@ -112,7 +117,13 @@ def turn_between(model: Ints, data: Floats, link: int, rows: Floats, wanted: Flo
 
 
 def turn_back(
-    model: Ints, data: Floats, link: int, rows: Floats, wanted: Floats, twist: Vector, diagonal: Vector
+    model: Ints,
+    data: Floats,
+    link: int,
+    rows: Floats,
+    wanted: Floats,
+    twist: Vector,
+    diagonal: Vector,
 ) -> Vector:
     """The same for nearly half a turn: its even part is twice the axis times itself."""
     x, y, z = diagonal
@@ -121,7 +132,9 @@ def turn_back(
     for k in range(3):
         is_axis = direction(model, data, link, (rows[k], rows[3 + k], rows[6 + k]))
         measured = wanted[k], wanted[3 + k], wanted[6 + k]
-        row = along(along(row, component(is_axis, axis), measured), component(measured, axis), is_axis)
+        row = along(
+            along(row, component(is_axis, axis), measured), component(measured, axis), is_axis
+        )
     cosine, sine = 0.5 * (x + y + z - 1.0), 0.5 * sqrt(dot(twist, twist))
     row = minus(times(0.5, row), replaced(ZERO, axis, cosine))
     length = sqrt(dot(row, row))

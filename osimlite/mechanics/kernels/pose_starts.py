@@ -23,8 +23,9 @@ from osimlite.mechanics.laws.vectors import dot, vector
 INWARDS = 0.3
 """How far from the ends of their ranges coordinates begin when a better pose is looked for (rad or m)."""
 ROUND = 0.75 * pi
-"""By how much the first pose is turned in ground, to either side, when a better one is looked for (rad): a range may
-reach to just before half a turn."""
+"""By how much the first pose is turned in ground, to either side, when a better one is looked for
+(rad): a range may reach to just before half a turn.
+"""
 SAME = 1e-9
 """How near to an end of its range what is there may be (rad or m)."""
 
@@ -48,10 +49,17 @@ def turn_round(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: fl
     move_inwards(m, from_pose, start, 2.0 * INWARDS)
     start[freedom] += angle
     is_inside = ranges[2 * freedom] <= start[freedom] <= ranges[2 * freedom + 1]
-    if not (joint_to_ground(m, freedom) >= 0 and is_inside and p[p[RESOLVED_AT] + freedom] in (VARIABLE, AT_END)):
+    if not (
+        joint_to_ground(m, freedom) >= 0
+        and is_inside
+        and p[p[RESOLVED_AT] + freedom] in (VARIABLE, AT_END)
+    ):
         return False
     look(m, from_pose)
-    down, turn = vector(m.reals, GRAVITY_AT), vector(at(m.data, model[MODEL.WORK_COLUMN]), 6 * freedom)
+    down, turn = (
+        vector(m.reals, GRAVITY_AT),
+        vector(at(m.data, model[MODEL.WORK_COLUMN]), 6 * freedom),
+    )
     return dot(turn, turn) > 0.0 and 2.0 * dot(turn, down) ** 2 >= dot(turn, turn) * dot(down, down)
 
 
@@ -67,7 +75,10 @@ def joint_to_ground(m: Fit, freedom: int) -> int:
 
 def is_angle(m: Fit, freedom: int) -> bool:
     """Whether a degree of freedom turns anything in the pose that was looked at last, and may change."""
-    turn, mark = vector(at(m.data, m.model[MODEL.WORK_COLUMN]), 6 * freedom), m.p[m.p[RESOLVED_AT] + freedom]
+    turn, mark = (
+        vector(at(m.data, m.model[MODEL.WORK_COLUMN]), 6 * freedom),
+        m.p[m.p[RESOLVED_AT] + freedom],
+    )
     return dot(turn, turn) > 0.0 and mark in (VARIABLE, AT_END)
 
 
@@ -81,14 +92,19 @@ def is_at_end(m: Fit, y: Floats, freedom: int) -> bool:
 def go_round(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     """A pose in which an angle at one end of its range is a whole turn on, or at the other end; false if it is at none.
 
-    Who turns on the spot comes round. Other joints than those to ground do only if their ranges leave out little.
+    Who turns on the spot comes round. Other joints than those to ground do only if their ranges
+    leave out little.
     """
     ranges = at(m.c, m.p[RANGES_AT])
     low, high = ranges[2 * freedom], ranges[2 * freedom + 1]
-    if not is_at_end(m, y, freedom) or not (high - low > pi + SAME or joint_to_ground(m, freedom) >= 0):
+    if not is_at_end(m, y, freedom) or not (
+        high - low > pi + SAME or joint_to_ground(m, freedom) >= 0
+    ):
         return False
     copy(m.model[MODEL.DOFS], y, start)
-    start[freedom] = min(high, low + 2.0 * pi) if y[freedom] <= low + SAME else max(low, high - 2.0 * pi)
+    start[freedom] = (
+        min(high, low + 2.0 * pi) if y[freedom] <= low + SAME else max(low, high - 2.0 * pi)
+    )
     look(m, y)
     return is_angle(m, freedom)
 
@@ -96,7 +112,8 @@ def go_round(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
 def turn_over(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     """A pose in which the two other angles of a joint to ground are half a turn on, while this one is at an end.
 
-    Where the second of three angles is at 90 degrees that is the same pose, and the way on for who turns head over
+    Where the second of three angles is at 90 degrees that is the same pose, and the way on for who
+    turns head over
     heels: the second angle goes back from there.
     """
     link, others = joint_to_ground(m, freedom), 0
@@ -127,7 +144,12 @@ def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:
 
 def unwind(m: Fit, y: Floats, first: Floats, start: Floats, value: float) -> bool:
     """A pose without the whole turns that the way from the first one has led to, if it costs no more."""
-    size, ranges, trial, result = m.model[MODEL.DOFS], at(m.c, m.p[RANGES_AT]), at(m.v, m.p[TRIAL]), False
+    size, ranges, trial, result = (
+        m.model[MODEL.DOFS],
+        at(m.c, m.p[RANGES_AT]),
+        at(m.v, m.p[TRIAL]),
+        False,
+    )
     copy(size, y, start)
     for k in range(size):
         turns = floor((y[k] - first[k]) / (2.0 * pi) + 0.5)

@@ -1,7 +1,7 @@
 """One step towards the pose that fits best: where the quadratic model of the cost is least.
 
-The model counts for what couplers, equations and the ends of the ranges leave free (J. Nocedal, S. Wright, Numerical
-Optimization, 2006, chapters 16.2 and 16.7).
+The model counts for what couplers, equations and the ends of the ranges leave free (J. Nocedal, S.
+Wright, Numerical Optimization, 2006, chapters 16.2 and 16.7).
 """
 
 from __future__ import annotations
@@ -74,7 +74,9 @@ def find_ends(m: Fit, y: Floats) -> None:
     for k in range(m.model[MODEL.DOFS]):
         if p[p[RESOLVED_AT] + k] == VARIABLE or p[p[RESOLVED_AT] + k] == AT_END:
             low, high = ranges[2 * k], ranges[2 * k + 1]
-            out = (y[k] <= low and slope[k] > 0.0) or (y[k] >= high and slope[k] < 0.0) or low == high
+            out = (
+                (y[k] <= low and slope[k] > 0.0) or (y[k] >= high and slope[k] < 0.0) or low == high
+            )
             p[p[RESOLVED_AT] + k] = AT_END if out else VARIABLE
 
 
@@ -114,7 +116,12 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
 def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) -> int:
     """The step of the free coordinates, after those of others; its place in the work, or -1 if the model is no bowl."""
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    stiffness, bend, slope, step = at(v, p[STIFFNESS]), at(v, p[BEND]), at(v, p[SLOPE]), at(v, p[STEP])
+    stiffness, bend, slope, step = (
+        at(v, p[STIFFNESS]),
+        at(v, p[BEND]),
+        at(v, p[SLOPE]),
+        at(v, p[STEP]),
+    )
     count = equations_of(m)
     place = p[ROOM] + 2 * size + (count * size + count * count + 3 * count + 1) + 2 * count
     solution, matrix = at(v, place), at(v, place + size)

@@ -23,17 +23,12 @@ def look(
 ) -> int:
     """Evaluate states, or accelerate them, up to the first that cannot be: its time is in `data` then, and itself in y.
 
-    Args:
-        model: the structure.
-        reals: its numbers.
-        data: room for what is found.
-        y: room for a state.
-        f: room for its derivative.
-        stage: up to which each is evaluated.
-        states: time, state, and accelerations if they are given, one after another.
-        order: how many states, how many accelerations, the address of what is called for each state, how many places
-            are looked at, and these places: of data, and behind it of f.
-        found: what stands at the places, state by state.
+    Args: model: the structure. reals: its numbers. data: room for what is found. y: room for a
+        state. f: room for its derivative. stage: up to which each is evaluated. states: time,
+        state, and accelerations if they are given, one after another. order: how many states, how
+        many accelerations, the address of what is called for each state, how many places are looked
+        at, and these places: of data, and behind it of f. found: what stands at the places, state
+        by state.
     """
     size, room, count, moving, law, looked = (
         model[MODEL.STATE_SIZE],
@@ -61,24 +56,32 @@ def look(
 
 
 def push_each(
-    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, law: int, states: Floats, order: Ints, found: Floats
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    y: Floats,
+    f: Floats,
+    law: int,
+    states: Floats,
+    order: Ints,
+    found: Floats,
 ) -> int:
     """What is missing of accelerations while no actuator pushes, and what each pushes by a control of 1; see `look`.
 
-    Args:
-        model: the structure.
-        reals: its numbers.
-        data: room for what is found.
-        y: room for a state.
-        f: room for its derivative.
-        law: address of `inverse`.
-        states: time, state and accelerations, one after another.
-        order: how many states, how many actuators, and of each its item, the place of its control, the item of its path
-            and the place of what it pulls with by a control of 1; these two are -1 if it has no path.
-        found: generalized forces that are missing (n,), and of each actuator those that it gives (n,) and what it pulls
-            with, state by state.
+    Args: model: the structure. reals: its numbers. data: room for what is found. y: room for a
+        state. f: room for its derivative. law: address of `inverse`. states: time, state and
+        accelerations, one after another. order: how many states, how many actuators, and of each
+        its item, the place of its control, the item of its path and the place of what it pulls with
+        by a control of 1; these two are -1 if it has no path. found: generalized forces that are
+        missing (n,), and of each actuator those that it gives (n,) and what it pulls with, state by
+        state.
     """
-    size, freedoms, count, actuators = model[MODEL.STATE_SIZE], model[MODEL.DOFS], order[0], order[1]
+    size, freedoms, count, actuators = (
+        model[MODEL.STATE_SIZE],
+        model[MODEL.DOFS],
+        order[0],
+        order[1],
+    )
     applied = at(f, freedoms)
     for number in range(count):
         given = at(states, (1 + size + freedoms) * number)
@@ -127,17 +130,12 @@ def watch(
 ) -> int:
     """Look at states.
 
-    Args:
-        model: the structure.
-        reals: its numbers.
-        data: room for what is found.
-        y: room for a state.
-        f: room for its derivative.
-        count: how many states.
-        states: one after another.
-        order: how many places in data are looked at, how many are set to 0 before each state, these places one after
-            the other; then for each state the number of the one item that is computed, -1 for all.
-        found: what stands at the places, state by state; NaN in a state that cannot be computed.
+    Args: model: the structure. reals: its numbers. data: room for what is found. y: room for a
+        state. f: room for its derivative. count: how many states. states: one after another. order:
+        how many places in data are looked at, how many are set to 0 before each state, these places
+        one after the other; then for each state the number of the one item that is computed, -1 for
+        all. found: what stands at the places, state by state; NaN in a state that cannot be
+        computed.
 
     Returns:
         OK, or what the kernel of an item said last that is something else.

@@ -11,7 +11,11 @@ OF_ONE = tuple(law for name, law in FUNCTIONS.items() if name not in OF_TWO)
 STEPS = ("number", "+", "-", "*", "negative", "divide", "power", "smaller", "larger", *OF_ONE)
 """What a step may do, by its number."""
 
-LINES = [line for number, law in enumerate(OF_ONE) for line in (f"if kind == {number}:", f"    return {law}(a)")]
+LINES = [
+    line
+    for number, law in enumerate(OF_ONE)
+    for line in (f"if kind == {number}:", f"    return {law}(a)")
+]
 of_one = written(
     "of_one",
     __name__,
@@ -23,12 +27,9 @@ of_one = written(
 def compute(steps: Ints, count: int, constants: Floats, registers: Floats, variables: int) -> float:
     """The result of a program.
 
-    Args:
-        steps: what each does, and the registers that it works on (count, 3); for a number its place in the constants.
-        count: of the steps.
-        constants: numbers of the formula.
-        registers: the variables, and after them room for the results.
-        variables: their count.
+    Args: steps: what each does, and the registers that it works on (count, 3); for a number its
+        place in the constants. count: of the steps. constants: numbers of the formula. registers:
+        the variables, and after them room for the results. variables: their count.
     """
     value = 0.0
     for k in range(count):

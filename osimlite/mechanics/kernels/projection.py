@@ -1,9 +1,10 @@
 """The nearest state where constraints hold.
 
-When states are projected, how exactly, and by which measure of nearness, is as in Simbody, so that the steps are those
-of OpenSim: positions and speeds are left alone as long as the root mean square of the errors of all constraints, locks
-included, is below the tolerance, and brought to a tenth of it otherwise; a change of a speed above 1 counts relative to
-it; and what lies across the constraints counts as no error of the integration.
+When states are projected, how exactly, and by which measure of nearness, is as in Simbody, so that
+the steps are those of OpenSim: positions and speeds are left alone as long as the root mean square
+of the errors of all constraints, locks included, is below the tolerance, and brought to a tenth of
+it otherwise; a change of a speed above 1 counts relative to it; and what lies across the
+constraints counts as no error of the integration.
 """
 
 from __future__ import annotations
@@ -26,16 +27,14 @@ ITERATIONS = 20
 """Newton's steps of a projection."""
 
 
-def project(model: Ints, reals: Floats, data: Floats, y: Floats, off: Floats, has_errors: int) -> int:
+def project(
+    model: Ints, reals: Floats, data: Floats, y: Floats, off: Floats, has_errors: int
+) -> int:
     """Move a state to where the constraints hold, if it is near; else it stays.
 
-    Args:
-        model: the mechanism.
-        reals: its numbers.
-        data: what the constraints may be off, and may be off at most in y, are in SCRATCH.
-        y: the state.
-        off: how far off each entry of it may be; of that, what lies across the constraints is taken away.
-        has_errors: 0 if that is not known.
+    Args: model: the mechanism. reals: its numbers. data: what the constraints may be off, and may
+        be off at most in y, are in SCRATCH. y: the state. off: how far off each entry of it may be;
+        of that, what lies across the constraints is taken away. has_errors: 0 if that is not known.
 
     Returns:
         OK if they hold then.
@@ -66,7 +65,14 @@ def bound(model: Ints, reals: Floats, data: Floats, y: Floats) -> int:
 
 
 def project_values(
-    model: Ints, reals: Floats, data: Floats, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    y: Floats,
+    off: Floats,
+    has_errors: int,
+    tolerance: float,
+    limit: float,
 ) -> int:
     """Change the values of a state whose equations are known, and the errors with them; the equations follow."""
     size, h = model[MODEL.DOFS], at(model, model[MODEL.CONSTRAINED])
@@ -76,7 +82,11 @@ def project_values(
         at(data, h[CONSTRAINED.WORK_FACTOR]),
     )
     errors = at(data, h[CONSTRAINED.WORK_SYSTEM])
-    room, step, following = at(errors, count), at(errors, 2 * count), at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size)
+    room, step, following = (
+        at(errors, count),
+        at(errors, 2 * count),
+        at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size),
+    )
     norm = position_errors(model, data, errors)
     if norm <= tolerance:
         return OUTCOME.OK
@@ -110,7 +120,13 @@ def project_values(
 
 
 def project_speeds(
-    model: Ints, data: Floats, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float
+    model: Ints,
+    data: Floats,
+    y: Floats,
+    off: Floats,
+    has_errors: int,
+    tolerance: float,
+    limit: float,
 ) -> int:
     """Change the speeds of a state whose equations are known, and their errors with them."""
     size, h = model[MODEL.DOFS], at(model, model[MODEL.CONSTRAINED])
@@ -177,7 +193,9 @@ def position_errors(model: Ints, data: Floats, errors: Floats) -> float:
     h, count, total = at(model, model[MODEL.CONSTRAINED]), 0, 0.0
     for number in range(h[CONSTRAINED.CONSTRAINTS]):
         constraint = at(model, model[h[CONSTRAINED.CONSTRAINT_AT] + number])
-        for row in range(constraint[CONSTRAINT.FIRST_EQUATION], constraint[CONSTRAINT.END_POSITION]):
+        for row in range(
+            constraint[CONSTRAINT.FIRST_EQUATION], constraint[CONSTRAINT.END_POSITION]
+        ):
             errors[count] = data[h[CONSTRAINED.WORK_ERRORS] + row]
             total += errors[count] * errors[count]
             count += 1

@@ -13,19 +13,25 @@ from osimlite.mechanics.laws.rotations import Axes
 from osimlite.mechanics.laws.vectors import dot, minus, put, vector
 
 
-def touch_ellipsoid(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+def touch_ellipsoid(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
+) -> int:
     """An ellipsoid on a half space; after the numbers of a pair stand the directions of its axes and half axes."""
     i = at(model, item)
     one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
     o, n = station(model, data, one, vector(p, 0)), direction(model, data, one, vector(p, 3))
     center = station(model, data, two, vector(p, 7))
-    d, radius, point = half_space_ellipsoid(o, n, center, axes(model, data, two, at(p, 18)), vector(p, 27), p[12])
+    d, radius, point = half_space_ellipsoid(
+        o, n, center, axes(model, data, two, at(p, 18)), vector(p, 27), p[12]
+    )
     if d > 0.0:
         press(model, reals, data, item, d, radius, n, point)
     return OUTCOME.OK
 
 
-def touch_ellipsoids(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+def touch_ellipsoids(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
+) -> int:
     """Two ellipsoids, of which one may be a sphere; axes and half axes of both stand after the numbers of a pair."""
     i = at(model, item)
     one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
@@ -34,7 +40,9 @@ def touch_ellipsoids(model: Ints, reals: Floats, data: Floats, y: Floats, f: Flo
     if dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
         return OUTCOME.OK
     axes1, axes2 = axes(model, data, one, at(p, 18)), axes(model, data, two, at(p, 30))
-    d, radius, n, point = ellipsoid_ellipsoid(a, axes1, vector(p, 27), b, axes2, vector(p, 39), p[12])
+    d, radius, n, point = ellipsoid_ellipsoid(
+        a, axes1, vector(p, 27), b, axes2, vector(p, 39), p[12]
+    )
     if d > 0.0:
         press(model, reals, data, item, d, radius, n, point)
     return OUTCOME.OK
@@ -42,16 +50,20 @@ def touch_ellipsoids(model: Ints, reals: Floats, data: Floats, y: Floats, f: Flo
 
 def axes(model: Ints, data: Floats, link: int, p: Floats) -> Axes:
     """The axes of an ellipsoid in ground."""
-    one, two = direction(model, data, link, vector(p, 0)), direction(model, data, link, vector(p, 3))
+    one, two = (
+        direction(model, data, link, vector(p, 0)),
+        direction(model, data, link, vector(p, 3)),
+    )
     return one, two, direction(model, data, link, vector(p, 6))
 
 
 def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """All pairs of one force in Simbody's order, until one separates too fast to push.
 
-    The integers are the numbers of surfaces and pairs, the link of each surface, and the surfaces of each pair; the
-    numbers the centre and radius of each surface. Simbody sweeps along the axis of ground on which the centres lie
-    farthest apart (largest sum of distances from their mean), from the surface that begins first.
+    The integers are the numbers of surfaces and pairs, the link of each surface, and the surfaces
+    of each pair; the numbers the centre and radius of each surface. Simbody sweeps along the axis
+    of ground on which the centres lie farthest apart (largest sum of distances from their mean),
+    from the surface that begins first.
     """
     i = at(model, item)
     count, pairs, links, p, room = (
@@ -92,7 +104,12 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
             if near(at(centers, 3 * one), at(centers, 3 * two), p[4 * one + 3], p[4 * two + 3]):
                 pair = pair_of(at(links, count), pairs, one, two)
                 if pair >= 0 and separates(
-                    model, reals, data, y, f, model[model[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + pair]
+                    model,
+                    reals,
+                    data,
+                    y,
+                    f,
+                    model[model[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + pair],
                 ):
                     return OUTCOME.OK
     return OUTCOME.OK
@@ -119,4 +136,9 @@ def separates(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, pa
     """Compute one contact; whether it touches and does not push."""
     call(model[part + ITEM.LAW], model, reals, data, y, f, part)
     result = at(data, model[part + ITEM.RECORD])
-    return bool(result[CONTACT_WORK.DEPTH] > 0.0 and result[0] == 0.0 and result[1] == 0.0 and result[2] == 0.0)
+    return bool(
+        result[CONTACT_WORK.DEPTH] > 0.0
+        and result[0] == 0.0
+        and result[1] == 0.0
+        and result[2] == 0.0
+    )

@@ -14,8 +14,9 @@ from osimlite.mechanics.kernels.states import copy, cubic
 from osimlite.mechanics.laws.vectors import dot, vector
 
 DONE, FAILED, FULL, STOPPED, TOO_MANY = 0, 1, 2, 3, 4
-"""How a run ends: at its limit, at a state beyond which there is no step, with a full log, at an event that stops it,
-after as many tried steps as were allowed."""
+"""How a run ends: at its limit, at a state beyond which there is no step, with a full log, at an
+event that stops it, after as many tried steps as were allowed.
+"""
 
 TIME_OF_EVENT = 1e-9
 """How exactly the time of an event is found on the interpolated motion, s."""
@@ -46,21 +47,22 @@ class Motion(NamedTuple):
     data: Floats  # room; at METHOD_AT the method's
     sizes: Ints  # see MOST_TRIES
     clock: Floats  # time and next step to try, s; changed
-    # steps taken, tried, evaluations, reports made, steps logged, events; changed. Events beyond the room for them
-    # are counted only.
+    # steps taken, tried, evaluations, reports made, steps logged, events; changed. Events beyond
+    # the room for them are counted only.
     counts: Ints
     times: Floats  # of the reports, s (r,)
     reports: Floats  # states at these times (r, y)
     log: Floats  # of each step the time, y, f (k, 1 + 2y)
     forces: Floats  # of each step the force on surface 2 of each pair (k, P, 3)
-    # time, number (of a contact, or P and the number of a watch), 1 if it begins or rises, else 0, and if there is
-    # room the state (e, 3 or 3 + y)
+    # time, number (of a contact, or P and the number of a watch), 1 if it begins or rises, else 0,
+    # and if there is room the state (e, 3 or 3 + y)
     events: Floats
     peaks: Floats  # largest force of each pair at the end of a step, and its time (P, 2)
-    # kind, degree of freedom or link or contact, and -1 or 1 if falling or rising through the level ends the run, 0
-    # if neither (w, 3)
+    # kind, degree of freedom or link or contact, and -1 or 1 if falling or rising through the level
+    # ends the run, 0 if neither (w, 3)
     watches: Ints
-    levels: Floats  # of each watch the station in the link, the direction in ground, and the level (w, 7)
+    # of each watch the station in the link, the direction in ground, and the level (w, 7)
+    levels: Floats
 
 
 def evaluated(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:
@@ -70,18 +72,31 @@ def evaluated(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:
 
 
 def inside(
-    m: Motion, t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f1: Floats, t: float, y: Floats
+    m: Motion,
+    t0: float,
+    y0: Floats,
+    f0: Floats,
+    t1: float,
+    y1: Floats,
+    f1: Floats,
+    t: float,
+    y: Floats,
 ) -> None:
     """State y at a time within a step, where the constraints hold if it can be moved there."""
     cubic(m.model[MODEL.STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
     if m.model[MODEL.CONSTRAINED] > 0:
-        projected(m.model, m.reals, m.data, t, y, y, 0, m.data[m.sizes[METHOD_AT] + ACCEPTED] / 10.0, inf)
+        projected(
+            m.model, m.reals, m.data, t, y, y, 0, m.data[m.sizes[METHOD_AT] + ACCEPTED] / 10.0, inf
+        )
 
 
 def note_peaks(m: Motion, t: float) -> None:
     """Keep the largest forces."""
     for pair in range(m.model[MODEL.CONTACTS]):
-        c, peak = at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair), at(m.peaks, 2 * pair)
+        c, peak = (
+            at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair),
+            at(m.peaks, 2 * pair),
+        )
         size = sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
         if size > peak[0]:
             peak[0], peak[1] = size, t
@@ -116,7 +131,9 @@ def levels_at(m: Motion, y: Floats, levels: Floats) -> None:
         elif watch[0] == TOUCH:
             levels[pairs + number] = levels[watch[1]]
         else:
-            levels[pairs + number] = dot(station(m.model, m.data, watch[1], vector(a, 0)), vector(a, 3)) - a[6]
+            levels[pairs + number] = (
+                dot(station(m.model, m.data, watch[1], vector(a, 0)), vector(a, 3)) - a[6]
+            )
 
 
 def note_events(

@@ -1,12 +1,14 @@
 """Reflexes: sums of terms ``gain * (sensor - offset)`` with a delay, each on while a leg is in some states.
 
-The integers are a head, `REFLEXES`; of each term `TERM`; of each gate the sensors of a coordinate and of its speed; of
-each sensor what it feels, `senses.SOURCE`. The numbers of a candidate are a head, `LIMITS`, in which each leg has its
-own; of each term delay, gain and offset; of each gate delay, least and largest value; those of sources. Where legs have
-states the first two sensors feel their loads. Delays are in control steps. A term without a sensor is ``gain * (t -
-delay)**power`` from its delay on, with the time t in control steps.
+The integers are a head, `REFLEXES`; of each term `TERM`; of each gate the sensors of a coordinate
+and of its speed; of each sensor what it feels, `senses.SOURCE`. The numbers of a candidate are a
+head, `LIMITS`, in which each leg has its own; of each term delay, gain and offset; of each gate
+delay, least and largest value; those of sources. Where legs have states the first two sensors feel
+their loads. Delays are in control steps. A term without a sensor is ``gain * (t - delay)**power``
+from its delay on, with the time t in control steps.
 
-Noise is drawn anew at each control step, from a seed, the number of the step and that of what is noisy alone.
+Noise is drawn anew at each control step, from a seed, the number of the step and that of what is
+noisy alone.
 """
 
 from __future__ import annotations
@@ -35,31 +37,50 @@ WORD = 0xFFFFFFFF
 
 
 class REFLEXES(metaclass=Record):
-    """Counts of terms and gates, how many control steps and sensors are remembered, whether legs have states, whether
-    these go from stance to swing at once; how many numbers, and how much room, each candidate has; number of the first
-    control step that is recorded, and of rows of the record; whether there is noise."""
+    """Counts of terms and gates, how many control steps and sensors are remembered, whether legs
+    have states, whether these go from stance to swing at once; how many numbers, and how much room,
+    each candidate has; number of the first control step that is recorded, and of rows of the
+    record; whether there is noise.
+    """
 
-    TERMS, GATES, KEPT, SENSORS, HAS_STATES, SWINGS_FROM_STANCE, NUMBERS, ROOM, FIRST, ROWS, IS_NOISY, HEAD = range(12)
+    (
+        TERMS,
+        GATES,
+        KEPT,
+        SENSORS,
+        HAS_STATES,
+        SWINGS_FROM_STANCE,
+        NUMBERS,
+        ROOM,
+        FIRST,
+        ROWS,
+        IS_NOISY,
+        HEAD,
+    ) = range(12)
 
 
 class TERM(metaclass=Record):
-    """Muscle, sensor (-1 for none), what may not be negative (without a sensor the power of time), the leg whose states
-    decide, these as bits, and the number of what may suppress it or -1."""
+    """Muscle, sensor (-1 for none), what may not be negative (without a sensor the power of time),
+    the leg whose states decide, these as bits, and the number of what may suppress it or -1.
+    """
 
     TARGET, SENSOR, KIND, LEG, STATES, GATE, SIZE = range(7)
 
 
 class LIMITS(metaclass=Record):
-    """Delay of the loads; of each leg the loads with which it stands and swings, and how far the foot is ahead in late
-    stance, at liftoff and at landing, m; a seed, and standard deviations of the noise of controls and of sensors: at
-    least, and as part of what is noisy."""
+    """Delay of the loads; of each leg the loads with which it stands and swings, and how far the
+    foot is ahead in late stance, at liftoff and at landing, m; a seed, and standard deviations of
+    the noise of controls and of sensors: at least, and as part of what is noisy.
+    """
 
     DELAY, STANDS, SWINGS, LATE, LEAVES, LANDS, OF_LEG = 0, 0, 1, 2, 3, 4, 5
     SEED = 1 + 2 * OF_LEG
     CONTROL_NOISE, CONTROL_PART, SENSOR_NOISE, SENSOR_PART, HEAD = range(SEED + 1, SEED + 6)
 
 
-def note_senses(model: Ints, data: Floats, i: Ints, p: Floats, frames: int, row: Floats, history: Floats) -> None:
+def note_senses(
+    model: Ints, data: Floats, i: Ints, p: Floats, frames: int, row: Floats, history: Floats
+) -> None:
     """Remember what is felt after so many rows."""
     sensors = i[REFLEXES.SENSORS]
     kept = at(history, sensors * (frames % i[REFLEXES.KEPT]))
@@ -94,18 +115,30 @@ def felt_before(i: Ints, frames: int, history: Floats, sensor: int, delay: float
     return value + part * (other - value)
 
 
-def go_on(senses: Ints, i: Ints, p: Floats, frames: int, row: Floats, history: Floats, legs: Floats) -> None:
+def go_on(
+    senses: Ints, i: Ints, p: Floats, frames: int, row: Floats, history: Floats, legs: Floats
+) -> None:
     """The states of two legs after a control step."""
     one, two = felt_before(i, frames, history, 0, p[0]), felt_before(i, frames, history, 1, p[0])
     first, second = ahead(senses, row, 0), ahead(senses, row, 1)
-    of_one, of_two, is_direct = at(p, 1), at(p, 1 + LIMITS.OF_LEG), i[REFLEXES.SWINGS_FROM_STANCE] > 0
+    of_one, of_two, is_direct = (
+        at(p, 1),
+        at(p, 1 + LIMITS.OF_LEG),
+        i[REFLEXES.SWINGS_FROM_STANCE] > 0,
+    )
     states = int(legs[0]), int(legs[1])
     legs[0] = after(states[0], of_one, one, two > of_two[LIMITS.STANDS], first, second, is_direct)
     legs[1] = after(states[1], of_two, two, one > of_one[LIMITS.STANDS], second, first, is_direct)
 
 
 def after(
-    state: int, limits: Floats, load: float, other_stands: bool, here: float, other: float, is_direct: bool
+    state: int,
+    limits: Floats,
+    load: float,
+    other_stands: bool,
+    here: float,
+    other: float,
+    is_direct: bool,
 ) -> int:
     """The state of a leg that follows.
 
@@ -138,7 +171,9 @@ def after(
     return EARLY_STANCE if stands else LANDING
 
 
-def add_reflexes(i: Ints, p: Floats, frames: int, history: Floats, legs: Floats, result: Floats) -> None:
+def add_reflexes(
+    i: Ints, p: Floats, frames: int, history: Floats, legs: Floats, result: Floats
+) -> None:
     """Add what all terms that are on excite muscles by."""
     terms, count = at(i, REFLEXES.HEAD), i[REFLEXES.TERMS]
     gates, numbers = at(terms, TERM.SIZE * count), at(p, LIMITS.HEAD)

@@ -1,9 +1,10 @@
 """A Rosenbrock method of order 3, for stiff motion at loose tolerances: four linear systems a step, and no iteration.
 
-The first two stages are at the start of the step, so that two evaluations do for a step besides that at its end. The
-method is L-stable and stiffly accurate. The conditions of order 3, and of order 2 whatever the derivatives J are, leave
-a method of this shape one free number, its diagonal (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II,
-chapters IV.6 and IV.7); a quarter is near the least with which it is stable. What J of
+The first two stages are at the start of the step, so that two evaluations do for a step besides
+that at its end. The method is L-stable and stiffly accurate. The conditions of order 3, and of
+order 2 whatever the derivatives J are, leave a method of this shape one free number, its diagonal
+(E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, chapters IV.6 and IV.7); a
+quarter is near the least with which it is stable. What J of
 :mod:`osimlite.mechanics.kernels.condensation` leaves out costs it little.
 """
 
@@ -37,7 +38,12 @@ STATES = STAGES
 """The method keeps a derivative for each stage: so many vectors as long as a state."""
 
 DIAGONAL = 0.25
-ALPHA = ((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (1 / 3, 0.0, 0.0, 0.0), (43 / 56, 31 / 56, -9 / 28, 0.0))
+ALPHA = (
+    (0.0, 0.0, 0.0, 0.0),
+    (0.0, 0.0, 0.0, 0.0),
+    (1 / 3, 0.0, 0.0, 0.0),
+    (43 / 56, 31 / 56, -9 / 28, 0.0),
+)
 GAMMA = (
     (DIAGONAL, 0.0, 0.0, 0.0),
     (0.5, DIAGONAL, 0.0, 0.0),
@@ -64,9 +70,11 @@ CARRIED = tuple(-DIAGONAL * value for row in UNIT for value in _by_gamma(row))
 ENDS = _by_gamma(WEIGHTS)
 MISSES = _by_gamma(tuple(one - other for one, other in zip(WEIGHTS, EMBEDDED, strict=True)))
 TIMES = tuple(sum(row) for row in ALPHA)
-"""The coefficients as the stages need them, in which no product with J occurs (E. Hairer, G. Wanner, Solving Ordinary
-Differential Equations II, chapter IV.7): by rows where a stage is evaluated, and what it has of those before it; what
-end and error have of the stages; times, of which 0 is the start, where the derivative is known."""
+"""The coefficients as the stages need them, in which no product with J occurs (E. Hairer, G.
+Wanner, Solving Ordinary Differential Equations II, chapter IV.7): by rows where a stage is
+evaluated, and what it has of those before it; what end and error have of the stages; times, of
+which 0 is the start, where the derivative is known.
+"""
 
 SAFETY, SHRINK, GROW, WORTH = 0.9, 0.2, 5.0, 1.1
 """Of the step that should just do, which is taken; how much a step changes at most, and at least to be made longer."""
@@ -87,9 +95,17 @@ def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats,
     if h[IS_NEW] == 0.0:
         data[WORK.TIME] = t0
         copy(size, y0, y1)
-        h[IS_NEW] = 1.0 if linearise(model, reals, data, y1, f1, room, h[IS_EVALUATED]) == OUTCOME.OK else 0.0
+        h[IS_NEW] = (
+            1.0
+            if linearise(model, reals, data, y1, f1, room, h[IS_EVALUATED]) == OUTCOME.OK
+            else 0.0
+        )
     h[IS_EVALUATED] = 0.0
-    if h[IS_NEW] > 0.0 and condense(model, c, room) and staged(model, reals, data, t0, step, c, y0, y1, stages, room):
+    if (
+        h[IS_NEW] > 0.0
+        and condense(model, c, room)
+        and staged(model, reals, data, t0, step, c, y0, y1, stages, room)
+    ):
         for k in range(size):
             y1[k], errors[k] = y0[k], 0.0
             for i in range(STAGES):
@@ -129,9 +145,9 @@ def staged(
                 for j in range(i):
                     y[k] += PLACES[STAGES * i + j] * stages[size * j + k]
             data[WORK.TIME] = t0 + TIMES[i] * step
-            if call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.ACCELERATION) != OUTCOME.OK or not is_finite(
-                size, f
-            ):
+            if call(
+                model[MODEL.LAWS], model, reals, data, y, f, STAGE.ACCELERATION
+            ) != OUTCOME.OK or not is_finite(size, f):
                 return False
         for k in range(size):
             stage[k] = c * rates[k]

@@ -78,12 +78,29 @@ def run_several(
 ) -> int:
     """The runs `first` to `last` - 1, each on its own rows.
 
-    Args: as of `Motion`, one row for each run; a log, `data` and what tells how to run serve them all. `each` is the
-    length of a row of numbers, 0 if one serves them all.
+    Args: as of `Motion`, one row for each run; a log, `data` and what tells how to run serve them
+    all. `each` is the length of a row of numbers, 0 if one serves them all.
     """
     for k in range(first, last):
-        m = run_of(model, reals, data, each, sizes, clocks, counts, states, times, reports, log, forces, events, peaks,
-                   watches, levels, k)  # fmt: skip
+        m = run_of(
+            model,
+            reals,
+            data,
+            each,
+            sizes,
+            clocks,
+            counts,
+            states,
+            times,
+            reports,
+            log,
+            forces,
+            events,
+            peaks,
+            watches,
+            levels,
+            k,
+        )
         endings[k] = run(m, at(states, k * model[MODEL.STATE_SIZE]), False)
     return OUTCOME.OK
 
@@ -139,7 +156,9 @@ def run(m: Motion, y: Floats, is_going: bool) -> int:
     before = at(room, STATES * size)
     after = at(before, model[MODEL.CONTACTS] + sizes[WATCHES])
     is_kept = model[MODEL.CONSTRAINED] == 0 or sizes[START_HOLDS] > 0
-    if not is_kept and not projected(model, m.reals, m.data, clock[0], y, f0, 0, h[ACCEPTED] / 10.0, inf):
+    if not is_kept and not projected(
+        model, m.reals, m.data, clock[0], y, f0, 0, h[ACCEPTED] / 10.0, inf
+    ):
         return FAILED
     copy(size, y, y0)
     status = OUTCOME.OK if is_going else evaluated(m, clock[0], y0, f0, STAGE.ACCELERATION)
@@ -204,10 +223,15 @@ def run(m: Motion, y: Floats, is_going: bool) -> int:
 
 def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
     """Whether the end of a step has a derivative, which a method may have found where no forces are looked at."""
-    if m.data[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0 and m.model[MODEL.CONTACTS] + m.sizes[WATCHES] == 0:
+    if (
+        m.data[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0
+        and m.model[MODEL.CONTACTS] + m.sizes[WATCHES] == 0
+    ):
         return is_finite(m.model[MODEL.STATE_SIZE], f1)
     m.counts[EVALUATIONS] += 1
-    return evaluated(m, t1, y1, f1, STAGE.ACCELERATION) == OUTCOME.OK and is_finite(m.model[MODEL.STATE_SIZE], f1)
+    return evaluated(m, t1, y1, f1, STAGE.ACCELERATION) == OUTCOME.OK and is_finite(
+        m.model[MODEL.STATE_SIZE], f1
+    )
 
 
 def step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:

@@ -1,10 +1,11 @@
 """What is felt of a walker once its forces are computed: a row of numbers that measures go by, and sources of reflexes.
 
-The plan of a row are integers: a head, `SENSES`; of each muscle where w has what `OF_MUSCLES` names; of each force that
-limits a coordinate the number of that and where w has the force; the link of each body; of each leg the numbers of the
-bodies that it hangs on and ends with, and the first and the end of the contacts of its foot. The numbers that belong to
-it are a head, `SENSED`; optimal fiber lengths (m), strengths (N); of each control the least and the largest; mass
-centres in the links (m), masses (kg).
+The plan of a row are integers: a head, `SENSES`; of each muscle where w has what `OF_MUSCLES`
+names; of each force that limits a coordinate the number of that and where w has the force; the link
+of each body; of each leg the numbers of the bodies that it hangs on and ends with, and the first
+and the end of the contacts of its foot. The numbers that belong to it are a head, `SENSED`; optimal
+fiber lengths (m), strengths (N); of each control the least and the largest; mass centres in the
+links (m), masses (kg).
 """
 
 from __future__ import annotations
@@ -25,10 +26,12 @@ OF_LEG = 4
 
 
 class SENSES(metaclass=Record):
-    """Counts, of controls and of the numbers too, and where a row has what is felt: lengths of fibers over the optimal
-    ones, velocities (of these lengths per s), forces of tendons over the strengths, activations, active forces of
-    fibers (N); values of coordinates and their speeds, forces that limit them (N, N m); forces of the ground on each
-    leg over the weight; mass centres of bodies and the common one (m), how fast that rises (m/s)."""
+    """Counts, of controls and of the numbers too, and where a row has what is felt: lengths of
+    fibers over the optimal ones, velocities (of these lengths per s), forces of tendons over the
+    strengths, activations, active forces of fibers (N); values of coordinates and their speeds,
+    forces that limit them (N, N m); forces of the ground on each leg over the weight; mass centres
+    of bodies and the common one (m), how fast that rises (m/s).
+    """
 
     MUSCLES, COORDINATES, LEGS, LIMITS, BODIES, CONTROLS, KNOWN = range(7)
     LENGTHS, VELOCITIES, FORCES, ACTIVATIONS, ACTIVE, VALUES, SPEEDS, MOMENTS = range(7, 15)
@@ -42,17 +45,20 @@ class SENSED(metaclass=Record):
 
 
 IN_ROW, SPINDLE, POSITION, VELOCITY, ANGLE, TURN = range(6)
-"""Kinds of sources: a number of a row; the rate of a muscle's spindles, whose length and velocity are two numbers of a
-row (A. Prochazka, Prog. Brain Res. 123, 1999, p. 135, with a velocity over the optimal length as in SCONE). Of a link:
-where a point is, and how fast, along a direction of ground (m, m/s); angles that rotations about y, z and x make one
-after the other, and the angular velocity about an axis of the link (rad, rad/s)."""
+"""Kinds of sources: a number of a row; the rate of a muscle's spindles, whose length and velocity
+are two numbers of a row (A. Prochazka, Prog. Brain Res. 123, 1999, p. 135, with a velocity over the
+optimal length as in SCONE). Of a link: where a point is, and how fast, along a direction of ground
+(m, m/s); angles that rotations about y, z and x make one after the other, and the angular velocity
+about an axis of the link (rad, rad/s).
+"""
 SPINDLE_GAIN = 65.0 / 200.0
 
 
 class SOURCE(metaclass=Record):
-    """Kind; place in a row, or link; a second place in a row, or where numbers of a link are: of a point its place in
-    the link and the direction; of angles the axes of a frame in the link, and how each angle counts; of an angular
-    velocity the axis."""
+    """Kind; place in a row, or link; a second place in a row, or where numbers of a link are: of a
+    point its place in the link and the direction; of angles the axes of a frame in the link, and
+    how each angle counts; of an angular velocity the axis.
+    """
 
     KIND, PLACE, MORE, SIZE = range(4)
 
@@ -70,9 +76,13 @@ def felt(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats) -> flo
         xx, yx, zx = direction(model, data, place, vector(own, 0))
         _, yy, _ = direction(model, data, place, vector(own, 3))
         _, yz, _ = direction(model, data, place, vector(own, 6))
-        return dot(vector(own, 9), (atan2(-yz, yy), atan2(-zx, xx), atan2(yx, sqrt(xx * xx + zx * zx))))
+        return dot(
+            vector(own, 9), (atan2(-yz, yy), atan2(-zx, xx), atan2(yx, sqrt(xx * xx + zx * zx)))
+        )
     if kind == TURN:
-        return dot(direction(model, data, place, vector(own, 0)), angular_velocity(model, data, place))
+        return dot(
+            direction(model, data, place, vector(own, 0)), angular_velocity(model, data, place)
+        )
     point = station(model, data, place, vector(own, 0))
     return dot(vector(own, 3), point if kind == POSITION else velocity(model, data, place, point))
 

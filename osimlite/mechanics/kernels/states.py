@@ -19,7 +19,17 @@ def is_finite(count: int, values: Floats) -> bool:
     return total - total == 0.0
 
 
-def cubic(size: int, t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f1: Floats, t: float, y: Floats) -> None:
+def cubic(
+    size: int,
+    t0: float,
+    y0: Floats,
+    f0: Floats,
+    t1: float,
+    y1: Floats,
+    f1: Floats,
+    t: float,
+    y: Floats,
+) -> None:
     """State y at a time within a step, on the cubic Hermite polynomial through its ends."""
     h = t1 - t0
     z = (t - t0) / h

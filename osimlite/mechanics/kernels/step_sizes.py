@@ -11,7 +11,8 @@ PATIENCE = 10_000
 def shortest_step(t: float, tried: float) -> float:
     """The shortest step to take at a time t (s) after so many that were tried.
 
-    As in Simbody, the first steps from 0 may be of any length. OpenSim goes on with such steps for ever; here they end.
+    As in Simbody, the first steps from 0 may be of any length. OpenSim goes on with such steps for
+    ever; here they end.
     """
     return max(2.0**-52 * abs(t), 1e-300) if tried < PATIENCE else 4.0 * 2.0**-52 * max(1.0, abs(t))
 
@@ -24,8 +25,9 @@ def weight(value: float) -> float:
 def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: float) -> float:
     """Step to try after one of size h, as Simbody chooses it; less than h if and only if error > accuracy.
 
-    The estimated error goes with a power of h, so 0.9 h (accuracy / error)^(1/order) should just do. That is taken if
-    it is at least a fifth more or, after a failure, a tenth less; never more than five times or less than a tenth of h.
+    The estimated error goes with a power of h, so 0.9 h (accuracy / error)^(1/order) should just
+    do. That is taken if it is at least a fifth more or, after a failure, a tenth less; never more
+    than five times or less than a tenth of h.
 
     Args:
         h: step just tried, s.

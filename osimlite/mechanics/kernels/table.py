@@ -1,7 +1,8 @@
 """Which functions are compiled by themselves and called by their address, by name.
 
-Each is compiled when the first model that needs it is made ready, and kept. Those of the engine are here; those that
-are written for kinds of forces and probes are in :mod:`osimlite.simulation.elements.laws`.
+Each is compiled when the first model that needs it is made ready, and kept. Those of the engine are
+here; those that are written for kinds of forces and probes are in
+:mod:`osimlite.simulation.elements.laws`.
 """
 
 from __future__ import annotations
@@ -86,5 +87,7 @@ LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
 
 def own_function(name: str) -> Callable[..., Any]:
     """The function of a name."""
-    function: Callable[..., Any] = getattr(import_module(f"{__package__}.{LAW_MODULES[name]}"), name)
+    function: Callable[..., Any] = getattr(
+        import_module(f"{__package__}.{LAW_MODULES[name]}"), name
+    )
     return function

@@ -1,8 +1,8 @@
 """Sine and cosine of one angle at once, for angles of joints.
 
-Source: S. L. Moshier, Methods and Programs for Mathematical Functions, 1989 (the approximations of the Cephes library);
-W. J. Cody and W. Waite, Software Manual for the Elementary Functions, 1980 (the reduction). The error is less than
-one and a half units in the last place.
+Source: S. L. Moshier, Methods and Programs for Mathematical Functions, 1989 (the approximations of
+the Cephes library); W. J. Cody and W. Waite, Software Manual for the Elementary Functions, 1980
+(the reduction). The error is less than one and a half units in the last place.
 """
 
 from __future__ import annotations

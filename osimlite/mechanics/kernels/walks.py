@@ -1,6 +1,7 @@
 """Motions whose controls are held for a step, and whole walks in one call.
 
-A walk are control steps of reflexes, the motion between, what is felt, and how it is judged. Any other run can go by
+A walk are control steps of reflexes, the motion between, what is felt, and how it is judged. Any
+other run can go by
 reflexes, too: what they know of what was is a room of its own, from which a run goes on.
 """
 
@@ -35,8 +36,9 @@ from osimlite.mechanics.kernels.senses import SENSED, SENSES, feel
 from osimlite.mechanics.kernels.states import copy, is_finite
 
 FEEL, BEGIN, START = -1, -2, -3
-"""Orders besides a number of control steps: to feel what is; then to begin reflexes and excite muscles by them, or to
-begin criteria."""
+"""Orders besides a number of control steps: to feel what is; then to begin reflexes and excite
+muscles by them, or to begin criteria.
+"""
 STEPS, FRAMES, GOING, FORCES, COUNTS = range(5)
 """What is counted of a walk: control steps, rows that were felt, 1 while it goes on, evaluations of the forces."""
 LEGS = 2
@@ -57,7 +59,8 @@ class Walk(NamedTuple):
     room: Floats  # see LEGS
     row: Floats  # what is felt
     excitations: Floats  # that are held (c,)
-    record: Floats  # of each control step the state at its start, excitations, loads; of other runs see `decide`
+    # of each control step the state at its start, excitations, loads; of other runs see `decide`
+    record: Floats
     progress: Ints  # see STEPS
 
 
@@ -79,8 +82,8 @@ def hold_several(
 ) -> int:
     """A control step of the copies `first` to `last` - 1.
 
-    Args: as of `runs.run_several`; where the numbers have the controls, these of each copy, how many it has; which come
-    to the end of the step.
+    Args: as of `runs.run_several`; where the numbers have the controls, these of each copy, how
+    many it has; which come to the end of the step.
     """
     for k in range(first, last):
         for number in range(held_by):
@@ -104,7 +107,9 @@ def motion_of(
     """Of one of several, which has no reports, log, events and watches."""
     peak = at(peaks, 2 * k * model[MODEL.CONTACTS])
     clock, count = at(clocks, 2 * k), at(counts, COUNTED * k)
-    return Motion(model, reals, data, sizes, clock, count, peak, peak, peak, peak, peak, peak, unused, peak)
+    return Motion(
+        model, reals, data, sizes, clock, count, peak, peak, peak, peak, peak, peak, unused, peak
+    )
 
 
 def held(m: Motion, y: Floats, is_going: bool) -> bool:
@@ -196,7 +201,8 @@ def begun(a: Walk, y: Floats, order: int) -> int:
 def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
     """So many control steps at most.
 
-    As in SCONE each can begin with the derivative that the one before has ended with, which knows its excitations only.
+    As in SCONE each can begin with the derivative that the one before has ended with, which knows
+    its excitations only.
     """
     m, progress, lags = a.m, a.progress, a.known[SENSED.LAGS] > 0.0
     size, controls = m.model[MODEL.STATE_SIZE], a.senses[SENSES.CONTROLS]
@@ -213,7 +219,11 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
             record = at(a.record, (size + controls + a.senses[SENSES.LEGS]) * number)
             copy(size, y, record)
             copy(controls, a.excitations, at(record, size))
-            copy(a.senses[SENSES.LEGS], at(a.row, a.senses[SENSES.LOADS]), at(record, size + controls))
+            copy(
+                a.senses[SENSES.LEGS],
+                at(a.row, a.senses[SENSES.LOADS]),
+                at(record, size + controls),
+            )
         hold(a)
         goes_on = held(m, y, lags)
         progress[STEPS] += 1
@@ -294,8 +304,25 @@ def run_by_reflexes(
     Args: as of `run_several`, and of `Walk`: one row for each run.
     """
     for k in range(first, last):
-        m = run_of(model, reals, data, each, sizes, clocks, counts, states, times, reports, log, forces, events, peaks,
-                   watches, levels, k)  # fmt: skip
+        m = run_of(
+            model,
+            reals,
+            data,
+            each,
+            sizes,
+            clocks,
+            counts,
+            states,
+            times,
+            reports,
+            log,
+            forces,
+            events,
+            peaks,
+            watches,
+            levels,
+            k,
+        )
         walk = Walk(
             m,
             senses,
@@ -339,14 +366,18 @@ def run_on(a: Walk, y: Floats) -> int:
 
 
 def decide(a: Walk, y: Floats) -> bool:
-    """Begin a control step, and record it: what sensors were remembered, states of the legs, controls, and the step
-    that the method would try next; whether the forces could be computed."""
+    """Begin a control step, and record it: what sensors were remembered, states of the legs,
+    controls, and the step that the method would try next; whether the forces could be computed.
+    """
     m, progress, sensors = a.m, a.progress, a.plan[REFLEXES.SENSORS]
     # No method knows what was, as the motion has a kink here.
     at(m.data, m.sizes[METHOD_AT])[MEMORY] = 0.0
     hold(a)
     m.counts[EVALUATIONS] += 1
-    if evaluated(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE) != OUTCOME.OK:
+    if (
+        evaluated(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
+        != OUTCOME.OK
+    ):
         return False
     feel(m.model, m.data, y, a.senses, a.known, a.row)
     note_senses(m.model, m.data, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))

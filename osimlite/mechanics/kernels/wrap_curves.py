@@ -1,7 +1,7 @@
 """Where a path runs on its surfaces, and where as a whole: for whoever draws it.
 
-Of each law of a surface there is one here that is called after it, with room for points as f: it writes points of
-ground between the two tangent points there, and returns how many they are.
+Of each law of a surface there is one here that is called after it, with room for points as f: it
+writes points of ground between the two tangent points there, and returns how many they are.
 """
 
 from __future__ import annotations
@@ -37,8 +37,9 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 ANGLE, MOST = 0.15, 60.0
-"""The angle (rad) between neighbouring points, at most, unless there are so many; the path then is 0.3 % of the radius
-below the surface."""
+"""The angle (rad) between neighbouring points, at most, unless there are so many; the path then is
+0.3 % of the radius below the surface.
+"""
 FIRST, SECOND, SHAPE = BEST, BEST + SECOND_TANGENT - FIRST_TANGENT, BEST + CURVE - FIRST_TANGENT
 """In the record of a surface: the tangent points, and what the law has told of the way between them."""
 
@@ -46,7 +47,8 @@ FIRST, SECOND, SHAPE = BEST, BEST + SECOND_TANGENT - FIRST_TANGENT, BEST + CURVE
 def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Write all corners of a path that was measured into f, in ground; returns how many there are.
 
-    After the wraps among the integers of the path stand the laws that trace it on each surface, or 0.
+    After the wraps among the integers of the path stand the laws that trace it on each surface, or
+    0.
     """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     points, wraps = i[POINTS], i[WRAPS]
@@ -61,7 +63,9 @@ def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         wrap = (number - points) // 2
         if number >= points and number == points + 2 * wrap and own[WRAP_INTS * wraps + wrap] != 0:
             surface = item - own[WRAP_INTS * wrap + BACK]
-            count += call(own[WRAP_INTS * wraps + wrap], model, reals, data, y, at(f, 3 * count), surface)
+            count += call(
+                own[WRAP_INTS * wraps + wrap], model, reals, data, y, at(f, 3 * count), surface
+            )
     return count
 
 
@@ -70,7 +74,9 @@ def pieces(angle: float) -> int:
     return int(min(1.0 + abs(angle) / ANGLE, MOST)) if not isnan(angle) else 1
 
 
-def trace_cylinder(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+def trace_cylinder(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
+) -> int:
     """A helix about z."""
     e = at(data, model[item + ITEM.RECORD])
     one, two, turn = vector(e, FIRST), vector(e, SECOND), e[SHAPE]
@@ -84,7 +90,10 @@ def trace_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     """A helix on the cylinder in the place of the ring."""
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     ring, outwards = p[SIZES + 1], (e[SHAPE + 1], e[SHAPE + 2], 0.0)
-    one, two = in_cylinder(vector(e, FIRST), outwards, ring), in_cylinder(vector(e, SECOND), outwards, ring)
+    one, two = (
+        in_cylinder(vector(e, FIRST), outwards, ring),
+        in_cylinder(vector(e, SECOND), outwards, ring),
+    )
     count = pieces(e[SHAPE])
     for k in range(1, count):
         point = out_of_cylinder(on_helix(one, two, e[SHAPE], k / count), outwards, ring)
@@ -108,11 +117,17 @@ def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     count = pieces(turn)
     for k in range(1, count):
         angle = turn * k / count
-        put(f, 3 * (k - 1), in_ground(at(e, POSE), along(times(cos(angle), one), sin(angle), across)))
+        put(
+            f,
+            3 * (k - 1),
+            in_ground(at(e, POSE), along(times(cos(angle), one), sin(angle), across)),
+        )
     return count - 1
 
 
-def trace_ellipsoid(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+def trace_ellipsoid(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
+) -> int:
     """The section with the plane of the path; nothing where OpenSim's points are none."""
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     a, b, c = vector(p, SIZES)

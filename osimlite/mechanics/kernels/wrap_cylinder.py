@@ -1,12 +1,12 @@
 """How a path bends around a cylinder about z.
 
-Both ends are joined to the surface by lines that touch its circle, as seen along the axis. How high these points lie
-comes from a plane through both ends and an apex on the surface; between them the path is a helix. So it is the shortest
-path only if it stays at one height, as in OpenSim.
+Both ends are joined to the surface by lines that touch its circle, as seen along the axis. How high
+these points lie comes from a plane through both ends and an apex on the surface; between them the
+path is a helix. So it is the shortest path only if it stays at one height, as in OpenSim.
 
-Source: OpenSim 4.6's WrapCylinder; for the choice of the tangents also B. A. Garner and M. G. Pandy, The obstacle-set
-method for representing muscle paths in musculoskeletal models, Computer Methods in Biomechanics and Biomedical
-Engineering 3, 2000.
+Source: OpenSim 4.6's WrapCylinder; for the choice of the tangents also B. A. Garner and M. G.
+Pandy, The obstacle-set method for representing muscle paths in musculoskeletal models, Computer
+Methods in Biomechanics and Biomedical Engineering 3, 2000.
 """
 
 from __future__ import annotations
@@ -58,11 +58,20 @@ def wrap_cylinder(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
     """The law of a WrapCylinder, see :mod:`osimlite.mechanics.kernels.wrapping`."""
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second = vector(e, FIRST_END), vector(e, SECOND_END)
-    return around_cylinder(first, second, p[SIZES], p[SIZES + 1], int(p[AXIS]), p[SIDE], p[ALONE] == 1.0, e)
+    return around_cylinder(
+        first, second, p[SIZES], p[SIZES + 1], int(p[AXIS]), p[SIDE], p[ALONE] == 1.0, e
+    )
 
 
 def around_cylinder(
-    first: Vector, second: Vector, radius: float, length: float, axis: int, side: float, alone: bool, e: Floats
+    first: Vector,
+    second: Vector,
+    radius: float,
+    length: float,
+    axis: int,
+    side: float,
+    alone: bool,
+    e: Floats,
 ) -> int:
     """The law of a cylinder, between two ends."""
     px, py, pz = first
@@ -87,7 +96,9 @@ def around_cylinder(
     else:
         # One way around the cylinder is from a to b, the other from b to a.
         wide = dot(a1, b2) < dot(b1, a2)
-        from_a = starts_at_a(lifted(a1, pz), lifted(b1, pz), lifted(a2, qz), lifted(b2, qz), wide, axis, side)
+        from_a = starts_at_a(
+            lifted(a1, pz), lifted(b1, pz), lifted(a2, qz), lifted(b2, qz), wide, axis, side
+        )
         one, two = (a1, b2) if from_a else (b1, a2)
         far = from_a == wide
         long = dot(plus(one, two), plus(minus(one, flat_first), minus(two, flat_second))) < 0.0
@@ -96,11 +107,14 @@ def around_cylinder(
     normal = unit(cross(minus(first, apex), minus(second, apex)))
     z1, z2 = edge_height(one, pz, first, normal), edge_height(two, qz, first, normal)
     if abs(qz) < EPSILON:
-        # OpenSim takes the foot of the second end for a direction, which it is none if that is the origin: then all
-        # heights count as that of the first end.
+        # OpenSim takes the foot of the second end for a direction, which it is none if that is the
+        # origin: then all heights count as that of the first end.
         z1, z2 = pz, z2 if pz != qz else qz
     else:
-        z1, z2 = z1 if abs(z1 - qz) < abs(pz - qz) else pz, z2 if abs(z2 - pz) < abs(qz - pz) else qz
+        z1, z2 = (
+            z1 if abs(z1 - qz) < abs(pz - qz) else pz,
+            z2 if abs(z2 - pz) < abs(qz - pz) else qz,
+        )
     if abs(z1) > 0.5 * length and abs(z2) > 0.5 * length:
         return NONE
     x1, y1, _ = one
@@ -136,7 +150,9 @@ def lifted(point: Vector, height: float) -> Vector:
     return x, y, height
 
 
-def starts_at_a(a1: Vector, b1: Vector, a2: Vector, b2: Vector, wide: bool, axis: int, side: float) -> bool:
+def starts_at_a(
+    a1: Vector, b1: Vector, a2: Vector, b2: Vector, wide: bool, axis: int, side: float
+) -> bool:
     """Whether the way from a1 to b2 is that on the active side, and not the way from b1 to a2.
 
     If no point tells, it is so if that way is the wider one.
@@ -150,9 +166,9 @@ def starts_at_a(a1: Vector, b1: Vector, a2: Vector, b2: Vector, wide: bool, axis
 def apex_between(first: Vector, second: Vector, radius: float, far: bool) -> Vector:
     """The point of the cylinder over which the path bends.
 
-    It is at the height of the point that divides the line between the ends as their distances from the axis, and in the
-    direction in which the plane through the ends and the axis at that height cuts across the cylinder; on the far side
-    of the axis if `far`.
+    It is at the height of the point that divides the line between the ends as their distances from
+    the axis, and in the direction in which the plane through the ends and the axis at that height
+    cuts across the cylinder; on the far side of the axis if `far`.
     """
     px, py, pz = first
     qx, qy, qz = second
@@ -188,11 +204,14 @@ def helix(arc: float, rise: float) -> float:
     return sqrt(arc * arc + rise * rise)
 
 
-def settled(first: Vector, second: Vector, one: Vector, two: Vector, arc: float, turn: float) -> tuple[float, float]:
+def settled(
+    first: Vector, second: Vector, one: Vector, two: Vector, arc: float, turn: float
+) -> tuple[float, float]:
     """Heights of the tangent points where the lines go over into the helix with almost no bend.
 
-    OpenSim compares with the next point that it would draw, so that the result jumps where their number changes. It
-    asks for this only if a path has several PathWraps, and need not come to an end.
+    OpenSim compares with the next point that it would draw, so that the result jumps where their
+    number changes. It asks for this only if a path has several PathWraps, and need not come to an
+    end.
     """
     x1, y1, z1 = one
     x2, y2, z2 = two
@@ -223,8 +242,9 @@ def settled(first: Vector, second: Vector, one: Vector, two: Vector, arc: float,
 def leg(end: Vector, tangent: Vector, next_point: Vector) -> tuple[float, float, float, float]:
     """What stays as a tangent point slides along its edge.
 
-    As seen along the axis, the lengths of the line to it and of the first piece of the helix; and by how much the
-    heights of the next point and of the end move it: 3/2 of the way to where its edge is closest to their line.
+    As seen along the axis, the lengths of the line to it and of the first piece of the helix; and
+    by how much the heights of the next point and of the end move it: 3/2 of the way to where its
+    edge is closest to their line.
     """
     lx, ly, _ = minus(tangent, end)
     nx, ny, _ = minus(next_point, tangent)
@@ -234,7 +254,9 @@ def leg(end: Vector, tangent: Vector, next_point: Vector) -> tuple[float, float,
     return sqrt(lx * lx + ly * ly), sqrt(nx * nx + ny * ny), 1.5 * share, 1.5 * (1.0 - share)
 
 
-def moved(leg: tuple[float, float, float, float], end: float, tangent: float, next_point: float) -> float:
+def moved(
+    leg: tuple[float, float, float, float], end: float, tangent: float, next_point: float
+) -> float:
     """The next height of a tangent point from the three heights, the same if the path hardly bends there."""
     line, piece, with_next, with_end = leg
     line_rise, piece_rise = tangent - end, next_point - tangent

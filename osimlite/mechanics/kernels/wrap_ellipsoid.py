@@ -1,9 +1,10 @@
 """How a path bends around an ellipsoid: in a plane through both ends and a point of the surface beside the chord.
 
-The plane is not that of the shortest path. Its point is found beside the middle of the chord, or where the chord passes
-a plane of symmetry, or by a fan of the shortest ways out of the ellipsoid from points of the chord. The tangent points
-are searched for in it by damped least squares which stop at 1e-4, so that the path has little bends there, as in
-OpenSim. All is in units in which the mean radius is 1.
+The plane is not that of the shortest path. Its point is found beside the middle of the chord, or
+where the chord passes a plane of symmetry, or by a fan of the shortest ways out of the ellipsoid
+from points of the chord. The tangent points are searched for in it by damped least squares which
+stop at 1e-4, so that the path has little bends there, as in OpenSim. All is in units in which the
+mean radius is 1.
 
 Source: OpenSim 4.6's WrapEllipsoid.
 """
@@ -54,16 +55,20 @@ from osimlite.mechanics.laws.vectors import (
 CLOSE = 1e-4
 """How far in units of :func:`height` an end counts as on the surface; 1 - cosine between ends in one direction."""
 ALL_FAN, NO_FAN, BORDER = 0.7073, 0.9, 0.3
-"""Cosines of the angle between chord and axis at which the fan counts wholly and not at all; the part of the chord at
-either end in which it comes to count."""
+"""Cosines of the angle between chord and axis at which the fan counts wholly and not at all; the
+part of the chord at either end in which it comes to count.
+"""
 PIECE, PIECES = 0.001, 499
 """Length of the straight pieces that the path on the surface has in OpenSim (m), and how many it has at most."""
 EXACT, ROUNDS, TRIALS, STEPS = 1e-8, 50, 1000, 16.0
-"""Sum of squares at which the search for a tangent point ends, and after how many rounds; trials in each; the part of a
-step that is taken."""
+"""Sum of squares at which the search for a tangent point ends, and after how many rounds; trials in
+each; the part of a step that is taken.
+"""
 
 
-def wrap_ellipsoid(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+def wrap_ellipsoid(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
+) -> int:
     """The law of a WrapEllipsoid, see :mod:`osimlite.mechanics.kernels.wrapping`."""
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     a, b, c = vector(p, SIZES)
@@ -78,7 +83,9 @@ def wrap_ellipsoid(model: Ints, reals: Floats, data: Floats, y: Floats, f: Float
     one, two = along(second, enters, way), along(second, leaves, way)
     if abs(dot(unit(first), unit(second)) - 1.0) < CLOSE or not (enters < 1.0 and leaves > 0.0):
         return NONE
-    support, by_fan, starts = support_point(p[METHOD], radii, one, minus(two, one), way, at(e, ROOM))
+    support, by_fan, starts = support_point(
+        p[METHOD], radii, one, minus(two, one), way, at(e, ROOM)
+    )
     if starts:
         one = two = support
     if side != 0.0 and not on_side(support, axis, side):
@@ -89,7 +96,9 @@ def wrap_ellipsoid(model: Ints, reals: Floats, data: Floats, y: Floats, f: Float
     normal = unit(cross(way, minus(first, support)))
     offset = dot(normal, support)
     one = tangent_point(radii, one, first, normal, offset) if abs(first_height) >= CLOSE else first
-    two = tangent_point(radii, two, second, normal, offset) if abs(second_height) >= CLOSE else second
+    two = (
+        tangent_point(radii, two, second, normal, offset) if abs(second_height) >= CLOSE else second
+    )
 
     length = norm(minus(one, two)) / factor
     if isnan(length):
@@ -99,7 +108,11 @@ def wrap_ellipsoid(model: Ints, reals: Floats, data: Floats, y: Floats, f: Float
     if length >= PIECE:
         pieces = int(min(length / PIECE, 1.0 * PIECES))
         length, next_one, next_two = curve(radii, one, two, normal, offset, pieces, False)
-        if side != 0.0 and pieces > 1 and (bends_back(first, one, next_one) or bends_back(second, two, next_two)):
+        if (
+            side != 0.0
+            and pieces > 1
+            and (bends_back(first, one, next_one) or bends_back(second, two, next_two))
+        ):
             length, _, _ = curve(radii, one, two, normal, offset, pieces, True)
             e[CURVE + 4] = 1.0
         length /= factor
@@ -165,12 +178,15 @@ def longest(a: Vector) -> int:
     return 1 if abs(y) > abs(x) else 0
 
 
-def tangent_point(radii: Vector, start: Vector, end: Vector, normal: Vector, offset: float) -> Vector:
+def tangent_point(
+    radii: Vector, start: Vector, end: Vector, normal: Vector, offset: float
+) -> Vector:
     """The point of the surface in a plane whose tangent plane goes through an end, as it is found from a start on.
 
-    Four equations for the point r and a number d: r is in the plane and on the surface, and the end and r are in the
-    tangent plane n . x + d = 0 of r, n = (2 x / a a, 2 y / b b, 2 z / c c). OpenSim solves them by Levenberg's and
-    Marquardt's method in small steps, each of which is repeated at double length as long as that helps.
+    Four equations for the point r and a number d: r is in the plane and on the surface, and the end
+    and r are in the tangent plane n . x + d = 0 of r, n = (2 x / a a, 2 y / b b, 2 z / c c).
+    OpenSim solves them by Levenberg's and Marquardt's method in small steps, each of which is
+    repeated at double length as long as that helps.
     """
     weights = inverted(elementwise(radii, radii))
     by_end = times(2.0, elementwise(weights, end))
@@ -223,7 +239,8 @@ def damped_step(
 ) -> tuple[Vector, float]:
     """The step of r and d: (J' J + damping D) step = downhill, where D is the diagonal of J' J.
 
-    The gradients of the four equations by r are the normal, n, 2 n and `by_end`, those by d are 0, 0, 1, 1.
+    The gradients of the four equations by r are the normal, n, 2 n and `by_end`, those by d are 0,
+    0, 1, 1.
     """
     px, py, pz = normal
     nx, ny, nz = n
@@ -250,7 +267,8 @@ def curve(
 ) -> tuple[float, Vector, Vector]:
     """Length of a broken line on the surface, in a plane, and its points next to the two that it joins.
 
-    Its corners are at equal angles about the point where the plane meets the axis to which it is most normal.
+    Its corners are at equal angles about the point where the plane meets the axis to which it is
+    most normal.
 
     Args:
         radii: of the ellipsoid.
@@ -263,7 +281,8 @@ def curve(
     """
     centre, a, b, angle = around_axis(one, two, normal, offset)
     to_one, to_two = minus(one, centre), minus(two, centre)
-    # A corner is at centre + m (c a + s b), where c and s are cosine and sine of its angle: in the plane at m (c, s).
+    # A corner is at centre + m (c a + s b), where c and s are cosine and sine of its angle: in the
+    # plane at m (c, s).
     scale = inverted(radii)
     u, v, w = elementwise(scale, a), elementwise(scale, b), elementwise(scale, centre)
     uu, uv, vv, uw, vw, ww = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w), dot(w, w) - 1.0
@@ -285,10 +304,13 @@ def curve(
     return length + sqrt(dx * dx + dy * dy), next_one, next_two
 
 
-def around_axis(one: Vector, two: Vector, normal: Vector, offset: float) -> tuple[Vector, Vector, Vector, float]:
+def around_axis(
+    one: Vector, two: Vector, normal: Vector, offset: float
+) -> tuple[Vector, Vector, Vector, float]:
     """Where a plane meets the axis to which it is most normal, and how two points of it lie about that.
 
-    By unit vectors from there to the first and, square to that, towards the second, and by the angle between them.
+    By unit vectors from there to the first and, square to that, towards the second, and by the
+    angle between them.
     """
     axis = longest(normal)
     across = component(normal, axis)

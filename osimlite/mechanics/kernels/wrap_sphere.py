@@ -45,8 +45,9 @@ STRAIGHT = 1e-5
 def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """The law of a WrapSphere, see :mod:`osimlite.mechanics.kernels.wrapping`.
 
-    As in OpenSim a line through the centre goes straight on, a length on the far side of the sphere is negative, and
-    where a side is active a line must wrap only if its first end is less than 1 m from the middle of it.
+    As in OpenSim a line through the centre goes straight on, a length on the far side of the sphere
+    is negative, and where a side is active a line must wrap only if its first end is less than 1 m
+    from the middle of it.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second, radius = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES]
@@ -92,11 +93,21 @@ def crosses(first: Vector, second: Vector, radius: float) -> bool:
 
 
 def pair_on_side(
-    first: Vector, second: Vector, a1: Vector, b1: Vector, a2: Vector, b2: Vector, axis: int, side: float
+    first: Vector,
+    second: Vector,
+    a1: Vector,
+    b1: Vector,
+    a2: Vector,
+    b2: Vector,
+    axis: int,
+    side: float,
 ) -> tuple[Vector, Vector, bool]:
     """The tangent points of the two ends on the active side, and whether the way between them is the longer one."""
     to_centre = plus(first, second)
-    a1_nearer, a2_nearer = dot(a1, to_centre) < dot(b1, to_centre), dot(a2, to_centre) < dot(b2, to_centre)
+    a1_nearer, a2_nearer = (
+        dot(a1, to_centre) < dot(b1, to_centre),
+        dot(a2, to_centre) < dot(b2, to_centre),
+    )
     one, two = a1 if a1_nearer else b1, a2 if a2_nearer else b2
     outwards = plus(minus(one, first), minus(two, second))
     if side * component(outwards, axis) < 0.0:

@@ -1,8 +1,8 @@
 """How a path bends through the hole of a torus: as around a cylinder in the place of the ring where that is near.
 
-Source: OpenSim 4.6's WrapTorus. What it minimises there is not quite the distance from the ring, and it stops early; so
-the place is found with its very steps, those of MINPACK's lmdif (J. J. More, The Levenberg-Marquardt algorithm:
-implementation and theory, 1978) in one unknown.
+Source: OpenSim 4.6's WrapTorus. What it minimises there is not quite the distance from the ring,
+and it stops early; so the place is found with its very steps, those of MINPACK's lmdif (J. J. More,
+The Levenberg-Marquardt algorithm: implementation and theory, 1978) in one unknown.
 """
 
 from __future__ import annotations
@@ -56,7 +56,10 @@ def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     one, two = near_ring(first, second, ring), near_ring(second, first, ring)
     closer = distance_from_ring(one, ring) < distance_from_ring(two, ring)
     if p[SIDE] != 0.0:
-        one_active, two_active = on_side(one, int(p[AXIS]), p[SIDE]), on_side(two, int(p[AXIS]), p[SIDE])
+        one_active, two_active = (
+            on_side(one, int(p[AXIS]), p[SIDE]),
+            on_side(two, int(p[AXIS]), p[SIDE]),
+        )
         if not (one_active or two_active):
             return NONE
         closer = one_active and (closer or not two_active)
@@ -104,11 +107,18 @@ def near_ring(first: Vector, second: Vector, ring: float) -> Vector:
         return nan, nan, nan
     x, y, _ = first
     dx, dy, _ = way = dx / distance, dy / distance, dz / distance
-    start, flat_start, flat, square = dot(first, way), x * dx + y * dy, dx * dx + dy * dy, x * x + y * y
+    start, flat_start, flat, square = (
+        dot(first, way),
+        x * dx + y * dy,
+        dx * dx + dy * dy,
+        x * x + y * y,
+    )
     return along(first, least_squares(start, flat_start, flat, square, ring), way)
 
 
-def residual(u: float, start: float, flat_start: float, flat: float, square: float, ring: float) -> float:
+def residual(
+    u: float, start: float, flat_start: float, flat: float, square: float, ring: float
+) -> float:
     """What is to be zero at the nearest point, u from the first end: the slope of the squared distance from the ring.
 
     OpenSim's second term is twice as large as that.
@@ -119,10 +129,17 @@ def residual(u: float, start: float, flat_start: float, flat: float, square: flo
     return 2.0 * start + 2.0 * u - 4.0 * ring * (flat * u + flat_start) / sqrt(apart)
 
 
-def least_squares(start: float, flat_start: float, flat: float, square: float, ring: float) -> float:
+def least_squares(
+    start: float, flat_start: float, flat: float, square: float, ring: float
+) -> float:
     """Where the residual is smallest as lmdif finds it, from 0 on."""
     u = damping = scale = 0.0
-    value, radius, moved, evaluations = residual(u, start, flat_start, flat, square, ring), FIRST_RADIUS, False, 1
+    value, radius, moved, evaluations = (
+        residual(u, start, flat_start, flat, square, ring),
+        FIRST_RADIUS,
+        False,
+        1,
+    )
     while True:
         slope = (residual(u + STEP, start, flat_start, flat, square, ring) - value) / STEP
         if not abs(slope * value) > 0.0:
@@ -141,7 +158,11 @@ def least_squares(start: float, flat_start: float, flat: float, square: float, r
             predicted = linear + 2.0 * damped
             ratio = actual / predicted if predicted != 0.0 else 0.0
             if ratio <= 0.25:
-                part = 0.5 if actual >= 0.0 else 0.5 * (linear + damped) / (linear + damped - 0.5 * actual)
+                part = (
+                    0.5
+                    if actual >= 0.0
+                    else 0.5 * (linear + damped) / (linear + damped - 0.5 * actual)
+                )
                 part = part if falls and part >= 0.1 else 0.1
                 radius, damping = part * min(radius, 10.0 * size), damping / part
             elif damping == 0.0 or ratio >= 0.75:
@@ -156,7 +177,9 @@ def least_squares(start: float, flat_start: float, flat: float, square: float, r
                 break
 
 
-def damped_step(slope: float, value: float, scale: float, radius: float, damping: float) -> tuple[float, float]:
+def damped_step(
+    slope: float, value: float, scale: float, radius: float, damping: float
+) -> tuple[float, float]:
     """A step that is hardly longer than a radius in units of 1 / scale, and the damping that makes it so.
 
     MINPACK's lmpar, where neither slope nor value is zero.

@@ -1,8 +1,9 @@
 """Smooth curves of quintic Bezier sections, as OpenSim's SmoothSegmentedFunction has them; straight lines outside.
 
-A section is a corner: it leaves its first end along one line and reaches its second along another, and the more curvy
-it is, the nearer it comes to where the lines meet (M. Millard et al., Journal of Biomechanical Engineering 135, 2013,
-appendix A). Along it, x and y are polynomials in u, from 0 to 1.
+A section is a corner: it leaves its first end along one line and reaches its second along another,
+and the more curvy it is, the nearer it comes to where the lines meet (M. Millard et al., Journal of
+Biomechanical Engineering 135, 2013, appendix A). Along it, x and y are polynomials in u, from 0 to
+1.
 
 A curve is numbers, for `curve_value`: HEAD of all, where each section ends, and SECTION of each.
 """
@@ -26,8 +27,10 @@ HEAD = 7
 START, SCALE, X, Y, STARTS = 0, 1, 2, 7, 13
 NODES = 64
 SECTION = STARTS + 2 * (NODES + 1)
-"""x at its first end, NODES over its width, the coefficients of x from u on and those of y, and at NODES + 1 places
-that are equally far from each other in x, where u is, and how far it would go up to the next at its rate there."""
+"""x at its first end, NODES over its width, the coefficients of x from u on and those of y, and at
+NODES + 1 places that are equally far from each other in x, where u is, and how far it would go up
+to the next at its rate there.
+"""
 ROUNDS, NEAR = 20, 3e-6
 """Halley's steps in the search for u; one that is so small is the last, since what it leaves is beyond rounding."""
 
@@ -45,7 +48,13 @@ def curve(points: Sequence[Point], curviness: Sequence[float]) -> Numbers:
     """
     sections = zip(points, points[1:], curviness, strict=False)
     numbers = [x for item in sections for x in _section(*item)]
-    return (float(len(curviness)), *points[0], *points[-1], *(x for x, _, _ in points[1:]), *numbers)
+    return (
+        float(len(curviness)),
+        *points[0],
+        *points[-1],
+        *(x for x, _, _ in points[1:]),
+        *numbers,
+    )
 
 
 @lru_cache(maxsize=1024)
@@ -55,7 +64,11 @@ def _section(first: Point, last: Point, curviness: float) -> Numbers:
     if not 0.0 <= curviness <= 1.0:
         raise ValueError("its curviness is not from 0 to 1")
     # Where the lines meet.
-    x = (y1 - y0 - x1 * slope1 + x0 * slope0) / (slope0 - slope1) if abs(slope0 - slope1) > 2.0**-26 else (x1 + x0) / 2
+    x = (
+        (y1 - y0 - x1 * slope1 + x0 * slope0) / (slope0 - slope1)
+        if abs(slope0 - slope1) > 2.0**-26
+        else (x1 + x0) / 2
+    )
     y = (x - x1) * slope1 + y1
     if not max(hypot(x - x0, y - y0), hypot(x - x1, y - y1)) < hypot(x1 - x0, y1 - y0):
         raise ValueError(f"its slopes at {x0:g} and {x1:g} make no corner between these")
@@ -123,7 +136,9 @@ def first_place(c: Sequence[float], x: float) -> tuple[int, float, float]:
     part -= node
     s = k + STARTS + 2 * node
     u0, d0, u1, d1 = c[s], c[s + 1], c[s + 2], c[s + 3]
-    u = u0 + part * (d0 + part * (3.0 * (u1 - u0) - 2.0 * d0 - d1 + part * (2.0 * (u0 - u1) + d0 + d1)))
+    u = u0 + part * (
+        d0 + part * (3.0 * (u1 - u0) - 2.0 * d0 - d1 + part * (2.0 * (u0 - u1) + d0 + d1))
+    )
     return k, rest, u
 
 
@@ -149,7 +164,9 @@ def on_section(
     return u, goes_on, y, slope
 
 
-def nearer_place(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> tuple[float, bool]:
+def nearer_place(
+    c: Sequence[float], p: int, apart: int, u: float, rest: float
+) -> tuple[float, bool]:
     """u after a step, and whether more are wanted; the arguments are those of `on_section`."""
     a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     # In halves, which a processor computes side by side.
@@ -168,7 +185,14 @@ def value_at(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, f
     """y and the slope at u; the arguments are those of `on_section`."""
     a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     v, q = u * u, p + 5 * apart
-    g, h, i, j, k, m = c[q], c[q + apart], c[q + 2 * apart], c[q + 3 * apart], c[q + 4 * apart], c[q + 5 * apart]
+    g, h, i, j, k, m = (
+        c[q],
+        c[q + apart],
+        c[q + 2 * apart],
+        c[q + 3 * apart],
+        c[q + 4 * apart],
+        c[q + 5 * apart],
+    )
     run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
     rise = (h + u * (2.0 * i)) + v * ((3.0 * j + u * (4.0 * k)) + v * (5.0 * m))
     return (g + u * h) + v * ((i + u * j) + v * (k + u * m)), rise / run
@@ -184,7 +208,8 @@ def missed(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> flo
 def value_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tuple[float, float]:
     """y of a curve where ``of_y * y + of_x * x`` is a total, and how far the sum is from that.
 
-    On a section the sum is a polynomial in u, too, which rises with a rising curve and positive factors.
+    On a section the sum is a polynomial in u, too, which rises with a rising curve and positive
+    factors.
     """
     end = end_of_sum(c, of_y, of_x, total)
     if end > 0:
@@ -221,7 +246,9 @@ def beyond_sum(c: Sequence[float], of_y: float, of_x: float, total: float, end: 
     return y + slope * ((total - (of_y * y + of_x * x)) / (of_y * slope + of_x))
 
 
-def first_place_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tuple[int, float, float]:
+def first_place_of_sum(
+    c: Sequence[float], of_y: float, of_x: float, total: float
+) -> tuple[int, float, float]:
     """As `first_place` of a sum: its section, how far it is from what it is at its start, and u, roughly."""
     count, number = int(c[SECTIONS]), 0
     k = HEAD + count
@@ -254,4 +281,6 @@ def curve_integral(c: Sequence[float], x: float) -> float:
 def _area(c: Sequence[float], k: int, u: float) -> float:
     """Integral of y over x of a section up to u."""
     x, y = c[k + X : k + Y], c[k + Y : k + STARTS]
-    return sum(b * j * a * u ** (i + j) / (i + j) for i, b in enumerate(y) for j, a in enumerate(x, 1))
+    return sum(
+        b * j * a * u ** (i + j) / (i + j) for i, b in enumerate(y) for j, a in enumerate(x, 1)
+    )

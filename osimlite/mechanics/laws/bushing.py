@@ -1,9 +1,10 @@
 """Bushing: springs and dampers for the six deviations of a frame M from a frame F.
 
-The deviations are the body-fixed X-Y-Z angles (a, b, c) of M in F, so that R = Rx(a) Ry(b) Rz(c), and the origin of M
-in F along the axes of F. The generalized forces on the angles become a moment in M by the transpose of the matrix N
-that turns the angular velocity w of M in F, along the axes of M, into rates of the angles. Source: OpenSim's
-BushingForce and its kin; T. Kane, P. Likins and D. Levinson, Spacecraft Dynamics (1983), table for body-three 1-2-3.
+The deviations are the body-fixed X-Y-Z angles (a, b, c) of M in F, so that R = Rx(a) Ry(b) Rz(c),
+and the origin of M in F along the axes of F. The generalized forces on the angles become a moment
+in M by the transpose of the matrix N that turns the angular velocity w of M in F, along the axes of
+M, into rates of the angles. Source: OpenSim's BushingForce and its kin; T. Kane, P. Likins and D.
+Levinson, Spacecraft Dynamics (1983), table for body-three 1-2-3.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What is said of numbers that carry derivatives: to floats these functions do nothing new.
 
-Machine code with tangents puts its own in their places, and so does :mod:`osimlite.simulation.engines.carrying` in
-Python.
+Machine code with tangents puts its own in their places, and so does
+:mod:`osimlite.simulation.engines.carrying` in Python.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from typing import Any
 def settled(root: float, error: float, slope: float) -> float:
     """A root as a search has found it; its derivatives are those that the equation says.
 
-    A search ends when the value is good, and its derivatives may be a step behind, or those of where it started.
+    A search ends when the value is good, and its derivatives may be a step behind, or those of
+    where it started.
 
     Args:
         root: of the equation.

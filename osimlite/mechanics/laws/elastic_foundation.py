@@ -1,11 +1,12 @@
 """Elastic foundation: a mesh covered by a layer of springs, one at the middle of every triangle.
 
-A spring acts while its middle is inside the other surface. It then pushes along the way from the middle to the nearest
-point of that surface, at that point; its opposite acts on the other surface at the same point. All vectors are in one
-frame of the caller's choice, ground as a rule.
+A spring acts while its middle is inside the other surface. It then pushes along the way from the
+middle to the nearest point of that surface, at that point; its opposite acts on the other surface
+at the same point. All vectors are in one frame of the caller's choice, ground as a rule.
 
-Sources: K. L. Johnson, "Contact Mechanics" (1985), section 4.3, for the foundation; damping and friction in the form
-that Simbody's ElasticFoundationForce gives them (the friction is that of :mod:`osimlite.mechanics.laws.hunt_crossley`).
+Sources: K. L. Johnson, "Contact Mechanics" (1985), section 4.3, for the foundation; damping and
+friction in the form that Simbody's ElasticFoundationForce gives them (the friction is that of
+:mod:`osimlite.mechanics.laws.hunt_crossley`).
 """
 
 from __future__ import annotations
@@ -73,20 +74,15 @@ def spring_load(
 ) -> tuple[Vector, Vector, float]:
     """Force of one spring on the mesh at the nearest point of the other surface, its torque about a point, its energy.
 
-    With d the way from the middle to the end and v the velocity there, of which vn is along d: f = k |d| (1 + c vn)
-    along d, nothing where that is not positive; and f mu along the slip, mu being its `friction`. The energy is
-    k |d|^2 / 2.
+    With d the way from the middle to the end and v the velocity there, of which vn is along d: f =
+    k |d| (1 + c vn) along d, nothing where that is not positive; and f mu along the slip, mu being
+    its `friction`. The energy is k |d|^2 / 2.
 
-    Args:
-        k: stiffness of the layer times area of the triangle, N/m.
-        c: dissipation, s/m.
-        us: coefficient as of :func:`osimlite.mechanics.laws.hunt_crossley.friction`, with ud and uv.
-        vt: transition velocity, m/s.
-        middle: of the spring, m.
-        end: nearest point of the other surface, m.
-        about: point for torque and velocity, m.
-        v: velocity of the other surface relative to the mesh there, m/s.
-        turning: its angular velocity relative to the mesh, 1/s.
+    Args: k: stiffness of the layer times area of the triangle, N/m. c: dissipation, s/m. us:
+        coefficient as of :func:`osimlite.mechanics.laws.hunt_crossley.friction`, with ud and uv.
+        vt: transition velocity, m/s. middle: of the spring, m. end: nearest point of the other
+        surface, m. about: point for torque and velocity, m. v: velocity of the other surface
+        relative to the mesh there, m/s. turning: its angular velocity relative to the mesh, 1/s.
 
     Returns:
         Force, N; torque, N·m; energy, J.

@@ -1,8 +1,9 @@
 """Where an ellipsoid touches a half space or another ellipsoid; the force is that of
 :mod:`osimlite.mechanics.laws.hunt_crossley`.
 
-Source: Simbody's collision detection. Its effective radius in a half space comes from the curvatures of the section
-through the centre of the ellipsoid parallel to the plane, and is that of the sphere for three equal half axes.
+Source: Simbody's collision detection. Its effective radius in a half space comes from the
+curvatures of the section through the centre of the ellipsoid parallel to the plane, and is that of
+the sphere for three equal half axes.
 """
 
 from __future__ import annotations
@@ -60,10 +61,11 @@ def ellipsoid_ellipsoid(
 ) -> tuple[float, float, Vector, Vector]:
     """Depth, effective radius, normal and point of application of two ellipsoids, of which one may be a sphere.
 
-    The normal n is the direction in which the overlap h(n) = s1 + s2 - n (c2 - c1) is least, with c the centres and s
-    the distances from them to the planes that touch the ellipsoids across n. It is found by Newton's method from the
-    line of the centres. Ellipsoids with one centre have no normal and do not touch. The effective radius is
-    1 / sqrt(k k'), with k and k' the principal curvatures of one surface relative to the other.
+    The normal n is the direction in which the overlap h(n) = s1 + s2 - n (c2 - c1) is least, with c
+    the centres and s the distances from them to the planes that touch the ellipsoids across n. It
+    is found by Newton's method from the line of the centres. Ellipsoids with one centre have no
+    normal and do not touch. The effective radius is 1 / sqrt(k k'), with k and k' the principal
+    curvatures of one surface relative to the other.
 
     Args:
         c1: centre of the ellipsoid that is surface 1, m; c2 likewise.
@@ -71,9 +73,8 @@ def ellipsoid_ellipsoid(
         radii1: its half axes, m; radii2 likewise.
         a: part of the depth that is surface 1's, 1.
 
-    Returns:
-        d, R, n and P: d, R and the point in m; n, 1. They touch where d > 0; otherwise there is a gap, and the rest
-        means nothing.
+    Returns: d, R, n and P: d, R and the point in m; n, 1. They touch where d > 0; otherwise there
+        is a gap, and the rest means nothing.
     """
     way = minus(c2, c1)
     distance = norm(way)
@@ -111,7 +112,9 @@ def ellipsoid_ellipsoid(
             huu += h
             hvv += h
         determinant = huu * hvv - huv * huv
-        step = along(times((huv * fv - hvv * fu) / determinant, u), (huv * fu - huu * fv) / determinant, v)
+        step = along(
+            times((huv * fv - hvv * fu) / determinant, u), (huv * fu - huu * fv) / determinant, v
+        )
         n = plus(known, step)
         n = over(n, norm(n))
     one, two = huu1 * hvv1 - huv1 * huv1, huu2 * hvv2 - huv2 * huv2
@@ -123,7 +126,8 @@ def ellipsoid_ellipsoid(
 def stretched(axes: Axes, squares: Vector, x: Vector) -> Vector:
     """B x, with the squares of an ellipsoid's half axes as a matrix B.
 
-    s = sqrt(n B n) is the way to the plane that touches it across n, and B n / s leads to the point where it does.
+    s = sqrt(n B n) is the way to the plane that touches it across n, and B n / s leads to the point
+    where it does.
 
     Args:
         axes: of the ellipsoid.
@@ -160,4 +164,10 @@ def slopes(
     """
     gu, gv = dot(g, u), dot(g, v)
     bu, bv = stretched(axes, squares, u), stretched(axes, squares, v)
-    return gu, gv, (dot(bu, u) - gu * gu) / s, (dot(bu, v) - gu * gv) / s, (dot(bv, v) - gv * gv) / s
+    return (
+        gu,
+        gv,
+        (dot(bu, u) - gu * gu) / s,
+        (dot(bu, v) - gu * gv) / s,
+        (dot(bv, v) - gv * gv) / s,
+    )

@@ -1,8 +1,8 @@
 """What may stand in the formula of an expression-based force.
 
-As in C, and other than in Python, an argument outside of a function's domain gives a number that is not finite. The
-names and meanings are those of Lepton, the library of formulas that OpenSim uses. The exponential of more than 709.78
-is too large for a float.
+As in C, and other than in Python, an argument outside of a function's domain gives a number that is
+not finite. The names and meanings are those of Lepton, the library of formulas that OpenSim uses.
+The exponential of more than 709.78 is too large for a float.
 """
 
 from __future__ import annotations
@@ -74,7 +74,8 @@ def power(a: float, b: float) -> float:
         return 1.0 if b == 0.0 else inf if b < 0.0 else 0.0
     if a != a or b != b:
         return nan
-    # The remainder stays a float: where floor() gives an integer of 64 bits, b may be too large for it.
+    # The remainder stays a float: where floor() gives an integer of 64 bits, b may be too large for
+    # it.
     if a < 0.0 and (b - b != 0.0 or b % 1.0 != 0.0):
         return nan
     size = inf if b * log(abs(a)) > 709.78 else abs(a) ** b

@@ -1,16 +1,16 @@
 """Hunt-Crossley contact with friction: half space against sphere, sphere against sphere.
 
-Every contact has a surface 1 and a surface 2 (of a half space and a sphere, the half space is surface 1). The
-unit normal n points from 1 to 2, d is the depth of the overlap, v = v1 - v2 the velocity of the material of
-surface 1 relative to that of surface 2 at the point of application P. The laws return the force on surface 2
-at P; its opposite acts on surface 1 at P. All vectors are in one frame of the caller's choice, ground as a
-rule.
+Every contact has a surface 1 and a surface 2 (of a half space and a sphere, the half space is
+surface 1). The unit normal n points from 1 to 2, d is the depth of the overlap, v = v1 - v2 the
+velocity of the material of surface 1 relative to that of surface 2 at the point of application P.
+The laws return the force on surface 2 at P; its opposite acts on surface 1 at P. All vectors are in
+one frame of the caller's choice, ground as a rule.
 
-Sources: K. H. Hunt and F. R. E. Crossley, "Coefficient of restitution interpreted as damping in vibroimpact",
-Journal of Applied Mechanics 42 (1975) 440-445 (dissipation proportional to the elastic force); H. Hertz
-(1881) for the elastic force; M. Hollars' friction curve in the form that Simbody's HuntCrossleyForce gives it
-(friction proportional to slip below the transition velocity, Stribeck fall from static to dynamic friction
-above it, and a viscous part).
+Sources: K. H. Hunt and F. R. E. Crossley, "Coefficient of restitution interpreted as damping in
+vibroimpact", Journal of Applied Mechanics 42 (1975) 440-445 (dissipation proportional to the
+elastic force); H. Hertz (1881) for the elastic force; M. Hollars' friction curve in the form that
+Simbody's HuntCrossleyForce gives it (friction proportional to slip below the transition velocity,
+Stribeck fall from static to dynamic friction above it, and a viscous part).
 """
 
 from __future__ import annotations
@@ -21,13 +21,23 @@ from osimlite.mechanics.laws.vectors import ZERO, Vector, along, dot, minus, nor
 
 
 def combine_materials(
-    K1: float, c1: float, us1: float, ud1: float, uv1: float, K2: float, c2: float, us2: float, ud2: float, uv2: float
+    K1: float,
+    c1: float,
+    us1: float,
+    ud1: float,
+    uv1: float,
+    K2: float,
+    c2: float,
+    us2: float,
+    ud2: float,
+    uv2: float,
 ) -> tuple[float, float, float, float, float, float]:
     """Effective parameters of a pair of surfaces, to be computed once per pair.
 
-    With k_i = K_i^(2/3), a = k2 / (k1 + k2) of the depth is surface 1's: the softer surface yields more. A
-    surface of stiffness 0 (the default of the property) yields without resistance, so that k = 0 and the
-    pair exerts no force; that holds for two such surfaces also, where OpenSim 4.6 divides 0 by 0.
+    With k_i = K_i^(2/3), a = k2 / (k1 + k2) of the depth is surface 1's: the softer surface yields
+    more. A surface of stiffness 0 (the default of the property) yields without resistance, so that
+    k = 0 and the pair exerts no force; that holds for two such surfaces also, where OpenSim 4.6
+    divides 0 by 0.
 
     Args:
         K1: stiffness property of surface 1 (a plane-strain modulus), Pa; K2 likewise. Not negative.
@@ -36,14 +46,12 @@ def combine_materials(
         ud1: coefficient of dynamic friction, 1; ud2 likewise.
         uv1: coefficient of viscous friction, s/m; uv2 likewise.
 
-    Returns:
-        (k, a, c, us, ud, uv): k as `contact_force` takes it, Pa^(2/3); a, 1; c, s/m; us and ud, 1; uv, s/m.
-        The coefficients of friction are harmonic means, so that one frictionless surface makes the pair
-        frictionless.
+    Returns: (k, a, c, us, ud, uv): k as `contact_force` takes it, Pa^(2/3); a, 1; c, s/m; us and
+        ud, 1; uv, s/m. The coefficients of friction are harmonic means, so that one frictionless
+        surface makes the pair frictionless.
 
-    Raises:
-        ValueError: a stiffness is negative. The caller knows the component's name and says so in its own
-            words.
+    Raises: ValueError: a stiffness is negative. The caller knows the component's name and says so
+        in its own words.
     """
     if K1 < 0.0 or K2 < 0.0:
         raise ValueError("a contact stiffness must not be negative")
@@ -56,11 +64,13 @@ def combine_materials(
     return k1 * a, a, c1 * a + c2 * (1.0 - a), us, ud, uv
 
 
-def half_space_sphere(o: Vector, n: Vector, center: Vector, r: float, a: float) -> tuple[float, Vector]:
+def half_space_sphere(
+    o: Vector, n: Vector, center: Vector, r: float, a: float
+) -> tuple[float, Vector]:
     """Depth and point of application of a sphere (surface 2) in a half space (surface 1).
 
-    The half space has no bottom: a centre far below its plane gives a depth greater than 2 r. R of the pair
-    is r.
+    The half space has no bottom: a centre far below its plane gives a depth greater than 2 r. R of
+    the pair is r.
 
     Args:
         o: point on the plane, m.
@@ -77,7 +87,9 @@ def half_space_sphere(o: Vector, n: Vector, center: Vector, r: float, a: float) 
     return (d, along(center, -(s + a * d), n)) if d > 0.0 else (d, ZERO)
 
 
-def sphere_sphere(c1: Vector, r1: float, c2: Vector, r2: float, a: float) -> tuple[float, float, Vector, Vector]:
+def sphere_sphere(
+    c1: Vector, r1: float, c2: Vector, r2: float, a: float
+) -> tuple[float, float, Vector, Vector]:
     """Depth, effective radius, normal and point of application of two spheres.
 
     Spheres with one and the same centre have no normal and, as in Simbody, do not touch.
@@ -87,9 +99,8 @@ def sphere_sphere(c1: Vector, r1: float, c2: Vector, r2: float, a: float) -> tup
         r1: its radius, m; r2 likewise.
         a: part of the depth that is surface 1's, from `combine_materials`, 1.
 
-    Returns:
-        d, R = r1 r2 / (r1 + r2), n and P: d, R and the point in m; n, 1. They touch where d > 0; otherwise -d is the
-        gap (0 for one centre) and the rest means nothing.
+    Returns: d, R = r1 r2 / (r1 + r2), n and P: d, R and the point in m; n, 1. They touch where d >
+        0; otherwise -d is the gap (0 for one centre) and the rest means nothing.
     """
     way = minus(c2, c1)
     distance = norm(way)
@@ -103,15 +114,12 @@ def sphere_sphere(c1: Vector, r1: float, c2: Vector, r2: float, a: float) -> tup
 def friction(w: float, us: float, ud: float, uv: float, vt: float) -> float:
     """Coefficient of friction at a slip w: min(r, 1) (ud + 2 (us - ud) / (1 + r^2)) + uv w, with r = w / vt.
 
-    At w = vt it is us + uv vt and has a kink. With us < ud / 2 it is negative for small r: friction then drives the
-    slip instead of opposing it.
+    At w = vt it is us + uv vt and has a kink. With us < ud / 2 it is negative for small r: friction
+    then drives the slip instead of opposing it.
 
-    Args:
-        w: slip, m/s, greater than 0.
-        us: coefficient of static friction, 1.
-        ud: coefficient of dynamic friction, 1.
-        uv: coefficient of viscous friction, s/m.
-        vt: transition velocity, m/s. Where it is 0 (or less), the coefficient is ud + uv w, the limit for vt -> 0.
+    Args: w: slip, m/s, greater than 0. us: coefficient of static friction, 1. ud: coefficient of
+        dynamic friction, 1. uv: coefficient of viscous friction, s/m. vt: transition velocity, m/s.
+        Where it is 0 (or less), the coefficient is ud + uv w, the limit for vt -> 0.
     """
     if not vt > 0.0:
         return ud + uv * w
@@ -121,12 +129,21 @@ def friction(w: float, us: float, ud: float, uv: float, vt: float) -> float:
 
 
 def contact_force(
-    d: float, R: float, k: float, c: float, us: float, ud: float, uv: float, vt: float, n: Vector, v: Vector
+    d: float,
+    R: float,
+    k: float,
+    c: float,
+    us: float,
+    ud: float,
+    uv: float,
+    vt: float,
+    n: Vector,
+    v: Vector,
 ) -> Vector:
     """Force on surface 2 at the point of application.
 
-    f = (4/3) k d sqrt(R k d) (1 + (3/2) c vn) along n, nothing where that is not positive (no contact pulls); and f mu
-    along the slip of surface 1 over surface 2, mu being its `friction`.
+    f = (4/3) k d sqrt(R k d) (1 + (3/2) c vn) along n, nothing where that is not positive (no
+    contact pulls); and f mu along the slip of surface 1 over surface 2, mu being its `friction`.
 
     Args:
         d: depth, m; no force where d <= 0.
@@ -155,13 +172,21 @@ def contact_force(
 
 
 def contact_derivatives(
-    d: float, R: float, k: float, c: float, us: float, ud: float, uv: float, vt: float, n: Vector, v: Vector
+    d: float,
+    R: float,
+    k: float,
+    c: float,
+    us: float,
+    ud: float,
+    uv: float,
+    vt: float,
+    n: Vector,
+    v: Vector,
 ) -> tuple[float, float, float]:
     """How the force of `contact_force`, whose arguments these are, changes where surfaces are pressed and slip.
 
-    Returns:
-        Of the force along n its derivatives by the depth (N/m) and by the approach v n (N s/m), and the force across n
-        over the slip (N s/m); all 0 where there is no force.
+    Returns: Of the force along n its derivatives by the depth (N/m) and by the approach v n (N
+        s/m), and the force across n over the slip (N s/m); all 0 where there is no force.
     """
     if d <= 0.0:
         return 0.0, 0.0, 0.0

@@ -1,7 +1,7 @@
 """Metabolic power of muscles, W: heat of activation, maintenance and shortening, and work.
 
-As OpenSim 4.6 computes it, whose probes are told about in T. Uchida et al., "Stretching your energetic budget: how
-tendon compliance affects the metabolic cost of running", PLoS ONE 11, 2016.
+As OpenSim 4.6 computes it, whose probes are told about in T. Uchida et al., "Stretching your
+energetic budget: how tendon compliance affects the metabolic cost of running", PLoS ONE 11, 2016.
 """
 
 from __future__ import annotations
@@ -52,7 +52,10 @@ def umberger2010(
     activation *= m.muscle_effort_scaling_factor
     excitation *= m.muscle_effort_scaling_factor
     active_force *= m.muscle_effort_scaling_factor
-    length, velocity = fiber_length / m.optimal_fiber_length, fiber_velocity / m.optimal_fiber_length
+    length, velocity = (
+        fiber_length / m.optimal_fiber_length,
+        fiber_velocity / m.optimal_fiber_length,
+    )
     effort = excitation if excitation > activation else (excitation + activation) / 2.0
     slow = m.ratio_slow_twitch_fibers
     if m.use_Bhargava_recruitment_model:
@@ -65,7 +68,10 @@ def umberger2010(
         upkeep = m.aerobic_factor * (effort**0.6 if effort >= 0.0 else nan)
         upkeep *= unscaled if length <= 1.0 else 0.4 * unscaled + 0.6 * unscaled * force_length
     if forbids or m.shortening_rate_on:
-        of_fast, of_slow = 153.0 / m.max_contraction_velocity, 100.0 / (m.max_contraction_velocity / 2.5)
+        of_fast, of_slow = (
+            153.0 / m.max_contraction_velocity,
+            100.0 / (m.max_contraction_velocity / 2.5),
+        )
         if velocity <= 0.0:
             heat = min(-of_slow * velocity, 100.0) * slow - of_fast * velocity * (1.0 - slow)
             shortening = m.aerobic_factor * effort * effort * heat
@@ -74,12 +80,20 @@ def umberger2010(
             shortening = m.aerobic_factor * effort * heat
         if length > 1.0:
             shortening *= force_length
-    if (forbids or m.mechanical_work_rate_on) and (m.include_negative_mechanical_work or fiber_velocity <= 0.0):
+    if (forbids or m.mechanical_work_rate_on) and (
+        m.include_negative_mechanical_work or fiber_velocity <= 0.0
+    ):
         work = -max(active_force, 0.0) * fiber_velocity / m.mass
     if forbids:
         shortening -= min(upkeep + shortening + work, 0.0)
-    heat = (upkeep if m.activation_maintenance_rate_on else 0.0) + (shortening if m.shortening_rate_on else 0.0)
-    if m.activation_maintenance_rate_on and m.shortening_rate_on and m.enforce_minimum_heat_rate_per_muscle:
+    heat = (upkeep if m.activation_maintenance_rate_on else 0.0) + (
+        shortening if m.shortening_rate_on else 0.0
+    )
+    if (
+        m.activation_maintenance_rate_on
+        and m.shortening_rate_on
+        and m.enforce_minimum_heat_rate_per_muscle
+    ):
         heat = max(heat, 1.0)
     return (heat + (work if m.mechanical_work_rate_on else 0.0)) * m.mass
 
@@ -134,20 +148,28 @@ def bhargava2004(
     slow, fast = recruited(m.muscle_effort_scaling_factor * excitation, m.ratio_slow_twitch_fibers)
     starting = keeping = shortening = work = 0.0
     if forbids or m.activation_rate_on:
-        starting = m.mass * (m.activation_constant_slow_twitch * slow + m.activation_constant_fast_twitch * fast)
+        starting = m.mass * (
+            m.activation_constant_slow_twitch * slow + m.activation_constant_fast_twitch * fast
+        )
     if forbids or m.maintenance_rate_on:
-        keeping = m.maintenance_constant_slow_twitch * slow + m.maintenance_constant_fast_twitch * fast
+        keeping = (
+            m.maintenance_constant_slow_twitch * slow + m.maintenance_constant_fast_twitch * fast
+        )
         keeping *= m.mass * maintained
     if forbids or m.shortening_rate_on:
         if not m.use_force_dependent_shortening_prop_constant:
             factor = 0.25 * total if fiber_velocity <= 0.0 else 0.0
         elif fiber_velocity <= 0.0:
-            isometric = m.muscle_effort_scaling_factor * activation * force_length * m.max_isometric_force
+            isometric = (
+                m.muscle_effort_scaling_factor * activation * force_length * m.max_isometric_force
+            )
             factor = 0.16 * isometric + 0.18 * total
         else:
             factor = 0.157 * total
         shortening = -factor * fiber_velocity
-    if (forbids or m.mechanical_work_rate_on) and (m.include_negative_mechanical_work or fiber_velocity <= 0.0):
+    if (forbids or m.mechanical_work_rate_on) and (
+        m.include_negative_mechanical_work or fiber_velocity <= 0.0
+    ):
         work = -active_force * fiber_velocity
     if forbids:
         shortening -= min(starting + keeping + shortening + work, 0.0)
@@ -162,7 +184,9 @@ def bhargava2004(
 def recruited(excitation: float, ratio_slow_twitch_fibers: float) -> tuple[float, float]:
     """Which part of all fibers is excited, of slow and of fast ones."""
     angle = 0.5 * pi * excitation
-    return ratio_slow_twitch_fibers * sin(angle), (1.0 - ratio_slow_twitch_fibers) * (1.0 - cos(angle))
+    return ratio_slow_twitch_fibers * sin(angle), (1.0 - ratio_slow_twitch_fibers) * (
+        1.0 - cos(angle)
+    )
 
 
 class Smoothed(NamedTuple):
@@ -195,13 +219,17 @@ def bhargava2004_smoothed(
     active_force *= m.muscle_effort_scaling_factor
     total = active_force + passive_force
     slow, fast = recruited(m.muscle_effort_scaling_factor * excitation, m.ratio_slow_twitch_fibers)
-    starting = m.mass * (m.activation_constant_slow_twitch * slow + m.activation_constant_fast_twitch * fast)
+    starting = m.mass * (
+        m.activation_constant_slow_twitch * slow + m.activation_constant_fast_twitch * fast
+    )
     keeping = m.maintenance_constant_slow_twitch * slow + m.maintenance_constant_fast_twitch * fast
     keeping *= m.mass * maintained
     # OpenSim keeps the function of Huber away from 0.
     velocity = fiber_velocity + 1e-16
     if m.use_force_dependent_shortening_prop_constant:
-        isometric = m.muscle_effort_scaling_factor * activation * force_length * m.max_isometric_force
+        isometric = (
+            m.muscle_effort_scaling_factor * activation * force_length * m.max_isometric_force
+        )
         ends = 0.16 * isometric + 0.18 * total, 0.157 * total
         factor = transition(velocity, *ends, by.velocity_smoothing, -1.0, min(by.form, 1.0))
     else:
@@ -219,7 +247,9 @@ def bhargava2004_smoothed(
     return heat + work, starting, keeping, shortening, work
 
 
-def transition(x: float, left: float, right: float, sharpness: float, direction: float, form: float) -> float:
+def transition(
+    x: float, left: float, right: float, sharpness: float, direction: float, form: float
+) -> float:
     """From `left` where x is negative to `right` where it is positive.
 
     Args:

@@ -1,8 +1,8 @@
 """The muscle of M. Millard et al. with a mass between fibers and tendon, as OpenSim's Millard2012AccelerationMuscle.
 
-Forces are parts of the maximum isometric force F; the curves are those of :mod:`osimlite.mechanics.laws.muscle_curves`. Each
-elastic force has a damper that raises it by the normalized velocity times a factor; what pulls never pushes thereby,
-nor the other way round.
+Forces are parts of the maximum isometric force F; the curves are those of
+:mod:`osimlite.mechanics.laws.muscle_curves`. Each elastic force has a damper that raises it by the
+normalized velocity times a factor; what pulls never pushes thereby, nor the other way round.
 """
 
 from __future__ import annotations
@@ -98,13 +98,21 @@ def moment(
     turning, turn = -velocity / fiber * tan, -tan / fiber
     along = velocity * cos - fiber * sin * turning
     turning_slope = velocity / (fiber * fiber) * tan - velocity / fiber * (1.0 + tan * tan) * turn
-    along_slope = -velocity * sin * turn - sin * turning - fiber * cos * turn * turning - fiber * sin * turning_slope
+    along_slope = (
+        -velocity * sin * turn
+        - sin * turning
+        - fiber * cos * turn * turning
+        - fiber * sin * turning_slope
+    )
     by_length, active_slope = curve_value(curves.active, fiber / m.optimal)
     by_velocity, _ = curve_value(curves.velocity, velocity / (m.fastest * m.optimal))
 
     pull, pull_slope = curve_value(curves.tendon, tendon / m.slack)
     damped = max(1.0 + m.tendon_damping * rate / m.slack, 0.0)
-    tension, tendon_stiffness = m.strength * pull * damped, m.strength * pull_slope / m.slack * damped
+    tension, tendon_stiffness = (
+        m.strength * pull * damped,
+        m.strength * pull_slope / m.slack * damped,
+    )
     stretch, stretch_slope = curve_value(curves.passive, fiber / m.optimal)
     short, short_slope = curve_value(curves.short, fiber / m.optimal)
     stretched = max(1.0 + m.passive_damping * velocity / m.optimal, 0.0)
@@ -112,20 +120,30 @@ def moment(
     steep, steep_slope = curve_value(curves.steep, cos)
     normal = m.steep_damping / (m.optimal * m.optimal_cos)
     steepened = max(1.0 - normal * along, 0.0)
-    steep_slope = -steep_slope * sin * turn * steepened - (steep * normal * along_slope if steepened > 0.0 else 0.0)
+    steep_slope = -steep_slope * sin * turn * steepened - (
+        steep * normal * along_slope if steepened > 0.0 else 0.0
+    )
 
     passive = stretch * stretched - short * shortened + m.fiber_damping * velocity / m.optimal
     borne = active * by_length * by_velocity + passive
-    borne_slope = active * active_slope * by_velocity + stretch_slope * stretched - short_slope * shortened
+    borne_slope = (
+        active * active_slope * by_velocity + stretch_slope * stretched - short_slope * shortened
+    )
     net = tension - m.strength * (borne * cos - steep * steepened)
     stiffness = m.strength * (borne_slope / m.optimal * cos - borne * sin * turn - steep_slope)
     acceleration = net * cos / m.mass + fiber * turning * turning
     net_slope = tendon_stiffness * (fiber * sin * turn - cos) - stiffness
-    slope = (net_slope * cos - net * sin * turn) / m.mass + turning * turning + 2.0 * fiber * turning * turning_slope
+    slope = (
+        (net_slope * cos - net * sin * turn) / m.mass
+        + turning * turning
+        + 2.0 * fiber * turning * turning_slope
+    )
     # What damps the fibers themselves is no passive force to OpenSim.
     told = m.strength * (stretch * stretched - short * shortened - steep * steepened * cos)
     stiffness /= cos - fiber * sin * turn
-    return Moment(cos, by_length, by_velocity, told, tension, acceleration, slope, stiffness, tendon_stiffness)
+    return Moment(
+        cos, by_length, by_velocity, told, tension, acceleration, slope, stiffness, tendon_stiffness
+    )
 
 
 def millard2012_acceleration(
@@ -133,17 +151,19 @@ def millard2012_acceleration(
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """The muscle at a moment. The activation is bounded in its rate only, and fibers may be of any length.
 
-    Returns:
-        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
-        velocity, active and passive fiber force (N), whether the fibers are longer than the muscle is wide, rate of
-        activation (1/s), fiber velocity (m/s) and its rate (m/s^2).
+    Returns: Tension (N), activation, fiber length (m), cosine of pennation, factors of the active
+        force by length and by velocity, active and passive fiber force (N), whether the fibers are
+        longer than the muscle is wide, rate of activation (1/s), fiber velocity (m/s) and its rate
+        (m/s^2).
     """
     fiber_length, velocity = now.fiber_length, now.fiber_velocity
     cos = cos_pennation(fiber_length, m.height, m.shortest, m.largest_sin, m.least_cos)
     tendon, rate = now.length - fiber_length * cos, now.rate - velocity / cos
     at = moment(m, now.activation, fiber_length, velocity, tendon, rate, curves)
     pull = now.activation * at.by_length * at.by_velocity * m.strength
-    change = first_order_activation_rate(now.excitation, now.activation, m.rising, m.falling, m.least)
+    change = first_order_activation_rate(
+        now.excitation, now.activation, m.rising, m.falling, m.least
+    )
     return (
         at.tension,
         now.activation,
@@ -160,7 +180,9 @@ def millard2012_acceleration(
     )
 
 
-def millard2012_acceleration_rigid(now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves) -> float:
+def millard2012_acceleration_rigid(
+    now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
+) -> float:
     """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim."""
     fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
     if not fiber > m.shortest:
@@ -176,9 +198,10 @@ def millard2012_acceleration_equilibrium(
 ) -> tuple[bool, float, float]:
     """Whether there is a fiber length that is not accelerated, that length (m), and its velocity (m/s).
 
-    Step for step as in initMuscleState of OpenSim's class: parts of Newton's steps, while the rate of the path is
-    shared between fibers and tendon by their stiffness. Where the slope vanishes, OpenSim goes on somewhere at random;
-    here the search ends. It ends, as there, where a tendon without stiffness becomes taut.
+    Step for step as in initMuscleState of OpenSim's class: parts of Newton's steps, while the rate
+    of the path is shared between fibers and tendon by their stiffness. Where the slope vanishes,
+    OpenSim goes on somewhere at random; here the search ends. It ends, as there, where a tendon
+    without stiffness becomes taut.
     """
     length, rate = now.length, now.rate
     tolerance, tendon, tendon_rate = max(1e-8 * m.strength, 10.0 * SIGNIFICANT), 1.01 * m.slack, 0.0
@@ -194,7 +217,9 @@ def millard2012_acceleration_equilibrium(
         if not SIGNIFICANT < abs(at.slope) < inf:
             break
         fiber = max(fiber - STEP * at.acceleration / at.slope, m.shortest)
-        tendon = length - fiber * cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
+        tendon = length - fiber * cos_pennation(
+            fiber, m.height, m.shortest, m.largest_sin, m.least_cos
+        )
         both, tendon_rate = at.stiffness + at.tendon_stiffness, rate
         if tendon > m.slack and abs(both) > SIGNIFICANT:
             if at.tendon_stiffness == 0.0:
@@ -204,7 +229,11 @@ def millard2012_acceleration_equilibrium(
 
 
 def millard2012_acceleration_energy(
-    m: Millard2012Acceleration, length: float, fiber_length: float, cos: float, curves: AccelerationCurves
+    m: Millard2012Acceleration,
+    length: float,
+    fiber_length: float,
+    cos: float,
+    curves: AccelerationCurves,
 ) -> float:
     """Potential energy, J; the energy of the mass is not counted.
 

@@ -1,9 +1,10 @@
 """The muscle of M. Millard et al. (Journal of Biomechanical Engineering 135, 2013) without a mass between its parts.
 
-As OpenSim's Millard2012EquilibriumMuscle has it: with or without damping of the fibers, with an elastic or a rigid
-tendon, with or without dynamics of activation. Forces are parts of the maximum isometric force F, fiber lengths of the
-optimal fiber length, fiber velocities of the maximum contraction velocity times that length, tendon lengths of the
-tendon slack length. The curves are those of :mod:`osimlite.mechanics.laws.muscle_curves`.
+As OpenSim's Millard2012EquilibriumMuscle has it: with or without damping of the fibers, with an
+elastic or a rigid tendon, with or without dynamics of activation. Forces are parts of the maximum
+isometric force F, fiber lengths of the optimal fiber length, fiber velocities of the maximum
+contraction velocity times that length, tendon lengths of the tendon slack length. The curves are
+those of :mod:`osimlite.mechanics.laws.muscle_curves`.
 """
 
 from __future__ import annotations
@@ -82,13 +83,13 @@ def millard2012_equilibrium(
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """The muscle at a moment; see calcFiberVelocityInfo and calcMuscleDynamicsInfo of OpenSim's class.
 
-    Fibers at their least length stay there as long as they would shorten, and bear nothing then. A rigid tendon does
-    not bear pressure: the damping of fast fibers is bounded instead.
+    Fibers at their least length stay there as long as they would shorten, and bear nothing then. A
+    rigid tendon does not bear pressure: the damping of fast fibers is bounded instead.
 
-    Returns:
-        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
-        velocity, active and passive fiber force (N), whether a fiber velocity was found, rate of activation (1/s),
-        fiber velocity (m/s), what of the passive force is not by damping (N).
+    Returns: Tension (N), activation, fiber length (m), cosine of pennation, factors of the active
+        force by length and by velocity, active and passive fiber force (N), whether a fiber
+        velocity was found, rate of activation (1/s), fiber velocity (m/s), what of the passive
+        force is not by damping (N).
     """
     fibers = fibers_resting(now, m, curves)
     is_found, velocity, by_velocity = fibers.told_by != NONE, fibers.velocity, fibers.by_velocity
@@ -100,7 +101,9 @@ def millard2012_equilibrium(
         )
     elif fibers.told_by == INVERSE:
         velocity, _ = curve_value(curves.inverse, velocity)
-    return muscle_with(fibers, m, is_found, velocity, by_velocity, fibers.by_length, fibers.elastic, fibers.tendon)
+    return muscle_with(
+        fibers, m, is_found, velocity, by_velocity, fibers.by_length, fibers.elastic, fibers.tendon
+    )
 
 
 def millard2012_again(
@@ -108,7 +111,11 @@ def millard2012_again(
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """The same, where the velocity (m/s) that damped fibers have is known, so that its derivatives are all to find."""
     fibers = fibers_resting(now, m, curves)
-    velocity = plain(fiber_velocity) / (m.fastest * m.optimal) if fibers.told_by == DAMPED else fibers.velocity
+    velocity = (
+        plain(fiber_velocity) / (m.fastest * m.optimal)
+        if fibers.told_by == DAMPED
+        else fibers.velocity
+    )
     by_velocity, slope = 1.0, 0.0
     if fibers.told_by == INVERSE:
         velocity, _ = curve_value(curves.inverse, velocity)
@@ -129,9 +136,19 @@ def fibers_resting(now: MuscleInputs, m: Millard2012Equilibrium, curves: Millard
     elastic, _ = curve_value(curves.passive, fibers.by_length)
     if not m.is_rigid:
         tendon, _ = curve_value(curves.tendon, fibers.tendon)
-    velocity, by_velocity, by_length, elastic, tendon = fibers_loaded(fibers, m, by_length, elastic, tendon)
-    told_by, active, length, cos, change = fibers.told_by, fibers.active, fibers.length, fibers.cos, fibers.change
-    return Fibers(told_by, velocity, by_velocity, active, length, cos, by_length, elastic, tendon, change)
+    velocity, by_velocity, by_length, elastic, tendon = fibers_loaded(
+        fibers, m, by_length, elastic, tendon
+    )
+    told_by, active, length, cos, change = (
+        fibers.told_by,
+        fibers.active,
+        fibers.length,
+        fibers.cos,
+        fibers.change,
+    )
+    return Fibers(
+        told_by, velocity, by_velocity, active, length, cos, by_length, elastic, tendon, change
+    )
 
 
 def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> Fibers:
@@ -152,7 +169,9 @@ def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> Fibers:
         tendon = along_tendon / m.slack
     if not cos > SIGNIFICANT:
         told_by = NONE
-    change = first_order_activation_rate(now.excitation, now.activation, m.rising, m.falling, m.least)
+    change = first_order_activation_rate(
+        now.excitation, now.activation, m.rising, m.falling, m.least
+    )
     over = fiber / m.optimal
     return Fibers(told_by, velocity, 1.0, active, fiber, cos, over, over, tendon, change)
 
@@ -181,10 +200,14 @@ def fibers_asking(fibers: Fibers, m: Millard2012Equilibrium) -> tuple[int, float
     return 1 if fibers.told_by == INVERSE else 0, 0.0, 1.0, fibers.velocity
 
 
-def fibers_moved(fibers: Fibers, m: Millard2012Equilibrium, value: float, missed: float) -> tuple[float, float, float]:
+def fibers_moved(
+    fibers: Fibers, m: Millard2012Equilibrium, value: float, missed: float
+) -> tuple[float, float, float]:
     """What tells the velocity, it, and factor of the active force, by what the curve says."""
     if fibers.told_by == DAMPED:
-        is_found, velocity = damped_by(m, fibers.active * fibers.by_length, fibers.velocity, value, missed)
+        is_found, velocity = damped_by(
+            m, fibers.active * fibers.by_length, fibers.velocity, value, missed
+        )
         return DAMPED if is_found else NONE, velocity, value
     if fibers.told_by == INVERSE:
         return INVERSE, value, fibers.by_velocity
@@ -196,7 +219,9 @@ def muscle_of(
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """What `millard2012_equilibrium` returns, when the curves were asked."""
     of_curves = fibers.by_length, fibers.elastic, fibers.tendon
-    return muscle_with(fibers, m, fibers.told_by != NONE, fibers.velocity, fibers.by_velocity, *of_curves)
+    return muscle_with(
+        fibers, m, fibers.told_by != NONE, fibers.velocity, fibers.by_velocity, *of_curves
+    )
 
 
 def muscle_with(
@@ -222,14 +247,27 @@ def muscle_with(
     else:
         tension = tendon * m.strength
     speed = velocity * m.fastest * m.optimal
-    return tension, active, fiber, cos, by_length, by_velocity, pull, passive, is_found, fibers.change, speed, spring
+    return (
+        tension,
+        active,
+        fiber,
+        cos,
+        by_length,
+        by_velocity,
+        pull,
+        passive,
+        is_found,
+        fibers.change,
+        speed,
+        spring,
+    )
 
 
 def millard2012_rigid(now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves) -> float:
     """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim.
 
-    As there, the pennation that takes the force to the tendon is that of fibers as many meters long as they have
-    optimal lengths: next to none.
+    As there, the pennation that takes the force to the tendon is that of fibers as many meters long
+    as they have optimal lengths: next to none.
     """
     fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
     if fiber <= m.smallest:
@@ -252,7 +290,8 @@ def damped_velocity(
 ) -> tuple[bool, float, float]:
     """The normalized fiber velocity at which damped fibers bear what the tendon does.
 
-    OpenSim looks for it by Newton's method, up to a tolerance of 1e-10; here the search is that on a curve.
+    OpenSim looks for it by Newton's method, up to a tolerance of 1e-10; here the search is that on
+    a curve.
 
     Args:
         m: the muscle.
@@ -292,7 +331,8 @@ def millard2012_energy(
 ) -> float:
     """Potential energy of fibers and tendon, J.
 
-    OpenSim has it from splines of the integrals, which are good to 1e-9 but for the ends of the curves: 1e-6 there.
+    OpenSim has it from splines of the integrals, which are good to 1e-9 but for the ends of the
+    curves: 1e-6 there.
 
     Args:
         m: the muscle.
@@ -312,12 +352,18 @@ def millard2012_equilibrium_length(
 ) -> tuple[bool, float]:
     """Whether there is a fiber length at which fibers at rest and tendon bear the same, and that length (m).
 
-    Newton's method with halved steps, step for step as in estimateMuscleFiberState of OpenSim's class, which knows
-    nothing of the rate of the path. A length that would be below the least is that.
+    Newton's method with halved steps, step for step as in estimateMuscleFiberState of OpenSim's
+    class, which knows nothing of the rate of the path. A length that would be below the least is
+    that.
     """
-    length, active = now.length, min(max(now.excitation if m.is_excited else now.activation, m.least), 1.0)
+    length, active = (
+        now.length,
+        min(max(now.excitation if m.is_excited else now.activation, m.least), 1.0),
+    )
     tolerance = max(1e-8 * m.strength, 10.0 * SIGNIFICANT)
-    fiber = max(fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos), m.smallest)
+    fiber = max(
+        fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos), m.smallest
+    )
     error, slope = imbalance(m, length, fiber, active, curves)
     for _ in range(LENGTH_ROUNDS):
         if not abs(error) > tolerance:
@@ -357,5 +403,10 @@ def imbalance(
     borne = m.strength * (active * by_length) + m.strength * elastic
     sin = m.height / fiber
     turn = sin * sin / cos
-    along = m.strength * (active * active_slope + passive_slope) / m.optimal * cos + borne * turn / fiber
-    return borne * cos - tendon * m.strength, along + tendon_slope * m.strength / m.slack * (cos + turn)
+    along = (
+        m.strength * (active * active_slope + passive_slope) / m.optimal * cos
+        + borne * turn / fiber
+    )
+    return borne * cos - tendon * m.strength, along + tendon_slope * m.strength / m.slack * (
+        cos + turn
+    )

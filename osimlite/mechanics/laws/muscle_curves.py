@@ -1,8 +1,9 @@
 """The curves of Millard's muscles (M. Millard et al., Journal of Biomechanical Engineering 135, 2013, section 2).
 
-Lengths are parts of the optimal fiber length or of the tendon slack length, velocities of the maximum contraction
-velocity, forces of the maximum isometric force. Each function takes the properties of the class of OpenSim that has its
-name, in their order, and gives the numbers of a curve; None stands for a property that is left out.
+Lengths are parts of the optimal fiber length or of the tendon slack length, velocities of the
+maximum contraction velocity, forces of the maximum isometric force. Each function takes the
+properties of the class of OpenSim that has its name, in their order, and gives the numbers of a
+curve; None stands for a property that is left out.
 """
 
 from __future__ import annotations
@@ -23,12 +24,13 @@ _kept = lru_cache(maxsize=256)
 
 
 @_kept
-def active_force_length(shortest: float, transition: float, longest: float, slope: float, least: float) -> Numbers:
+def active_force_length(
+    shortest: float, transition: float, longest: float, slope: float, least: float
+) -> Numbers:
     """Active force over fiber length; it is 1 at 1, where the curve is flat.
 
-    Raises:
-        ValueError: there is no such curve; likewise for those below. The message begins with "its" and a property, or
-            tells which slopes make no corner.
+    Raises: ValueError: there is no such curve; likewise for those below. The message begins with
+        "its" and a property, or tells which slopes make no corner.
     """
     _require(
         shortest >= 0.0 and min(transition - shortest, 1.0 - transition, longest - 1.0) > NEAREST,
@@ -42,7 +44,11 @@ def active_force_length(shortest: float, transition: float, longest: float, slop
     return curve(
         (
             (shortest, least, 0.0),
-            (shortest + 0.5 * (transition - shortest), 0.5 * knee, 1.25 * knee / (transition - shortest)),
+            (
+                shortest + 0.5 * (transition - shortest),
+                0.5 * knee,
+                1.25 * knee / (transition - shortest),
+            ),
             (transition + 0.5 * (1.0 - half - transition), knee + 0.5 * (1.0 - knee), slope),
             (1.0, 1.0, 0.0),
             (top + 0.5 * (longest - top), 0.5, -1.0 / ((longest - half) - top)),
@@ -73,14 +79,25 @@ def force_velocity(
         "its concentric_slope_near_vmax is not less than 1",
     )
     _require(isometric > 1.0, "its isometric_slope is not above 1")
-    _require(0.0 <= eccentric_end <= eccentric_near, "its eccentric_slope_at_vmax is not from 0 to the slope near vmax")
+    _require(
+        0.0 <= eccentric_end <= eccentric_near,
+        "its eccentric_slope_at_vmax is not from 0 to the slope near vmax",
+    )
     _require(eccentric_near >= NEAREST, f"its eccentric_slope_near_vmax is less than {NEAREST:.2e}")
     _below(eccentric_near, most - 1.0, "eccentric_slope_near_vmax")
     points = [
         (-1.0, 0.0, concentric_end),
-        (-0.9, 0.5 * concentric_near * (-0.9 + 1.0) + 0.5 * concentric_end * (-0.9 + 1.0), concentric_near),
+        (
+            -0.9,
+            0.5 * concentric_near * (-0.9 + 1.0) + 0.5 * concentric_end * (-0.9 + 1.0),
+            concentric_near,
+        ),
         (0.0, 1.0, isometric),
-        (0.9, most + 0.5 * eccentric_near * (0.9 - 1.0) + 0.5 * eccentric_end * (0.9 - 1.0), eccentric_near),
+        (
+            0.9,
+            most + 0.5 * eccentric_near * (0.9 - 1.0) + 0.5 * eccentric_end * (0.9 - 1.0),
+            eccentric_near,
+        ),
         (1.0, most, eccentric_end),
     ]
     if inverse:
@@ -90,10 +107,17 @@ def force_velocity(
 
 @_kept
 def fiber_force_length(
-    zero: float, one: float, low: float | None = None, stiffness: float | None = None, curviness: float | None = None
+    zero: float,
+    one: float,
+    low: float | None = None,
+    stiffness: float | None = None,
+    curviness: float | None = None,
 ) -> Numbers:
     """Passive force over fiber length."""
-    _require(one > zero, f"its strain_at_zero_force is not less than its strain_at_one_norm_force, {one:.4g}")
+    _require(
+        one > zero,
+        f"its strain_at_zero_force is not less than its strain_at_one_norm_force, {one:.4g}",
+    )
     low, stiffness, curviness = _given_or(
         (low, stiffness, curviness), (0.2, 2.0 / (one - zero), 0.75), "stiffness_at_low_force"
     )
@@ -103,12 +127,18 @@ def fiber_force_length(
     start, end = 1.0 + zero, 1.0 + one
     foot = start + min(0.1 / stiffness, 0.1 * (end - start))
     middle = start + 0.5 * (foot - start)
-    return curve(((start, 0.0, 0.0), (foot, low * (foot - middle), low), (end, 1.0, stiffness)), [curviness] * 2)
+    return curve(
+        ((start, 0.0, 0.0), (foot, low * (foot - middle), low), (end, 1.0, stiffness)),
+        [curviness] * 2,
+    )
 
 
 @_kept
 def tendon_force_length(
-    one: float, stiffness: float | None = None, toe: float | None = None, curviness: float | None = None
+    one: float,
+    stiffness: float | None = None,
+    toe: float | None = None,
+    curviness: float | None = None,
 ) -> Numbers:
     """Force over tendon length."""
     _require(one > NEAREST, f"its strain_at_one_norm_force is not above {NEAREST:.1e}")
@@ -121,7 +151,10 @@ def tendon_force_length(
     foot, middle = 1.0 + (end - 1.0) / 10.0, (0.5 * toe - 1.0) / stiffness + 1.0 + one
     slope = 0.5 * toe / (middle - foot)
     control = foot + 0.5 * (middle - foot)
-    return curve(((1.0, 0.0, 0.0), (control, slope * (control - foot), slope), (end, toe, stiffness)), [curviness] * 2)
+    return curve(
+        ((1.0, 0.0, 0.0), (control, slope * (control - foot), slope), (end, toe, stiffness)),
+        [curviness] * 2,
+    )
 
 
 @_kept
@@ -130,8 +163,12 @@ def fiber_compressive_force_length(
 ) -> Numbers:
     """Force against short fibers over their length."""
     _require(zero > 0.0, "its norm_length_at_zero_force is not positive")
-    stiffness, curviness = _given_or((stiffness, curviness), (-2.0 / zero, 0.5), "stiffness_at_zero_length")
-    _require(stiffness < -1.0 / zero, f"its stiffness_at_zero_length is not less than {-1.0 / zero:.4g}")
+    stiffness, curviness = _given_or(
+        (stiffness, curviness), (-2.0 / zero, 0.5), "stiffness_at_zero_length"
+    )
+    _require(
+        stiffness < -1.0 / zero, f"its stiffness_at_zero_length is not less than {-1.0 / zero:.4g}"
+    )
     return curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
 
 
@@ -142,8 +179,13 @@ def fiber_compressive_force_cos_pennation(
     """Force against steep fibers over the cosine of pennation; the angle of engagement is in degrees."""
     zero = cos(radians(angle))
     _require(0.0 < zero < 1.0, "its engagement_angle_in_degrees is not between 0 and 90")
-    stiffness, curviness = _given_or((stiffness, curviness), (-2.0 / zero, 0.1), "stiffness_at_perpendicular")
-    _require(stiffness < -1.0 / zero, f"its stiffness_at_perpendicular is not less than {-1.0 / zero:.4g}")
+    stiffness, curviness = _given_or(
+        (stiffness, curviness), (-2.0 / zero, 0.1), "stiffness_at_perpendicular"
+    )
+    _require(
+        stiffness < -1.0 / zero,
+        f"its stiffness_at_perpendicular is not less than {-1.0 / zero:.4g}",
+    )
     return curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
 
 
@@ -160,8 +202,13 @@ def _above(slope: float, limit: float, name: str) -> None:
     _require(slope > limit, f"its {name} is not above {limit:.4g}")
 
 
-def _given_or(given: tuple[float | None, ...], usual: tuple[float, ...], first: str) -> tuple[float, ...]:
+def _given_or(
+    given: tuple[float | None, ...], usual: tuple[float, ...], first: str
+) -> tuple[float, ...]:
     """What is given, or the usual if nothing is; the first property is that of `given`."""
     result = [x for x in given if x is not None]
-    _require(len(result) in (0, len(usual)), f"its {first} and what follows it are neither all given nor all left out")
+    _require(
+        len(result) in (0, len(usual)),
+        f"its {first} and what follows it are neither all given nor all left out",
+    )
     return tuple(result) or usual

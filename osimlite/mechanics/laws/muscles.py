@@ -1,8 +1,9 @@
 """What muscles have in common: activation that follows excitation, and fibers that turn as they shorten.
 
-The fibers of a muscle are parallel, and stay as far apart as they are (F. E. Zajac, Critical Reviews in Biomedical
-Engineering 17, 1989): the height h = l sin(phi) of fibers of length l, at the pennation angle phi to the tendon, is
-constant. OpenSim's MuscleFixedWidthPennationModel bounds the angle, and so the length from below.
+The fibers of a muscle are parallel, and stay as far apart as they are (F. E. Zajac, Critical
+Reviews in Biomedical Engineering 17, 1989): the height h = l sin(phi) of fibers of length l, at the
+pennation angle phi to the tendon, is constant. OpenSim's MuscleFixedWidthPennationModel bounds the
+angle, and so the length from below.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ def first_order_activation_rate(
 ) -> float:
     """Rate of activation, 1/s (D. G. Thelen, Journal of Biomechanical Engineering 125, 2003, eq. 1 and 2).
 
-    As in OpenSim, the activation is kept within its bounds here, and the excitation is not: below the least activation
-    the rate stays what it is at it.
+    As in OpenSim, the activation is kept within its bounds here, and the excitation is not: below
+    the least activation the rate stays what it is at it.
 
     Args:
         excitation: what the control asks for.
@@ -48,7 +49,9 @@ def first_order_activation_rate(
     return (excitation - active) / (rising * slow if excitation > active else falling / slow)
 
 
-def pennation(optimal_length: float, optimal_angle: float, largest_angle: float) -> tuple[float, float, float, float]:
+def pennation(
+    optimal_length: float, optimal_angle: float, largest_angle: float
+) -> tuple[float, float, float, float]:
     """What the laws are given of pennation.
 
     Args:
@@ -66,7 +69,9 @@ def pennation(optimal_length: float, optimal_angle: float, largest_angle: float)
     return height, shortest, sin(largest_angle), cos(largest_angle)
 
 
-def cos_pennation(length: float, height: float, shortest: float, largest_sin: float, least_cos: float) -> float:
+def cos_pennation(
+    length: float, height: float, shortest: float, largest_sin: float, least_cos: float
+) -> float:
     """Cosine of the pennation angle of fibers of a length (m); the rest as of `pennation`."""
     if length <= shortest or height >= largest_sin * length:
         return least_cos

@@ -1,11 +1,12 @@
 """The muscles that OpenSim keeps for old files: its classes whose names end in Deprecated.
 
-Forces are parts of the maximum isometric force, fiber lengths of the optimal fiber length where they are normalized.
-Fibers are parallel and keep their height across the tendon, at any angle.
+Forces are parts of the maximum isometric force, fiber lengths of the optimal fiber length where
+they are normalized. Fibers are parallel and keep their height across the tendon, at any angle.
 
-Sources: L. M. Schutte, "Using musculoskeletal models to explore strategies for improving performance in electrical
-stimulation-induced leg cycle ergometry" (Stanford University, 1993); S. L. Delp, "Surgery simulation" (Stanford
-University, 1990); D. G. Thelen, Journal of Biomechanical Engineering 125 (2003) 70-77; as OpenSim computes them.
+Sources: L. M. Schutte, "Using musculoskeletal models to explore strategies for improving
+performance in electrical stimulation-induced leg cycle ergometry" (Stanford University, 1993); S.
+L. Delp, "Surgery simulation" (Stanford University, 1990); D. G. Thelen, Journal of Biomechanical
+Engineering 125 (2003) 70-77; as OpenSim computes them.
 """
 
 from __future__ import annotations
@@ -50,7 +51,9 @@ def cos_upright(length: float, height: float) -> float:
     return sqrt((length - height) * (length + height)) / length if height < length else UPRIGHT
 
 
-def scaled_activation_rate(excitation: float, activation: float, more: float, least: float, time: float) -> float:
+def scaled_activation_rate(
+    excitation: float, activation: float, more: float, least: float, time: float
+) -> float:
     """Rate of activation, 1/s.
 
     Args:
@@ -113,13 +116,21 @@ def thelen_tendon_force(strain: float, strain_at_one: float) -> float:
     force = 0.001 * (1.0 + strain)
     if strain > toe:
         return force + 1.712 / strain_at_one * (strain - toe) + 0.333333
-    return force + 0.333333 * (exp(3.0 * strain / toe) - 1.0) / (exp(3.0) - 1.0) if strain > 0.0 else force
+    return (
+        force + 0.333333 * (exp(3.0 * strain / toe) - 1.0) / (exp(3.0) - 1.0)
+        if strain > 0.0
+        else force
+    )
 
 
 def thelen_passive_force(length: float, strain_at_one: float, shape: float) -> float:
     """Passive force of fibers of a normalized length: an exponential, and a line beyond the strain at 1."""
     beyond = length - (1.0 + strain_at_one)
-    return 1.0 + shape / strain_at_one * beyond if beyond > 0.0 else exp(shape * (length - 1.0) / strain_at_one - shape)
+    return (
+        1.0 + shape / strain_at_one * beyond
+        if beyond > 0.0
+        else exp(shape * (length - 1.0) / strain_at_one - shape)
+    )
 
 
 def thelen_active_force(length: float, width: float) -> float:
@@ -127,7 +138,9 @@ def thelen_active_force(length: float, width: float) -> float:
     return exp(-(length - 1.0) * (length - 1.0) / width)
 
 
-def thelen_velocity(activation: float, active: float, borne: float, damping: float, shape: float, most: float) -> float:
+def thelen_velocity(
+    activation: float, active: float, borne: float, damping: float, shape: float, most: float
+) -> float:
     """Velocity of fibers over their fastest one; the curve goes on as straight lines, through two points at its ends.
 
     Args:
@@ -143,7 +156,9 @@ def thelen_velocity(activation: float, active: float, borne: float, damping: flo
         if borne >= 0.0:
             return thelen_shortening(borne, isometric, damping, shape)
         at_end = thelen_shortening(0.0, isometric, damping, shape)
-        return at_end + borne / (near / (thelen_shortening(near, isometric, damping, shape) - at_end))
+        return at_end + borne / (
+            near / (thelen_shortening(near, isometric, damping, shape) - at_end)
+        )
     end = 0.95 * isometric * most
     if borne < end:
         return thelen_lengthening(borne, isometric, damping, shape, most)
@@ -158,9 +173,13 @@ def thelen_shortening(borne: float, isometric: float, damping: float, shape: flo
     return (borne - isometric) / (isometric + borne / shape + damping)
 
 
-def thelen_lengthening(borne: float, isometric: float, damping: float, shape: float, most: float) -> float:
+def thelen_lengthening(
+    borne: float, isometric: float, damping: float, shape: float, most: float
+) -> float:
     """The curve of `thelen_velocity` from the isometric force on."""
-    return (borne - isometric) / ((2.0 + 2.0 / shape) * (isometric * most - borne) / (most - 1.0) + damping)
+    return (borne - isometric) / (
+        (2.0 + 2.0 / shape) * (isometric * most - borne) / (most - 1.0) + damping
+    )
 
 
 def fitted(path_length: float, length: float, m: OldMuscle) -> Guess:
@@ -186,8 +205,9 @@ def next_length(
 ) -> float:
     """The fiber length (m) to try next.
 
-    Between two of which one is too short and the other too long; else as the stiffness of fibers and tendon, which are
-    taken for their forces over their lengths, leads to, but no more than half an optimal length away.
+    Between two of which one is too short and the other too long; else as the stiffness of fibers
+    and tendon, which are taken for their forces over their lengths, leads to, but no more than half
+    an optimal length away.
 
     Args:
         guess: that was tried last.
@@ -200,7 +220,11 @@ def next_length(
         m: the muscle.
     """
     if (error >= 0.0) != (error_before >= 0.0):
-        return guess.length + abs(error) / (abs(error) + abs(error_before)) * (before - guess.length)
+        return guess.length + abs(error) / (abs(error) + abs(error_before)) * (
+            before - guess.length
+        )
     of_tendon = max(tendon, fibers * TENDON_MODULUS / TENDON_STRENGTH) * m.strength / m.slack
-    step = min(abs(error / (m.strength / m.optimal * fully / guess.cos + of_tendon)), 0.5 * m.optimal)
+    step = min(
+        abs(error / (m.strength / m.optimal * fully / guess.cos + of_tendon)), 0.5 * m.optimal
+    )
     return guess.length + step if error > 0.0 else guess.length - step

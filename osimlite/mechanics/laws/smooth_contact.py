@@ -1,9 +1,10 @@
 """Hunt-Crossley contact of a half space and a sphere, made smooth.
 
-As in :mod:`osimlite.mechanics.laws.hunt_crossley` the half space is surface 1 and the sphere surface 2, n is the unit normal
-of the half space, d the depth and v the velocity of surface 1 relative to surface 2. Source: G. Serrancolí et al.,
-"Subject-exoskeleton contact model calibration leads to accurate interaction force predictions", IEEE Transactions on
-Neural Systems and Rehabilitation Engineering 27 (2019) 1597-1605, as Simbody's SmoothSphereHalfSpaceForce has it.
+As in :mod:`osimlite.mechanics.laws.hunt_crossley` the half space is surface 1 and the sphere
+surface 2, n is the unit normal of the half space, d the depth and v the velocity of surface 1
+relative to surface 2. Source: G. Serrancolí et al., "Subject-exoskeleton contact model calibration
+leads to accurate interaction force predictions", IEEE Transactions on Neural Systems and
+Rehabilitation Engineering 27 (2019) 1597-1605, as Simbody's SmoothSphereHalfSpaceForce has it.
 """
 
 from __future__ import annotations
@@ -30,22 +31,28 @@ def smooth_hertz(d: float, R: float, E: float, cf: float, bd: float) -> float:
 
 
 def smooth_contact_force(
-    hertz: float, c: float, us: float, ud: float, uv: float, vt: float, cf: float, bv: float, n: Vector, v: Vector
+    hertz: float,
+    c: float,
+    us: float,
+    ud: float,
+    uv: float,
+    vt: float,
+    cf: float,
+    bv: float,
+    n: Vector,
+    v: Vector,
 ) -> Vector:
     """Force on the sphere, in N, at the point midway between the two surfaces.
 
     f = fh (1 + (3/2) c vn) (1 + tanh(bv (vn + 2 / (3 c)))) / 2 along n, and along the slip vT
     f mu / w with w = sqrt(|vT|^2 + cf) and mu its `friction`.
 
-    Args:
-        hertz: fh from `smooth_hertz`, N.
-        c: dissipation, s/m. With 0, f = fh.
-        us: coefficient as of :func:`osimlite.mechanics.laws.hunt_crossley.friction`, with ud and uv.
-        vt: transition velocity, m/s.
-        cf: what keeps w from vanishing, m^2/s^2 (the same number as in `smooth_hertz`).
-        bv: how sharply the force goes when the surfaces separate, s/m.
-        n: unit normal out of the half space, 1.
-        v: velocity of the half space relative to the sphere at the point, m/s.
+    Args: hertz: fh from `smooth_hertz`, N. c: dissipation, s/m. With 0, f = fh. us: coefficient as
+        of :func:`osimlite.mechanics.laws.hunt_crossley.friction`, with ud and uv. vt: transition
+        velocity, m/s. cf: what keeps w from vanishing, m^2/s^2 (the same number as in
+        `smooth_hertz`). bv: how sharply the force goes when the surfaces separate, s/m. n: unit
+        normal out of the half space, 1. v: velocity of the half space relative to the sphere at the
+        point, m/s.
     """
     vn = dot(v, n)
     f = hertz * (1.0 + 1.5 * c * vn)
@@ -62,9 +69,9 @@ def smooth_contact_derivatives(
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """How the force of `smooth_contact_force` changes; the arguments are its own and those of `smooth_hertz`.
 
-    Returns:
-        Of the force along n its derivatives by the depth (N/m) and by the approach v n (N s/m), the force across n over
-        the slip (N s/m), and by what part the force grows with the depth (1/m); all 0 where there is no force.
+    Returns: Of the force along n its derivatives by the depth (N/m) and by the approach v n (N
+        s/m), the force across n over the slip (N s/m), and by what part the force grows with the
+        depth (1/m); all 0 where there is no force.
     """
     hertz, vn = smooth_hertz(d, R, E, cf, bd), dot(v, n)
     if hertz <= 0.0:
@@ -78,7 +85,12 @@ def smooth_contact_derivatives(
         part *= 0.5 + 0.5 * t
     slip = along(v, -vn, n)
     w = sqrt(dot(slip, slip) + cf)
-    return hertz * part * growth, hertz * slope, hertz * part * friction(w, us, ud, uv, vt) / w, growth
+    return (
+        hertz * part * growth,
+        hertz * slope,
+        hertz * part * friction(w, us, ud, uv, vt) / w,
+        growth,
+    )
 
 
 def smooth_contact_energy(hertz: float, d: float) -> float:

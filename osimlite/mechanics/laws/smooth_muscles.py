@@ -1,11 +1,12 @@
 """Muscles whose curves are smooth everywhere, made for direct collocation.
 
-Forces are parts of the maximum isometric force, fiber lengths of the optimal fiber length, fiber velocities of the
-maximum contraction velocity times that length, tendon lengths of the tendon slack length.
+Forces are parts of the maximum isometric force, fiber lengths of the optimal fiber length, fiber
+velocities of the maximum contraction velocity times that length, tendon lengths of the tendon slack
+length.
 
-Sources: F. De Groote, A. L. Kinney, A. V. Rao and B. J. Fregly, Annals of Biomedical Engineering 44 (2016) 2922-2936;
-A. J. Meyer et al., Frontiers in Bioengineering and Biotechnology 4 (2016) 77; with the constants that OpenSim has for
-their curves.
+Sources: F. De Groote, A. L. Kinney, A. V. Rao and B. J. Fregly, Annals of Biomedical Engineering 44
+(2016) 2922-2936; A. J. Meyer et al., Frontiers in Bioengineering and Biotechnology 4 (2016) 77;
+with the constants that OpenSim has for their curves.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ SHORTEST, PASSIVE_SHAPE = 0.2, 4.0
 BELOW = 0.2
 """How far below 0 the exponential of the tendon's force begins."""
 LARGEST_FORCE, CLOSE, ROUNDS = 5.0, 1e-10, 100
-"""Of the search for an equilibrium: the tendon force that it begins with besides 0, how well the force is found, and
-how often an interval is halved."""
+"""Of the search for an equilibrium: the tendon force that it begins with besides 0, how well the
+force is found, and how often an interval is halved.
+"""
 
 
 class SmoothMuscle(NamedTuple):
@@ -45,9 +47,11 @@ class SmoothTendon(NamedTuple):
     """The numbers of De Groote's muscle besides."""
 
     passive_strain: float  # passive_fiber_strain_at_one_norm_force
-    growth: float  # the k of the tendon's force 0.2 (exp(k (l - 1)) - 1) at a length l, see `tendon_growth`
+    # the k of the tendon's force 0.2 (exp(k (l - 1)) - 1) at a length l, see `tendon_growth`
+    growth: float
     elastic: float  # whether the tendon is
-    # whether its force changes so that it stays in equilibrium with the fibers; if not, as a solver says
+    # whether its force changes so that it stays in equilibrium with the fibers; if not, as a solver
+    # says
     explicit: float
 
 
@@ -118,16 +122,18 @@ def smooth_tendon_length(force: float, growth: float) -> float:
 
 def degroote(
     now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
-) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float, float]:
+) -> tuple[
+    float, float, float, float, float, float, float, float, float, float, float, float, float
+]:
     """De Groote's muscle at a moment; see DeGrooteFregly2016Muscle of OpenSim.
 
-    As in OpenSim, damping of the fibers is not in the rate of the tendon's force: with an elastic tendon it changes
-    only what is reported of the fibers.
+    As in OpenSim, damping of the fibers is not in the rate of the tendon's force: with an elastic
+    tendon it changes only what is reported of the fibers.
 
-    Returns:
-        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
-        velocity, active and passive fiber force (N), rates of activation and of the normalized tendon force (1/s),
-        fiber velocity (m/s), what of the passive force is not by damping (N), energy (J).
+    Returns: Tension (N), activation, fiber length (m), cosine of pennation, factors of the active
+        force by length and by velocity, active and passive fiber force (N), rates of activation and
+        of the normalized tendon force (1/s), fiber velocity (m/s), what of the passive force is not
+        by damping (N), energy (J).
     """
     a = now.activation if m.follows else now.excitation
     force = now.normalized_tendon_force
@@ -136,7 +142,11 @@ def degroote(
     fiber_length = sqrt(along * along + m.height * m.height)
     cos = along / fiber_length
     active = degroote_active(fiber_length / m.optimal, m.scale)
-    passive, energy = degroote_passive(fiber_length / m.optimal, tendon.passive_strain) if m.passive else (0.0, 0.0)
+    passive, energy = (
+        degroote_passive(fiber_length / m.optimal, tendon.passive_strain)
+        if m.passive
+        else (0.0, 0.0)
+    )
     energy *= m.strength * m.optimal
     fastest, force_rate = m.fastest * m.optimal, 0.0
     if tendon.elastic and tendon.explicit:
@@ -172,7 +182,9 @@ def rigid_fibers(now: MuscleInputs, m: SmoothMuscle) -> tuple[float, float]:
     return fiber_length / m.optimal, now.rate * (along / fiber_length) / (m.fastest * m.optimal)
 
 
-def degroote_equilibrium(now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon) -> tuple[bool, float]:
+def degroote_equilibrium(
+    now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
+) -> tuple[bool, float]:
     """Whether there is a tendon force that the fibers bear while it does not change, and that force.
 
     The interval from 0 to 5 is halved, step for step as in OpenSim's solveBisection.
@@ -193,7 +205,9 @@ def degroote_equilibrium(now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendo
     return result, middle
 
 
-def degroote_residual(force: float, now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon) -> float:
+def degroote_residual(
+    force: float, now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
+) -> float:
     """By how much the tendon's force exceeds what the fibers bear along it, if it does not change."""
     still = SmoothTendon(tendon.passive_strain, tendon.growth, tendon.elastic, 0.0)
     pulled = MuscleInputs(now.length, now.rate, now.excitation, now.activation, 0.0, 0.0, force)
@@ -206,7 +220,9 @@ def meyer_active(length: float, scale: float) -> float:
     x = (length - 1.0) / scale + 1.0
     return (
         bell(x, 0.8174335195120225, 1.054348561163096, 0.16194288662761705, 0.06381565266097716)
-        + bell(x, 0.43130780147182907, 0.7163004817144202, -0.029060905806803296, 0.19835014521987723)
+        + bell(
+            x, 0.43130780147182907, 0.7163004817144202, -0.029060905806803296, 0.19835014521987723
+        )
         + bell(x, 0.1, 1.0, 0.353553390593274, 0.0)
     )
 
@@ -220,7 +236,9 @@ def meyer_passive(length: float) -> float:
 def meyer_factor(velocity: float) -> float:
     """Factor of the active force by the normalized velocity."""
     inner = atan(-0.27671677680513945 + 8.053304562566995 * velocity)
-    return -32.51401019139919 + 22.160392466960214 * atan(18.7932134796918 + 6.320952269683997 * inner)
+    return -32.51401019139919 + 22.160392466960214 * atan(
+        18.7932134796918 + 6.320952269683997 * inner
+    )
 
 
 def meyer(

@@ -1,9 +1,11 @@
 """Springs on a coordinate, between two points and along a path.
 
-q is a coordinate and u its speed; l is a length and v its rate of change. Tensions are positive where they pull.
-Sources: Hooke's law; for a path, R. Hunt and F. Crossley's form of dissipation (proportional to the elastic force)
-as OpenSim's PathSpring has it; for ligaments L. Blankevoort and R. Huiskes, "Ligament-bone interaction in a
-three-dimensional model of the knee", Journal of Biomechanical Engineering 113 (1991) 263-269.
+q is a coordinate and u its speed; l is a length and v its rate of change. Tensions are positive
+where they pull.
+Sources: Hooke's law; for a path, R. Hunt and F. Crossley's form of dissipation (proportional to the
+elastic force) as OpenSim's PathSpring has it; for ligaments L. Blankevoort and R. Huiskes,
+"Ligament-bone interaction in a three-dimensional model of the knee", Journal of Biomechanical
+Engineering 113 (1991) 263-269.
 """
 
 from __future__ import annotations
@@ -76,11 +78,13 @@ def stretch(length: float, l0: float, clamped: bool) -> float:
     return 0.0 if clamped and length < l0 else length - l0
 
 
-def blankevoort_tension(length: float, rate: float, l0: float, k: float, e1: float, c: float) -> float:
+def blankevoort_tension(
+    length: float, rate: float, l0: float, k: float, e1: float, c: float
+) -> float:
     """Tension of a ligament, in N, at the strain e = l / l0 - 1.
 
-    k e^2 / (2 e1) for 0 < e < e1, k (e - e1 / 2) beyond; while the ligament is taut and lengthens, c v / l0 more, which
-    sets in along 10 x^3 - 15 x^4 + 6 x^5 with x = e / 0.01, as OpenSim has it.
+    k e^2 / (2 e1) for 0 < e < e1, k (e - e1 / 2) beyond; while the ligament is taut and lengthens,
+    c v / l0 more, which sets in along 10 x^3 - 15 x^4 + 6 x^5 with x = e / 0.01, as OpenSim has it.
 
     Args:
         length: l, m.
@@ -117,8 +121,8 @@ def blankevoort_energy(length: float, l0: float, k: float, e1: float) -> float:
 def mckibben_tension(L: float, p: float, n: float, B: float, l0: float) -> float:
     """Tension p (3 (L - l0)^2 - B^2) / (4 pi n^2) of a pneumatic muscle, N.
 
-    Source: C.-P. Chou and B. Hannaford, "Measurement and modeling of McKibben pneumatic artificial muscles", IEEE
-    Transactions on Robotics and Automation 12 (1996) 90-102.
+    Source: C.-P. Chou and B. Hannaford, "Measurement and modeling of McKibben pneumatic artificial
+    muscles", IEEE Transactions on Robotics and Automation 12 (1996) 90-102.
 
     Args:
         L: length of the path, m.

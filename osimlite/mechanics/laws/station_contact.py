@@ -1,7 +1,8 @@
 """Contact of a point with the plane y = 0 of ground, by a damped spring that sets in smoothly.
 
-Source: A. J. Meyer et al., "Muscle synergies facilitate computational prediction of subject-specific walking motions",
-Frontiers in Bioengineering and Biotechnology 4 (2016) 77, in the form of OpenSim's MeyerFregly2016Force.
+Source: A. J. Meyer et al., "Muscle synergies facilitate computational prediction of
+subject-specific walking motions", Frontiers in Bioengineering and Biotechnology 4 (2016) 77, in the
+form of OpenSim's MeyerFregly2016Force.
 """
 
 from __future__ import annotations
@@ -23,9 +24,10 @@ def station_contact_force(
 ) -> tuple[float, float, float]:
     """Force on the point.
 
-    With h = 0.7 tanh((y - l0) / 0.7), s = (k - k0) / 2 and v = (k + k0) / (k - k0), the elastic force is
-    s (v (y0 - h) - e (log cosh((y0 + d) / e) - log cosh((h + d) / e))); k0 = 0.1 N/m, y0 = 0.01 m, d = e = 0.001 m. It
-    is multiplied by 1 - c vy, and rubs with (ud tanh(w / vl) + uv w) times its size, w being the slip.
+    With h = 0.7 tanh((y - l0) / 0.7), s = (k - k0) / 2 and v = (k + k0) / (k - k0), the elastic
+    force is s (v (y0 - h) - e (log cosh((y0 + d) / e) - log cosh((h + d) / e))); k0 = 0.1 N/m, y0 =
+    0.01 m, d = e = 0.001 m. It is multiplied by 1 - c vy, and rubs with (ud tanh(w / vl) + uv w)
+    times its size, w being the slip.
 
     Args:
         y: height of the point, m.

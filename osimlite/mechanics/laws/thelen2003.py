@@ -1,7 +1,8 @@
 """The muscle of D. G. Thelen (Journal of Biomechanical Engineering 125, 2003), as OpenSim's Thelen2003Muscle has it.
 
-Forces are parts of the maximum isometric force F, fiber lengths of the optimal fiber length, fiber velocities of the
-maximum contraction velocity times that length, tendon lengths of the tendon slack length.
+Forces are parts of the maximum isometric force F, fiber lengths of the optimal fiber length, fiber
+velocities of the maximum contraction velocity times that length, tendon lengths of the tendon slack
+length.
 """
 
 from __future__ import annotations
@@ -71,11 +72,15 @@ def fibers_at(m: Thelen2003, path_length: float, length: float) -> Fibers:
     """Fibers of some length, m."""
     cos = cos_pennation(length, m.height, m.shortest, m.largest_sin, m.least_cos)
     tendon_length = path_length - length * cos
-    tendon, tendon_slope = tendon_force(tendon_length / m.slack - 1.0, m.toe, m.growth, m.factor, m.slope)
+    tendon, tendon_slope = tendon_force(
+        tendon_length / m.slack - 1.0, m.toe, m.growth, m.factor, m.slope
+    )
     active, active_slope = active_force(length / m.optimal, m.width)
     passive, passive_slope = passive_force(length / m.optimal, m.passive_growth, m.passive_factor)
     is_taut = tendon_length > m.slack
-    return Fibers(length, cos, is_taut, tendon, tendon_slope, active, active_slope, passive, passive_slope)
+    return Fibers(
+        length, cos, is_taut, tendon, tendon_slope, active, active_slope, passive, passive_slope
+    )
 
 
 def tendon_shape(strain_at_one: float) -> tuple[float, float, float, float]:
@@ -88,7 +93,9 @@ def tendon_shape(strain_at_one: float) -> tuple[float, float, float, float]:
     return end, TOE_SHAPE / end, TOE_FORCE / (exp(TOE_SHAPE) - 1.0), 0.67 / (strain_at_one - end)
 
 
-def tendon_force(strain: float, toe: float, growth: float, factor: float, slope: float) -> tuple[float, float]:
+def tendon_force(
+    strain: float, toe: float, growth: float, factor: float, slope: float
+) -> tuple[float, float]:
     """The tendon's force and its derivative; see `tendon_shape`."""
     if strain > toe:
         return slope * (strain - toe) + TOE_FORCE, slope
@@ -102,7 +109,9 @@ def tendon_energy(strain: float, toe: float, growth: float, factor: float, slope
     """Integral of the tendon's force over its strain."""
     bent = min(max(strain, 0.0), toe)
     straight = max(strain - toe, 0.0)
-    return factor * ((exp(growth * bent) - 1.0) / growth - bent) + straight * (TOE_FORCE + 0.5 * slope * straight)
+    return factor * ((exp(growth * bent) - 1.0) / growth - bent) + straight * (
+        TOE_FORCE + 0.5 * slope * straight
+    )
 
 
 def passive_energy(length: float, growth: float, factor: float) -> float:
@@ -126,11 +135,13 @@ def active_force(length: float, width: float) -> tuple[float, float]:
     return force, -2.0 * off / width * force
 
 
-def fiber_velocity(m: Thelen2003, force: float, activation: float, isometric: float) -> tuple[float, float]:
+def fiber_velocity(
+    m: Thelen2003, force: float, activation: float, isometric: float
+) -> tuple[float, float]:
     """Normalized velocity of fibers that actively bear a force, and its derivative.
 
-    The paper's curve goes on as a straight line for forces below 0, and near the one that fibers approach that
-    lengthen.
+    The paper's curve goes on as a straight line for forces below 0, and near the one that fibers
+    approach that lengthen.
 
     Args:
         m: the muscle.
@@ -150,7 +161,9 @@ def fiber_velocity(m: Thelen2003, force: float, activation: float, isometric: fl
     return velocity + slope * (force - at), slope
 
 
-def force_at_velocity(m: Thelen2003, velocity: float, activation: float, isometric: float, enough: float) -> float:
+def force_at_velocity(
+    m: Thelen2003, velocity: float, activation: float, isometric: float, enough: float
+) -> float:
     """What `fiber_velocity` inverts, over the force at rest; not a number if Newton's method does not end.
 
     Args:
@@ -180,11 +193,12 @@ def thelen2003(
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
     """The muscle at a moment; see Thelen2003Muscle::calcFiberVelocityInfo and calcMuscleDynamicsInfo of OpenSim.
 
-    Fibers at their least length stay there as long as they would shorten, and bear nothing then but what is passive.
+    Fibers at their least length stay there as long as they would shorten, and bear nothing then but
+    what is passive.
 
-    Returns:
-        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
-        velocity, active and passive fiber force (N), rate of activation (1/s), fiber velocity (m/s).
+    Returns: Tension (N), activation, fiber length (m), cosine of pennation, factors of the active
+        force by length and by velocity, active and passive fiber force (N), rate of activation
+        (1/s), fiber velocity (m/s).
     """
     active = min(max(now.activation, m.least), 1.0)
     fibers = fibers_at(m, now.length, max(now.fiber_length, m.shortest))
@@ -221,7 +235,8 @@ def thelen2003_rigid(now: MuscleInputs, m: Thelen2003) -> float:
 def thelen2003_energy(m: Thelen2003, length: float, fiber_length: float, cos: float) -> float:
     """Potential energy of tendon and fibers, J.
 
-    As in OpenSim, whose fibers store what those of as many optimal lengths do as they have meters: none below 1 m.
+    As in OpenSim, whose fibers store what those of as many optimal lengths do as they have meters:
+    none below 1 m.
 
     Args:
         m: the muscle.
@@ -231,18 +246,22 @@ def thelen2003_energy(m: Thelen2003, length: float, fiber_length: float, cos: fl
     """
     strain = (length - fiber_length * cos) / m.slack - 1.0
     tendon = m.slack * tendon_energy(strain, m.toe, m.growth, m.factor, m.slope)
-    return m.strength * (tendon + m.optimal * passive_energy(fiber_length, m.passive_growth, m.passive_factor))
+    return m.strength * (
+        tendon + m.optimal * passive_energy(fiber_length, m.passive_growth, m.passive_factor)
+    )
 
 
 def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, float]:
     """Whether there is a fiber length at which fibers and tendon bear the same, and that length (m).
 
-    Newton's method with halved steps, step for step as in Thelen2003Muscle::initMuscleState: the rate of the path is
-    shared between fibers and tendon by their stiffness, so that a muscle whose path moves does not start at rest. A
-    length that would be below the least is that.
+    Newton's method with halved steps, step for step as in Thelen2003Muscle::initMuscleState: the
+    rate of the path is shared between fibers and tendon by their stiffness, so that a muscle whose
+    path moves does not start at rest. A length that would be below the least is that.
     """
     length, active = now.length, min(max(now.activation, m.least), 1.0)
-    fibers = fibers_at(m, length, fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos))
+    fibers = fibers_at(
+        m, length, fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos)
+    )
     stiffness, _ = stiffnesses(m, fibers, active, 0.0)
     by_velocity = shared(m, fibers, active, now.rate, stiffness)
     borne, error = balance(m, fibers, active * by_velocity)
@@ -295,7 +314,9 @@ def stiffnesses(m: Thelen2003, fibers: Fibers, active: float, borne: float) -> t
     return stiffness * fibers.cos + borne * sin * sin / (length * cos), of_tendon
 
 
-def shared(m: Thelen2003, fibers: Fibers, activation: float, rate: float, stiffness: float) -> float:
+def shared(
+    m: Thelen2003, fibers: Fibers, activation: float, rate: float, stiffness: float
+) -> float:
     """Factor of the active force by the velocity that the fibers have if the stiffer part moves less.
 
     Args:

@@ -23,8 +23,9 @@ _get = imported_when_used(__name__, _NUMERIC)
 
 
 def __getattr__(name: str) -> Any:
-    # `from osimlite.mechanics.multibody import functions` asks for the name of a module too, before it is imported. The linter
-    # needs such modules without numpy, so only the names above may ask for it.
+    # `from osimlite.mechanics.multibody import functions` asks for the name of a module too, before
+    # it is imported. The linter needs such modules without numpy, so only the names above may ask
+    # for it.
     if name in _NUMERIC:
         require("numpy", extra="sim", purpose="a mechanism")
     return _get(name)

@@ -18,8 +18,8 @@ _SERIES = [(-1.0) ** n / math.factorial(2 * n + first) for first in (1, 2) for n
 class ArcPoint(Function):
     """One component of the end of a rod that starts upright and bends evenly, as a function of its two end angles.
 
-    The rod stands along Y; its end points along the Y axis that is turned first about X by one angle, then about the
-    new Z by the other. Bent by θ in all, it is an arc of radius length / θ.
+    The rod stands along Y; its end points along the Y axis that is turned first about X by one
+    angle, then about the new Z by the other. Bent by θ in all, it is an arc of radius length / θ.
     """
 
     component: int  # 0 to 2
@@ -29,7 +29,15 @@ class ArcPoint(Function):
     @property
     def table(self) -> Sequence[float]:
         """A bent rod."""
-        return [ARC, 1.0, float(self.component), self.length, *self.neutral, len(_SERIES) / 2.0, *_SERIES]
+        return [
+            ARC,
+            1.0,
+            float(self.component),
+            self.length,
+            *self.neutral,
+            len(_SERIES) / 2.0,
+            *_SERIES,
+        ]
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
         """Value, gradient (2,) and Hessian (2, 2) at the two angles."""

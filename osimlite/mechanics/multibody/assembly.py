@@ -1,12 +1,14 @@
 """States that fulfil the constraints: the nearest pose, the nearest speeds.
 
-OpenSim assembles a model by minimising half the sum of squared changes of the coordinates under the constraints;
-coordinates that depend on others and those free to satisfy constraints do not count, locked ones keep their values,
-and clamped ones stay in their range. Here Newton's method leads to the constraints and then along them to the minimum.
+OpenSim assembles a model by minimising half the sum of squared changes of the coordinates under the
+constraints; coordinates that depend on others and those free to satisfy constraints do not count,
+locked ones keep their values, and clamped ones stay in their range. Here Newton's method leads to
+the constraints and then along them to the minimum.
 
-OpenSim's optimizer (IPOPT, to `assembly_accuracy`) ends within that of the minimum, but for clamped coordinates: of
-these a barrier of about 1e-10 keeps it off, by 1e-10 / d from an end at distance d, by 1e-5 where the minimum is at an
-end. Where exactly depends on the whole way there, which is not followed here.
+OpenSim's optimizer (IPOPT, to `assembly_accuracy`) ends within that of the minimum, but for clamped
+coordinates: of these a barrier of about 1e-10 keeps it off, by 1e-10 / d from an end at distance d,
+by 1e-5 where the minimum is at an end. Where exactly depends on the whole way there, which is not
+followed here.
 """
 
 from __future__ import annotations
@@ -57,13 +59,16 @@ def assembled(mechanism: Mechanism, q: Array, time: float, kept: Collection[int]
     """The coordinate values (n,) nearest to `q` (n,) that fulfil the constraints at `time` (s).
 
     The coordinates with indices `kept` keep their values, as locked ones do. Where no pose within
-    the ranges of the clamped coordinates fulfils the constraints, the ranges give way, as in OpenSim.
+    the ranges of the clamped coordinates fulfils the constraints, the ranges give way, as in
+    OpenSim.
 
     Raises:
         SimulationError: there are none, or they are too far to be found.
     """
     infos = mechanism.coordinates
-    held = {place: float(q[place]) for place, info in enumerate(infos) if info.locked or place in kept}
+    held = {
+        place: float(q[place]) for place, info in enumerate(infos) if info.locked or place in kept
+    }
     unclamped: Array | None = None
     while True:
         try:
@@ -96,7 +101,9 @@ def find_unclamped(mechanism: Mechanism, q: Array) -> list[int]:
     return [
         index
         for index, info in enumerate(mechanism.coordinates)
-        if info.clamped and info.prescribed is None and not info.range[0] - 1e-12 <= q[index] <= info.range[1] + 1e-12
+        if info.clamped
+        and info.prescribed is None
+        and not info.range[0] - 1e-12 <= q[index] <= info.range[1] + 1e-12
     ]
 
 
@@ -117,7 +124,9 @@ def projected(state: Kinematics, kept: Collection[int] = ()) -> Array:
     missing = wanted - rows @ state.u
     change, _ = solutions(rows * scales, missing)
     u: Array = state.u + scales * change
-    if kept and np.abs(rows @ u - wanted).max(initial=0.0) > 1e-9 * (1.0 + np.abs(missing).max(initial=0.0)):
+    if kept and np.abs(rows @ u - wanted).max(initial=0.0) > 1e-9 * (
+        1.0 + np.abs(missing).max(initial=0.0)
+    ):
         names = [state.mechanism.coordinates[place].name for place in kept]
         raise SimulationError(
             f"the constraints of '{state.mechanism.name}' do not allow the speeds given for {listed(names)}; "
@@ -160,20 +169,31 @@ def tolerance_of(mechanism: Mechanism) -> float:
 class _Search:
     """Half the sum of squared changes of the coordinates that count, on the surface where the constraints hold."""
 
-    def __init__(self, mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int, float]) -> None:
+    def __init__(
+        self, mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int, float]
+    ) -> None:
         self.mechanism, self.wanted, self.time = mechanism, wanted, time
         self.counted = np.array([0.0 if info.yielding else 1.0 for info in mechanism.coordinates])
         self.free = [index for index in range(len(wanted)) if index not in held]
         self.start = wanted.copy()
         self.start[list(held)] = list(held.values())
         self.tolerance = tolerance_of(mechanism)
-        # OpenSim leaves such a pose as it is; its integrator takes the shortest way to the constraints.
-        self.assembled = bool(np.abs(_errors(self._state(self.start))).max(initial=0.0) <= self.tolerance)
+        # OpenSim leaves such a pose as it is; its integrator takes the shortest way to the
+        # constraints.
+        self.assembled = bool(
+            np.abs(_errors(self._state(self.start))).max(initial=0.0) <= self.tolerance
+        )
         # Otherwise what does not count gives way first; what depends on others follows them.
         if not self.assembled:
             for item in mechanism.constraints:
-                if isinstance(item, Coupler) and item.dependent in self.free and not self.counted[item.dependent]:
-                    self.start[item.dependent] = item.function.evaluate(self.start[list(item.independent)])[0]
+                if (
+                    isinstance(item, Coupler)
+                    and item.dependent in self.free
+                    and not self.counted[item.dependent]
+                ):
+                    self.start[item.dependent] = item.function.evaluate(
+                        self.start[list(item.independent)]
+                    )[0]
         self.ease = np.where(self.assembled | (self.counted[self.free] > 0.0), 1.0, _EASE)
 
     def cost(self, q: Array) -> float:
@@ -184,7 +204,9 @@ class _Search:
         """Newton's step (n,) along the surface, with the curvature of the constraints."""
         rows = self._rows(self._state(q))
         gradient, weights = (self.counted * (q - self.wanted))[self.free], self.counted[self.free]
-        multipliers = np.asarray(np.linalg.lstsq(rows.T, -gradient, rcond=1e-9)[0], dtype=np.float64)
+        multipliers = np.asarray(
+            np.linalg.lstsq(rows.T, -gradient, rcond=1e-9)[0], dtype=np.float64
+        )
         _, along = solutions(rows, np.zeros(len(rows)))
         curvature = along.T @ (weights[:, None] * along)
         if np.abs(multipliers).max(initial=0.0) > 1e-12:
@@ -208,7 +230,8 @@ class _Search:
         for _ in range(_STEPS):
             step, _ = solutions(self._rows(state) * self.ease, -errors)
             step *= self.ease
-            # Far away the equations say little about where to go; small steps, even to worse places, find out.
+            # Far away the equations say little about where to go; small steps, even to worse
+            # places, find out.
             size = min(1.0, _FURTHEST / float(np.abs(step).max(initial=_FURTHEST)))
             trial = q + size * self._spread(step)
             state = self._state(trial)
@@ -241,7 +264,9 @@ class _Search:
     def _bend(self, q: Array, direction: Array, multipliers: Array) -> Array:
         """How the multipliers' pull on the free coordinates changes along a direction of them (f,)."""
         change = 1e-6 * self._spread(direction)
-        ahead, behind = (self._rows(self._state(place)).T @ multipliers for place in (q + change, q - change))
+        ahead, behind = (
+            self._rows(self._state(place)).T @ multipliers for place in (q + change, q - change)
+        )
         return (ahead - behind) / 2e-6
 
     def _spread(self, step: Array) -> Array:

@@ -90,11 +90,12 @@ class WeldConstraint(_Between[FramePlacement]):
 class RollingConstraint(Constraint):
     """OpenSim's RollingOnSurfaceConstraint: a roller on a plane that neither slips nor turns about the normal.
 
-    The roller's origin stays at `height` along `normal` (3,) of the surface's frame, its Z axis square to the
-    surface's X axis; and along the surface's X and Z axes the two bodies have the same velocity at the origin of the
-    surface (which is where OpenSim puts the point of contact, wherever the roller is). The accelerations are those
-    that keep all this up; Simbody's do not, because it compares material points and leaves out that the roller has
-    another one at the contact every moment.
+    The roller's origin stays at `height` along `normal` (3,) of the surface's frame, its Z axis
+    square to the surface's X axis; and along the surface's X and Z axes the two bodies have the
+    same velocity at the origin of the surface (which is where OpenSim puts the point of contact,
+    wherever the roller is). The accelerations are those that keep all this up; Simbody's do not,
+    because it compares material points and leaves out that the roller has another one at the
+    contact every moment.
     """
 
     surface: int

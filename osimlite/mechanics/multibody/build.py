@@ -39,33 +39,35 @@ from osimlite.schema.model import Model, expect_model
 
 
 @any_numbers
-def build_mechanism(model: Model, *, opensim_derivatives: bool = False, rolling: bool = False) -> Mechanism:
+def build_mechanism(
+    model: Model, *, opensim_derivatives: bool = False, rolling: bool = False
+) -> Mechanism:
     """The tree of bodies and mobilizers that a model describes, with its constraints.
 
-    Bodies come level by level from ground, within a level in the order of the joints that carry them; coordinates
-    come in the order of OpenSim's CoordinateSet. A joint whose child is nearer to ground than its parent is reversed.
-    Bodies that no joint connects to ground get a FreeJoint, named as OpenSim names it.
+    Bodies come level by level from ground, within a level in the order of the joints that carry
+    them; coordinates come in the order of OpenSim's CoordinateSet. A joint whose child is nearer to
+    ground than its parent is reversed. Bodies that no joint connects to ground get a FreeJoint,
+    named as OpenSim names it.
 
-    Where a joint closes a loop, a WeldJoint becomes a constraint; for any other joint its child body is split into
-    halves, one of which the joint carries, and the halves are welded by a constraint. (OpenSim 4.6 does the same, but
-    then counts the child of the WeldJoint twice, and gives the half a wrong inertia: so it is with
-    `opensim_derivatives`.) Forces and geometry play no part.
+    Where a joint closes a loop, a WeldJoint becomes a constraint; for any other joint its child
+    body is split into halves, one of which the joint carries, and the halves are welded by a
+    constraint. (OpenSim 4.6 does the same, but then counts the child of the WeldJoint twice, and
+    gives the half a wrong inertia: so it is with `opensim_derivatives`.) Forces and geometry play
+    no part.
 
-    Args:
-        model: the model.
-        opensim_derivatives: compute two second derivatives as OpenSim 4.6 does, which are wrong. Simbody differentiates
-            the angular velocity of a CustomJoint as if its first coordinate alone drove the first rotation and the
-            first two alone the first two, so accelerations are off where one coordinate drives several rotations (the
-            knee of Rajagopal's model: up to 1 % at usual speeds) and energy is not conserved. And OpenSim takes the
-            gradient of a MultivariatePolynomialFunction for each column of its Hessian. Without this switch both are
-            right.
-        rolling: let every RollingOnSurfaceConstraint act. OpenSim leaves them off until a program turns them on.
+    Args: model: the model. opensim_derivatives: compute two second derivatives as OpenSim 4.6 does,
+        which are wrong. Simbody differentiates the angular velocity of a CustomJoint as if its
+        first coordinate alone drove the first rotation and the first two alone the first two, so
+        accelerations are off where one coordinate drives several rotations (the knee of Rajagopal's
+        model: up to 1 % at usual speeds) and energy is not conserved. And OpenSim takes the
+        gradient of a MultivariatePolynomialFunction for each column of its Hessian. Without this
+        switch both are right. rolling: let every RollingOnSurfaceConstraint act. OpenSim leaves
+        them off until a program turns them on.
 
-    Raises:
-        ModelError: something names what does not exist, a joint connects
-            a body with itself or has the wrong number of coordinates, a mass, an inertia, a function is impossible.
-        UnsupportedError: a joint, a constraint, a frame or a function of another class; a loop closed by a FreeJoint or
-            by a joint whose child is ground.
+    Raises: ModelError: something names what does not exist, a joint connects a body with itself or
+        has the wrong number of coordinates, a mass, an inertia, a function is impossible.
+        UnsupportedError: a joint, a constraint, a frame or a function of another class; a loop
+        closed by a FreeJoint or by a joint whose child is ground.
     """
     expect_model(model)
     return _Builder(model, opensim_derivatives, rolling).mechanism()
@@ -122,8 +124,13 @@ class _Builder:
         placed = self.placements
         for path, (base, _) in placed.found.items():
             if base not in index:
-                raise UnsupportedError(f"the frame '{path}' is no body of the model, nor fixed to one; take it out")
-        frames = {path: FramePlacement(index[base], matrix) for path, (base, matrix) in placed.found.items()}
+                raise UnsupportedError(
+                    f"the frame '{path}' is no body of the model, nor fixed to one; take it out"
+                )
+        frames = {
+            path: FramePlacement(index[base], matrix)
+            for path, (base, matrix) in placed.found.items()
+        }
         stations = {}
         for component in self.tree.components:
             if isinstance(component, Station) and not self.tree.is_internal(component):
@@ -153,13 +160,23 @@ class _Builder:
 
     def _edge(self, joint: Joint) -> _Edge:
         path = self.placements.path(joint)
-        parent, parent_frame = self.placements.frame(self.placements.named(joint, "socket_parent_frame"))
-        child, child_frame = self.placements.frame(self.placements.named(joint, "socket_child_frame"))
+        parent, parent_frame = self.placements.frame(
+            self.placements.named(joint, "socket_parent_frame")
+        )
+        child, child_frame = self.placements.frame(
+            self.placements.named(joint, "socket_child_frame")
+        )
         if parent == child:
-            raise ModelError(f"the joint '{path}' connects '{parent}' to itself; name frames of two bodies")
-        motions, coordinates = joint_motions(joint, path, opensim_derivatives=self.opensim_derivatives)
+            raise ModelError(
+                f"the joint '{path}' connects '{parent}' to itself; name frames of two bodies"
+            )
+        motions, coordinates = joint_motions(
+            joint, path, opensim_derivatives=self.opensim_derivatives
+        )
         first, count = len(self.coordinates), len(coordinates)
-        middle = {motion.coordinates[1] for motion in motions if isinstance(motion, SphericalMotion)}
+        middle = {
+            motion.coordinates[1] for motion in motions if isinstance(motion, SphericalMotion)
+        }
         kinds = motion_types(motions, count)
         for index, (coordinate, motion_type) in enumerate(zip(coordinates, kinds, strict=True)):
             own_path = self.placements.path(coordinate)
@@ -181,10 +198,13 @@ class _Builder:
                 )
             )
         own = tuple(range(first, first + count))
-        return _Edge(type(joint).__name__, path, parent, child, parent_frame, child_frame, motions, own)
+        return _Edge(
+            type(joint).__name__, path, parent, child, parent_frame, child_frame, motions, own
+        )
 
     def _prescribed(self, coordinate: Coordinate, path: str) -> Function | None:
-        # OpenSim leaves a prescribed coordinate without a function free. It cannot start where one is locked too.
+        # OpenSim leaves a prescribed coordinate without a function free. It cannot start where one
+        # is locked too.
         if not coordinate.prescribed or coordinate.prescribed_function is None or coordinate.locked:
             return None
         return numeric(
@@ -202,14 +222,19 @@ class _Builder:
         edges = [*edges, *(self._free(path, ground) for path in self.bodies if path not in joined)]
         while True:
             branches, loops = spanning_tree(edges, ground, masses)
-            index = {ground: GROUND} | {branch.outer: place for place, branch in enumerate(branches)}
+            index = {ground: GROUND} | {
+                branch.outer: place for place, branch in enumerate(branches)
+            }
             loose = [path for path in self.bodies if path not in index]
             if not loose:
                 break
             edges.append(self._free(new_base(loose, edges), ground))
         bodies = []
         for edge, outer, backward in branches:
-            carrier, mobilizer = edge.child if backward else edge.parent, edge.mobilizer(reversed=backward)
+            carrier, mobilizer = (
+                edge.child if backward else edge.parent,
+                edge.mobilizer(reversed=backward),
+            )
             properties = mass_properties(self.bodies[outer], outer)
             bodies.append(MobileBody(_last(outer), outer, index[carrier], properties, mobilizer))
         for edge in loops:
@@ -244,18 +269,26 @@ class _Builder:
     def _split(self, edge: _Edge, index: dict[str, int], bodies: list[MobileBody]) -> None:
         """Let the joint carry a part of its child, and weld that to the rest."""
         place, whole = index[edge.child], mass_properties(self.bodies[edge.child], edge.child)
-        parts = [place, *(k for k, body in enumerate(bodies) if body.path.startswith(f"{edge.child}_part"))]
+        parts = [
+            place,
+            *(k for k, body in enumerate(bodies) if body.path.startswith(f"{edge.child}_part")),
+        ]
         path = f"{edge.child}_part{len(parts)}"
-        bodies.append(MobileBody(_last(path), path, index[edge.parent], whole, edge.mobilizer(reversed=False)))
+        bodies.append(
+            MobileBody(_last(path), path, index[edge.parent], whole, edge.mobilizer(reversed=False))
+        )
         parts.append(len(bodies) - 1)
         share = whole.share(len(parts))
         for part in parts:
-            # OpenSim gives its parts, but for the body itself, the inertia about the origin of 1 kg of the body.
+            # OpenSim gives its parts, but for the body itself, the inertia about the origin of 1 kg
+            # of the body.
             wrong = self.opensim_derivatives and part != place
             inertia = whole.about_origin() / whole.mass if wrong and whole.mass else share.inertia
             bodies[part] = replace(bodies[part], mass_properties=replace(share, inertia=inertia))
         still = np.eye(4)
-        weld = WeldConstraint(FramePlacement(place, still), FramePlacement(len(bodies) - 1, still), edge.path)
+        weld = WeldConstraint(
+            FramePlacement(place, still), FramePlacement(len(bodies) - 1, still), edge.path
+        )
         self.constraints.append(weld)
 
     def _constrain(self, index: dict[str, int]) -> None:
@@ -298,11 +331,15 @@ def mass_properties(body: Body, path: str) -> MassProperties:
     """
     mass = body.mass
     if not 0.0 <= mass < np.inf:
-        raise ModelError(f"the body '{path}' has mass {mass:g}; give it a mass in kg that is not negative")
+        raise ModelError(
+            f"the body '{path}' has mass {mass:g}; give it a mass in kg that is not negative"
+        )
     center, (xx, yy, zz, xy, xz, yz) = np.array(body.mass_center, dtype=float), body.inertia
     inertia = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), dtype=float)
     if not (np.isfinite(center).all() and np.isfinite(inertia).all()):
-        raise ModelError(f"the body '{path}' has a mass centre or inertia that is not finite; give numbers")
+        raise ModelError(
+            f"the body '{path}' has a mass centre or inertia that is not finite; give numbers"
+        )
     # OpenSim lets a body without mass have no inertia either.
     return MassProperties(mass, center, inertia if mass > np.finfo(float).eps else np.zeros((3, 3)))
 

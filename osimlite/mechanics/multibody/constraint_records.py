@@ -69,10 +69,14 @@ def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> C
         case Lock():
             # Every value is right, as long as it stays.
             own = _coordinate(constraint.coordinate, places, balls)
-            return ConstraintRecord("prescribe", own, table_of_one(Constant(0.0), constraint.name), positions=0)
+            return ConstraintRecord(
+                "prescribe", own, table_of_one(Constant(0.0), constraint.name), positions=0
+            )
         case Prescribed():
             table = table_of_one(constraint.function, f"the function of '{constraint.name}'")
-            return ConstraintRecord("prescribe", _coordinate(constraint.coordinate, places, balls), table)
+            return ConstraintRecord(
+                "prescribe", _coordinate(constraint.coordinate, places, balls), table
+            )
         case Coupler():
             return _coupler(constraint, places, balls)
         case b.RollingConstraint():
@@ -126,7 +130,9 @@ def _coupler(constraint: Coupler, places: Places, balls: Balls) -> ConstraintRec
     for place in others:
         ints += _coordinate(place, places, balls)
     numbers = [places.locked_value(place) for place in (constraint.dependent, *others)]
-    return ConstraintRecord("couple", ints, [*numbers, *table], room=max(len(others), 1), room_at=len(dependent))
+    return ConstraintRecord(
+        "couple", ints, [*numbers, *table], room=max(len(others), 1), room_at=len(dependent)
+    )
 
 
 def _between(equations: Sequence[_Equation], positions: int | None = None) -> ConstraintRecord:
@@ -136,7 +142,9 @@ def _between(equations: Sequence[_Equation], positions: int | None = None) -> Co
         ints += [item.kind, *item.first.ints, *item.second.ints]
         numbers += [*item.first.numbers, *item.second.numbers, item.wanted]
     count = len(equations)
-    return ConstraintRecord("bind_bodies", ints, numbers, count, count if positions is None else positions)
+    return ConstraintRecord(
+        "bind_bodies", ints, numbers, count, count if positions is None else positions
+    )
 
 
 def _axis(places: Places, body: int, axis: ArrayLike) -> _Vector:
@@ -145,7 +153,9 @@ def _axis(places: Places, body: int, axis: ArrayLike) -> _Vector:
 
 
 def _arm(places: Places, first: StationPlacement, second: StationPlacement) -> _Vector:
-    (one, start), (two, end) = (places.station(body, point.tolist()) for body, point in (first, second))
+    (one, start), (two, end) = (
+        places.station(body, point.tolist()) for body, point in (first, second)
+    )
     return _Vector([ARM, one, two], [*start, *end])
 
 
@@ -160,7 +170,11 @@ def _meeting(places: Places, first: StationPlacement, second: StationPlacement) 
 def _weld(constraint: b.WeldConstraint, places: Places) -> list[_Equation]:
     (one, inner), (two, outer) = constraint.first, constraint.second
     turns = [
-        _Equation(PRODUCT, _axis(places, two, outer[:3, axis]), _axis(places, one, inner[:3, (axis + 1) % 3]))
+        _Equation(
+            PRODUCT,
+            _axis(places, two, outer[:3, axis]),
+            _axis(places, one, inner[:3, (axis + 1) % 3]),
+        )
         for axis in range(3)
     ]
     return [*turns, *_meeting(places, _origin(constraint.first), _origin(constraint.second))]
@@ -168,12 +182,18 @@ def _weld(constraint: b.WeldConstraint, places: Places) -> list[_Equation]:
 
 def _rolling(constraint: b.RollingConstraint, places: Places) -> list[_Equation]:
     surface, roller = constraint.surface, constraint.roller
-    arm = _arm(places, StationPlacement(surface, np.zeros(3)), StationPlacement(roller, np.zeros(3)))
+    arm = _arm(
+        places, StationPlacement(surface, np.zeros(3)), StationPlacement(roller, np.zeros(3))
+    )
     x, _, z = np.eye(3)
     normal: Array = constraint.normal / np.linalg.norm(constraint.normal)
     square = _Equation(PRODUCT, _axis(places, surface, x), _axis(places, roller, z))
     slips = [_Equation(SLIP, _axis(places, surface, axis), arm) for axis in (x, z)]
-    return [_Equation(PRODUCT, _axis(places, surface, normal), arm, constraint.height), square, *slips]
+    return [
+        _Equation(PRODUCT, _axis(places, surface, normal), arm, constraint.height),
+        square,
+        *slips,
+    ]
 
 
 def _origin(placement: FramePlacement) -> StationPlacement:

@@ -1,7 +1,8 @@
 """Constraints: what forbids some of the motions that the joints allow.
 
-Here are those that speak of coordinates; those between bodies are in :mod:`osimlite.mechanics.multibody.body_constraints`. The
-kernels have their equations, see :mod:`osimlite.mechanics.multibody.constraint_records`.
+Here are those that speak of coordinates; those between bodies are in
+:mod:`osimlite.mechanics.multibody.body_constraints`. The kernels have their equations, see
+:mod:`osimlite.mechanics.multibody.constraint_records`.
 """
 
 from __future__ import annotations
@@ -60,8 +61,8 @@ class Constraint(Protocol):
 class Lock(Constraint):
     """Holds one coordinate where it is.
 
-    It acts on the value of the coordinate, not on its speed: a locked angle of a ball joint stands still,
-    whichever angular velocities that takes. Every value is right, as long as it stays.
+    It acts on the value of the coordinate, not on its speed: a locked angle of a ball joint stands
+    still, whichever angular velocities that takes. Every value is right, as long as it stays.
     """
 
     bodies: ClassVar[tuple[int, ...]] = ()

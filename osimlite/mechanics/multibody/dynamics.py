@@ -1,7 +1,8 @@
 """Forces and accelerations of a mechanism.
 
-The equation of motion reads M udot + C = gravity + applied forces, where the generalized forces belong to the
-generalized speeds. The kernels compute it, see :mod:`osimlite.mechanics.kernels.dynamics`.
+The equation of motion reads M udot + C = gravity + applied forces, where the generalized forces
+belong to the generalized speeds. The kernels compute it, see
+:mod:`osimlite.mechanics.kernels.dynamics`.
 """
 
 from __future__ import annotations
@@ -105,7 +106,11 @@ def missing_forces(state: Kinematics, udot: Array, gravity: Array) -> Array:
 
 def _weighed(state: Kinematics, gravity: Array, udot: Floats | None = None) -> Floats:
     """The work vector with the inertias of the links, and the wrenches that are missing for their accelerations."""
-    model, reals, data = state.program.model, state.program.reals, floats(state.vectors[0].tobytes())
+    model, reals, data = (
+        state.program.model,
+        state.program.reals,
+        floats(state.vectors[0].tobytes()),
+    )
     with numbers(data):
         for link in range(model[MODEL.LINKS]):
             acceleration = link_work(model, data, link)[LINK_WORK.ACCELERATION + 3 :]
@@ -121,9 +126,9 @@ def _weighed(state: Kinematics, gravity: Array, udot: Floats | None = None) -> F
 def accelerations(state: Kinematics, applied: Array) -> Array:
     """Derivatives of the speeds (n,) under gravity, `applied` generalized forces (n,) and the constraints.
 
-    Equations that follow from others or contradict them are fulfilled in the sense of least squares. Where the mass
-    matrix cannot be divided by, the motion is solved for in the null space of the constraints: they may drive what has
-    no mass.
+    Equations that follow from others or contradict them are fulfilled in the sense of least
+    squares. Where the mass matrix cannot be divided by, the motion is solved for in the null space
+    of the constraints: they may drive what has no mass.
 
     Raises:
         SimulationError: a motion that nothing forbids moves no mass, or something is no number.

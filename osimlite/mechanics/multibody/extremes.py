@@ -24,8 +24,9 @@ _LEAST, _MOST = 1e-100, 1e25
 def any_numbers(function: Callable[P, R]) -> Callable[P, R]:
     """Let a function compute with whatever numbers a model has.
 
-    What overflows is infinite, or no number, without a warning; whoever needs it finite checks that. Where equations
-    have no solution then, there is a ModelError, which names the most extreme number of a model among the arguments.
+    What overflows is infinite, or no number, without a warning; whoever needs it finite checks
+    that. Where equations have no solution then, there is a ModelError, which names the most extreme
+    number of a model among the arguments.
     """
 
     @wraps(function)
@@ -35,12 +36,18 @@ def any_numbers(function: Callable[P, R]) -> Callable[P, R]:
                 return function(*values, **named)
         except (ArithmeticError, ValueError) as fault:
             is_meant = isinstance(fault, OsimliteError)
-            is_numeric = isinstance(fault, ArithmeticError | np.linalg.LinAlgError) or str(fault) in _OF_MATH
+            is_numeric = (
+                isinstance(fault, ArithmeticError | np.linalg.LinAlgError) or str(fault) in _OF_MATH
+            )
             if is_meant or not is_numeric:
                 raise
             models = [value for value in (*values, *named.values()) if isinstance(value, Model)]
-            what = next((text for model in models if (text := extreme(model))), "a number of the model")
-            raise ModelError(f"{what} is too large or too small to compute with ({fault}); give another") from None
+            what = next(
+                (text for model in models if (text := extreme(model))), "a number of the model"
+            )
+            raise ModelError(
+                f"{what} is too large or too small to compute with ({fault}); give another"
+            ) from None
 
     return computing
 

@@ -1,11 +1,12 @@
 """Formulas of expression-based forces.
 
-The grammar is that of Lepton, which OpenSim uses: numbers, variables, + - * / ^, parentheses, functions, and after
-semicolons definitions ``name = formula`` that the text before them may use. ^ binds most closely and from the right,
-a sign less closely than ^ and more closely than *. White space means nothing.
+The grammar is that of Lepton, which OpenSim uses: numbers, variables, + - * / ^, parentheses,
+functions, and after semicolons definitions ``name = formula`` that the text before them may use. ^
+binds most closely and from the right, a sign less closely than ^ and more closely than *. White
+space means nothing.
 
-As Lepton does, a formula is simplified as it is read: ``0*x`` is 0, ``x-x`` is 0 and ``x/x`` is 1, whatever x is. What
-drops out may be NaN, or a name that nothing has.
+As Lepton does, a formula is simplified as it is read: ``0*x`` is 0, ``x-x`` is 0 and ``x/x`` is 1,
+whatever x is. What drops out may be NaN, or a name that nothing has.
 """
 
 from __future__ import annotations
@@ -87,7 +88,8 @@ class Formula:
     """A formula as a list of steps, so that neither its length nor its depth has a limit."""
 
     variables: tuple[str, ...]  # names of what it is computed from, in the first registers
-    steps: tuple[Step, ...]  # each gives the number of the next register; the last one gives the result
+    # each gives the number of the next register; the last one gives the result
+    steps: tuple[Step, ...]
 
     @classmethod
     def parse(cls, text: str, variables: Sequence[str], where: str) -> Formula:
@@ -127,11 +129,15 @@ class Formula:
             for argument, rule in zip(step.arguments, DERIVATIVES.get(step.law, ()), strict=False):
                 if argument in derivatives:
                     part = reader.add("*", reader.read(rule), derivatives[argument])
-                    derivatives[index] = reader.add("+", derivatives[index], part) if index in derivatives else part
+                    derivatives[index] = (
+                        reader.add("+", derivatives[index], part) if index in derivatives else part
+                    )
         last = first + len(self.steps) - 1
         return Formula(
             self.variables,
-            reader.ending_with(derivatives[last] if last in derivatives else reader.add("number", value=0.0)),
+            reader.ending_with(
+                derivatives[last] if last in derivatives else reader.add("number", value=0.0)
+            ),
         )
 
 
@@ -188,7 +194,8 @@ class _Reader:
         if law in ("number", _UNKNOWN):
             return self._append(law, value=value)
         constants = [self._constant(argument) for argument in arguments]
-        # Lepton computes what is written in numbers alone, and only then applies its rules: 0/0 is NaN, 0*q/0 is 1.
+        # Lepton computes what is written in numbers alone, and only then applies its rules: 0/0 is
+        # NaN, 0*q/0 is 1.
         if self._derived.isdisjoint(arguments) and None not in constants:
             return self._append("number", value=_compute(law, *constants))
         return self._simplify(law, arguments, constants)
@@ -202,8 +209,8 @@ class _Reader:
     def ending_with(self, result: int) -> tuple[Step, ...]:
         """Return the steps that a result needs, of which the last gives it.
 
-        Raises:
-            _Wrong: one of them stands for a name that nothing has, or is NaN whatever the variables are.
+        Raises: _Wrong: one of them stands for a name that nothing has, or is NaN whatever the
+            variables are.
         """
         needed, waiting = set[int](), [result]
         while waiting:
@@ -217,7 +224,9 @@ class _Reader:
             step = self._step(register)
             self._expect_meaning(step)
             places[register] = self._first + len(steps)
-            steps.append(step._replace(arguments=tuple(places[argument] for argument in step.arguments)))
+            steps.append(
+                step._replace(arguments=tuple(places[argument] for argument in step.arguments))
+            )
         if not steps:
             # The result is a variable, and the last step has to give it.
             steps = [Step("number"), Step("+", (result, self._first))]
@@ -244,7 +253,11 @@ class _Reader:
         return one == two or (first is not None and first == self._constant(two))
 
     def _step(self, register: int) -> Step:
-        return self.steps[register - self._first] if register >= self._first else Step("variable", (register,))
+        return (
+            self.steps[register - self._first]
+            if register >= self._first
+            else Step("variable", (register,))
+        )
 
     def _constant(self, register: int) -> float | None:
         step = self._step(register)
@@ -270,7 +283,9 @@ class _Reader:
             return self._derive(factor * number)
         return self._append("*", self._append("number", value=factor), register)
 
-    def _simplify(self, law: str, arguments: Sequence[int], constants: Sequence[float | None]) -> int:
+    def _simplify(
+        self, law: str, arguments: Sequence[int], constants: Sequence[float | None]
+    ) -> int:
         """Add a step of which not all arguments are numbers, by the rules of Lepton's optimizer."""
         match law:
             case "+":
@@ -330,9 +345,15 @@ class _Reader:
         one_negated, two_negated = self._argument("negative", one), self._argument("negative", two)
         if one_negated is not None or two_negated is not None:
             product = self.add(
-                "*", one if one_negated is None else one_negated, two if two_negated is None else two_negated
+                "*",
+                one if one_negated is None else one_negated,
+                two if two_negated is None else two_negated,
             )
-            return product if one_negated is not None and two_negated is not None else self.add("negative", product)
+            return (
+                product
+                if one_negated is not None and two_negated is not None
+                else self.add("negative", product)
+            )
         if (divisor := self._argument("reciprocal", two)) is not None:
             return self.add("divide", one, divisor)
         if (divisor := self._argument("reciprocal", one)) is not None:
@@ -355,9 +376,15 @@ class _Reader:
         one_negated, two_negated = self._argument("negative", one), self._argument("negative", two)
         if one_negated is not None or two_negated is not None:
             ratio = self.add(
-                "divide", one if one_negated is None else one_negated, two if two_negated is None else two_negated
+                "divide",
+                one if one_negated is None else one_negated,
+                two if two_negated is None else two_negated,
             )
-            return ratio if one_negated is not None and two_negated is not None else self.add("negative", ratio)
+            return (
+                ratio
+                if one_negated is not None and two_negated is not None
+                else self.add("negative", ratio)
+            )
         if (factor := self._argument("reciprocal", two)) is not None:
             return self.add("*", one, factor)
         return self._append("divide", one, two)

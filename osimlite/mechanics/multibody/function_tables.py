@@ -21,7 +21,9 @@ def function_table(function: f.Function, where: str) -> list[float]:
 def _known(table: list[float], function: f.Function, where: str) -> list[float]:
     if not table:
         name = type(function).__name__
-        raise UnsupportedError(f"{where} is a {name}, which cannot be computed; take another function")
+        raise UnsupportedError(
+            f"{where} is a {name}, which cannot be computed; take another function"
+        )
     return table
 
 

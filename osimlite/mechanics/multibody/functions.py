@@ -93,7 +93,11 @@ class Multivariate(Function):
         """Value, gradient (k,) and Hessian (k, k)."""
         size = len(arguments)
         places: Any = range(size)
-        given, table, gradient = floats(arguments), floats([*arguments, *self.table]), floats([0.0] * size)
+        given, table, gradient = (
+            floats(arguments),
+            floats([*arguments, *self.table]),
+            floats([0.0] * size),
+        )
 
         def at_rates(*moving: int) -> tuple[float, float]:
             """Value, and second derivative while some arguments change by 1."""
@@ -228,14 +232,21 @@ class MultivariatePolynomial(Multivariate):
 
     @classmethod
     def complete(
-        cls, coefficients: Sequence[float], dimension: int, order: int, *, opensim_derivatives: bool = False
+        cls,
+        coefficients: Sequence[float],
+        dimension: int,
+        order: int,
+        *,
+        opensim_derivatives: bool = False,
     ) -> MultivariatePolynomial:
         """With all monomials up to `order`, sorted by the power of the first argument, then of the next.
 
         Raises:
             ModelError: there are not as many coefficients as monomials.
         """
-        powers = tuple(item for item in product(range(order + 1), repeat=dimension) if sum(item) <= order)
+        powers = tuple(
+            item for item in product(range(order + 1), repeat=dimension) if sum(item) <= order
+        )
         if len(powers) != len(coefficients):
             raise ModelError(
                 f"a polynomial of {dimension} variables up to order {order} has {len(powers)} coefficients; "
@@ -253,7 +264,13 @@ class MultivariatePolynomial(Multivariate):
     def evaluate(self, arguments: Arguments) -> Evaluated:
         """Value, gradient (k,) and Hessian (k, k)."""
         value, gradient, hessian = super().evaluate(arguments)
-        return value, gradient, [[slope] * len(gradient) for slope in gradient] if self.opensim_derivatives else hessian
+        return (
+            value,
+            gradient,
+            [[slope] * len(gradient) for slope in gradient]
+            if self.opensim_derivatives
+            else hessian,
+        )
 
 
 @dataclass(frozen=True)
@@ -267,7 +284,11 @@ class Scaled(Function):
         """`scale` times value, gradient and Hessian of the function."""
         value, gradient, hessian = self.function.evaluate(arguments)
         scale = self.scale
-        return scale * value, [scale * slope for slope in gradient], [[scale * bend for bend in row] for row in hessian]
+        return (
+            scale * value,
+            [scale * slope for slope in gradient],
+            [[scale * bend for bend in row] for row in hessian],
+        )
 
     @property
     def table(self) -> Sequence[float]:
@@ -307,20 +328,25 @@ class PiecewiseConstant(Univariate):
 class SimmSpline(Univariate):
     """Cubic spline through (`x`, `y`) with straight lines, of the end slopes, outside.
 
-    The ends have the third derivative of the cubic through the first (last) four points (Forsythe, Malcolm
-    and Moler, Computer Methods for Mathematical Computations, 1977, chapter 4); three points give a parabola,
-    two a line. Intervals narrower than 1e-7 count as 1e-7 wide, as in OpenSim.
+    The ends have the third derivative of the cubic through the first (last) four points (Forsythe,
+    Malcolm and Moler, Computer Methods for Mathematical Computations, 1977, chapter 4); three
+    points give a parabola, two a line. Intervals narrower than 1e-7 count as 1e-7 wide, as in
+    OpenSim.
     """
 
     def __init__(self, x: Iterable[float], y: Iterable[float]) -> None:
         self.x, self.y = tuple(map(float, x)), tuple(map(float, y))
         widths = [max(right - left, 1e-7) for left, right in pairwise(self.x)]
-        slopes = [(y1 - y0) / width for (y0, y1), width in zip(pairwise(self.y), widths, strict=True)]
+        slopes = [
+            (y1 - y0) / width for (y0, y1), width in zip(pairwise(self.y), widths, strict=True)
+        ]
         # sigma: a sixth of the second derivative at every point.
         sigma = _spline_curvature(self.x, widths, slopes)
         self._pieces = [
             (y, slope - width * (after + 2.0 * here), 3.0 * here, (after - here) / width)
-            for y, slope, width, (here, after) in zip(self.y[:-1], slopes, widths, pairwise(sigma), strict=True)
+            for y, slope, width, (here, after) in zip(
+                self.y[:-1], slopes, widths, pairwise(sigma), strict=True
+            )
         ]
         end = slopes[-1] + widths[-1] * (sigma[-2] + 2.0 * sigma[-1])
         self._pieces.append((self.y[-1], end, 3.0 * sigma[-1], 0.0))
@@ -329,8 +355,8 @@ class SimmSpline(Univariate):
     def pieces(self) -> tuple[tuple[float, float, float, float], ...]:
         """For every point k the factors of 1, t, t² and t³ from it on, t = argument - x[k].
 
-        Of the last point the first two count; they are the line beyond it. The line before the first point has the
-        first two of that.
+        Of the last point the first two count; they are the line beyond it. The line before the
+        first point has the first two of that.
         """
         return tuple(self._pieces)
 
@@ -353,8 +379,8 @@ def _pieces(knots: Sequence[float], pieces: Sequence[Sequence[float]]) -> list[f
 def table_at_knots(function: Function) -> list[float]:
     """The table of a function, by which the kernels take at a knot the piece that OpenSim takes there.
 
-    They take the one after it; where OpenSim takes that before it, the knot is moved by its last digit. It shows where
-    slopes or values jump.
+    They take the one after it; where OpenSim takes that before it, the knot is moved by its last
+    digit. It shows where slopes or values jump.
     """
     table, inner = [*function.table], function
     while isinstance(inner, Scaled):
@@ -384,19 +410,31 @@ def _interval(knots: Sequence[float], x: float) -> int:
     return low
 
 
-def _spline_curvature(points: Sequence[float], widths: Sequence[float], slopes: Sequence[float]) -> list[float]:
+def _spline_curvature(
+    points: Sequence[float], widths: Sequence[float], slopes: Sequence[float]
+) -> list[float]:
     """A sixth of the second derivative at each of n points: smooth inside, end conditions as above."""
     n = len(points)
     if n == 2:
         return [0.0, 0.0]
-    # The equations of the points: the diagonal, what is right of them; beside the diagonal are the widths.
+    # The equations of the points: the diagonal, what is right of them; beside the diagonal are the
+    # widths.
     diagonal = [-widths[0], *(2.0 * (one + two) for one, two in pairwise(widths)), -widths[-1]]
     right = [0.0, *(after - before for before, after in pairwise(slopes)), 0.0]
     if n > 3:
         # Where three points lie on each other there is no spline.
-        second = [right[k + 1] / ((points[k + 2] - points[k]) or math.nan) for k in (0, 1, n - 4, n - 3)]
-        right[0] = widths[0] * widths[0] * (second[1] - second[0]) / ((points[3] - points[0]) or math.nan)
-        right[-1] = -widths[-1] * widths[-1] * (second[3] - second[2]) / ((points[-1] - points[-4]) or math.nan)
+        second = [
+            right[k + 1] / ((points[k + 2] - points[k]) or math.nan) for k in (0, 1, n - 4, n - 3)
+        ]
+        right[0] = (
+            widths[0] * widths[0] * (second[1] - second[0]) / ((points[3] - points[0]) or math.nan)
+        )
+        right[-1] = (
+            -widths[-1]
+            * widths[-1]
+            * (second[3] - second[2])
+            / ((points[-1] - points[-4]) or math.nan)
+        )
     for k in range(1, n):
         share = widths[k - 1] / diagonal[k - 1]
         diagonal[k] -= share * widths[k - 1]

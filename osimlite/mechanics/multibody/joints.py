@@ -1,7 +1,8 @@
 """Mobilizers: the joints of a model as products of elementary motions.
 
-What the coordinates of a joint type do is a line of its class in the schema, or a short function here; nothing else in
-the package knows joint types. The conventions (order of coordinates, meaning of speeds) are OpenSim's.
+What the coordinates of a joint type do is a line of its class in the schema, or a short function
+here; nothing else in the package knows joint types. The conventions (order of coordinates, meaning
+of speeds) are OpenSim's.
 """
 
 from __future__ import annotations
@@ -57,7 +58,16 @@ def _plain(kind: type[Joint]) -> tuple[Motion, ...]:
 
 MOTIONS: dict[str, tuple[Motion, ...]] = {
     kind.__name__: _plain(kind)
-    for kind in (WeldJoint, PinJoint, SliderJoint, PlanarJoint, UniversalJoint, GimbalJoint, BallJoint, FreeJoint)
+    for kind in (
+        WeldJoint,
+        PinJoint,
+        SliderJoint,
+        PlanarJoint,
+        UniversalJoint,
+        GimbalJoint,
+        BallJoint,
+        FreeJoint,
+    )
 }
 """X_FM of the joint types that have no properties of their own."""
 
@@ -67,7 +77,9 @@ def ellipsoid(radii: ArrayLike) -> tuple[Motion, ...]:
     return (SphericalMotion((0, 1, 2), np.array(radii, dtype=float)),)
 
 
-def scapulothoracic(radii: ArrayLike, winging_origin: ArrayLike, winging_direction: float) -> tuple[Motion, ...]:
+def scapulothoracic(
+    radii: ArrayLike, winging_origin: ArrayLike, winging_direction: float
+) -> tuple[Motion, ...]:
     """Motions of a ScapulothoracicJoint.
 
     Args:
@@ -116,7 +128,10 @@ class TransformAxis(NamedTuple):
 
 
 def custom(
-    rotations: Sequence[TransformAxis], translations: Sequence[TransformAxis], *, opensim_derivatives: bool = False
+    rotations: Sequence[TransformAxis],
+    translations: Sequence[TransformAxis],
+    *,
+    opensim_derivatives: bool = False,
 ) -> tuple[Motion, ...]:
     """Motions of a CustomJoint: three translations along axes of F, then three body-fixed rotations.
 
@@ -128,25 +143,33 @@ def custom(
     """
     slides = tuple(_along("translate", axis) for axis in translations)
     turns = tuple(_along("rotate", axis) for axis in rotations)
-    return (*slides, SimbodyAccelerationError(turns), *turns) if opensim_derivatives else (*slides, *turns)
+    return (
+        (*slides, SimbodyAccelerationError(turns), *turns)
+        if opensim_derivatives
+        else (*slides, *turns)
+    )
 
 
 def _along(kind: Literal["rotate", "translate"], axis: TransformAxis) -> AxisMotion:
     direction = np.array(axis.axis, dtype=float)
     length = float(np.linalg.norm(direction))
     if not 0.0 < length < np.inf:
-        raise ModelError(f"the axis {direction.tolist()} of a transform has no direction; give one that is not zero")
+        raise ModelError(
+            f"the axis {direction.tolist()} of a transform has no direction; give one that is not zero"
+        )
     return AxisMotion(kind, direction / length, axis.coordinates, axis.function)
 
 
 def motion_types(motions: Sequence[Motion], count: int) -> tuple[MotionType, ...]:
     """What each of `count` coordinates of a joint does.
 
-    A coordinate that drives an axis with slope exactly 1 or -1 has the motion of that axis (of the last such
-    axis, translations counting after rotations); any other is coupled.
+    A coordinate that drives an axis with slope exactly 1 or -1 has the motion of that axis (of the
+    last such axis, translations counting after rotations); any other is coupled.
     """
     types: list[MotionType] = ["coupled"] * count
-    axes = [axis for motion in motions for axis in motion.elementary() if isinstance(axis, AxisMotion)]
+    axes = [
+        axis for motion in motions for axis in motion.elementary() if isinstance(axis, AxisMotion)
+    ]
     for axis in sorted(axes, key=lambda axis: axis.kind):
         if axis.function.slope in (1.0, -1.0):
             types[axis.coordinates[0]] = "rotational" if axis.kind == "rotate" else "translational"
@@ -157,9 +180,9 @@ def motion_types(motions: Sequence[Motion], count: int) -> tuple[MotionType, ...
 class Mobilizer:
     """How a body moves in the body (or ground) that carries it.
 
-    The joint says T_PC = X_PF X_FM(q) X_CM⁻¹ for its parent P and child C; `motions` are the factors of X_FM.
-    `reversed` tells that the joint's child carries its parent in the tree: nothing else changes, the speeds
-    still are those of M in F.
+    The joint says T_PC = X_PF X_FM(q) X_CM⁻¹ for its parent P and child C; `motions` are the
+    factors of X_FM. `reversed` tells that the joint's child carries its parent in the tree: nothing
+    else changes, the speeds still are those of M in F.
     """
 
     joint: str  # absolute path of the joint
@@ -175,9 +198,8 @@ class Mobilizer:
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
         """The way from the carrying to the carried body as fixed transforms and one-axis motions, in order.
 
-        The numbers in ``coordinates`` of each motion are
-        places among `coordinates` of this mobilizer. This is all that a program with one-axis joints
-        needs to know.
+        The numbers in ``coordinates`` of each motion are places among `coordinates` of this
+        mobilizer. This is all that a program with one-axis joints needs to know.
         """
         motions = (Fixed(self.parent_frame), *self.motions, Fixed(inverse(self.child_frame)))
         chain = [part for motion in motions for part in motion.elementary()]

@@ -1,8 +1,8 @@
 """Where every body of a mechanism is and how it moves, as the kernels find it.
 
-Arrays over bodies have one row more than there are bodies: the last is ground, which -1, the parent index of a
-body that ground carries, picks out. All vectors are along the axes of ground; spatial velocities and accelerations
-stack the angular part over the linear part of the body's origin.
+Arrays over bodies have one row more than there are bodies: the last is ground, which -1, the parent
+index of a body that ground carries, picks out. All vectors are along the axes of ground; spatial
+velocities and accelerations stack the angular part over the linear part of the body's origin.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ class Kinematics:
     """
 
     def __init__(self, mechanism: Mechanism, q: Array, u: Array, time: float = 0.0) -> None:
-        # What follows from them is computed when it is asked for: nobody may change them until then.
+        # What follows from them is computed when it is asked for: nobody may change them until
+        # then.
         self.mechanism, self.q, self.u, self.time = mechanism, q.copy(), u.copy(), time
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -82,7 +83,9 @@ class Kinematics:
         if program is self.program:
             errors, rows, rates, drifts = self.all_equations
             first, end, end_position = program.equations_of(constraint)
-            return Equations(errors[first:end_position], rows[first:end], rates[first:end], drifts[first:end])
+            return Equations(
+                errors[first:end_position], rows[first:end], rates[first:end], drifts[first:end]
+            )
         other = Kinematics(self.mechanism, self.q, self.u, self.time)
         other.program = program
         return other.equations(constraint)
@@ -91,7 +94,11 @@ class Kinematics:
     def all_equations(self) -> Equations:
         """The equations of all constraints; of those that bind speeds only, the errors mean nothing."""
         program = self.program
-        balls = [item for item in self.mechanism.turning if not program.bound.isdisjoint(item.coordinates)]
+        balls = [
+            item
+            for item in self.mechanism.turning
+            if not program.bound.isdisjoint(item.coordinates)
+        ]
         for ball in balls:
             # The rates of its coordinates must be defined.
             ball.rate_matrix(self.q[list(ball.coordinates)])
@@ -118,7 +125,11 @@ class Kinematics:
         """From the n speeds to the velocity of each body (b + 1, 6, n)."""
         program, size = self.program, len(self.q)
         first = program.model[MODEL.WORK_COLUMN]
-        columns = np.frombuffer(self.vectors[0])[first : first + 6 * size].reshape(size, 6)[program.freedoms].T
+        columns = (
+            np.frombuffer(self.vectors[0])[first : first + 6 * size]
+            .reshape(size, 6)[program.freedoms]
+            .T
+        )
         result = np.empty((len(program.links), 6, size))
         result[:, :3], result[:, 3:] = columns[:3], columns[3:] - skews(self._arms) @ columns[:3]
         result.swapaxes(1, 2)[program.still] = 0.0
@@ -146,7 +157,9 @@ class Kinematics:
         model = self.program.model
         first, count, size = model[MODEL.WORK_LINK], model[MODEL.LINKS], LINK_WORK.SIZE
         result = np.zeros((count + 1, size))
-        result[:-1] = np.frombuffer(self.vectors[0])[first : first + size * count].reshape(count, size)
+        result[:-1] = np.frombuffer(self.vectors[0])[first : first + size * count].reshape(
+            count, size
+        )
         result[-1, [0, 4, 8]] = 1.0
         return result[self.program.links]
 

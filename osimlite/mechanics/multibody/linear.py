@@ -12,14 +12,17 @@ from osimlite.mechanics.multibody.spatial import Array
 
 def stacked(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
     """G (m, n) and b (m,) of several sets of equations in one."""
-    return np.concatenate([rows for rows, _ in equations]), np.concatenate([values for _, values in equations])
+    return np.concatenate([rows for rows, _ in equations]), np.concatenate(
+        [values for _, values in equations]
+    )
 
 
 def solutions(rows: Array, values: Array) -> tuple[Array, Array]:
     """The shortest solution (n,) of `rows` (m, n) x = `values` (m,), and the directions (n, f) left free.
 
-    Where equations contradict each other, the solution has the least squares of their errors, each equation counted
-    with a left side of unit length; those that are rounding errors are left out. The directions are orthonormal.
+    Where equations contradict each other, the solution has the least squares of their errors, each
+    equation counted with a left side of unit length; those that are rounding errors are left out.
+    The directions are orthonormal.
     """
     count, size = rows.shape
     if not (count and size):

@@ -104,7 +104,8 @@ class Operation:
     radii: Array = field(default_factory=lambda: np.zeros(3))
     axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))  # of a slide
     turns: list[Operation | None] = field(default_factory=list)  # of a drift
-    looked_at: list[int] = field(default_factory=list)  # by a drift: its sign, and two places in the mechanism
+    # by a drift: its sign, and two places in the mechanism
+    looked_at: list[int] = field(default_factory=list)
     joint: str = ""
 
 
@@ -116,7 +117,8 @@ class Link:
     operations: list[Operation]
     mass: float = 0.0
     first: Array = field(default_factory=lambda: np.zeros(3))  # first moment
-    second: Array = field(default_factory=lambda: np.zeros((3, 3)))  # inertia about the link's origin
+    # inertia about the link's origin
+    second: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
 
 class Tree(NamedTuple):
@@ -131,10 +133,9 @@ class Tree(NamedTuple):
 def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False) -> Tree:
     """The links of a mechanism.
 
-    Args:
-        mechanism: what moves.
-        free: places of the coordinates that are degrees of freedom; the others stay at their defaults.
-        apart: whether bodies that never move in one another are links of their own.
+    Args: mechanism: what moves. free: places of the coordinates that are degrees of freedom; the
+        others stay at their defaults. apart: whether bodies that never move in one another are
+        links of their own.
 
     Raises:
         UnsupportedError: a joint that the kernels do not know.
@@ -166,7 +167,11 @@ def _operations(
 ) -> tuple[list[Operation], Array]:
     """The motions of a joint from a frame of the carrying link on, and the carried body after the last of them."""
     own = mobilizer.coordinates
-    chain: list[Motion] = [Fixed(mobilizer.parent_frame), *mobilizer.motions, Fixed(inverse(mobilizer.child_frame))]
+    chain: list[Motion] = [
+        Fixed(mobilizer.parent_frame),
+        *mobilizer.motions,
+        Fixed(inverse(mobilizer.child_frame)),
+    ]
     if mobilizer.reversed:
         chain.reverse()
     result: list[Operation] = []
@@ -180,12 +185,16 @@ def _operations(
         elif isinstance(motion, SimbodyAccelerationError):
             if motion.elementary() and not free.isdisjoint(own):
                 sign = -1 if mobilizer.reversed else 1
-                result.append(Operation(MOTION.ACCELERATION_ERROR, frame, [], looked_at=[sign, *own[:2]]))
+                result.append(
+                    Operation(MOTION.ACCELERATION_ERROR, frame, [], looked_at=[sign, *own[:2]])
+                )
                 drifts.append((result[-1], motion))
                 frame = np.eye(4)
         elif still:
             q = np.zeros(len(own))
-            q[list(motion.coordinates)] = [mechanism.coordinates[place].default_value for place in places]
+            q[list(motion.coordinates)] = [
+                mechanism.coordinates[place].default_value for place in places
+            ]
             matrix = motion.placed(q)
             frame = frame @ (inverse(matrix) if mobilizer.reversed else matrix)
         elif isinstance(motion, AxisMotion):
@@ -204,7 +213,9 @@ def _operations(
             result.append(Operation(kind, frame, places, radii=motion.radii))
             frame = np.eye(4)
         else:
-            raise UnsupportedError(f"the {type(motion).__name__} of '{mobilizer.joint}' cannot be computed")
+            raise UnsupportedError(
+                f"the {type(motion).__name__} of '{mobilizer.joint}' cannot be computed"
+            )
     for operation in result:
         operation.joint = mobilizer.joint
     for operation, drift in drifts:
@@ -230,7 +241,9 @@ def _load(link: Link, properties: Any, frame: Array) -> None:
     center = rotation @ properties.center + frame[:3, 3]
     link.mass += properties.mass
     link.first = link.first + properties.mass * center
-    link.second = link.second + rotation @ properties.inertia @ rotation.T - properties.mass * _square(center)
+    link.second = (
+        link.second + rotation @ properties.inertia @ rotation.T - properties.mass * _square(center)
+    )
 
 
 def _square(v: Array) -> Array:
@@ -270,7 +283,11 @@ class LinkPacker:
         ints[MODEL.FIXED_AT] = len(self.numbers)
         for operation in self.operations:
             before = operation.before
-            self.numbers += [*before[:3, :3].ravel().tolist(), *before[:3, 3].tolist(), *operation.axis.tolist()]
+            self.numbers += [
+                *before[:3, :3].ravel().tolist(),
+                *before[:3, 3].tolist(),
+                *operation.axis.tolist(),
+            ]
         ints[MODEL.LINKS], ints[MODEL.DOFS] = len(self.links), size
         ints[MODEL.WORK_LINK] = self.room(LINK_WORK.SIZE * len(self.links))
         ints[MODEL.WORK_OPERATION] = self.room(OPERATION_WORK.SIZE * len(self.operations))
@@ -298,7 +315,11 @@ class LinkPacker:
             first, end = self.ends[number], self.ends[number + 1]
             behind = operation + len(link.operations)
             self.ints += LINK.record(
-                PARENT=link.parent, FIRST_OPERATION=operation, END_OPERATION=behind, FIRST_DOF=first, END_DOF=end
+                PARENT=link.parent,
+                FIRST_OPERATION=operation,
+                END_OPERATION=behind,
+                FIRST_DOF=first,
+                END_DOF=end,
             )
             operation = behind
             last = carrying[link.parent] if link.parent >= 0 else -1
@@ -347,7 +368,11 @@ class LinkPacker:
                 law = self.law("place_drift")
                 self.law("move_drift")
                 sign, *watched = item.looked_at
-                looked_at = [sign, *(self.places.freedom(place) for place in watched), *[-1] * (2 - len(watched))]
+                looked_at = [
+                    sign,
+                    *(self.places.freedom(place) for place in watched),
+                    *[-1] * (2 - len(watched)),
+                ]
                 looked_at += [-1 if turn is None else numbers[id(turn)] for turn in item.turns]
             elif item.kind in (MOTION.BALL, MOTION.BALL_BACK):
                 law = self.law("place_ball")
@@ -358,7 +383,9 @@ class LinkPacker:
                 law = OPERATION.ALONE if freedom in self.simple_freedoms else OPERATION.TOGETHER
             else:
                 infos = [self.places.mechanism.coordinates[place] for place in item.arguments]
-                table = function_table(item.function, f"the function of an axis of the joint '{infos[0].joint}'")
+                table = function_table(
+                    item.function, f"the function of an axis of the joint '{infos[0].joint}'"
+                )
                 law = self.law(LAWS_OF_FUNCTIONS.get(int(table[0]), "amount_by_one"))
                 self.numbers += [*(info.default_value for info in infos), *table]
                 gradient = self.room(len(freedoms))
@@ -366,10 +393,18 @@ class LinkPacker:
             self.ints += [*freedoms, *looked_at]
             if item.kind in (MOTION.BALL, MOTION.BALL_BACK):
                 self.balls[tuple(freedoms)] = arguments
-            self.ints[start + OPERATION.SIZE * number : start + OPERATION.SIZE * (number + 1)] = OPERATION.record(
-                MOTION=item.kind, BEFORE=_kind_of(item.before), DOF=freedom, FUNCTION=law,
-                ARGUMENTS=arguments, ARGUMENT_COUNT=len(freedoms), EXTRA=extra, GRADIENT=gradient,
-            )  # fmt: skip
+            self.ints[start + OPERATION.SIZE * number : start + OPERATION.SIZE * (number + 1)] = (
+                OPERATION.record(
+                    MOTION=item.kind,
+                    BEFORE=_kind_of(item.before),
+                    DOF=freedom,
+                    FUNCTION=law,
+                    ARGUMENTS=arguments,
+                    ARGUMENT_COUNT=len(freedoms),
+                    EXTRA=extra,
+                    GRADIENT=gradient,
+                )
+            )
 
     def constraint_records(self, kept: Sequence[Constraint], locks: int) -> None:
         """Write what constraints need, if there are any."""
@@ -385,25 +420,39 @@ class LinkPacker:
             records.append(len(self.ints))
             end, end_position = equations + constraint.equations, equations + constraint.positions
             ints = [
-                x + self.room(constraint.room) if k == constraint.room_at else x for k, x in enumerate(constraint.ints)
+                x + self.room(constraint.room) if k == constraint.room_at else x
+                for k, x in enumerate(constraint.ints)
             ]
             self.ints += CONSTRAINT.record(
-                LAW=self.law(constraint.law), NUMBERS=len(self.numbers),
-                FIRST_EQUATION=equations, END_EQUATION=end, END_POSITION=end_position,
-            )  # fmt: skip
+                LAW=self.law(constraint.law),
+                NUMBERS=len(self.numbers),
+                FIRST_EQUATION=equations,
+                END_EQUATION=end,
+                END_POSITION=end_position,
+            )
             self.ints += ints
             self.numbers += constraint.numbers
             equations = end
         record_at, ball_at = len(self.ints), len(self.ints) + len(records)
         self.ints += [*records, *self.balls.values()]
         self.ints[start : start + CONSTRAINED.SIZE] = CONSTRAINED.record(
-            DYNAMICS=self.law("constrained_dynamics"), PROJECT=self.law("project"),
-            FACTORISE=self.law("factorise_law"), MINIMUM_NORM=self.law("minimum_norm_law"),
-            CONSTRAINTS=len(constraints), CONSTRAINT_AT=record_at, BALLS=len(self.balls), BALL_AT=ball_at,
-            EQUATIONS=equations, POSITIONS=sum(constraint.positions for constraint in constraints),
-            LOCKS=locks, ENTRIES=self.entries,
-            **{name: self.room(count) for name, count in room_for(equations, size, self.entries).items()},
-        )  # fmt: skip
+            DYNAMICS=self.law("constrained_dynamics"),
+            PROJECT=self.law("project"),
+            FACTORISE=self.law("factorise_law"),
+            MINIMUM_NORM=self.law("minimum_norm_law"),
+            CONSTRAINTS=len(constraints),
+            CONSTRAINT_AT=record_at,
+            BALLS=len(self.balls),
+            BALL_AT=ball_at,
+            EQUATIONS=equations,
+            POSITIONS=sum(constraint.positions for constraint in constraints),
+            LOCKS=locks,
+            ENTRIES=self.entries,
+            **{
+                name: self.room(count)
+                for name, count in room_for(equations, size, self.entries).items()
+            },
+        )
 
 
 def _kind_of(matrix: Array) -> int:

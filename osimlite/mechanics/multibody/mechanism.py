@@ -1,9 +1,10 @@
 """The mechanism: a flat tree of bodies and mobilizers, and what can be asked of it.
 
-Bodies stand in an order in which every body follows the one that carries it; -1 stands for ground. Coordinates stand
-in the order of OpenSim's CoordinateSet, and values q, generalized speeds u, their derivatives udot and generalized
-forces all use that order. The speeds are the rates of the coordinates except for ball, free, ellipsoid and
-scapulothoracic joints, whose rotational speeds are the angular velocity of the joint's child frame in its parent frame.
+Bodies stand in an order in which every body follows the one that carries it; -1 stands for ground.
+Coordinates stand in the order of OpenSim's CoordinateSet, and values q, generalized speeds u, their
+derivatives udot and generalized forces all use that order. The speeds are the rates of the
+coordinates except for ball, free, ellipsoid and scapulothoracic joints, whose rotational speeds are
+the angular velocity of the joint's child frame in its parent frame.
 """
 
 from __future__ import annotations
@@ -58,19 +59,18 @@ Values = ArrayLike | Mapping[str, float]
 class Mechanism:
     """A tree of bodies under gravity.
 
-    Wherever a method takes q or u, an array (n,) in the order of `coordinates` or a mapping by coordinate name will
-    do; names left out take their default. A body or frame is named by its absolute path, a body also by its name.
-    Every method raises ModelError for a name that does not exist and for values of the wrong number. A `time` (s)
-    matters only where coordinates are prescribed.
+    Wherever a method takes q or u, an array (n,) in the order of `coordinates` or a mapping by
+    coordinate name will do; names left out take their default. A body or frame is named by its
+    absolute path, a body also by its name. Every method raises ModelError for a name that does not
+    exist and for values of the wrong number. A `time` (s) matters only where coordinates are
+    prescribed.
 
-    Attributes:
-        bodies: carriers before the carried.
-        coordinates: in the order of all arrays.
-        gravity: acceleration (3,) in ground (m/s²).
-        frames: every frame fixed to a body or to ground, by absolute path.
-        constraints: what holds besides the joints; what locked and prescribed coordinates need is put before them.
-        stations: every marker and other station, by absolute path.
-        assembly_accuracy: ten times what position errors of constraints may be in an assembled pose (m or rad).
+    Attributes: bodies: carriers before the carried. coordinates: in the order of all arrays.
+        gravity: acceleration (3,) in ground (m/s²). frames: every frame fixed to a body or to
+        ground, by absolute path. constraints: what holds besides the joints; what locked and
+        prescribed coordinates need is put before them. stations: every marker and other station, by
+        absolute path. assembly_accuracy: ten times what position errors of constraints may be in an
+        assembled pose (m or rad).
     """
 
     name: str
@@ -90,7 +90,9 @@ class Mechanism:
                 )
         places = sorted(place for body in self.bodies for place in body.mobilizer.coordinates)
         if places != list(range(len(self.coordinates))):
-            raise ModelError(f"the joints of '{self.name}' do not share out its coordinates one by one")
+            raise ModelError(
+                f"the joints of '{self.name}' do not share out its coordinates one by one"
+            )
         holds: list[Constraint] = []
         for index, info in enumerate(self.coordinates):
             if info.locked:
@@ -104,7 +106,9 @@ class Mechanism:
     def coordinate_names(self) -> tuple[str, ...]:
         """Names in the order of all arrays; of coordinates that share a name, the paths."""
         counts = Counter(info.name for info in self.coordinates)
-        return tuple(info.name if counts[info.name] == 1 else info.path for info in self.coordinates)
+        return tuple(
+            info.name if counts[info.name] == 1 else info.path for info in self.coordinates
+        )
 
     def coordinate_index(self, name: str) -> int:
         """Place of a coordinate, by its absolute path, or by its name if no other has it."""
@@ -144,8 +148,8 @@ class Mechanism:
     def assemble(self, q: Values, time: float = 0.0, *, kept: Collection[int] = ()) -> Array:
         """The values (n,) nearest to `q` that fulfil the constraints, by the rules of OpenSim's assembly.
 
-        Locked coordinates, and those whose places are in `kept`, keep their values, clamped ones their ranges; those
-        that are `yielding` do not count.
+        Locked coordinates, and those whose places are in `kept`, keep their values, clamped ones
+        their ranges; those that are `yielding` do not count.
 
         Raises:
             SimulationError: no pose near the given one fulfils the constraints.
@@ -155,10 +159,13 @@ class Mechanism:
             return values
         return assembled(self, values, time, kept)
 
-    def project_speeds(self, q: Values, u: Values, time: float = 0.0, *, kept: Collection[int] = ()) -> Array:
+    def project_speeds(
+        self, q: Values, u: Values, time: float = 0.0, *, kept: Collection[int] = ()
+    ) -> Array:
         """The speeds (n,) nearest to `u` that fulfil the constraints, by the rules of OpenSim's integrator.
 
-        The change of a speed above 1 counts relative to it; speeds of the coordinates in `kept` do not change.
+        The change of a speed above 1 counts relative to it; speeds of the coordinates in `kept` do
+        not change.
 
         Raises:
             SimulationError: the constraints do not allow the speeds that are kept.
@@ -176,7 +183,9 @@ class Mechanism:
     def at(self, q: Values, u: Values | None = None, time: float = 0.0) -> Kinematics:
         """Poses and velocities of all bodies (u None: at rest), from which everything else follows."""
         values = self.values(q)
-        return Kinematics(self, values, np.zeros(len(values)) if u is None else self.speeds(u), time)
+        return Kinematics(
+            self, values, np.zeros(len(values)) if u is None else self.speeds(u), time
+        )
 
     # ------------------------------------------------------------------------------------------ kinematics
     def body_transforms(self, q: Values) -> dict[str, Array]:
@@ -295,18 +304,19 @@ class Mechanism:
     ) -> Array:
         """Derivatives of the generalized speeds (n,) under gravity, the given forces and the constraints.
 
-        Args:
-            q: coordinate values, which must obey the constraints already.
-            u: generalized speeds, which must obey them too (that of a locked coordinate is zero).
-            generalized_forces: conjugate to the generalized speeds (N, N·m); zero for names left out.
-            body_wrenches: by body or frame, applied at its origin, along ground's axes.
-            time: what prescribed coordinates go by (s).
+        Args: q: coordinate values, which must obey the constraints already. u: generalized speeds,
+            which must obey them too (that of a locked coordinate is zero). generalized_forces:
+            conjugate to the generalized speeds (N, N·m); zero for names left out. body_wrenches: by
+            body or frame, applied at its origin, along ground's axes. time: what prescribed
+            coordinates go by (s).
 
         Raises:
             SimulationError: a coordinate moves no mass, or a number is not finite.
         """
         state = self.at(q, u, time)
-        applied = self._applied(state, {} if generalized_forces is None else generalized_forces, body_wrenches or {})
+        applied = self._applied(
+            state, {} if generalized_forces is None else generalized_forces, body_wrenches or {}
+        )
         return dynamics.accelerations(state, applied)
 
     def inverse_dynamics(

@@ -1,7 +1,8 @@
 """Elementary motions: what the transform of every joint is a product of.
 
-A motion moves its outgoing frame in its incoming frame as a few generalized coordinates and speeds say. The numbers
-in `coordinates` are places among the coordinates of the joint; `q` (k,) and `u` (k,) always are all those of the joint.
+A motion moves its outgoing frame in its incoming frame as a few generalized coordinates and speeds
+say. The numbers in `coordinates` are places among the coordinates of the joint; `q` (k,) and `u`
+(k,) always are all those of the joint.
 """
 
 from __future__ import annotations
@@ -114,10 +115,10 @@ class AxisMotion(Motion):
 class SimbodyAccelerationError(Motion):
     """No motion, but the error of Simbody's angular acceleration of a CustomJoint with these three `turns` after it.
 
-    The angular velocity is W r with the rates r of the three angles and the axes W, each turned by the angles before
-    it. In the rate of W Simbody takes for the rate of the first angle what the first coordinate does to all three
-    angles, and for that of the first two what the first two coordinates do. That is right only if each coordinate
-    drives the angle of the same number.
+    The angular velocity is W r with the rates r of the three angles and the axes W, each turned by
+    the angles before it. In the rate of W Simbody takes for the rate of the first angle what the
+    first coordinate does to all three angles, and for that of the first two what the first two
+    coordinates do. That is right only if each coordinate drives the angle of the same number.
     """
 
     turns: tuple[AxisMotion, ...]
@@ -125,10 +126,13 @@ class SimbodyAccelerationError(Motion):
 
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
         """Three turns that stay at zero and accelerate all the same; nothing where there is no error."""
-        turned = [set() if isinstance(turn.function, Constant) else set(turn.coordinates) for turn in self.turns]
-        if (not turned[1] or (turned[0] <= {0} and not turned[1] & {0} and not turned[2] & {0})) and (
-            not turned[2] or (turned[0] | turned[1] <= {0, 1} and not turned[2] & {0, 1})
-        ):
+        turned = [
+            set() if isinstance(turn.function, Constant) else set(turn.coordinates)
+            for turn in self.turns
+        ]
+        if (
+            not turned[1] or (turned[0] <= {0} and not turned[1] & {0} and not turned[2] & {0})
+        ) and (not turned[2] or (turned[0] | turned[1] <= {0, 1} and not turned[2] & {0, 1})):
             return ()
         places = tuple(sorted(set().union(*(turn.coordinates for turn in self.turns))))
         return tuple(
@@ -154,9 +158,9 @@ class AccelerationErrorAngle(Function):
 class SphericalMotion(Motion):
     """Rotation by three body-fixed X-Y-Z angles, whose generalized speeds are the angular velocity.
 
-    The angular velocity is that of the outgoing frame in the incoming frame F, expressed in F, so the speeds
-    are not the rates of the angles. With `radii` (m) the origin moves on an ellipsoid: it lies where the
-    outgoing Z axis, stretched by the radii along F, ends.
+    The angular velocity is that of the outgoing frame in the incoming frame F, expressed in F, so
+    the speeds are not the rates of the angles. With `radii` (m) the origin moves on an ellipsoid:
+    it lies where the outgoing Z axis, stretched by the radii along F, ends.
     """
 
     coordinates: tuple[int, ...]
@@ -169,7 +173,12 @@ class SphericalMotion(Motion):
             for axis, place in zip((X, Y, Z), self.coordinates, strict=True)
         )
         slides = tuple(
-            AxisMotion("translate", np.array(axis), self.coordinates, EllipsoidPoint(component, float(radius)))
+            AxisMotion(
+                "translate",
+                np.array(axis),
+                self.coordinates,
+                EllipsoidPoint(component, float(radius)),
+            )
             for component, (axis, radius) in enumerate(zip((X, Y, Z), self.radii, strict=True))
             if radius != 0.0
         )
@@ -215,7 +224,11 @@ class EllipsoidPoint(Function):
         # g(a) cos b with g = -sin a for y and cos a for z, so that g'' = -g.
         g, slope = (-sa, -ca) if self.component == 1 else (ca, -sa)
         across = -slope * sb
-        return g * cb, [slope * cb, -g * sb, 0.0], [[-g * cb, across, 0.0], [across, -g * cb, 0.0], [0.0] * 3]
+        return (
+            g * cb,
+            [slope * cb, -g * sb, 0.0],
+            [[-g * cb, across, 0.0], [across, -g * cb, 0.0], [0.0] * 3],
+        )
 
 
 def rotate(axis: Sequence[float], coordinate: int) -> AxisMotion:

@@ -49,7 +49,8 @@ class CoordinateInfo:
     locked: bool = False
     # its value as a function of time (s), or None; a locked coordinate keeps its value all the same
     prescribed: Function | None = None
-    yielding: bool = False  # assembling a pose moves it as the constraints like, instead of as little as it can
+    # assembling a pose moves it as the constraints like, instead of as little as it can
+    yielding: bool = False
 
     @property
     def unit(self) -> str:

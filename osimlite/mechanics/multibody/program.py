@@ -1,7 +1,7 @@
 """A mechanism in the vectors of the kernels, which run on it as Python.
 
-:mod:`osimlite.mechanics.kernels.layout` says what is where. Every state has a work vector of its own, so that nothing that is
-known of one changes with another.
+:mod:`osimlite.mechanics.kernels.layout` says what is where. Every state has a work vector of its
+own, so that nothing that is known of one changes with another.
 """
 
 from __future__ import annotations
@@ -84,7 +84,9 @@ class Program:
     def equations_of(self, constraint: Constraint) -> tuple[int, int, int]:
         """First and end of the equations of a constraint of its own, and the end of those that bind positions."""
         s = self.model
-        at = s[s[s[MODEL.CONSTRAINED] + CONSTRAINED.CONSTRAINT_AT] + self.constraints[id(constraint)]]
+        at = s[
+            s[s[MODEL.CONSTRAINED] + CONSTRAINED.CONSTRAINT_AT] + self.constraints[id(constraint)]
+        ]
         return tuple(s[at + k] for k in _ENDS)
 
     def equations(self, data: Floats) -> Equations:
@@ -94,7 +96,9 @@ class Program:
             return Equations(np.zeros(0), np.zeros((0, size)), np.zeros(0), np.zeros(0))
         h, vector = self.model[self.model[MODEL.CONSTRAINED] :], np.frombuffer(data)
         count = h[CONSTRAINED.EQUATIONS]
-        rows = vector[h[CONSTRAINED.WORK_ROWS] :][: count * size].reshape(count, size)[:, self.freedoms]
+        rows = vector[h[CONSTRAINED.WORK_ROWS] :][: count * size].reshape(count, size)[
+            :, self.freedoms
+        ]
         places = (CONSTRAINED.WORK_ERRORS, CONSTRAINED.WORK_RATES, CONSTRAINED.WORK_DRIFTS)
         errors, rates, drifts = (vector[h[place] :][:count].copy() for place in places)
         return Equations(errors, rows, rates, drifts)
@@ -131,4 +135,8 @@ class Program:
     def state(self, q: Array, u: Array) -> tuple[Floats, Floats, Floats]:
         """A work vector for a state, the state, and its rates, as they are but for balls."""
         values, speeds = q[self.order].tolist(), u[self.order].tolist()
-        return floats(bytes(8 * self.model[MODEL.WORK_SIZE])), floats([*values, *speeds]), floats([*speeds, *speeds])
+        return (
+            floats(bytes(8 * self.model[MODEL.WORK_SIZE])),
+            floats([*values, *speeds]),
+            floats([*speeds, *speeds]),
+        )

@@ -33,9 +33,8 @@ class ConstraintReader:
     def constraint(self, constraint: SchemaConstraint) -> Constraint:
         """The equations of an enforced constraint.
 
-        Raises:
-            ModelError: it names what does not exist, or its function, a direction or a distance is impossible.
-            UnsupportedError: a constraint of another class.
+        Raises: ModelError: it names what does not exist, or its function, a direction or a distance
+            is impossible. UnsupportedError: a constraint of another class.
         """
         make = _READERS.get(type(constraint))
         path = self.placements.path(constraint)
@@ -47,8 +46,11 @@ class ConstraintReader:
         return self.bodies[self.placements.frame(self.placements.named(owner, socket))[0]]
 
     def _station(self, owner: Component, socket: str, location: str) -> StationPlacement:
-        # OpenSim takes the location in the body itself, even where the socket names a frame that is off the body's.
-        return StationPlacement(self._base(owner, socket), np.array(getattr(owner, location), dtype=float))
+        # OpenSim takes the location in the body itself, even where the socket names a frame that is
+        # off the body's.
+        return StationPlacement(
+            self._base(owner, socket), np.array(getattr(owner, location), dtype=float)
+        )
 
     def _frame(self, owner: Component, socket: str) -> FramePlacement:
         base, matrix = self.placements.frame(self.placements.named(owner, socket))
@@ -91,7 +93,9 @@ class ConstraintReader:
     def distance(self, item: schema.ConstantDistanceConstraint, path: str) -> Constraint:
         """Two stations at a distance."""
         if not 0.0 < item.constant_distance < np.inf:
-            raise ModelError(f"'{path}' has a distance of {item.constant_distance:g}; give a positive length in m")
+            raise ModelError(
+                f"'{path}' has a distance of {item.constant_distance:g}; give a positive length in m"
+            )
         return b.DistanceConstraint(
             self._station(item, "socket_body_1", "location_body_1"),
             self._station(item, "socket_body_2", "location_body_2"),
@@ -120,7 +124,9 @@ class ConstraintReader:
 
     def weld(self, item: schema.WeldConstraint, path: str) -> Constraint:
         """Two frames on each other."""
-        return b.WeldConstraint(self._frame(item, "socket_frame1"), self._frame(item, "socket_frame2"), path)
+        return b.WeldConstraint(
+            self._frame(item, "socket_frame1"), self._frame(item, "socket_frame2"), path
+        )
 
 
 def unknown_constraint(path: str, kind: str) -> UnsupportedError:

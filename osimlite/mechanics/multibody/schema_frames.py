@@ -30,21 +30,24 @@ class Placements:
     def frame(self, frame: PhysicalFrame) -> tuple[str, Array]:
         """The body (or ground) that a frame is fixed to, and the frame's transform (4, 4) there.
 
-        Raises:
-            ModelError: frames are fixed to each other in a circle, or stations do not define a frame.
-            UnsupportedError: a frame of another class.
+        Raises: ModelError: frames are fixed to each other in a circle, or stations do not define a
+            frame. UnsupportedError: a frame of another class.
         """
         # Each frame that waits is fixed to the next one; a chain of them may be of any length.
         wanted = self.path(frame)
         waiting = {} if wanted in self.found else {wanted: frame}
         while waiting:
             path, last = next(reversed(waiting.items()))
-            below = next((item for item in self._below(last) if self.path(item) not in self.found), None)
+            below = next(
+                (item for item in self._below(last) if self.path(item) not in self.found), None
+            )
             if below is None:
                 self.found[path] = self._placed(last, path)
                 del waiting[path]
             elif (place := self.path(below)) in waiting:
-                raise ModelError(f"the frame '{place}' is fixed to itself, through {listed(waiting)}; fix it to a body")
+                raise ModelError(
+                    f"the frame '{place}' is fixed to itself, through {listed(waiting)}; fix it to a body"
+                )
             else:
                 waiting[place] = below
         return self.found[wanted]
@@ -63,11 +66,15 @@ class Placements:
         if isinstance(frame, PhysicalOffsetFrame):
             base, matrix = self.frame(self.named(frame, "socket_parent"))
             if not np.isfinite((*frame.translation, *frame.orientation)).all():
-                raise ModelError(f"the frame '{path}' has a place or turning that is not finite; give numbers")
+                raise ModelError(
+                    f"the frame '{path}' has a place or turning that is not finite; give numbers"
+                )
             return base, matrix @ offset(frame.translation, frame.orientation)
         if isinstance(frame, StationDefinedFrame):
             return self._through_stations(frame, path)
-        raise UnsupportedError(f"the frame '{path}' is a {type(frame).__name__}, which osimlite cannot place")
+        raise UnsupportedError(
+            f"the frame '{path}' is a {type(frame).__name__}, which osimlite cannot place"
+        )
 
     def named(self, owner: Component, socket: str) -> PhysicalFrame:
         """The frame that a socket of `owner` leads to."""
@@ -114,13 +121,17 @@ class Placements:
         a, b, c, origin = points
         along, across = b - a, cross(b - a, c - a)
         if not np.linalg.norm(across) > 0.0:
-            raise ModelError(f"point_a, point_b and point_c of the frame '{path}' lie on a line; move one off it")
+            raise ModelError(
+                f"point_a, point_b and point_c of the frame '{path}' lie on a line; move one off it"
+            )
         # The third vector completes the two, in the order of the two axes.
         first, second = _axis(frame.ab_axis), _axis(frame.ab_x_ac_axis)
         first = np.eye(3)[0] if first is None else first
         if second is None or first @ second != 0.0:
             second = np.roll(np.abs(first), 1)
-        vectors = [vector / np.linalg.norm(vector) for vector in (along, across, cross(along, across))]
+        vectors = [
+            vector / np.linalg.norm(vector) for vector in (along, across, cross(along, across))
+        ]
         axes = [first, second, cross(first, second)]
         rotation = np.array(vectors).T @ np.array(axes)
         return bases[0], transform(rotation, origin)

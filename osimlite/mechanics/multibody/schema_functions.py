@@ -15,30 +15,34 @@ from osimlite.schema import functions as schema
 from osimlite.schema.base import Object, Unknown
 
 
-def numeric(function: Object | None, arguments: int, where: str, *, opensim_derivatives: bool = False) -> f.Function:
+def numeric(
+    function: Object | None, arguments: int, where: str, *, opensim_derivatives: bool = False
+) -> f.Function:
     """The function that a component of a model describes.
 
-    Args:
-        function: one of OpenSim's functions.
-        arguments: how many arguments it will get.
-        where: the path and property it stands in, for messages.
-        opensim_derivatives: give a multivariate polynomial the second derivatives that OpenSim takes for them.
+    Args: function: one of OpenSim's functions. arguments: how many arguments it will get. where:
+        the path and property it stands in, for messages. opensim_derivatives: give a multivariate
+        polynomial the second derivatives that OpenSim takes for them.
 
-    Raises:
-        ModelError: there is no function, or it is not a function of this many arguments, or has impossible values.
-        UnsupportedError: a function of another class.
+    Raises: ModelError: there is no function, or it is not a function of this many arguments, or has
+        impossible values. UnsupportedError: a function of another class.
     """
     if function is None:
         raise ModelError(f"{where} is missing; give one, for instance a LinearFunction")
     kind = type(function)
     try:
         if isinstance(function, schema.MultiplierFunction):
-            inner = numeric(function.function, arguments, where, opensim_derivatives=opensim_derivatives)
+            inner = numeric(
+                function.function, arguments, where, opensim_derivatives=opensim_derivatives
+            )
             return f.Scaled(function.scale, inner)
         if isinstance(function, schema.MultivariatePolynomialFunction):
             _takes(function, function.dimension, arguments)
             return f.MultivariatePolynomial.complete(
-                function.coefficients, function.dimension, function.order, opensim_derivatives=opensim_derivatives
+                function.coefficients,
+                function.dimension,
+                function.order,
+                opensim_derivatives=opensim_derivatives,
             )
         if isinstance(function, schema.LinearFunction):
             return _linear(function, arguments)
@@ -46,7 +50,12 @@ def numeric(function: Object | None, arguments: int, where: str, *, opensim_deri
             return f.Constant(function.value)
         if kind not in _UNIVARIATE:
             name = function.class_name if isinstance(function, Unknown) else kind.__name__
-            can = ["Constant", "LinearFunction", "MultiplierFunction", "MultivariatePolynomialFunction"]
+            can = [
+                "Constant",
+                "LinearFunction",
+                "MultiplierFunction",
+                "MultivariatePolynomialFunction",
+            ]
             can += [item.__name__ for item in _UNIVARIATE]
             raise UnsupportedError(
                 f"{where} is a {name}, which osimlite cannot differentiate twice; "
@@ -64,7 +73,9 @@ class _Impossible(Exception):
 
 def _takes(function: Object, wanted: int, given: int) -> None:
     if given != wanted:
-        raise _Impossible(f"it is a function of {wanted} variables and gets {given}; list as many coordinates")
+        raise _Impossible(
+            f"it is a function of {wanted} variables and gets {given}; list as many coordinates"
+        )
 
 
 def _linear(function: schema.LinearFunction, arguments: int) -> f.Function:
@@ -76,7 +87,9 @@ def _linear(function: schema.LinearFunction, arguments: int) -> f.Function:
     return f.Linear(weights[0], start) if arguments == 1 else f.WeightedSum(weights, start)
 
 
-def _points(function: Any, least: int, *, apart: bool = False) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _points(
+    function: Any, least: int, *, apart: bool = False
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the abscissae and ordinates of a function that goes through points, checked.
 
     Args:
@@ -88,7 +101,9 @@ def _points(function: Any, least: int, *, apart: bool = False) -> tuple[tuple[fl
     x = tuple(function.x)
     y = tuple(function.y)[: len(x)]
     if len(x) != len(y) or len(x) < least:
-        raise _Impossible(f"it has {len(x)} x and {len(y)} y; give as many of both, at least {least}")
+        raise _Impossible(
+            f"it has {len(x)} x and {len(y)} y; give as many of both, at least {least}"
+        )
     if not all(map(isfinite, (*x, *y))):
         raise _Impossible("a point is not finite; give numbers")
     if any(after < before or (apart and after == before) for before, after in pairwise(x)):

@@ -27,7 +27,13 @@ from osimlite.schema.joints import (
     ScapulothoracicJoint,
 )
 
-JOINT_TYPES = (*MOTIONS, "EllipsoidJoint", "ScapulothoracicJoint", "ConstantCurvatureJoint", "CustomJoint")
+JOINT_TYPES = (
+    *MOTIONS,
+    "EllipsoidJoint",
+    "ScapulothoracicJoint",
+    "ConstantCurvatureJoint",
+    "CustomJoint",
+)
 """OpenSim's joint classes that osimlite computes."""
 
 
@@ -36,9 +42,8 @@ def joint_motions(
 ) -> tuple[tuple[Motion, ...], Sequence[Coordinate]]:
     """The factors of X_FM of a joint, and its coordinates in the order that the factors count them in.
 
-    Raises:
-        ModelError: a wrong number of coordinates, an axis or a function that cannot be, radii that are no numbers.
-        UnsupportedError: a joint or a function of another class.
+    Raises: ModelError: a wrong number of coordinates, an axis or a function that cannot be, radii
+        that are no numbers. UnsupportedError: a joint or a function of another class.
     """
     kind, coordinates = type(joint).__name__, list(joint.coordinates)
     if isinstance(joint, schema.CustomJoint):
@@ -53,7 +58,9 @@ def joint_motions(
         )
     elif isinstance(joint, ConstantCurvatureJoint):
         if not 0.0 < joint.length < np.inf:
-            raise ModelError(f"the rod of '{path}' has the length {joint.length:g}; give a positive length in m")
+            raise ModelError(
+                f"the rod of '{path}' has the length {joint.length:g}; give a positive length in m"
+            )
         motions = constant_curvature(joint.length, joint.neutral_angle_x_z_y)
     elif kind in MOTIONS:
         motions = MOTIONS[kind]
@@ -83,14 +90,20 @@ def _custom(
         where, words = f"{name} of '{path}'", axis.names
         for word in words:
             if word not in known:
-                raise ModelError(f"{where} names the coordinate '{word}', which the joint does not have; add it there")
-            # OpenSim sorts the coordinates by their first appearance here, whatever their order in the file.
+                raise ModelError(
+                    f"{where} names the coordinate '{word}', which the joint does not have; add it there"
+                )
+            # OpenSim sorts the coordinates by their first appearance here, whatever their order in
+            # the file.
             order.setdefault(word, len(order))
         direction = np.array(axis.axis, dtype=float)
         if not np.isfinite(direction).all() or not direction.any():
             raise ModelError(f"the axis of {where} has no direction; give one that is not zero")
         function = numeric(
-            axis.function, len(words), f"the function of {where}", opensim_derivatives=opensim_derivatives
+            axis.function,
+            len(words),
+            f"the function of {where}",
+            opensim_derivatives=opensim_derivatives,
         )
         axes.append(TransformAxis(tuple(order[word] for word in words), direction, function))
     unused = [name for name in known if name not in order]
@@ -107,5 +120,7 @@ def _radii(radii: Sequence[float], path: str) -> Sequence[float]:
     # Models mirror an ellipsoid by negative radii: the point is then on the other side.
     if not np.isfinite(radii).all():
         words = " ".join(f"{radius:g}" for radius in radii)
-        raise ModelError(f"the radii of the ellipsoid of '{path}' are {words}; give three lengths in m")
+        raise ModelError(
+            f"the radii of the ellipsoid of '{path}' are {words}; give three lengths in m"
+        )
     return radii

@@ -1,9 +1,9 @@
 """Natural splines of odd degree through or near points: OpenSim's GCVSpline.
 
-The spline of degree 2m - 1 minimises the sum of squared residuals plus p times the integral of its squared m-th
-derivative (Woltring, "A Fortran package for generalized, cross-validatory spline smoothing and differentiation",
-Advances in Engineering Software 8, 1986). Outside the points it is the polynomial of degree m - 1 that joins
-smoothly.
+The spline of degree 2m - 1 minimises the sum of squared residuals plus p times the integral of its
+squared m-th derivative (Woltring, "A Fortran package for generalized, cross-validatory spline
+smoothing and differentiation", Advances in Engineering Software 8, 1986). Outside the points it is
+the polynomial of degree m - 1 that joins smoothly.
 """
 
 from __future__ import annotations
@@ -40,15 +40,14 @@ class PiecewisePolynomial(Univariate):
         return numbers
 
 
-def smoothing_spline(x: ArrayLike, y: ArrayLike, half_order: int, error_variance: float) -> PiecewisePolynomial:
+def smoothing_spline(
+    x: ArrayLike, y: ArrayLike, half_order: int, error_variance: float
+) -> PiecewisePolynomial:
     """The natural spline of degree 2 `half_order` - 1 for n points (n,) that increase, n >= 2 `half_order`.
 
-    Args:
-        x: abscissae (n,).
-        y: ordinates (n,).
-        half_order: m.
-        error_variance: of the ordinates; the smoothing is chosen to leave it in the residuals. Zero goes through the
-            points, a negative number chooses the smoothing by generalized cross validation.
+    Args: x: abscissae (n,). y: ordinates (n,). half_order: m. error_variance: of the ordinates; the
+        smoothing is chosen to leave it in the residuals. Zero goes through the points, a negative
+        number chooses the smoothing by generalized cross validation.
     """
     points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     if error_variance != 0.0:
@@ -70,7 +69,10 @@ def natural_splines(x: ArrayLike, y: ArrayLike, half_order: int) -> list[Piecewi
     pieces = _pieces(places, values, half_order) / scale ** np.arange(2.0 * half_order)[:, None]
     # The piece before the first point counts from there too.
     knots = np.append(points[0], points)
-    return [PiecewisePolynomial(knots, column) for column in np.ascontiguousarray(np.moveaxis(pieces, 2, 0))]
+    return [
+        PiecewisePolynomial(knots, column)
+        for column in np.ascontiguousarray(np.moveaxis(pieces, 2, 0))
+    ]
 
 
 def derivatives_of_samples(
@@ -94,7 +96,8 @@ class SampledCurves:
     def __init__(self, x: ArrayLike, y: ArrayLike, half_order: int = 3) -> None:
         points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         places, self._scale = _unit_spacing(points)
-        # What lies closer to the point before than rounding of the values would let a slope be found, says nothing.
+        # What lies closer to the point before than rounding of the values would let a slope be
+        # found, says nothing.
         kept = np.diff(places, prepend=-1.0) > TOUCHING
         self._start, self._places = points[0], places[kept]
         self._pieces = _pieces(self._places, values[kept], half_order)
@@ -125,19 +128,22 @@ def _derivative(points: Array, pieces: Array, at: Array, order: int) -> Array:
 def _pieces(points: Array, values: Array, half_order: int) -> Array:
     """Coefficients (n + 1, 2 m, k) of natural splines through n points with values (n, k), from the constant up.
 
-    Between two points they go with the distance from the first; before the first point and after the last, where the
-    degree is m - 1, with that from there.
+    Between two points they go with the distance from the first; before the first point and after
+    the last, where the degree is m - 1, with that from there.
     """
     derivatives = _derivatives(points, values, half_order)
     powers = np.arange(2.0 * half_order)[:, None]
     width = np.diff(points)[:, None, None] ** powers
-    # What the polynomials are over a unit interval by their values and derivatives at its ends; the first value is 0.
+    # What the polynomials are over a unit interval by their values and derivatives at its ends; the
+    # first value is 0.
     ends = np.concatenate([derivatives[:-1], derivatives[1:]], axis=1)
     ends[:, 0], ends[:, half_order] = 0.0, np.diff(values, axis=0)
     shapes, _ = _unit_interval(half_order)
     pieces = np.zeros((len(points) + 1, 2 * half_order, values.shape[1]))
     pieces[1:-1] = shapes @ (ends * np.tile(width[:, :half_order], (1, 2, 1))) / width
-    pieces[1:, :half_order] = derivatives / np.array([math.factorial(order) for order in range(half_order)])[:, None]
+    pieces[1:, :half_order] = (
+        derivatives / np.array([math.factorial(order) for order in range(half_order)])[:, None]
+    )
     pieces[0, :half_order] = pieces[1, :half_order]
     return pieces
 
@@ -145,8 +151,8 @@ def _pieces(points: Array, values: Array, half_order: int) -> Array:
 def _derivatives(points: Array, values: Array, half_order: int) -> Array:
     """Derivatives (n, m, k) of orders 0 .. m - 1 at the points of splines through them.
 
-    They make the sum of the integrals of the squared m-th derivative a minimum: each interval is a beam with as many
-    freedoms at both ends.
+    They make the sum of the integrals of the squared m-th derivative a minimum: each interval is a
+    beam with as many freedoms at both ends.
     """
     result = np.empty((len(points), half_order, values.shape[1]))
     result[:, 0] = values
@@ -154,12 +160,20 @@ def _derivatives(points: Array, values: Array, half_order: int) -> Array:
         return result
     width, (_, bending) = np.diff(points), _unit_interval(half_order)
     powers = np.tile(width[:, None] ** np.arange(half_order), 2)
-    stiffness = bending * powers[:, :, None] * powers[:, None, :] * width[:, None, None] ** (1 - 2 * half_order)
+    stiffness = (
+        bending
+        * powers[:, :, None]
+        * powers[:, None, :]
+        * width[:, None, None] ** (1 - 2 * half_order)
+    )
     one, two = slice(1, half_order), slice(half_order + 1, 2 * half_order)
     diagonal = np.zeros((len(points), half_order - 1, half_order - 1))
     diagonal[:-1] += stiffness[:, one, one]
     diagonal[1:] += stiffness[:, two, two]
-    rise, right = np.diff(values, axis=0)[:, None], np.zeros((len(points), half_order - 1, values.shape[1]))
+    rise, right = (
+        np.diff(values, axis=0)[:, None],
+        np.zeros((len(points), half_order - 1, values.shape[1])),
+    )
     right[:-1] -= stiffness[:, one, half_order, None] * rise
     right[1:] -= stiffness[:, two, half_order, None] * rise
     result[:, 1:] = _chained(diagonal, stiffness[:, one, two], right)
@@ -170,9 +184,8 @@ def _derivatives(points: Array, values: Array, half_order: int) -> Array:
 def _unit_interval(half_order: int) -> tuple[Array, Array]:
     """Of the polynomial of degree 2 m - 1 by its derivatives up to m - 1 at 0 and, behind these, at 1.
 
-    Returns:
-        Its coefficients from the constant up (2 m, 2 m), and half the second derivatives of the integral of its squared
-        m-th derivative (2 m, 2 m); all are fractions of whole numbers.
+    Returns: Its coefficients from the constant up (2 m, 2 m), and half the second derivatives of
+        the integral of its squared m-th derivative (2 m, 2 m); all are fractions of whole numbers.
     """
     size, parts = 2 * half_order, math.factorial(half_order - 1)
     ends = np.zeros((size, size))
@@ -189,7 +202,8 @@ def _unit_interval(half_order: int) -> tuple[Array, Array]:
 def _chained(diagonal: Array, beside: Array, right: Array) -> Array:
     """The solution (n, p, k) of symmetric equations in which each of n unknowns (p, k) meets its neighbours only.
 
-    Every other unknown is eliminated, all at once, until one is left: cyclic reduction (R. Hockney, J. ACM 12, 1965).
+    Every other unknown is eliminated, all at once, until one is left: cyclic reduction (R. Hockney,
+    J. ACM 12, 1965).
 
     Args:
         diagonal: blocks (n, p, p), positive definite all together.
@@ -203,7 +217,9 @@ def _chained(diagonal: Array, beside: Array, right: Array) -> Array:
     wide = np.zeros((len(before), size, 2 * size + right.shape[2]))
     wide[:, :, :size], wide[:count, :, size : 2 * size] = before.transpose(0, 2, 1), behind
     wide[:, :, 2 * size :] = right[1::2]
-    from_before, from_behind, own = np.split(np.linalg.solve(diagonal[1::2], wide), [size, 2 * size], axis=2)
+    from_before, from_behind, own = np.split(
+        np.linalg.solve(diagonal[1::2], wide), [size, 2 * size], axis=2
+    )
     kept, sides = diagonal[::2].copy(), right[::2].copy()
     kept[: len(before)] -= before @ from_before
     sides[: len(before)] -= before @ own
@@ -221,13 +237,15 @@ def _chained(diagonal: Array, beside: Array, right: Array) -> Array:
 def _smoothed(points: Array, values: Array, half_order: int, error_variance: float) -> Array:
     """Values at the points (n,) of the spline whose smoothing the criterion prefers."""
     n = len(values)
-    # The penalty of the values s is sᵀ K s, by Gauss's rule, which is exact here; K's eigenvectors make every choice of
-    # p cheap.
+    # The penalty of the values s is sᵀ K s, by Gauss's rule, which is exact here; K's eigenvectors
+    # make every choice of p cheap.
     nodes, weights = np.polynomial.legendre.leggauss(half_order)
     width, middle = np.diff(points) / 2.0, (points[1:] + points[:-1]) / 2.0
     places = (middle[:, None] + width[:, None] * nodes).ravel()
     bends = _derivative(points, _pieces(points, np.eye(n), half_order), places, half_order)
-    roughness, vectors = np.linalg.eigh(bends.T @ ((width[:, None] * weights).ravel()[:, None] * bends))
+    roughness, vectors = np.linalg.eigh(
+        bends.T @ ((width[:, None] * weights).ravel()[:, None] * bends)
+    )
     roughness = np.maximum(roughness, 0.0)
     roughness[:half_order] = 0.0
     loads = vectors.T @ values

@@ -36,12 +36,16 @@ def skews(vectors: Array) -> Array:
 
 def rotation_about(axis: Array, angle: float) -> Array:
     """Rotation matrix (3, 3) by `angle` (rad) about the unit vector `axis` (Rodrigues' formula)."""
-    return np.array(transposed(about_axis(axis.tolist(), float(np.sin(angle)), float(np.cos(angle)))))
+    return np.array(
+        transposed(about_axis(axis.tolist(), float(np.sin(angle)), float(np.cos(angle))))
+    )
 
 
 def rotation_xyz(angles: Array) -> Array:
     """Rotation matrix Rx(a) Ry(b) Rz(c) of body-fixed X-Y-Z `angles` (rad)."""
-    return np.array(transposed(body_fixed(*np.stack((np.sin(angles), np.cos(angles)), axis=1).ravel().tolist())))
+    return np.array(
+        transposed(body_fixed(*np.stack((np.sin(angles), np.cos(angles)), axis=1).ravel().tolist()))
+    )
 
 
 def rotation_about_space(angles: ArrayLike) -> Array:
@@ -58,7 +62,9 @@ def angles_xyz(rotation: Array) -> Array:
     is_straight = np.abs(r13) > 1.0 - 1e-14
     alone = np.arctan2(rotation[..., 1, 0], rotation[..., 1, 1]) * np.copysign(1.0, r13)
     second = np.arcsin(np.clip(r13, -1.0, 1.0))
-    return np.stack([np.where(is_straight, alone, first), second, np.where(is_straight, 0.0, third)], axis=-1)
+    return np.stack(
+        [np.where(is_straight, alone, first), second, np.where(is_straight, 0.0, third)], axis=-1
+    )
 
 
 def quaternion(rotation: ArrayLike) -> Array:
@@ -69,7 +75,9 @@ def quaternion(rotation: ArrayLike) -> Array:
     products = np.empty((*m.shape[:-2], 4, 4))
     products[..., 1:, 1:] = m + np.swapaxes(m, -1, -2) + (1.0 - trace) * np.eye(3)
     for k in range(3):
-        products[..., k + 1, 0] = products[..., 0, k + 1] = m[..., k - 1, k - 2] - m[..., k - 2, k - 1]
+        products[..., k + 1, 0] = products[..., 0, k + 1] = (
+            m[..., k - 1, k - 2] - m[..., k - 2, k - 1]
+        )
     products[..., :1, :1] = 1.0 + trace
     largest = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
     rows: Array = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
@@ -86,9 +94,15 @@ def rotation_of(quaternions: ArrayLike) -> Array:
         w, x, y, z = np.moveaxis(near / np.linalg.norm(near, axis=-1, keepdims=True), -1, 0)
     return np.stack(
         (
-            np.stack((w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)), -1),
-            np.stack((2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)), -1),
-            np.stack((2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z), -1),
+            np.stack(
+                (w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)), -1
+            ),
+            np.stack(
+                (2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)), -1
+            ),
+            np.stack(
+                (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z), -1
+            ),
         ),
         -2,
     )

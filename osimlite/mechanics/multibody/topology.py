@@ -43,11 +43,14 @@ def new_base(loose: Sequence[str], links: Sequence[Link]) -> str:
     return max(loose, key=lambda path: (path not in children, parents.count(path)))
 
 
-def spanning_tree(links: Sequence[L], ground: str, masses: Mapping[str, float]) -> tuple[list[Branch[L]], list[L]]:
+def spanning_tree(
+    links: Sequence[L], ground: str, masses: Mapping[str, float]
+) -> tuple[list[Branch[L]], list[L]]:
     """The joints that carry bodies, carriers before the carried, and those that only close loops.
 
-    The tree grows level by level from ground, within a level in the order of the joints. Where a joint would move a
-    body without mass, the branch goes on at once, to the heaviest neighbour, until a body with mass ends it.
+    The tree grows level by level from ground, within a level in the order of the joints. Where a
+    joint would move a body without mass, the branch goes on at once, to the heaviest neighbour,
+    until a body with mass ends it.
     """
     levels = {ground: 0}
     branches: list[Branch[L]] = []
@@ -72,7 +75,11 @@ def spanning_tree(links: Sequence[L], ground: str, masses: Mapping[str, float]) 
                 if outer not in levels:
                     result.append((masses.get(outer, 0.0), not backward, -place))
         heavy = [item for item in result if item[0] > 0.0]
-        best = max(heavy, key=lambda item: (item[1], item[0], item[2])) if heavy else max(result, default=None)
+        best = (
+            max(heavy, key=lambda item: (item[1], item[0], item[2]))
+            if heavy
+            else max(result, default=None)
+        )
         return None if best is None else -best[2]
 
     level = 0
@@ -93,5 +100,7 @@ def spanning_tree(links: Sequence[L], ground: str, masses: Mapping[str, float]) 
                     break
         level += 1
     return branches, [
-        link for place, link in enumerate(links) if place not in used and link.parent in levels and link.child in levels
+        link
+        for place, link in enumerate(links)
+        if place not in used and link.parent in levels and link.child in levels
     ]

@@ -28,7 +28,11 @@ def human() -> Model:
     """Build the human, with one force of the ground for each foot, as scenarios want it."""
     model = jumper(driven=False)
     model.name = "Human"
-    forces = {force.name: force for force in model.force_set.objects if isinstance(force, HuntCrossleyForce)}
+    forces = {
+        force.name: force
+        for force in model.force_set.objects
+        if isinstance(force, HuntCrossleyForce)
+    }
     for side in "rl":
         heel, ball = forces[f"heel_{side}_force"], forces[f"ball_{side}_force"]
         (own,), (other,) = heel.contact_parameters.objects, ball.contact_parameters.objects
@@ -52,7 +56,9 @@ def write_scenario(folder: Path) -> Path:
     make_folder(folder)
     files = {folder / "human.osim": to_text(human()).encode()}
     for ending in ENDINGS:
-        files[folder / f"{SCENARIO}{ending}"] = Path(__file__).with_name(f"{SCENARIO}{ending}").read_bytes()
+        files[folder / f"{SCENARIO}{ending}"] = (
+            Path(__file__).with_name(f"{SCENARIO}{ending}").read_bytes()
+        )
     for path, content in files.items():
         if path.exists() and read_file(path) != content:
             raise SettingError(

@@ -40,7 +40,9 @@ def rows_between(
         raise problem.wrong(constraint, "it has neither a lower_bound nor an upper_bound")
     if constraint.equality_with_lower:
         if constraint.lower_bound is None or constraint.upper_bound is not None:
-            raise problem.wrong(constraint, "equality_with_lower needs a lower_bound and no upper_bound")
+            raise problem.wrong(
+                constraint, "equality_with_lower needs a lower_bound and no upper_bound"
+            )
         functions = [(constraint.lower_bound, (0.0, 0.0))]
     series = [
         problem.given(partial(over_time, numeric(function, 1, f"a bound of '{constraint.name}'")))
@@ -49,6 +51,10 @@ def rows_between(
     limits: list[Range] = [limit for _ in paths for _, limit in functions]
 
     def formula(point: Point) -> Formula:
-        return casadi.vertcat(*(variable(point, path) - point.at(own) for path in paths for own in series))
+        return casadi.vertcat(
+            *(variable(point, path) - point.at(own) for path in paths for own in series)
+        )
 
-    return Rows([f"{constraint.name} of {path}" for path in paths for _ in functions], formula, limits)
+    return Rows(
+        [f"{constraint.name} of {path}" for path in paths for _ in functions], formula, limits
+    )

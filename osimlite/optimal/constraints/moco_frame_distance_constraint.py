@@ -18,7 +18,9 @@ def rows(constraint: MocoFrameDistanceConstraint, problem: Problem) -> Rows:
             problem.expect(constraint, path, problem.functions.mechanism.frames, "frame")
         near, far = pair.minimum_distance, pair.maximum_distance
         if not 0.0 <= near <= far:
-            raise problem.wrong(constraint, f"its distances rise from {near:g} to {far:g} m, which none can fulfil")
+            raise problem.wrong(
+                constraint, f"its distances rise from {near:g} to {far:g} m, which none can fulfil"
+            )
         pairs.append(ends)
         limits.append((near * near, far * far))
     along = projected(constraint, problem)
@@ -27,4 +29,6 @@ def rows(constraint: MocoFrameDistanceConstraint, problem: Problem) -> Rows:
         ways = (point.frame(end).position - point.frame(start).position for start, end in pairs)
         return casadi.vertcat(*(casadi.sumsqr(along(way)) for way in ways))
 
-    return Rows([f"{constraint.name} of {start} and {end}" for start, end in pairs], formula, limits)
+    return Rows(
+        [f"{constraint.name} of {start} and {end}" for start, end in pairs], formula, limits
+    )

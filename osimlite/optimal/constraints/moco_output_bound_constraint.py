@@ -12,4 +12,6 @@ from osimlite.schema.moco.path_constraints import MocoOutputBoundConstraint
 def rows(constraint: MocoOutputBoundConstraint, problem: Problem) -> Rows:
     """How far the output is above the functions."""
     value = output_value(constraint, problem)
-    return rows_between(constraint, problem, [constraint.output_path], lambda point, _: value(point))
+    return rows_between(
+        constraint, problem, [constraint.output_path], lambda point, _: value(point)
+    )

@@ -22,6 +22,11 @@ def terms(goal: MocoAccelerationTrackingGoal, problem: Problem) -> Terms:
         return casadi.sumsqr(found - given)
 
     followed = Followed(
-        goal, goal.acceleration_reference_file, None, goal.frame_paths, goal.acceleration_weights, "Vec3"
+        goal,
+        goal.acceleration_reference_file,
+        None,
+        goal.frame_paths,
+        goal.acceleration_weights,
+        "Vec3",
     )
     return followed.terms(problem, error)

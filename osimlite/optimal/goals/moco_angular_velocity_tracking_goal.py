@@ -20,4 +20,6 @@ def terms(goal: MocoAngularVelocityTrackingGoal, problem: Problem) -> Terms:
         "Vec3",
         "angular_velocity",
     )
-    return followed.terms(problem, lambda point, frame, given: casadi.sumsqr(frame.angular_velocity - given))
+    return followed.terms(
+        problem, lambda point, frame, given: casadi.sumsqr(frame.angular_velocity - given)
+    )

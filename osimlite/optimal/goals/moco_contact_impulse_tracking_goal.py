@@ -14,12 +14,16 @@ def terms(goal: MocoContactImpulseTrackingGoal, problem: Problem) -> Terms:
     if axis not in range(3):
         raise problem.wrong(goal, f"its impulse_axis is {axis}; it has to be 0, 1 or 2")
     if len(goal.contact_groups) != 1:
-        raise problem.wrong(goal, f"it has {len(goal.contact_groups)} contact_groups; it takes one, as in OpenSim")
+        raise problem.wrong(
+            goal, f"it has {len(goal.contact_groups)} contact_groups; it takes one, as in OpenSim"
+        )
     ((paths, measured, _),) = measured_groups(goal, problem)
 
     def integrand(point: Point) -> Formula:
         pushes = point.output("contact_forces")
-        return sum(pushes[f"{path}|force_{'xyz'[axis]}"] for path in paths) - point.at(measured[axis])
+        return sum(pushes[f"{path}|force_{'xyz'[axis]}"] for path in paths) - point.at(
+            measured[axis]
+        )
 
     result, weight = integral(integrand), weight_of(problem)
     return Terms(lambda ends: result.value(ends) ** 2 / weight, integrand)

@@ -21,7 +21,10 @@ def terms(goal: MocoContactTrackingGoal, problem: Problem) -> Terms:
         for paths, measured, greatest in groups:
             parts = []
             for axis, series, by in zip(
-                "xyz", measured, greatest if goal.normalize_tracking_error else np.ones(3), strict=True
+                "xyz",
+                measured,
+                greatest if goal.normalize_tracking_error else np.ones(3),
+                strict=True,
             ):
                 push = sum(pushes[f"{path}|force_{axis}"] for path in paths)
                 parts.append((push - point.at(series)) / by)

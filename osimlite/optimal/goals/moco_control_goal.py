@@ -11,7 +11,9 @@ from osimlite.schema.moco.goals import MocoControlGoal
 def terms(goal: MocoControlGoal, problem: Problem) -> Terms:
     """The integral of the weighted sum of powers of the controls' sizes."""
     controls = [*problem.controls]
-    weights = problem.weights(goal, goal.control_weights, goal.control_weights_pattern, controls, "control")
+    weights = problem.weights(
+        goal, goal.control_weights, goal.control_weights_pattern, controls, "control"
+    )
     power = goal.exponent
 
     def integrand(point: Point) -> Formula:

@@ -13,15 +13,29 @@ def terms(goal: MocoControlTrackingGoal, problem: Problem) -> Terms:
     controls, table = [*problem.controls], table_of(problem, goal, goal.reference)
     columns = {item.name: item.reference for item in goal.reference_labels}
     if not columns:
-        columns = {name: name for name in table.columns if name in controls or not goal.allow_unused_references}
+        columns = {
+            name: name
+            for name in table.columns
+            if name in controls or not goal.allow_unused_references
+        }
     for name, label in columns.items():
         problem.expect(goal, name, controls, "control")
         if label not in table.columns:
-            raise problem.wrong(goal, f"its reference has no column '{label}', which '{name}' is to follow")
-    weights = dict(zip(controls, problem.weights(goal, goal.control_weights, None, controls, "control"), strict=True))
+            raise problem.wrong(
+                goal, f"its reference has no column '{label}', which '{name}' is to follow"
+            )
+    weights = dict(
+        zip(
+            controls,
+            problem.weights(goal, goal.control_weights, None, controls, "control"),
+            strict=True,
+        )
+    )
     pairs = [*zip(columns, splines(problem, table, [*columns.values()]), strict=True)]
 
     def integrand(point: Point) -> Formula:
-        return sum(weights[name] * (point.control(name) - point.at(series)) ** 2 for name, series in pairs)
+        return sum(
+            weights[name] * (point.control(name) - point.at(series)) ** 2 for name, series in pairs
+        )
 
     return integral(integrand)

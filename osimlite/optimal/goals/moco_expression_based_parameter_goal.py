@@ -19,7 +19,9 @@ def terms(goal: MocoExpressionBasedParameterGoal, problem: Problem) -> Terms:
     if not goal.expression.strip():
         raise problem.wrong(goal, "it has no expression")
     if len(goal.variables) != len(goal.parameters):
-        raise problem.wrong(goal, f"it has {len(goal.parameters)} parameters and {len(goal.variables)} variables")
+        raise problem.wrong(
+            goal, f"it has {len(goal.parameters)} parameters and {len(goal.variables)} variables"
+        )
     try:
         formula = Formula.parse(goal.expression, goal.variables, "expression")
     except ModelError as error:
@@ -31,9 +33,13 @@ def terms(goal: MocoExpressionBasedParameterGoal, problem: Problem) -> Terms:
     numbers = {path: _number(goal, problem, path) for path in paths if path not in known}
 
     def value(ends: Ends) -> Value:
-        given = [numbers[path] if path in numbers else ends.start.p[known.index(path)] for path in paths]
+        given = [
+            numbers[path] if path in numbers else ends.start.p[known.index(path)] for path in paths
+        ]
         registers = Vector([*given, *[0.0] * len(formula.steps)])
-        return on_symbols(compute)(Vector(steps), len(formula.steps), Vector(constants), registers, len(given))
+        return on_symbols(compute)(
+            Vector(steps), len(formula.steps), Vector(constants), registers, len(given)
+        )
 
     return Terms(value, modes=("cost", "endpoint_constraint"))
 

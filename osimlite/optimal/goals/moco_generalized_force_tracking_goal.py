@@ -17,8 +17,9 @@ from osimlite.schema.states import variables
 
 
 def terms(goal: MocoGeneralizedForceTrackingGoal, problem: Problem) -> Terms:
-    """The integral of the weighted sum of squares of the distances of what the motion takes beyond gravity and the
-    forces of `force_paths` (N, N m) from splines through the table."""
+    """The integral of the weighted sum of squares of the distances of what the motion takes beyond
+    gravity and the forces of `force_paths` (N, N m) from splines through the table.
+    """
     pushing = _pushing(goal, problem)
     coordinates: dict[str, Any] = {**variables(problem.model.tree(), "generalized force")}
     known = {
@@ -31,20 +32,29 @@ def terms(goal: MocoGeneralizedForceTrackingGoal, problem: Problem) -> Terms:
     for name in followed:
         problem.expect(goal, name, known, "free generalized force")
     given = goal.generalized_force_weights, goal.generalized_force_weights_pattern
-    weights = dict(zip(known, problem.weights(goal, *given, [*known], "free generalized force"), strict=True))
+    weights = dict(
+        zip(known, problem.weights(goal, *given, [*known], "free generalized force"), strict=True)
+    )
     rows: list[Any] = []
     for name, series in zip(followed, splines(problem, table, followed), strict=True):
         if weights[name] < 0.0:
-            raise problem.wrong(goal, f"the weight of '{name}' is negative, which OpenSim refuses, too")
+            raise problem.wrong(
+                goal, f"the weight of '{name}' is negative, which OpenSim refuses, too"
+            )
         greatest = float(np.abs(table[name]).max()) if goal.normalize_tracking_error else 1.0
         if not greatest:
-            raise problem.wrong(goal, f"the column '{name}' is zero, so that no error can be divided by its greatest")
+            raise problem.wrong(
+                goal,
+                f"the column '{name}' is zero, so that no error can be divided by its greatest",
+            )
         rows.append((series, weights[name] / greatest**2))
     missing = problem.dynamics.generalized_forces(pushing, [known[name] for name in followed])
 
     def integrand(point: Point) -> Formula:
         found = missing(point)
-        return sum(weight * (found[k] - point.at(series)) ** 2 for k, (series, weight) in enumerate(rows))
+        return sum(
+            weight * (found[k] - point.at(series)) ** 2 for k, (series, weight) in enumerate(rows)
+        )
 
     return integral(integrand)
 
@@ -65,6 +75,14 @@ def _pushing(goal: MocoGeneralizedForceTrackingGoal, problem: Problem) -> list[s
 
 def _is_constrained(problem: Problem, coordinate: Coordinate) -> bool:
     """Whether its motion is given, or is that of others."""
-    couplers = (part for part in problem.components.values() if isinstance(part, CoordinateCouplerConstraint))
+    couplers = (
+        part
+        for part in problem.components.values()
+        if isinstance(part, CoordinateCouplerConstraint)
+    )
     dependent = {str(part.dependent_coordinate_name) for part in couplers if part.isEnforced}
-    return coordinate.prescribed or coordinate.is_free_to_satisfy_constraints or coordinate.name in dependent
+    return (
+        coordinate.prescribed
+        or coordinate.is_free_to_satisfy_constraints
+        or coordinate.name in dependent
+    )

@@ -10,7 +10,9 @@ from osimlite.schema.moco.goals import MocoInitialActivationGoal
 
 def terms(goal: MocoInitialActivationGoal, problem: Problem) -> Terms:
     """For each muscle with an activation, excitation less activation."""
-    muscles = [name for name in problem.controls if f"{name}/activation" in problem.functions.states]
+    muscles = [
+        name for name in problem.controls if f"{name}/activation" in problem.functions.states
+    ]
 
     def value(ends: Ends) -> Formula:
         start = ends.start

@@ -12,7 +12,12 @@ from osimlite.schema.moco.goals import MEASURES, MocoJointReactionGoal
 def terms(goal: MocoJointReactionGoal, problem: Problem) -> Terms:
     """The integral of the weighted sum of the squares of forces (N) and moments (N m), over the weight of the model."""
     path, side = str(goal.joint_path), goal.loads_frame
-    problem.expect(goal, path, [key for key, part in problem.components.items() if isinstance(part, Joint)], "joint")
+    problem.expect(
+        goal,
+        path,
+        [key for key, part in problem.components.items() if isinstance(part, Joint)],
+        "joint",
+    )
     joint = problem.components[path]
     frame = str(goal.expressed_in_frame_path)
     if not frame:

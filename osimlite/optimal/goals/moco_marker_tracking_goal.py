@@ -18,7 +18,9 @@ def terms(goal: MocoMarkerTrackingGoal, problem: Problem) -> Terms:
             raise problem.wrong(goal, "its markers_reference names no marker_file")
         table = read_table(problem.place(reference.marker_file))
     measured = [*dict.fromkeys(label[:-2] for label in table.columns)]
-    known = {part.name: path for path, part in problem.components.items() if isinstance(part, Marker)}
+    known = {
+        part.name: path for path, part in problem.components.items() if isinstance(part, Marker)
+    }
     known |= {path: path for path in known.values()}
     followed = [name for name in measured if name in known or not goal.allow_unused_references]
     for name in followed:

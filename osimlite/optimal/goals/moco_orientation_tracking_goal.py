@@ -36,7 +36,11 @@ def squared_angle(point: Point, frame: Frame, given: Formula) -> Formula:
     )
     turn = frame.rotation.T @ wanted
     cosine = (casadi.trace(turn) - 1) / 2
-    square = ((turn[2, 1] - turn[1, 2]) ** 2 + (turn[0, 2] - turn[2, 0]) ** 2 + (turn[1, 0] - turn[0, 1]) ** 2) / 4
+    square = (
+        (turn[2, 1] - turn[1, 2]) ** 2
+        + (turn[0, 2] - turn[2, 0]) ** 2
+        + (turn[1, 0] - turn[0, 1]) ** 2
+    ) / 4
     angle = casadi.atan2(casadi.sqrt(casadi.fmax(square, SMALL * SMALL)), cosine)
     is_small = casadi.logic_and(square < SMALL, cosine > 0)
     return casadi.if_else(is_small, square + square**2 / 3 + 8 * square**3 / 45, angle**2)

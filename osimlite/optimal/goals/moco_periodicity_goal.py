@@ -23,7 +23,8 @@ def terms(goal: MocoPeriodicityGoal, problem: Problem) -> Terms:
 
     def value(ends: Ends) -> Formula:
         differences = [
-            sign * getattr(ends.start, what)(first) - getattr(ends.end, what)(last) for what, first, last, sign in pairs
+            sign * getattr(ends.start, what)(first) - getattr(ends.end, what)(last)
+            for what, first, last, sign in pairs
         ]
         return casadi.vertcat(*differences) if differences else casadi.SX(0, 1)
 

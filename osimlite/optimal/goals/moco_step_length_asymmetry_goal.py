@@ -21,7 +21,10 @@ def terms(goal: MocoStepLengthAsymmetryGoal, problem: Problem) -> Terms:
     def integrand(point: Point) -> Formula:
         right, left = (along(goal.walking_direction, point.frame(foot).position) for foot in feet)
         ahead = right - left, left - right
-        return sum(smooth(way - length, 0.5, 0.5, sharpness) for way, length in zip(ahead, lengths, strict=True))
+        return sum(
+            smooth(way - length, 0.5, 0.5, sharpness)
+            for way, length in zip(ahead, lengths, strict=True)
+        )
 
     result = integral(integrand)
     return Terms(lambda ends: 100.0 * result.value(ends), integrand)

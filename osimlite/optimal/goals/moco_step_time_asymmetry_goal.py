@@ -11,8 +11,9 @@ from osimlite.schema.moco.goals import MocoStepTimeAsymmetryGoal, MocoStepTimeAs
 
 
 def terms(goal: MocoStepTimeAsymmetryGoal, problem: Problem) -> Terms:
-    """A hundred times the square of what the asymmetry is off the wanted one; each moment counts as one of a step of
-    the foot that is on the ground, and of the one in front if both are."""
+    """A hundred times the square of what the asymmetry is off the wanted one; each moment counts as
+    one of a step of the foot that is on the ground, and of the one in front if both are.
+    """
     groups = goal.right_contact_group, goal.left_contact_group
     feet = [_foot(goal, problem, group) for group in groups]
 
@@ -20,9 +21,17 @@ def terms(goal: MocoStepTimeAsymmetryGoal, problem: Problem) -> Terms:
         pushes = point.output("contact_forces")
         loads, places = [], []
         for paths, foot in feet:
-            load = sum(along(goal.contact_force_direction, [pushes[f"{path}|force_{axis}"] for axis in "xyz"])
-                       for path in paths)  # fmt: skip
-            loads.append(smooth(load - goal.contact_force_threshold, 0.5, 0.5, goal.contact_detection_smoothing))
+            load = sum(
+                along(
+                    goal.contact_force_direction, [pushes[f"{path}|force_{axis}"] for axis in "xyz"]
+                )
+                for path in paths
+            )
+            loads.append(
+                smooth(
+                    load - goal.contact_force_threshold, 0.5, 0.5, goal.contact_detection_smoothing
+                )
+            )
             places.append(along(goal.walking_direction, point.frame(foot).position))
         right, left = loads
         front = smooth(places[0] - places[1], 0.0, 1.0, 100.0)
@@ -44,7 +53,9 @@ def _foot(
     chosen = group.foot_position_contact_force_path
     if chosen not in names:
         near = did_you_mean(chosen, names)
-        raise problem.wrong(goal, f"contact_force_paths of '{group.name}' have no foot_position '{chosen}'{near}")
+        raise problem.wrong(
+            goal, f"contact_force_paths of '{group.name}' have no foot_position '{chosen}'{near}"
+        )
     contacts = dict(contact_at(goal, problem, name) for name in names)
     sphere = contact_at(goal, problem, chosen)[1]
     frame = problem.model.tree().target(sphere, "socket_frame", sphere.socket_frame).path

@@ -14,5 +14,7 @@ def terms(goal: MocoSumSquaredStateGoal, problem: Problem) -> Terms:
     weights = problem.weights(goal, goal.state_weights, None, states, "state")
     if goal.pattern is not None:
         matches = problem.pattern(goal, goal.pattern)
-        weights = [weight if matches(name) else 0.0 for weight, name in zip(weights, states, strict=True)]
+        weights = [
+            weight if matches(name) else 0.0 for weight, name in zip(weights, states, strict=True)
+        ]
     return integral(lambda point: casadi.dot(casadi.DM(weights), point.x**2))

@@ -20,4 +20,6 @@ def terms(goal: MocoTranslationTrackingGoal, problem: Problem) -> Terms:
         "Vec3",
         "position",
     )
-    return followed.terms(problem, lambda point, frame, given: casadi.sumsqr(frame.position - given))
+    return followed.terms(
+        problem, lambda point, frame, given: casadi.sumsqr(frame.position - given)
+    )

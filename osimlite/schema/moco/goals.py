@@ -56,7 +56,9 @@ class MocoGoal(Object, abstract=True):
     """Whether the goal counts."""
     weight: Number = 1.0
     """How much a cost counts beside others."""
-    mode: Annotated[str | None, Value("string", "optional", choices=("cost", "endpoint_constraint"))] = None
+    mode: Annotated[
+        str | None, Value("string", "optional", choices=("cost", "endpoint_constraint"))
+    ] = None
     """Whether it is a cost or a constraint; left out, what is usual for the goal."""
     moco_constraint_info: Unnamed[MocoConstraintInfo] = made(MocoConstraintInfo)
     """Bounds of the values if it is a constraint."""

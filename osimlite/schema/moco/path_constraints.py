@@ -30,7 +30,9 @@ class MocoPathConstraint(Object, abstract=True):
 class MocoControlBoundConstraint(MocoPathConstraint):
     """Controls stay between functions of time."""
 
-    control_paths: Annotated[tuple[str, ...], Reference("state-path", "control", "list", required=False)] = ()
+    control_paths: Annotated[
+        tuple[str, ...], Reference("state-path", "control", "list", required=False)
+    ] = ()
     """Paths of the controls."""
     lower_bound: Optional[Function] = None
     """Least value over time."""
@@ -43,7 +45,9 @@ class MocoControlBoundConstraint(MocoPathConstraint):
 class MocoStateBoundConstraint(MocoPathConstraint):
     """States stay between functions of time."""
 
-    state_paths: Annotated[tuple[str, ...], Reference("state-path", "state variable", "list", required=False)] = ()
+    state_paths: Annotated[
+        tuple[str, ...], Reference("state-path", "state variable", "list", required=False)
+    ] = ()
     """Paths of the states."""
     lower_bound: Optional[Function] = None
     """Least value over time."""

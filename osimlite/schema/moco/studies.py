@@ -50,11 +50,15 @@ class MocoPhase(Object):
         ModelProcessor, name="model", model=lambda: Model.build({"name": "model"}, set())
     )
     """The model."""
-    time_initial_bounds: Single[MocoInitialBounds] = made(MocoInitialBounds, name="time_initial_bounds")
+    time_initial_bounds: Single[MocoInitialBounds] = made(
+        MocoInitialBounds, name="time_initial_bounds"
+    )
     """When the phase begins."""
     time_final_bounds: Single[MocoFinalBounds] = made(MocoFinalBounds, name="time_final_bounds")
     """When the phase ends."""
-    default_speed_bounds: Single[MocoBounds] = made(MocoBounds, name="default_speed_bounds", bounds=(-50.0, 50.0))
+    default_speed_bounds: Single[MocoBounds] = made(
+        MocoBounds, name="default_speed_bounds", bounds=(-50.0, 50.0)
+    )
     """Bounds of speeds that have none of their own."""
     bound_activation_from_excitation: Flag = True
     """Whether activations without bounds have those of their excitations."""
@@ -80,7 +84,9 @@ class MocoPhase(Object):
         MocoBounds, name="kinematic_constraint_bounds", bounds=(0.0,)
     )
     """Bounds of the errors of the model's constraints."""
-    multiplier_bounds: Single[MocoBounds] = made(MocoBounds, name="multiplier_bounds", bounds=(-1000.0, 1000.0))
+    multiplier_bounds: Single[MocoBounds] = made(
+        MocoBounds, name="multiplier_bounds", bounds=(-1000.0, 1000.0)
+    )
     """Bounds of the multipliers of the model's constraints."""
 
 
@@ -169,7 +175,9 @@ class MocoCasADiSolver(MocoDirectCollocationSolver):
     """How it is found which derivatives are always zero."""
     optim_write_sparsity: Annotated[str, Value("string")] = ""
     """What the names of files of sparsity patterns begin with; left out, there are none."""
-    optim_finite_difference_scheme: Annotated[str, word("central", "forward", "backward")] = "central"
+    optim_finite_difference_scheme: Annotated[str, word("central", "forward", "backward")] = (
+        "central"
+    )
     """How derivatives are computed."""
     parallel: Annotated[int | None, Value("int", "optional")] = None
     """Number of threads: 0 for one, 1 for as many as there are processors."""
@@ -226,7 +234,9 @@ class MocoTool(Object, abstract=True):
 class MocoInverse(MocoTool):
     """Finds controls of muscles for a motion that is given exactly."""
 
-    kinematics: Annotated[Single[TableProcessor], OfStates] = made(TableProcessor, name="kinematics")
+    kinematics: Annotated[Single[TableProcessor], OfStates] = made(
+        TableProcessor, name="kinematics"
+    )
     """The motion."""
     kinematics_allow_extra_columns: Flag = False
     """Whether the table may have columns that are no states."""
@@ -251,7 +261,9 @@ class MocoInverse(MocoTool):
 class MocoTrack(MocoTool):
     """Finds a motion that follows measured states or markers."""
 
-    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(TableProcessor, name="states_reference")
+    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(
+        TableProcessor, name="states_reference"
+    )
     """States to follow."""
     states_global_tracking_weight: Number = 1.0
     """How much deviations of states count."""
@@ -263,7 +275,9 @@ class MocoTrack(MocoTool):
     """Whether deviations are divided by the ranges of the coordinates."""
     track_reference_position_derivatives: Flag = False
     """Whether speeds are followed that are derivatives of the measured values."""
-    markers_reference: Annotated[Single[TableProcessor], OfMarkers] = made(TableProcessor, name="markers_reference")
+    markers_reference: Annotated[Single[TableProcessor], OfMarkers] = made(
+        TableProcessor, name="markers_reference"
+    )
     """Markers to follow."""
     markers_global_tracking_weight: Number = 1.0
     """How much deviations of markers count."""

@@ -66,7 +66,9 @@ class MocoControlTrackingGoalReference(Object):
 class MocoControlTrackingGoal(MocoGoal):
     """Controls follow a table."""
 
-    reference: Annotated[Single[TableProcessor], OfControls] = made(TableProcessor, name="reference")
+    reference: Annotated[Single[TableProcessor], OfControls] = made(
+        TableProcessor, name="reference"
+    )
     """The table, a column for each control."""
     allow_unused_references: Flag = False
     """Whether the table may have columns that are no controls."""
@@ -83,7 +85,9 @@ class MocoControlTrackingGoal(MocoGoal):
 class MocoMarkerTrackingGoal(MocoGoal):
     """Markers follow measured ones."""
 
-    markers_reference: Annotated[Single[MarkersReference], OfMarkers] = made(MarkersReference, name="markers_reference")
+    markers_reference: Annotated[Single[MarkersReference], OfMarkers] = made(
+        MarkersReference, name="markers_reference"
+    )
     """The measured markers and their weights."""
     allow_unused_references: Flag = False
     """Whether there may be measured markers that the model has not."""
@@ -92,7 +96,9 @@ class MocoMarkerTrackingGoal(MocoGoal):
 class MocoTranslationTrackingGoal(MocoGoal):
     """Origins of frames follow given places."""
 
-    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(TableProcessor, name="states_reference")
+    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(
+        TableProcessor, name="states_reference"
+    )
     """A motion of the model, from which the places are computed."""
     translation_reference_file: InputTable = ""
     """The places themselves, a column of vectors for each frame by its path."""
@@ -105,7 +111,9 @@ class MocoTranslationTrackingGoal(MocoGoal):
 class MocoOrientationTrackingGoal(MocoGoal):
     """Frames follow given orientations."""
 
-    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(TableProcessor, name="states_reference")
+    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(
+        TableProcessor, name="states_reference"
+    )
     """A motion of the model, from which the orientations are computed."""
     rotation_reference_file: InputTable = ""
     """The orientations themselves, a column of quaternions for each frame by its path."""
@@ -118,7 +126,9 @@ class MocoOrientationTrackingGoal(MocoGoal):
 class MocoAngularVelocityTrackingGoal(MocoGoal):
     """Frames follow given angular velocities."""
 
-    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(TableProcessor, name="states_reference")
+    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(
+        TableProcessor, name="states_reference"
+    )
     """A motion of the model, from which the angular velocities are computed."""
     angular_velocity_reference_file: InputTable = ""
     """The angular velocities themselves, a column of vectors for each frame by its path."""

@@ -58,7 +58,9 @@ class Actuation(Analysis):
 class BodyKinematics(Analysis):
     """Places, velocities and accelerations of bodies."""
 
-    bodies: Annotated[Names, several("body-name-or-com", "Body", "all", "center_of_mass")] = ("all",)
+    bodies: Annotated[Names, several("body-name-or-com", "Body", "all", "center_of_mass")] = (
+        "all",
+    )
     """Names of bodies, `all`, or center_of_mass."""
     express_results_in_body_local_frame: LegacyFlag = False
     """Whether velocities and accelerations are along the axes of the body; otherwise of ground."""
@@ -82,18 +84,22 @@ class IMUDataReporter(Analysis):
     """Whether accelerations, gravity included, are written."""
     compute_accelerations_without_forces: Flag = False
     """Whether accelerations are from the motion alone; otherwise from the forces of the model."""
-    frame_paths: Annotated[Names, Reference("model-path", "PhysicalFrame", "list", required=False)] = ()
+    frame_paths: Annotated[
+        Names, Reference("model-path", "PhysicalFrame", "list", required=False)
+    ] = ()
     """Frames with sensors; without any, all sensors of the model."""
 
 
 class InducedAccelerations(Analysis):
     """What each force contributes to accelerations."""
 
-    coordinate_names: Annotated[Names, several("coordinate-name", "Coordinate", "all", any_case=True)] = ()
+    coordinate_names: Annotated[
+        Names, several("coordinate-name", "Coordinate", "all", any_case=True)
+    ] = ()
     """Coordinates whose accelerations are divided up, or `all`."""
-    body_names: Annotated[Names, several("body-name-or-com", "Body", "all", "center_of_mass", any_case=True)] = (
-        "center_of_mass",
-    )
+    body_names: Annotated[
+        Names, several("body-name-or-com", "Body", "all", "center_of_mass", any_case=True)
+    ] = ("center_of_mass",)
     """Bodies whose accelerations are divided up, `all`, or center_of_mass."""
     constraint_set: LegacyUnnamed[ConstraintSet] = made(ConstraintSet)
     """Constraints that stand for the contact with the ground."""
@@ -114,23 +120,27 @@ class JointReaction(Analysis):
     """Joints that are written, or ALL."""
     apply_on_bodies: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ("child",)
     """Which side of each joint the loads act on: child or parent, one word for all or one for each joint."""
-    express_in_frame: Annotated[Names, several("frame-path-or-member", "Frame", "child", "parent", any_case=True)] = (
-        "ground",
-    )
+    express_in_frame: Annotated[
+        Names, several("frame-path-or-member", "Frame", "child", "parent", any_case=True)
+    ] = ("ground",)
     """Frames along whose axes the loads are given: child, parent or a frame, one for all or one for each joint."""
 
 
 class Kinematics(Analysis):
     """Values, speeds and accelerations of coordinates."""
 
-    coordinates: Annotated[Names, several("coordinate-name", "Coordinate", "all", legacy=False)] = ("all",)
+    coordinates: Annotated[Names, several("coordinate-name", "Coordinate", "all", legacy=False)] = (
+        "all",
+    )
     """Coordinates that are written, or `all`."""
 
 
 class MuscleAnalysis(Analysis):
     """Lengths, speeds, forces and moment arms of muscles."""
 
-    muscle_list: Annotated[Names, several("muscle-name", "Muscle", "all", fate="left out")] = ("all",)
+    muscle_list: Annotated[Names, several("muscle-name", "Muscle", "all", fate="left out")] = (
+        "all",
+    )
     """Muscles that are written, or `all`."""
     moment_arm_coordinate_list: Annotated[
         Names, several("coordinate-name", "Coordinate", "all", any_case=True, fate="left out")
@@ -154,12 +164,19 @@ class OutputReporter(Analysis):
 class PointKinematics(Analysis):
     """Place, velocity and acceleration of a point."""
 
-    body_name: Annotated[Named, Reference("frame-path-or-body-name", "PhysicalFrame", legacy=True)] = "ground"
+    body_name: Annotated[
+        Named, Reference("frame-path-or-body-name", "PhysicalFrame", legacy=True)
+    ] = "ground"
     """The body that the point is fixed in."""
     relative_to_body_name: Annotated[
         Named,
         Reference(
-            "frame-path-or-body-name", "PhysicalFrame", required=False, legacy=True, words=("none",), fate="left out"
+            "frame-path-or-body-name",
+            "PhysicalFrame",
+            required=False,
+            legacy=True,
+            words=("none",),
+            fate="left out",
         ),
     ] = "none"
     """The body along whose axes the results are given; none for ground."""

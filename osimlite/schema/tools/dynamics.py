@@ -36,10 +36,16 @@ class DynamicsTool(Tool, abstract=True):
 
     model_file: LegacyInputModel = "Unassigned"
     """The model, found from the folder that OpenSim runs in."""
-    time_range: Annotated[Reals, reals("s", least=2, most=2, legacy=True)] = (float("-inf"), float("inf"))
+    time_range: Annotated[Reals, reals("s", least=2, most=2, legacy=True)] = (
+        float("-inf"),
+        float("inf"),
+    )
     """First and last time."""
     forces_to_exclude: Annotated[
-        Names, several("set-member", "Force", "MUSCLES", "ACTUATORS", "ALL", any_case=True, fate="left out")
+        Names,
+        several(
+            "set-member", "Force", "MUSCLES", "ACTUATORS", "ALL", any_case=True, fate="left out"
+        ),
     ] = ()
     """Forces that do not act: ALL, ACTUATORS, MUSCLES, groups of the model's forces, names of forces."""
     external_loads_file: LegacyInputLoads = "Unassigned"
@@ -53,7 +59,9 @@ class InverseDynamicsTool(DynamicsTool):
     """The motion: a column for each coordinate by its plain name (.mot, .sto)."""
     lowpass_cutoff_frequency_for_coordinates: Annotated[float, real("Hz", legacy=True)] = -1.0
     """Cut-off frequency of the filter of the coordinates; negative for no filter."""
-    output_gen_force_file: Annotated[str, writes("table", legacy=True, required=True)] = "inverse_dynamics.sto"
+    output_gen_force_file: Annotated[str, writes("table", legacy=True, required=True)] = (
+        "inverse_dynamics.sto"
+    )
     """File for the generalized forces, in `results_directory`."""
     joints_to_report_body_forces: LegacyJointNames = ()
     """Joints whose generalized forces are also written as forces and torques on bodies, or ALL."""

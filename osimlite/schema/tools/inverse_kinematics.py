@@ -56,7 +56,9 @@ class IKCoordinateTask(IKTask):
 
     name_reference = Reference("coordinate-name", "Coordinate")
 
-    value_type: Annotated[str, word("default_value", "manual_value", "from_file", legacy=True)] = "default_value"
+    value_type: Annotated[str, word("default_value", "manual_value", "from_file", legacy=True)] = (
+        "default_value"
+    )
     """Where the value is from: the model, this task, or the coordinate file of the tool."""
     value: LegacyNumber = 0.0
     """The value if `value_type` is manual_value, in radians or metres."""
@@ -121,7 +123,9 @@ class IMUInverseKinematicsTool(InverseKinematicsToolBase):
     """Angles about x, y and z of space that turn the axes of the data into those of OpenSim's ground."""
     orientations_file: Annotated[str, reads("table", required=True)] = ""
     """Measured orientations, a column of quaternions for each sensor (.sto)."""
-    orientation_weights: Single[OrientationWeightSet] = made(OrientationWeightSet, name="orientation_weights")
+    orientation_weights: Single[OrientationWeightSet] = made(
+        OrientationWeightSet, name="orientation_weights"
+    )
     """How much each sensor counts."""
 
 

@@ -53,7 +53,10 @@ class PolynomialPathFitter(Object):
     """Greatest order that is tried."""
     num_parallel_threads: Integer = 2
     """Number of threads."""
-    global_coordinate_sampling_bounds: Annotated[Vec2, Value("double", "Vec2", unit="deg")] = (-10.0, 10.0)
+    global_coordinate_sampling_bounds: Annotated[Vec2, Value("double", "Vec2", unit="deg")] = (
+        -10.0,
+        10.0,
+    )
     """Least and greatest deviation of coordinates that have none of their own."""
     coordinate_sampling_bounds: Many[PolynomialPathFitterBounds] = none()
     """Deviations of single coordinates."""

@@ -43,7 +43,9 @@ class GenericModelMaker(Object):
 class MarkerPair(Object):
     """Two markers whose distance is measured."""
 
-    markers: Annotated[Names, Reference("marker-name", "Marker", "list", legacy=True, fate="left out")] = ()
+    markers: Annotated[
+        Names, Reference("marker-name", "Marker", "list", legacy=True, fate="left out")
+    ] = ()
     """Names of the two markers, of the model and of the data."""
 
 
@@ -93,7 +95,9 @@ class Scale(Object):
 
     scales: Annotated[Reals, reals(least=3, most=3, legacy=True)] = (1.0, 1.0, 1.0)
     """Factors along the x, y and z axes of the body."""
-    segment: Annotated[Named, Reference("body-name", "PhysicalFrame", legacy=True, fate="left out")] = "unnamed_segment"
+    segment: Annotated[
+        Named, Reference("body-name", "PhysicalFrame", legacy=True, fate="left out")
+    ] = "unnamed_segment"
     """Name of the body."""
     apply: LegacyFlag = True
     """Whether the factors count."""

@@ -39,7 +39,9 @@ _Optimizer = Annotated[str, word("ipopt", "cfsqp", legacy=True)]
 
 def _body(*words: str, fate: Fate = "refused") -> Reference:
     """Marker of the name of a body, or of a word for something else."""
-    return Reference("body-name-or-com", "Body", required=False, legacy=True, words=words, fate=fate)
+    return Reference(
+        "body-name-or-com", "Body", required=False, legacy=True, words=words, fate=fate
+    )
 
 
 class TrackingTask(Object, abstract=True):
@@ -118,7 +120,9 @@ class CMCTool(AbstractTool):
     """Finds excitations of muscles that make a model follow a measured motion."""
 
     solve_for_equilibrium_for_auxiliary_states: LegacyFlag = True
-    actuators_to_exclude: Annotated[Names, several("actuator-name", "Actuator", fate="left out")] = ()
+    actuators_to_exclude: Annotated[
+        Names, several("actuator-name", "Actuator", fate="left out")
+    ] = ()
     """Actuators and groups of them that are not controlled."""
     desired_points_file: LegacyInputTable = ""
     """Measured points that tasks follow."""

@@ -44,12 +44,14 @@ class ContactSurface:
     body: int
     frame: str  # name of the frame that holds it in the model
     center: Triple  # of the sphere, or a point on the plane, in the body frame (m)
-    # of the sphere, the largest of the ellipsoid, or of the ball around the mesh (m); infinite for a half space
+    # of the sphere, the largest of the ellipsoid, or of the ball around the mesh (m); infinite for
+    # a half space
     radius: float
     normal: Triple  # unit vector out of the half space, in the body frame
     material: Material  # the law's K (Pa), c (s/m), us, ud (1), uv (s/m)
     radii: Triple | None = None  # half axes of an ellipsoid (m), None for the others
-    axes: tuple[Triple, Triple, Triple] | None = None  # their directions in the body frame, as the columns of a matrix
+    # their directions in the body frame, as the columns of a matrix
+    axes: tuple[Triple, Triple, Triple] | None = None
     mesh: TriangleMesh | None = None  # the triangles of a mesh, in the body frame
 
     @property
@@ -74,10 +76,9 @@ class ContactPair:
 class PairContact:
     """Contact of all surfaces of one force on different bodies, in pairs.
 
-    Attributes:
-        vt: transition velocity, m/s.
-        early_return: reproduce Simbody's defect, see `osimlite.mechanics.laws.hunt_crossley.contact_forces`.
-        records: the surfaces in the order of OpenSim's record.
+    Attributes: vt: transition velocity, m/s. early_return: reproduce Simbody's defect, see
+        `osimlite.mechanics.laws.hunt_crossley.contact_forces`. records: the surfaces in the order
+        of OpenSim's record.
     """
 
     states: ClassVar[tuple[StateVariable, ...]] = ()
@@ -115,18 +116,33 @@ class PairContact:
             if not (one.radii or two.radii):
                 for axis in range(3):
                     ints = back, axis, int(one.is_half_space)
-                    result.append(Item(ints=ints, is_part=True, response=Response(RESPONSE, 0, 0, 1)))
+                    result.append(
+                        Item(ints=ints, is_part=True, response=Response(RESPONSE, 0, 0, 1))
+                    )
                     back += ITEM.OWN + len(ints)
             back -= ITEM.OWN + 2
         return result
 
-    def pair_numbers(self, pair: ContactPair, places: Places) -> tuple[tuple[int, int], tuple[float, ...]]:
+    def pair_numbers(
+        self, pair: ContactPair, places: Places
+    ) -> tuple[tuple[int, int], tuple[float, ...]]:
         """Links and numbers of a pair."""
         one, two = self.surfaces[pair.first], self.surfaces[pair.second]
         first, center = places.station(one.body, one.center)
         second, other = places.station(two.body, two.center)
-        normal, radius = places.direction(one.body, one.normal), 0.0 if one.is_half_space else one.radius
-        return (first, second), (*center, *normal, radius, *other, two.radius, *pair.effective, self.vt)
+        normal, radius = (
+            places.direction(one.body, one.normal),
+            0.0 if one.is_half_space else one.radius,
+        )
+        return (first, second), (
+            *center,
+            *normal,
+            radius,
+            *other,
+            two.radius,
+            *pair.effective,
+            self.vt,
+        )
 
     def _early_return(self, places: Places) -> Item:
         """What computes the pairs one by one in Simbody's order."""
@@ -134,7 +150,9 @@ class PairContact:
         links = (link for link, _ in stations)
         pairs = (place for pair in self.pairs for place in (pair.first, pair.second))
         numbers = (
-            x for (_, center), surface in zip(stations, self.surfaces, strict=True) for x in (*center, surface.radius)
+            x
+            for (_, center), surface in zip(stations, self.surfaces, strict=True)
+            for x in (*center, surface.radius)
         )
         ints = len(stations), len(self.pairs), *links, *pairs
         return Item("early_return", ints, tuple(numbers), room=5 * len(stations))
@@ -150,16 +168,23 @@ class PairContact:
     def columns(self) -> tuple[str, ...]:
         """Force and torque on the frame of each surface."""
         labels = [f"{kind}.{axis}" for kind in ("force", "torque") for axis in "XYZ"]
-        return tuple(f"{self.name}.{surface.frame}.{label}" for surface in self.surfaces for label in labels)
+        return tuple(
+            f"{self.name}.{surface.frame}.{label}" for surface in self.surfaces for label in labels
+        )
 
-    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
+    def report(
+        self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]
+    ) -> list[float]:
         """Total force on the body of each surface, and its torque about the body's origin, in ground."""
         loads: dict[int, list[float]] = {}
         for pair, record in zip(self.pairs, records, strict=False):
             if not record[CONTACT_WORK.DEPTH] > 0.0:
                 continue
             force, torque = vector(record, 0), vector(self.torque(records, pair), 0)
-            for surface, sign in ((self.surfaces[pair.first], -1.0), (self.surfaces[pair.second], 1.0)):
+            for surface, sign in (
+                (self.surfaces[pair.first], -1.0),
+                (self.surfaces[pair.second], 1.0),
+            ):
                 load = loads.setdefault(surface.body, [0.0] * 6)
                 moment = cross(minus(vector(record, 3), vector(origins[surface.body], 0)), force)
                 for axis, part in enumerate((*force, *plus(torque, moment))):
@@ -176,7 +201,9 @@ class PairContact:
     def energy(self, records: Sequence[Sequence[float]]) -> float:
         """Potential energy, J."""
         return sum(
-            contact_energy(record[CONTACT_WORK.DEPTH], record[CONTACT_WORK.RADIUS], pair.effective[0])
+            contact_energy(
+                record[CONTACT_WORK.DEPTH], record[CONTACT_WORK.RADIUS], pair.effective[0]
+            )
             for pair, record in zip(self.pairs, records, strict=False)
             if record[CONTACT_WORK.DEPTH] > 0.0
         )
@@ -191,7 +218,10 @@ class HuntCrossley(PairContact):
     def make(cls, builder: ElementBuilder, force: HuntCrossleyForce) -> HuntCrossley:
         """The element of a force."""
         surfaces = [surface_of(builder, force, *result) for result in geometries(builder, force)]
-        builder.check(force, (force.transition_velocity, *(x for surface in surfaces for x in surface.material)))
+        builder.check(
+            force,
+            (force.transition_velocity, *(x for surface in surfaces for x in surface.material)),
+        )
         pairs = []
         for first, second in combinations(range(len(surfaces)), 2):
             a, b = surfaces[first], surfaces[second]
@@ -200,7 +230,9 @@ class HuntCrossley(PairContact):
             if b.is_half_space:
                 first, second, a, b = second, first, b, a
             try:
-                pairs.append(ContactPair(first, second, combine_materials(*a.material, *b.material)))
+                pairs.append(
+                    ContactPair(first, second, combine_materials(*a.material, *b.material))
+                )
             except ValueError as error:
                 raise ModelError(f"the force '{builder.path(force)}': {error}") from None
         early_return = builder.early_return and len(pairs) > 1
@@ -213,7 +245,20 @@ class HuntCrossley(PairContact):
 def _shape(surface: ContactSurface, places: Places) -> tuple[float, ...]:
     """Axes in the link, and half axes, of an ellipsoid or a sphere."""
     if surface.radii is None or surface.axes is None:
-        return 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, surface.radius, surface.radius, surface.radius
+        return (
+            1.0,
+            0.0,
+            0.0,
+            0.0,
+            1.0,
+            0.0,
+            0.0,
+            0.0,
+            1.0,
+            surface.radius,
+            surface.radius,
+            surface.radius,
+        )
     axes = (places.direction(surface.body, axis) for axis in zip(*surface.axes, strict=True))
     return (*(x for axis in axes for x in axis), *surface.radii)
 
@@ -245,7 +290,9 @@ def geometries(builder: ElementBuilder, force: Any) -> Iterator[tuple[ContactGeo
             yield geometry, material
 
 
-def surface_of(builder: ElementBuilder, force: Any, geometry: Any, material: Material) -> ContactSurface:
+def surface_of(
+    builder: ElementBuilder, force: Any, geometry: Any, material: Material
+) -> ContactSurface:
     """A contact geometry as the surface of a contact.
 
     Raises:
@@ -260,14 +307,20 @@ def surface_of(builder: ElementBuilder, force: Any, geometry: Any, material: Mat
     if isinstance(geometry, ContactEllipsoid):
         builder.check(geometry, (*center, *axes.ravel(), *geometry.radii))
         if not min(geometry.radii) > 0.0:
-            raise ModelError(f"the radii of '{builder.path(geometry)}' are not all positive; give such")
+            raise ModelError(
+                f"the radii of '{builder.path(geometry)}' are not all positive; give such"
+            )
         place, still = triple(center), (0.0, 0.0, 0.0)
         rows = triple(axes[0]), triple(axes[1]), triple(axes[2])
         longest, radii = max(geometry.radii), triple(geometry.radii)
-        return ContactSurface(geometry.name, body, frame, place, longest, still, material, radii, rows)
+        return ContactSurface(
+            geometry.name, body, frame, place, longest, still, material, radii, rows
+        )
     radius = geometry.radius if isinstance(geometry, ContactSphere) else inf
     builder.check(geometry, (*center, *normal, 0.0 if radius == inf else radius))
-    return ContactSurface(geometry.name, body, frame, triple(center), radius, triple(normal), material)
+    return ContactSurface(
+        geometry.name, body, frame, triple(center), radius, triple(normal), material
+    )
 
 
 def place_of(builder: ElementBuilder, geometry: ContactGeometry) -> tuple[str, int, Array]:

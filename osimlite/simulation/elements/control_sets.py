@@ -27,9 +27,8 @@ from osimlite.simulation.elements.control_tables import read_controls
 class ControlCurves:
     """The controls of a file.
 
-    Attributes:
-        curves: functions of time by the names of the controls; of several controls of a name the first.
-        of_model: the names of those that the model is to have.
+    Attributes: curves: functions of time by the names of the controls; of several controls of a
+        name the first. of_model: the names of those that the model is to have.
     """
 
     curves: Mapping[str, Function]
@@ -76,7 +75,9 @@ def _curve(control: Control, file: str) -> Function:
     return node_curve(control, control.x_nodes, file)
 
 
-def node_curve(control: ControlLinear, nodes: Sequence[ControlLinearNode], file: str | None = None) -> Function:
+def node_curve(
+    control: ControlLinear, nodes: Sequence[ControlLinearNode], file: str | None = None
+) -> Function:
     """Lines or steps through nodes of a control, such as its x_nodes.
 
     Raises:
@@ -85,11 +86,14 @@ def node_curve(control: ControlLinear, nodes: Sequence[ControlLinearNode], file:
     times, values = [node.t for node in nodes], [node.value for node in nodes]
     if not np.isfinite([*times, *values]).all() or (np.diff(times) < 0.0).any():
         raise ModelError(
-            f"the x_nodes of the control '{control.name}' go back in time, or have no numbers; sort them", file=file
+            f"the x_nodes of the control '{control.name}' go back in time, or have no numbers; sort them",
+            file=file,
         )
     if control.use_steps:
         # A value holds up to its own time, that included.
-        return PiecewiseConstant((times[0], *(nextafter(time, inf) for time in times[:-1])), tuple(values))
+        return PiecewiseConstant(
+            (times[0], *(nextafter(time, inf) for time in times[:-1])), tuple(values)
+        )
     return _lines(times, values, goes_on=control.extrapolate)
 
 

@@ -27,25 +27,42 @@ def read_controls(path: str | Path) -> StoTable:
         for time, row in stream:
             for number, value in enumerate((time, *row)):
                 if not isfinite(value):
-                    where, column = ("time", *stream.columns)[number], start_of_word(stream.text, number)
+                    where, column = (
+                        ("time", *stream.columns)[number],
+                        start_of_word(stream.text, number),
+                    )
                     raise ModelError(
-                        f"'{where}' is {value}; give a number", file=stream.file, line=stream.line, column=column
+                        f"'{where}' is {value}; give a number",
+                        file=stream.file,
+                        line=stream.line,
+                        column=column,
                     )
             if time < last:
                 raise ModelError(
-                    f"the time goes back from {last:g} to {time:g} s; sort the rows", file=stream.file, line=stream.line
+                    f"the time goes back from {last:g} to {time:g} s; sort the rows",
+                    file=stream.file,
+                    line=stream.line,
                 )
             rows[time] = row
             last = time
         if not rows:
-            raise ModelError("the table has no rows; give it some", file=stream.file, line=stream.line)
-        return StoTable(stream.name, np.array([*rows]), stream.columns, np.array([*rows.values()]), file=stream.file)
+            raise ModelError(
+                "the table has no rows; give it some", file=stream.file, line=stream.line
+            )
+        return StoTable(
+            stream.name,
+            np.array([*rows]),
+            stream.columns,
+            np.array([*rows.values()]),
+            file=stream.file,
+        )
 
 
 def column_function(table: StoTable, place: int, degree: int, what: str) -> Function:
     """A column as a function of time, as OpenSim makes it one: steps, or a spline through its values.
 
-    Outside, steps and straight lines hold the end values, and other splines go on as polynomials of lower degree.
+    Outside, steps and straight lines hold the end values, and other splines go on as polynomials of
+    lower degree.
 
     Args:
         table: with the column.

@@ -1,6 +1,7 @@
 """The controls of a model's actuators: what its controllers, and the user, make of each.
 
-A control that nothing drives is 0; what several want of one is added up. OpenSim keeps it within no limits.
+A control that nothing drives is 0; what several want of one is added up. OpenSim keeps it within no
+limits.
 """
 
 from __future__ import annotations
@@ -27,15 +28,18 @@ if TYPE_CHECKING:
 class Controls:
     """All controls: for each of them the functions of time whose sum it is."""
 
-    # paths of the actuators in the order of the model; of one with several controls with `_0`, `_1` ... behind it, as
-    # OpenSim's tools call them.
+    # paths of the actuators in the order of the model; of one with several controls with `_0`, `_1`
+    # ... behind it, as OpenSim's tools call them.
     names: tuple[str, ...] = ()
     functions: tuple[tuple[Function, ...], ...] = ()  # of each
 
     def driven(self, more: Mapping[str, Function]) -> Controls:
         """With a function added to some of them, by name."""
         pairs = zip(self.names, self.functions, strict=True)
-        return replace(self, functions=tuple((*own, more[name]) if name in more else own for name, own in pairs))
+        return replace(
+            self,
+            functions=tuple((*own, more[name]) if name in more else own for name, own in pairs),
+        )
 
     def record(self) -> tuple[list[int], list[float], str | Callable[..., None]]:
         """Integers and numbers for the kernel that computes them, and this; in Python if a function has no table."""
@@ -74,7 +78,8 @@ class Drive(NamedTuple):
     actuator: Any  # the component
     # what it adds to a control, or the error that says why that cannot be computed
     signal: Function | Reflex | UnsupportedError
-    number: int | None = None  # of the control among those of the actuator; of the only one if left out
+    # of the control among those of the actuator; of the only one if left out
+    number: int | None = None
 
 
 class ModelControls:
@@ -83,9 +88,8 @@ class ModelControls:
     Args:
         builder: of the model's elements.
 
-    Attributes:
-        controls: the functions of time.
-        reflexes: by the paths of the muscles that have one, what reflexes add where they lengthen the fastest.
+    Attributes: controls: the functions of time. reflexes: by the paths of the muscles that have
+        one, what reflexes add where they lengthen the fastest.
 
     Raises:
         ModelError: a controller has no meaning, or a file that it names does not fit the model.
@@ -139,7 +143,8 @@ class ModelControls:
 def _drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive]]:
     """What each enabled controller does.
 
-    A class of controllers is declared in the module of its name in `controllers/`, by a function `drives`.
+    A class of controllers is declared in the module of its name in `controllers/`, by a function
+    `drives`.
     """
     from osimlite.simulation.elements.gather import module_of
 
@@ -164,7 +169,9 @@ def _drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive]]:
 
 def named(builder: ElementBuilder, controller: Controller) -> list[Any]:
     """The actuators that a controller names."""
-    return [builder.target(controller, "socket_actuators", word) for word in controller.socket_actuators]
+    return [
+        builder.target(controller, "socket_actuators", word) for word in controller.socket_actuators
+    ]
 
 
 def actuators_by_name(builder: ElementBuilder) -> dict[str, Actuator]:

@@ -1,7 +1,8 @@
 """Measured forces: the ExternalLoads of a document and the columns of their data file (.sto, .mot, .c3d).
 
-As in OpenSim, a column is a natural cubic spline through all its values, straight lines if there are two or three, and
-a constant if there is one. Before the first time and after the last, a spline goes on straight.
+As in OpenSim, a column is a natural cubic spline through all its values, straight lines if there
+are two or three, and a constant if there is one. Before the first time and after the last, a spline
+goes on straight.
 """
 
 from __future__ import annotations
@@ -45,29 +46,34 @@ def external_load(path: str, name: str, load: Load) -> DeclaredForce:
 def pushing(table: str | Path, applied_to: Mapping[str, Sequence[Sequence[str]]]) -> ExternalLoads:
     """The loads of a table without a document.
 
-    Args:
-        table: a .mot, .sto or .c3d file, in the axes of ground.
-        applied_to: by the names of bodies, for each load on one what the labels of its force, point and moment begin
-            with; the last one or two may be left out. Without a point it acts at the origin of the body.
+    Args: table: a .mot, .sto or .c3d file, in the axes of ground. applied_to: by the names of
+        bodies, for each load on one what the labels of its force, point and moment begin with; the
+        last one or two may be left out. Without a point it acts at the origin of the body.
 
     Raises:
         SettingError: it is no such file, or a load has none of these, or more.
     """
     if Path(table).suffix.lower() not in TABLES:
-        raise SettingError(f"'{table}' is no table of forces ({', '.join(TABLES)}), whose columns could push bodies")
+        raise SettingError(
+            f"'{table}' is no table of forces ({', '.join(TABLES)}), whose columns could push bodies"
+        )
     loads = ExternalLoads(name="loads", datafile=str(table))
     for body, several in applied_to.items():
         for number, names in enumerate(several, start=1):
             if not 1 <= len(names) <= len(PARTS) or not names[0]:
                 message = f"the load on '{body}' is {list(names)}; name what the labels of its force begin with"
                 raise SettingError(f"{message}, then of its point, then of its moment")
-            identifiers: Any = {f"{part}_identifier": text for part, text in zip(PARTS, names, strict=False)}
+            identifiers: Any = {
+                f"{part}_identifier": text for part, text in zip(PARTS, names, strict=False)
+            }
             name = body.rpartition("/")[2] + (f"_{number}" if len(several) > 1 else "")
             loads.objects.append(ExternalForce(name=name, applied_to_body=body, **identifiers))
     return loads
 
 
-def read_external_loads(mechanism: Mechanism, source: str | Path | ExternalLoads) -> tuple[DeclaredForce, ...]:
+def read_external_loads(
+    mechanism: Mechanism, source: str | Path | ExternalLoads
+) -> tuple[DeclaredForce, ...]:
     """The loads of a document of ExternalLoads, those whose `appliesForce` is false left out.
 
     Args:
@@ -76,27 +82,34 @@ def read_external_loads(mechanism: Mechanism, source: str | Path | ExternalLoads
 
     Its data file is looked for beside it, then from the folder that the program runs in.
 
-    Raises:
-        DocumentError: a file is missing, or holds something else; the mechanism has no body of a name, or the data file
-            no three columns for an identifier.
+    Raises: DocumentError: a file is missing, or holds something else; the mechanism has no body of
+        a name, or the data file no three columns for an identifier.
     """
     if isinstance(source, ExternalLoads):
         loads, folder, file = source, Path(), None
     elif Path(source).suffix.lower() in TABLES:
         message = "this is a table, which does not say what its forces push: name it in a document of ExternalLoads"
-        raise DocumentError(f"{message}, or say so to inverse-dynamics by --applied-to", file=str(source))
+        raise DocumentError(
+            f"{message}, or say so to inverse-dynamics by --applied-to", file=str(source)
+        )
     else:
         loads, folder, file = read_object(source, ExternalLoads), Path(source).parent, str(source)
     members: list[Any] = [*loads.objects]
     for item in members:
         if not isinstance(item, ExternalForce):
             kind = getattr(item, "class_name", "") or type(item).__name__
-            message = f"'{item.name}' is a {kind}, which OpenSim refuses here; make it an ExternalForce"
+            message = (
+                f"'{item.name}' is a {kind}, which OpenSim refuses here; make it an ExternalForce"
+            )
             raise DocumentError(message, file=file)
     forces = [force for force in loads.objects if force.appliesForce]
     columns = _Columns(loads_table(loads, folder, file), forces)
     return tuple(
-        external_load(f"/componentset/{loads.name}/{force.name}", force.name, _load(mechanism, force, columns, file))
+        external_load(
+            f"/componentset/{loads.name}/{force.name}",
+            force.name,
+            _load(mechanism, force, columns, file),
+        )
         for force in forces
     )
 
@@ -124,7 +137,11 @@ def loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> StoTabl
     if name in ("", "Unassigned"):
         raise DocumentError("it names no data file; give it a <datafile>", file=file)
     path = beside(folder, name)
-    return read_c3d_forces(path) if path.suffix.lower() == ENDING else _known(str(path)) or read_sto(path)
+    return (
+        read_c3d_forces(path)
+        if path.suffix.lower() == ENDING
+        else _known(str(path)) or read_sto(path)
+    )
 
 
 _known = while_unchanged(4)(read_sto)
@@ -137,9 +154,15 @@ def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: s
         for what, identifier in _identifiers(force).items()
     }
     if not given.keys() & {"force", "torque"}:
-        raise DocumentError(f"'{force.name}' has no force_identifier and no torque_identifier; give it one", file=file)
+        raise DocumentError(
+            f"'{force.name}' has no force_identifier and no torque_identifier; give it one",
+            file=file,
+        )
     if "point" in given and "force" not in given:
-        raise DocumentError(f"'{force.name}' has a point_identifier and no force_identifier; leave it out", file=file)
+        raise DocumentError(
+            f"'{force.name}' has a point_identifier and no force_identifier; leave it out",
+            file=file,
+        )
 
     def place(field: str) -> FramePlacement:
         return _place(mechanism, getattr(force, field), f"the {field} of '{force.name}'", file)
@@ -159,7 +182,11 @@ def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: s
 def _identifiers(force: ExternalForce) -> dict[str, str]:
     """What the labels of the columns of a force begin with, by their parts; those that are given."""
     given = {what: (getattr(force, f"{what}_identifier") or "").strip() for what in PARTS}
-    return {what: identifier for what, identifier in given.items() if identifier not in ("", "Unassigned")}
+    return {
+        what: identifier
+        for what, identifier in given.items()
+        if identifier not in ("", "Unassigned")
+    }
 
 
 def _place(mechanism: Mechanism, value: Any, what: str, file: str | None) -> FramePlacement:
@@ -179,15 +206,21 @@ class _Columns:
         late = np.flatnonzero(np.diff(table.times) <= 0.0)
         if len(late):
             before, after = table.times[late[0] : late[0] + 2]
-            raise DocumentError(f"the time {after:g} does not come after {before:g}; sort the rows", file=table.file)
+            raise DocumentError(
+                f"the time {after:g} does not come after {before:g}; sort the rows", file=table.file
+            )
         if not len(table.times):
             raise DocumentError("the table has no rows", file=table.file)
 
     @cached_property
     def _functions(self) -> dict[int, Function]:
         """Those of all columns that are named, by their places: one solution of the equations of their splines."""
-        starts = tuple({identifier for force in self._forces for identifier in _identifiers(force).values()})
-        named = [index for index, label in enumerate(self.table.columns) if label.startswith(starts)]
+        starts = tuple(
+            {identifier for force in self._forces for identifier in _identifiers(force).values()}
+        )
+        named = [
+            index for index, label in enumerate(self.table.columns) if label.startswith(starts)
+        ]
         rows = self.table.rows[:, named]
         # Gaps are told of where they are asked for.
         sound = np.where(np.isfinite(rows), rows, 0.0)
@@ -198,7 +231,9 @@ class _Columns:
         labels = self.table.columns
         places = [place for place, label in enumerate(labels) if label.startswith(identifier)]
         if len(places) != 3:
-            raise DocumentError(f"{what} is '{identifier}'; {self._why(identifier, places)}", file=file)
+            raise DocumentError(
+                f"{what} is '{identifier}'; {self._why(identifier, places)}", file=file
+            )
         rows = self.table.rows[:, places]
         bad = np.argwhere(~np.isfinite(rows))
         if len(bad):
@@ -226,5 +261,7 @@ def functions_of(times: Array, columns: Array) -> list[Function]:
     if len(times) == 1:
         return [Constant(float(value)) for value in columns[0]]
     if len(times) < 4:
-        return [PiecewiseLinear(tuple(times.tolist()), tuple(column)) for column in columns.T.tolist()]
+        return [
+            PiecewiseLinear(tuple(times.tolist()), tuple(column)) for column in columns.T.tolist()
+        ]
     return [*natural_splines(times, columns, 2)]

@@ -1,7 +1,7 @@
 """Contact of meshes by an elastic foundation, in sets of pairs.
 
-As in Simbody, meshes touch half spaces, spheres and each other; nothing else touches in such a force. The springs of
-two meshes are both taken, each with half its area.
+As in Simbody, meshes touch half spaces, spheres and each other; nothing else touches in such a
+force. The springs of two meshes are both taken, each with half its area.
 """
 
 from __future__ import annotations
@@ -63,7 +63,10 @@ class ElasticFoundation(PairContact):
                 surfaces.append(_mesh_surface(builder, force, geometry, material))
             else:
                 surfaces.append(surface_of(builder, force, geometry, material))
-        builder.check(force, (force.transition_velocity, *(x for surface in surfaces for x in surface.material)))
+        builder.check(
+            force,
+            (force.transition_velocity, *(x for surface in surfaces for x in surface.material)),
+        )
         pairs = []
         for first, second in combinations(range(len(surfaces)), 2):
             if surfaces[second].mesh is None:
@@ -71,12 +74,22 @@ class ElasticFoundation(PairContact):
             a, b = surfaces[first], surfaces[second]
             if a.body != b.body and b.mesh is not None and a.radii is None:
                 pairs.append(ContactPair(first, second, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
-        return cls(builder.path(force), force.name, tuple(surfaces), tuple(pairs), force.transition_velocity)
+        return cls(
+            builder.path(force),
+            force.name,
+            tuple(surfaces),
+            tuple(pairs),
+            force.transition_velocity,
+        )
 
     def items(self, places: Places) -> list[Item]:
         """The contacts, and after them what computes each."""
-        contacts = [Item("touch_mesh", (GROUND, GROUND), is_contact=True, is_part=True) for _ in self.pairs]
-        return contacts + [self._pair(number, pair, places) for number, pair in enumerate(self.pairs)]
+        contacts = [
+            Item("touch_mesh", (GROUND, GROUND), is_contact=True, is_part=True) for _ in self.pairs
+        ]
+        return contacts + [
+            self._pair(number, pair, places) for number, pair in enumerate(self.pairs)
+        ]
 
     def _pair(self, number: int, pair: ContactPair, places: Places) -> Item:
         one, two = self.surfaces[pair.first], self.surfaces[pair.second]
@@ -84,7 +97,9 @@ class ElasticFoundation(PairContact):
         assert two.mesh is not None
         ints = *links, number, len(two.mesh.areas), int(one.is_half_space)
         if one.mesh is not None:
-            touching = _Meshes(Springs(one, two, self.vt), places.placement(one.body), places.placement(two.body))
+            touching = _Meshes(
+                Springs(one, two, self.vt), places.placement(one.body), places.placement(two.body)
+            )
             return Item("", ints, numbers, room=MESH_WORK, python=touching)
         stiffness, *material = two.material
         middles = (places.station(two.body, middle)[1] for middle in two.mesh.centroids.tolist())
@@ -93,7 +108,9 @@ class ElasticFoundation(PairContact):
             for area, middle in zip(two.mesh.areas.tolist(), middles, strict=True)
             for x in (stiffness * area, *middle)
         )
-        return Item("touch_mesh", ints, (*numbers[:11], *material, self.vt, *springs), room=MESH_WORK)
+        return Item(
+            "touch_mesh", ints, (*numbers[:11], *material, self.vt, *springs), room=MESH_WORK
+        )
 
     def torque(self, records: Sequence[Sequence[float]], pair: ContactPair) -> Sequence[float]:
         """What turns surface 2 besides the force."""
@@ -104,16 +121,22 @@ class ElasticFoundation(PairContact):
         return sum(record[9] for record in records[len(self.pairs) :])
 
 
-def _mesh_surface(builder: ElementBuilder, force: Any, geometry: ContactMesh, material: Material) -> ContactSurface:
+def _mesh_surface(
+    builder: ElementBuilder, force: Any, geometry: ContactMesh, material: Material
+) -> ContactSurface:
     frame, body, placed = place_of(builder, geometry)
     builder.check(geometry, placed.ravel().tolist())
     if not geometry.filename:
         raise ModelError(f"the contact mesh '{builder.path(geometry)}' names no file; give it one")
     if material[0] < 0.0:
-        raise ModelError(f"the force '{builder.path(force)}': a contact stiffness must not be negative")
+        raise ModelError(
+            f"the force '{builder.path(force)}': a contact stiffness must not be negative"
+        )
     mesh = TriangleMesh.read(geometry.filename, builder.mesh_folders).moved(placed)
     center, still = triple(mesh.center), (0.0, 0.0, 0.0)
-    return ContactSurface(geometry.name, body, frame, center, mesh.radius, still, material, mesh=mesh)
+    return ContactSurface(
+        geometry.name, body, frame, center, mesh.radius, still, material, mesh=mesh
+    )
 
 
 class Springs:
@@ -130,7 +153,8 @@ class Springs:
         self.one, self.two, self.vt = one, two, vt
         self._first, self._second = one.mesh, two.mesh
         self._stiffness = [
-            0.5 * surface.material[0] * mesh.areas for surface, mesh in ((one, one.mesh), (two, two.mesh))
+            0.5 * surface.material[0] * mesh.areas
+            for surface, mesh in ((one, one.mesh), (two, two.mesh))
         ]
 
     def load(self, one: Pose, two: Pose, about: Vector, v: Vector, turning: Vector) -> Load:
@@ -155,19 +179,28 @@ class Springs:
             or first.crosses(second.moved(one.inverse_times(two)))
         ):
             return ZERO, ZERO, 0.0
-        force1, torque1, energy1 = self._sum(self.one, own, about, times(-1.0, v), times(-1.0, turning))
+        force1, torque1, energy1 = self._sum(
+            self.one, own, about, times(-1.0, v), times(-1.0, turning)
+        )
         force2, torque2, energy2 = self._sum(self.two, others, about, v, turning)
         return minus(force2, force1), minus(torque2, torque1), energy1 + energy2
 
     def _sum(
-        self, surface: ContactSurface, acting: Iterable[Sequence[float]], about: Vector, v: Vector, turning: Vector
+        self,
+        surface: ContactSurface,
+        acting: Iterable[Sequence[float]],
+        about: Vector,
+        v: Vector,
+        turning: Vector,
     ) -> Load:
         """The load on a mesh of the springs that act: stiffness, middle and end of each."""
         _, c, us, ud, uv = surface.material
         force = torque = ZERO
         energy = 0.0
         for k, x, y, z, *end in acting:
-            push, turn, stored = spring_load(k, c, us, ud, uv, self.vt, (x, y, z), triple(end), about, v, turning)
+            push, turn, stored = spring_load(
+                k, c, us, ud, uv, self.vt, (x, y, z), triple(end), about, v, turning
+            )
             force, torque, energy = plus(force, push), plus(torque, turn), energy + stored
         return force, torque, energy
 
@@ -187,7 +220,9 @@ class Pose(NamedTuple):
         return transform(self.turn.T @ other.turn, self.turn.T @ (other.origin - self.origin))
 
 
-def _inside(stiffness: Array, mesh: TriangleMesh, own: Pose, other: TriangleMesh, theirs: Pose) -> list[list[float]]:
+def _inside(
+    stiffness: Array, mesh: TriangleMesh, own: Pose, other: TriangleMesh, theirs: Pose
+) -> list[list[float]]:
     """The springs of a mesh that are inside another: stiffness, middle and end of each."""
     middles = own.points(mesh.centroids)
     seen = (middles - theirs.origin) @ theirs.turn
@@ -197,7 +232,9 @@ def _inside(stiffness: Array, mesh: TriangleMesh, own: Pose, other: TriangleMesh
         return []
     ends, inside = other.nearest(seen[places])
     acting = places[inside]
-    return np.column_stack((stiffness[acting], middles[acting], theirs.points(ends[inside]))).tolist()
+    return np.column_stack(
+        (stiffness[acting], middles[acting], theirs.points(ends[inside]))
+    ).tolist()
 
 
 @dataclass(frozen=True)
@@ -208,7 +245,9 @@ class _Meshes:
     one: Placement  # where the body of surface 1 is in its link
     two: Placement  # where the body of surface 2 is in its link
 
-    def __call__(self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> None:
+    def __call__(
+        self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
+    ) -> None:
         """Compute and apply the contact."""
         data[model[item + ITEM.RECORD] :][:MESH_WORK] = 0.0
         one, two = self._pose(model, data, self.one), self._pose(model, data, self.two)

@@ -40,7 +40,8 @@ WRAPPINGS = OPENSIM, GEODESIC = "opensim", "geodesic"
 class Forces:
     """The force elements of a model, then its probes; forces that were left out, as ``path (class)``; all controls.
 
-    `reads_files` tells whether any of them is of more than the model: of a mesh, of measured loads or controls.
+    `reads_files` tells whether any of them is of more than the model: of a mesh, of measured loads
+    or controls.
     """
 
     elements: tuple[ForceElement, ...]
@@ -66,16 +67,14 @@ def force_elements(
 
     Those whose `appliesForce` is false have nothing but their states, as in OpenSim.
 
-    Args:
-        model: whose forces.
-        mechanism: of the same model.
-        skip_unsupported: leave out what cannot be computed instead of raising.
-        simbody_early_return: reproduce Simbody's defect in contact of several surfaces.
-        own_activation_times: do not reproduce OpenSim's defect in the activation of several DeGrooteFregly2016Muscles.
-        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
-        external_loads: measured loads or their file, which follow the forces of the model.
-        folder: where the model's file is, and the files that it names; the folder that the program runs in if None.
-        rigid_tendons: muscles pull with their control times the force of fully active fibers along a rigid tendon.
+    Args: model: whose forces. mechanism: of the same model. skip_unsupported: leave out what cannot
+        be computed instead of raising. simbody_early_return: reproduce Simbody's defect in contact
+        of several surfaces. own_activation_times: do not reproduce OpenSim's defect in the
+        activation of several DeGrooteFregly2016Muscles. wrapping: how paths bend around surfaces,
+        see :class:`osimlite.simulation.Options`. external_loads: measured loads or their file,
+        which follow the forces of the model. folder: where the model's file is, and the files that
+        it names; the folder that the program runs in if None. rigid_tendons: muscles pull with
+        their control times the force of fully active fibers along a rigid tendon.
 
     Raises:
         UnsupportedError: some forces cannot be computed; the message names them.
@@ -83,7 +82,13 @@ def force_elements(
         OsimliteError: a file that is named cannot be read.
     """
     builder = ElementBuilder(
-        model, mechanism, Path(folder or "."), simbody_early_return, own_activation_times, wrapping, rigid_tendons
+        model,
+        mechanism,
+        Path(folder or "."),
+        simbody_early_return,
+        own_activation_times,
+        wrapping,
+        rigid_tendons,
     )
     elements: list[ForceElement] = []
     skipped: list[str] = []
@@ -103,11 +108,16 @@ def force_elements(
     from osimlite.simulation.elements.probe import probe_elements
 
     elements += probe_elements(builder, elements)
-    controls, reads_files = builder.controls.controls, builder.reads_files or external_loads is not None
+    controls, reads_files = (
+        builder.controls.controls,
+        builder.reads_files or external_loads is not None,
+    )
     return Forces(tuple(elements), tuple(skipped), controls, reads_files)
 
 
-SKIP_ADVICE = ", or leave out what cannot be computed with --skip-unsupported (skip_unsupported=True)"
+SKIP_ADVICE = (
+    ", or leave out what cannot be computed with --skip-unsupported (skip_unsupported=True)"
+)
 """Advice for those commands that have this option; those that run setups have not, and take it out of the message."""
 FEW = 4
 """So many forces that are left out are told of one by one."""
@@ -159,7 +169,11 @@ class ElementBuilder:
         self._folder, self.reads_files = folder, False
         self._of: dict[type, list[Any]] = {}
         self.drives: dict[str, list[Drive]] = {}
-        self.early_return, self.own_times, self.geodesic = early_return, own_times, wrapping == GEODESIC
+        self.early_return, self.own_times, self.geodesic = (
+            early_return,
+            own_times,
+            wrapping == GEODESIC,
+        )
         self.rigid_tendons = rigid_tendons
 
     @property
@@ -186,10 +200,16 @@ class ElementBuilder:
         from osimlite.simulation.elements.kind import kind_of_class
 
         for component in self.tree.components:
-            unknown = isinstance(component, Unknown) and self.tree.parent_of(component) is self.model.force_set
+            unknown = (
+                isinstance(component, Unknown)
+                and self.tree.parent_of(component) is self.model.force_set
+            )
             if unknown or (
                 isinstance(component, Force)
-                and (component.appliesForce or getattr(kind_of_class(type(component)), "states", False))
+                and (
+                    component.appliesForce
+                    or getattr(kind_of_class(type(component)), "states", False)
+                )
             ):
                 yield component
 
@@ -251,7 +271,9 @@ class ElementBuilder:
         """Raise a ModelError if a number is not finite."""
         # A sum is finite only of finite numbers; that of great ones may be infinite.
         if not (isfinite(sum(numbers)) or all(map(isfinite, numbers))):
-            raise ModelError(f"'{self.path(component)}' has a parameter that is not a finite number; give one")
+            raise ModelError(
+                f"'{self.path(component)}' has a parameter that is not a finite number; give one"
+            )
 
     def unsupported(self, force: Any, why: str = "") -> UnsupportedError:
         """The error that names a force that cannot be computed."""

@@ -18,9 +18,12 @@ def value_of(function: Function, argument: float) -> float:
 def integral(function: Function, start: float, end: float) -> float:
     """The integral of a function of one number, exact for pieces of polynomials up to the ninth degree.
 
-    By Gauss and Legendre's five points from knot to knot, or in sixteen parts where there are no knots.
+    By Gauss and Legendre's five points from knot to knot, or in sixteen parts where there are no
+    knots.
     """
-    inner = [knot for knot in getattr(function, "x", ()) if min(start, end) < knot < max(start, end)]
+    inner = [
+        knot for knot in getattr(function, "x", ()) if min(start, end) < knot < max(start, end)
+    ]
     knots = np.unique([start, end, *inner]) if inner else np.linspace(start, end, 17)
     knots = knots if knots[0] == start else knots[::-1]
     nodes, weights = np.polynomial.legendre.leggauss(5)

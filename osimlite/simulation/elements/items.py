@@ -11,8 +11,10 @@ from osimlite.simulation.states import StateVariable
 
 
 class Response(NamedTuple):
-    """How a force along one displacement changes with that: the kernel that finds its derivatives, the place among the
-    item's integers of the first of those that say where its states are, their count, and -1 if it pulls, else 1."""
+    """How a force along one displacement changes with that: the kernel that finds its derivatives,
+    the place among the item's integers of the first of those that say where its states are, their
+    count, and -1 if it pulls, else 1.
+    """
 
     kernel: str
     first_state: int
@@ -27,7 +29,8 @@ CONTROLS = ""
 class Item:
     """One item."""
 
-    # name of what computes it, see `law_function`; "" for one that only tells how another one changes
+    # name of what computes it, see `law_function`; "" for one that only tells how another one
+    # changes
     kernel: str = ""
     ints: tuple[int, ...] = ()  # of its own
     numbers: tuple[float, ...] = ()  # of its own
@@ -36,13 +39,17 @@ class Item:
     is_part: bool = False  # whether another item of the element calls its kernel
     # places among its integers where those of its element's states in y are put, in their order
     states: tuple[int, ...] = ()
-    # which of its integers are places in the record of another element, which comes before, and the path of that; or
-    # CONTROLS for the record of the controls
+    # which of its integers are places in the record of another element, which comes before, and the
+    # path of that; or CONTROLS for the record of the controls
     looks_at: tuple[tuple[int, str], ...] = ()
-    equilibrium: str = ""  # name of the kernel that brings its states into equilibrium, if they have one
+    # name of the kernel that brings its states into equilibrium, if they have one
+    equilibrium: str = ""
     response: Response | None = None  # of a force along one displacement
-    abreast: str = ""  # name of the kernel that computes several that follow one another, if there is one
-    # what computes it in place of a kernel, called with (model, reals, data, y, f, place of the item) as arrays
+    abreast: str = (
+        ""  # name of the kernel that computes several that follow one another, if there is one
+    )
+    # what computes it in place of a kernel, called with (model, reals, data, y, f, place of the
+    # item) as arrays
     python: Callable[..., None] | None = None
 
 
@@ -68,7 +75,9 @@ class ForceElement(Protocol):
     def columns(self) -> tuple[str, ...]:
         """Labels of what :meth:`report` gives, as OpenSim's ForceReporter has them."""
 
-    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
+    def report(
+        self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]
+    ) -> list[float]:
         """One row of the columns.
 
         Args:
@@ -85,7 +94,9 @@ class Silent:
 
     columns: tuple[str, ...] = ()
 
-    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
+    def report(
+        self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]
+    ) -> list[float]:
         """Nothing."""
         return []
 

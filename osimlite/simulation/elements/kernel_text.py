@@ -36,7 +36,8 @@ SOUGHT_ROUNDS = 4
 class Asked(NamedTuple):
     """A part of a law that follows when curves were asked."""
 
-    curves: dict[str, str]  # names of the curves, each with the name of what is known that is its argument
+    # names of the curves, each with the name of what is known that is its argument
+    curves: dict[str, str]
     law: Callable[..., Any]  # given what is known, the first parameter, and the value of each curve
     results: tuple[str, ...]  # names of what it finds
 
@@ -45,10 +46,12 @@ class Sought(NamedTuple):
     """A part of a law that follows when one of some curves was asked, itself or a sum of it and its argument."""
 
     curves: tuple[str, ...]  # names of the curves
-    # given what is known and the first parameter, tells the number of the curve, factors of it and of its argument, and
-    # what the sum of both is; a curve itself is asked where the first factor is 0 and the second 1
+    # given what is known and the first parameter, tells the number of the curve, factors of it and
+    # of its argument, and what the sum of both is; a curve itself is asked where the first factor
+    # is 0 and the second 1
     asking: Callable[..., Any]
-    law: Callable[..., Any]  # given the same, the value of the curve, and how far a search has missed
+    # given the same, the value of the curve, and how far a search has missed
+    law: Callable[..., Any]
     results: tuple[str, ...]  # names of what it finds
 
 
@@ -59,7 +62,8 @@ class Abreast(NamedTuple):
     """
 
     known: type[Any]  # named tuple of what the parts find
-    begin: Callable[..., Any]  # makes it, from what the law is given of the moment, and the first parameter
+    # makes it, from what the law is given of the moment, and the first parameter
+    begin: Callable[..., Any]
     asked: Asked  # the first part
     sought: Sought  # the second
     end: Callable[..., Any]  # the results of the law, from what is known and the first parameter
@@ -99,15 +103,18 @@ class KernelText:
         lines = [f"active_fiber_force = {self._call(self._arguments)}"]
         lines += [f"activation = {self._arguments[len(self.kind.geometry.inputs)]}"]
         lines += ["tension = activation * active_fiber_force"]
-        lines += self._noted(("tension", "activation", "active_fiber_force", *self.kind.geometry.inputs))
+        lines += self._noted(
+            ("tension", "activation", "active_fiber_force", *self.kind.geometry.inputs)
+        )
         return self._function(RIGID, self.kind.rigid, [*lines, *self.kind.geometry.after])
 
     @cached_property
     def response_kernel(self) -> Callable[..., int]:
         """The function that applies 1 of a force along a displacement, and leaves its derivatives in SCRATCH.
 
-        A row for the force and for the rate of each state, see :mod:`osimlite.mechanics.kernels.condensation`. The moment is that
-        of the last evaluation, whose record tells what that has found.
+        A row for the force and for the rate of each state, see
+        :mod:`osimlite.mechanics.kernels.condensation`. The moment is that of the last evaluation,
+        whose record tells what that has found.
         """
         kind, force = self.kind, self.kind.geometry.along[0]
         rows, changed = (force, *(state.rate for state in kind.states)), self.changed_outputs
@@ -118,20 +125,26 @@ class KernelText:
             arguments[place] = f"carrying({arguments[place]}, {directions[column]}, {count})"
         # Formulas compute in the record; controls have what reflexes add to them.
         arguments = [
-            f"carrying_room({each}, {count})" if each.startswith("at(found") else each.replace(", rate)", ", 0.0)")
+            f"carrying_room({each}, {count})"
+            if each.startswith("at(found")
+            else each.replace(", rate)", ", 0.0)")
             for each in arguments
         ]
         if kind.again is not None and kind.law is not None:
             given = signature(kind.law).parameters
             arguments += [
-                f"found[{kind.recorded[name]}]" for name in signature(kind.again).parameters if name not in given
+                f"found[{kind.recorded[name]}]"
+                for name in signature(kind.again).parameters
+                if name not in given
             ]
         # A rate may have the name of an output of another meaning, such as that of a state.
         lines = [f"{', '.join(f'{name}_0' for name in kind.outputs)} = {self._call(arguments)}"]
         lines += [f"{force} = 1.0", *kind.geometry.after, "change = at(data, WORK.SCRATCH)"]
         for row, name in enumerate(rows):
             for column in range(WIDTH):
-                value = f"slope_of({name}_0, {directions[column]})" if column in directions else "0.0"
+                value = (
+                    f"slope_of({name}_0, {directions[column]})" if column in directions else "0.0"
+                )
                 lines.append(f"change[{WIDTH * row + column}] = {value}")
         lines[:0] = *self._places_of_item, *(kind.geometry.again or kind.geometry.before)
         carried = {function.__name__: function for function in (carrying, carrying_room, slope_of)}
@@ -160,26 +173,39 @@ class KernelText:
             f"ask(reals, lanes, asked + {k}, {places[curve]}, {known[name]})"
             for k, (curve, name) in enumerate(first.curves.items())
         ]
-        lines = ["asked = 0", *self._each([*kind.geometry.before, *self._noted(inputs), begin, *asks,
-                                           f"asked += {count}"])]  # fmt: skip
+        lines = [
+            "asked = 0",
+            *self._each(
+                [*kind.geometry.before, *self._noted(inputs), begin, *asks, f"asked += {count}"]
+            ),
+        ]
         answers = ", ".join(f"value_of(lanes, {count} * asked + {k})" for k in range(count))
         place = places[second.curves[-1]]
         for number, curve in reversed([*enumerate(second.curves[:-1])]):
             place = f"{places[curve]} if which == {number} else {place}"
         # Whoever has an answer asks for the next at once, in the room of what is answered.
-        lines += ["answer(lanes, asked, 1)", "asked = 0", *self._each([
-            f"{', '.join(known[name] for name in first.results)} = law({told}, {answers})",
-            f"which, of_curve, of_argument, total = asking({told})",
-            f"place = {place}",
-            "if of_curve == 0.0 and of_argument == 1.0:",
-            "    ask(reals, lanes, asked, place, total)",
-            "else:",
-            "    ask_sum(reals, lanes, asked, place, of_curve, of_argument, total)",
-            "asked += 1",
-        ])]  # fmt: skip
+        lines += [
+            "answer(lanes, asked, 1)",
+            "asked = 0",
+            *self._each(
+                [
+                    f"{', '.join(known[name] for name in first.results)} = law({told}, {answers})",
+                    f"which, of_curve, of_argument, total = asking({told})",
+                    f"place = {place}",
+                    "if of_curve == 0.0 and of_argument == 1.0:",
+                    "    ask(reals, lanes, asked, place, total)",
+                    "else:",
+                    "    ask_sum(reals, lanes, asked, place, of_curve, of_argument, total)",
+                    "asked += 1",
+                ]
+            ),
+        ]
         lines += [f"answer(lanes, asked, {SOUGHT_ROUNDS})", "asked = 0"]
         found = ", ".join(known[name] for name in second.results)
-        ended = [f"{found} = found_law({told}, value_of(lanes, asked), missed_of(lanes, asked))", "asked += 1"]
+        ended = [
+            f"{found} = found_law({told}, value_of(lanes, asked), missed_of(lanes, asked))",
+            "asked += 1",
+        ]
         end = [f"{', '.join(kind.outputs)} = end({told})"]
         end += self._results(name for name in recorded if name not in inputs)
         lines += self._each([*ended, *end, *kind.geometry.after])
@@ -194,14 +220,24 @@ class KernelText:
                 "    first = end_of_part",
             ],
             **{"known": made.known, "begin": made.begin, "law": first.law, "asking": second.asking},
-            **{"found_law": second.law, "end": made.end, "ask": ask, "ask_sum": ask_sum, "answer": answer},
+            **{
+                "found_law": second.law,
+                "end": made.end,
+                "ask": ask,
+                "ask_sum": ask_sum,
+                "answer": answer,
+            },
             **{"value_of": value_of, "missed_of": missed_of},
         )
 
     def _each(self, lines: Sequence[str]) -> list[str]:
         """Lines about each item of a run; who is told of an item without a solution is told its number."""
         refused = "    return OUTCOME.UNSOLVED"
-        told = [new for line in lines for new in (("    f[0] = number", line) if line == refused else (line,))]
+        told = [
+            new
+            for line in lines
+            for new in (("    f[0] = number", line) if line == refused else (line,))
+        ]
         return [
             "for number in range(first, end_of_part):",
             "    item = model[model[MODEL.ITEM_AT] + number]",
@@ -213,7 +249,11 @@ class KernelText:
         """By column of the derivatives the place of the argument that is changed."""
         kind = self.kind
         inputs = list(self.input_names)
-        result = {column: inputs.index(name) for column, name in enumerate(kind.geometry.inputs) if name in inputs}
+        result = {
+            column: inputs.index(name)
+            for column, name in enumerate(kind.geometry.inputs)
+            if name in inputs
+        }
         given = [column for column, state in enumerate(kind.states) if state.given]
         first = len(inputs) + kind.controlled
         return result | {2 + column: first + number for number, column in enumerate(given)}
@@ -222,10 +262,18 @@ class KernelText:
     def responds(self) -> bool:
         """Whether its forces have derivatives along one displacement."""
         kind = self.kind
-        return kind.law is not None and kind.geometry.along[0] in kind.outputs and bool(self.changed_outputs)
+        return (
+            kind.law is not None
+            and kind.geometry.along[0] in kind.outputs
+            and bool(self.changed_outputs)
+        )
 
-    def _function(self, form: str, law: Callable[..., Any] | None, lines: Sequence[str]) -> Callable[..., int]:
-        return self._written(form, "item", [*self._places_of_item, *self.kind.geometry.before, *lines], law=law)
+    def _function(
+        self, form: str, law: Callable[..., Any] | None, lines: Sequence[str]
+    ) -> Callable[..., int]:
+        return self._written(
+            form, "item", [*self._places_of_item, *self.kind.geometry.before, *lines], law=law
+        )
 
     @property
     def _places_of_item(self) -> list[str]:
@@ -236,7 +284,9 @@ class KernelText:
             f"g, gp, room = at(i, {ITEM.OWN + self.heads}), at(p, {self.size}), at(found, {recorded})",
         ]
 
-    def _written(self, form: str, place: str, lines: Sequence[str], **own: Any) -> Callable[..., int]:
+    def _written(
+        self, form: str, place: str, lines: Sequence[str], **own: Any
+    ) -> Callable[..., int]:
         kind, name = self.kind, self.kind.name + form
         source = "\n    ".join(
             [
@@ -248,7 +298,14 @@ class KernelText:
         scope = {name: value for term in kind.terms for name, value in term.functions().items()}
         if kind.together is not None:
             scope[kind.together.__name__] = kind.together
-        return written(name, f"{__package__}.kinds.{kind.name}", source, **own, **kind.geometry.functions(), **scope)
+        return written(
+            name,
+            f"{__package__}.kinds.{kind.name}",
+            source,
+            **own,
+            **kind.geometry.functions(),
+            **scope,
+        )
 
     @property
     def _computing(self) -> list[str]:
@@ -298,7 +355,11 @@ class KernelText:
         made = self.kind.together
         if made is None:
             return f"{law}({', '.join(arguments)})"
-        names = *self.input_names, "excitation", *(state.name for state in self.kind.states if state.given)
+        names = (
+            *self.input_names,
+            "excitation",
+            *(state.name for state in self.kind.states if state.given),
+        )
         given = dict(zip(names, arguments, strict=False))
         first = f"{made.__name__}({', '.join(given.get(name, '0.0') for name in made._fields)})"
         return f"{law}({', '.join((first, *arguments[len(names) :]))})"

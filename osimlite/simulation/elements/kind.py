@@ -1,14 +1,15 @@
 """One declaration for each kind of force; packing, kernel, states, columns, records and energy follow from it.
 
-A kind says where its forces act (a geometry), what a law is given, and what the law's results mean. The law is a scalar
-function of floats. It is given, one after the other: the inputs of the geometry, the control if there is one, the
-states, the parameters. The kernel of a kind is written from this (:mod:`osimlite.simulation.elements.kernel_text`), and
-compiled as every other kernel is. A second law, given the same, may find states in equilibrium; its kernel is written
-likewise.
+A kind says where its forces act (a geometry), what a law is given, and what the law's results mean.
+The law is a scalar function of floats. It is given, one after the other: the inputs of the
+geometry, the control if there is one, the states, the parameters. The kernel of a kind is written
+from this (:mod:`osimlite.simulation.elements.kernel_text`), and compiled as every other kernel is.
+A second law, given the same, may find states in equilibrium; its kernel is written likewise.
 
-The integers of an item are the places of what varies in length (curves, formulas, controls) and of its states, and
-after these the geometry's; its numbers the parameters, the geometry's, and the tables; its record the outputs that are
-no rates of states, inputs that are kept, what the geometry keeps, and the registers of formulas.
+The integers of an item are the places of what varies in length (curves, formulas, controls) and of
+its states, and after these the geometry's; its numbers the parameters, the geometry's, and the
+tables; its record the outputs that are no rates of states, inputs that are kept, what the geometry
+keeps, and the registers of formulas.
 """
 
 from __future__ import annotations
@@ -50,7 +51,8 @@ class State:
     """A state of a kind: the law is given its value, and gives its derivative."""
 
     name: str  # as OpenSim has it
-    # value at the beginning, from the component; its property `default_<name>` if left out, 0 if it has none
+    # value at the beginning, from the component; its property `default_<name>` if left out, 0 if it
+    # has none
     start: Callable[[Any], float] | None = None
     given: bool = True  # whether the law is given its value at all
     output: str = ""  # name of the output that is its derivative; `<name>_rate` if left out
@@ -80,32 +82,39 @@ class Kind:
     outputs: tuple[str, ...] = ()
     # what the law is given of a component; a name stands for a property that is a number
     parameters: Sequence[str | Parameter] = ()
-    inputs: tuple[str, ...] | None = None  # which of the geometry's inputs the law is given; all if None
+    # which of the geometry's inputs the law is given; all if None
+    inputs: tuple[str, ...] | None = None
     kept: tuple[str, ...] = ()  # which of them, and of the derivatives of states, are recorded too
-    controlled: bool = False  # whether the law is given the control, or the controls if there are several
+    # whether the law is given the control, or the controls if there are several
+    controlled: bool = False
     states: tuple[State, ...] = ()  # of each force
     # named tuple as which the law is given inputs, excitation and states; one by one if None
     together: type[Any] | None = None
-    # computes states in equilibrium from what the law is given: whether it found them, and those that `settled` names
+    # computes states in equilibrium from what the law is given: whether it found them, and those
+    # that `settled` names
     equilibrium: Callable[..., Any] | None = None
     settled: tuple[str, ...] = ()  # names of the states that it finds
     # force (N) of fully active fibers along a rigid tendon, from what the law is given; of muscles
     rigid: Callable[..., float] | None = None
-    # the law where its results are known, given also those that its other parameters name of the record; of derivatives
+    # the law where its results are known, given also those that its other parameters name of the
+    # record; of derivatives
     again: Callable[..., Any] | None = None
-    # name of the kernel that tells how the force of a contact changes along its normal and across it
+    # name of the kernel that tells how the force of a contact changes along its normal and across
+    # it
     contact_response: str = ""
     abreast: Abreast | None = None  # the law in parts, which several forces take together
     # what is said of a force whose law, or equilibrium, has no solution, from what is `known` of it
     told: Callable[[Mapping[str, float]], str] | None = None
-    # of the record, in which {name} stands for that of the force, each with its output; the geometry's own if None
+    # of the record, in which {name} stands for that of the force, each with its output; the
+    # geometry's own if None
     labels: Mapping[str, str] | None = None
     # energy (J) of a force from its record, where it is no output of the law
     stored: Callable[[DeclaredForce, Sequence[float]], float] | None = None
     # raises a ModelError if the parameters have no meaning together
     check: Callable[[ElementBuilder, Any], None] | None = None
     shares: bool = False  # whether a force may have numbers of others of its class
-    # whether the states of a force that is off (appliesForce) change as those of others do; else they rest
+    # whether the states of a force that is off (appliesForce) change as those of others do; else
+    # they rest
     goes_on: bool = False
     terms: tuple[Parameter, ...] = field(init=False)
 
@@ -117,7 +126,9 @@ class Kind:
             is_muscle = issubclass(self.component, Muscle)
             named.insert(0, ReflexControl() if is_muscle else Control(self.component.control_count))
         object.__setattr__(self, "terms", tuple(named))
-        if self.together is not None and not {state.name for state in self.states} <= {*self.together._fields}:
+        if self.together is not None and not {state.name for state in self.states} <= {
+            *self.together._fields
+        }:
             raise TypeError(f"{self.together.__name__} lacks a state of {self.component.__name__}")
 
     @property
@@ -162,7 +173,9 @@ class Kind:
             if self.rigid is None:
                 raise builder.unsupported(force, " with a rigid tendon")
             made = RigidTendon
-        return made(self.component, path, force.name, self.geometry.read(builder, force), values, states)
+        return made(
+            self.component, path, force.name, self.geometry.read(builder, force), values, states
+        )
 
     @cached_property
     def recorded(self) -> dict[str, int]:
@@ -199,9 +212,15 @@ class Kind:
             more, plain = term.pack(value, tail, f"'{force.path}'")
             heads += more
             own += plain
-        at_states = tuple(len(heads) + k for k, state in enumerate(force.optional_states) if state is not None)
+        at_states = tuple(
+            len(heads) + k for k, state in enumerate(force.optional_states) if state is not None
+        )
         all_ints = (*heads, *[-1] * len(self.states), *ints, *tail.ints)
-        there = {state.name for state, own in zip(self.states, force.optional_states, strict=True) if own is not None}
+        there = {
+            state.name
+            for state, own in zip(self.states, force.optional_states, strict=True)
+            if own is not None
+        }
         sense = self.geometry.along[1]
         responds = self.text.responds and not force.form
         item = Item(
@@ -210,15 +229,22 @@ class Kind:
             (*own, *numbers, *tail.numbers),
             room=tail.room,
             states=at_states,
-            equilibrium=self.name + EQUILIBRIUM if there & set(self.settled) and not force.form else "",
+            equilibrium=self.name + EQUILIBRIUM
+            if there & set(self.settled) and not force.form
+            else "",
             abreast=self.name + ABREAST if self.abreast is not None and not force.form else "",
-            response=Response(self.name + RESPONSE, len(heads), len(self.states), sense) if responds else None,
+            response=Response(self.name + RESPONSE, len(heads), len(self.states), sense)
+            if responds
+            else None,
         )
         responses = []
         if self.contact_response and not force.form:
             told = Response(self.contact_response, 0, 0, 1)
             size = ITEM.OWN + 2
-            responses = [Item(ints=(size * (3 - axis), axis), is_part=True, response=told) for axis in range(3)]
+            responses = [
+                Item(ints=(size * (3 - axis), axis), is_part=True, response=told)
+                for axis in range(3)
+            ]
         return [*responses, *parts, item]
 
 
@@ -249,7 +275,9 @@ class DeclaredForce:
 
     def items(self, places: Places) -> list[Item]:
         """What the kernels compute."""
-        return self.kind.items(self, places) if self.kind.outputs or self.kind.geometry.after else []
+        return (
+            self.kind.items(self, places) if self.kind.outputs or self.kind.geometry.after else []
+        )
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -259,11 +287,15 @@ class DeclaredForce:
             return kind.geometry.columns(self)
         return tuple(label.format(name=self.name) for label in kind.labels)
 
-    def report(self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]) -> list[float]:
+    def report(
+        self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]
+    ) -> list[float]:
         """One row of the columns; see :class:`osimlite.simulation.elements.items.ForceElement`."""
         kind = self.kind
         if kind.labels is None:
-            return kind.geometry.report(self, records[-1][len(kind.recorded) :] if records else (), origins)
+            return kind.geometry.report(
+                self, records[-1][len(kind.recorded) :] if records else (), origins
+            )
         return [float(records[-1][kind.recorded[output]]) for output in kind.labels.values()]
 
     def known(self, record: Sequence[float]) -> dict[str, float]:
@@ -310,7 +342,10 @@ class RigidTendon(DeclaredForce):
 def kinds() -> list[Any]:
     """All declarations."""
     package = import_module(f"{__package__}.kinds")
-    return [import_module(f"{package.__name__}.{item.name}").KIND for item in iter_modules(package.__path__)]
+    return [
+        import_module(f"{package.__name__}.{item.name}").KIND
+        for item in iter_modules(package.__path__)
+    ]
 
 
 @cache

@@ -1,9 +1,10 @@
 """The functions that are compiled by themselves, with those of forces and probes, by name.
 
-The kernel of a kind of force is written from its declaration, and has the name of the module that declares it; so are
-the one that brings such a force into equilibrium, with EQUILIBRIUM behind the name, that of a force that is off, with
-OFF, the one that finds its derivatives, with RESPONSE, and that of a muscle whose tendon is taken for rigid, with
-RIGID. Kernels of probes are written likewise.
+The kernel of a kind of force is written from its declaration, and has the name of the module that
+declares it; so are the one that brings such a force into equilibrium, with EQUILIBRIUM behind the
+name, that of a force that is off, with OFF, the one that finds its derivatives, with RESPONSE, and
+that of a muscle whose tendon is taken for rigid, with RIGID. Kernels of probes are written
+likewise.
 """
 
 from __future__ import annotations
@@ -15,7 +16,13 @@ from typing import Any
 
 from osimlite.mechanics.kernels.table import LAW_MODULES, own_function
 
-EQUILIBRIUM, OFF, RESPONSE, RIGID, ABREAST = "_equilibrium", "_off", "_response", "_rigid", "_abreast"
+EQUILIBRIUM, OFF, RESPONSE, RIGID, ABREAST = (
+    "_equilibrium",
+    "_off",
+    "_response",
+    "_rigid",
+    "_abreast",
+)
 FORMS = {
     EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel", RESPONSE: "response_kernel", RIGID: "rigid_kernel",
     ABREAST: "abreast_kernel",
@@ -28,7 +35,8 @@ DIRECTIONS = 16
 
 WITHOUT_DERIVATIVES = frozenset(
     (
-        # Whole motions, which are followed step by step, and methods that no derivatives are followed along.
+        # Whole motions, which are followed step by step, and methods that no derivatives are
+        # followed along.
         "run_several", "hold_several", "walk_several", "run_by_reflexes", "euler2", "adams", "bdf", "rosenbrock",
         # Searches, and looks at many poses.
         "fit_frames", "least_effort", "watch", "look", "push_each", "assemble_poses",
@@ -60,10 +68,13 @@ def library_laws(directions: int = 0) -> list[str]:
             names.append(name)
     if not directions:
         return names
-    # The kernels of responses have derivatives of their own within; nothing is brought into equilibrium on the way.
+    # The kernels of responses have derivatives of their own within; nothing is brought into
+    # equilibrium on the way.
     without = EQUILIBRIUM, RESPONSE, ABREAST
     return [
-        f"{name}{ALONG}{directions}" for name in names if name not in WITHOUT_DERIVATIVES and not name.endswith(without)
+        f"{name}{ALONG}{directions}"
+        for name in names
+        if name not in WITHOUT_DERIVATIVES and not name.endswith(without)
     ]
 
 

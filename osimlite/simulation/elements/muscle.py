@@ -23,8 +23,9 @@ RECORDED = (
     "active_fiber_force",
     "passive_fiber_force",
 )
-"""What the law of a muscle gives first: N, m, N; what is kept of it besides are length and rate of the path, and the
-velocity of the fibers."""
+"""What the law of a muscle gives first: N, m, N; what is kept of it besides are length and rate of
+the path, and the velocity of the fibers.
+"""
 
 STRENGTH = "active_fiber_force"
 """The force (N) of fully active fibers, where the tendon is taken for rigid."""
@@ -33,13 +34,17 @@ SPRING = "elastic_fiber_force"
 """What of the passive force of fibers with damping is not by that, N."""
 
 PENNATION = Number(
-    "pennation_angle_at_optimal", lambda x: 0.0 <= x <= 0.5 * pi - SIGNIFICANT, "is not from 0 to less than pi/2"
+    "pennation_angle_at_optimal",
+    lambda x: 0.0 <= x <= 0.5 * pi - SIGNIFICANT,
+    "is not from 0 to less than pi/2",
 )
 
 
 def height(builder: ElementBuilder, force: Any) -> tuple[float]:
     """Of the fibers across the tendon, m."""
-    return (force.optimal_fiber_length * sin(Number("pennation_angle_at_optimal").read(builder, force)),)
+    return (
+        force.optimal_fiber_length * sin(Number("pennation_angle_at_optimal").read(builder, force)),
+    )
 
 
 def curve(
@@ -50,20 +55,22 @@ def curve(
 ) -> Vector:
     """The curve that a property of a muscle stands for; the law is given its numbers, as `curve_value` takes them.
 
-    Args:
-        name: of the property.
-        size: how many numbers.
-        make: makes them of the curve's own properties, in their order; a ValueError tells why there is no such curve.
-        changed: those that the muscle changes.
+    Args: name: of the property. size: how many numbers. make: makes them of the curve's own
+        properties, in their order; a ValueError tells why there is no such curve. changed: those
+        that the muscle changes.
     """
 
     def read(builder: ElementBuilder, force: Any) -> Sequence[float]:
         own = getattr(force, name)
-        properties = {name: getattr(own, name) for name in type(own).__annotations__} | changed(force)
+        properties = {name: getattr(own, name) for name in type(own).__annotations__} | changed(
+            force
+        )
         try:
             return make(*properties.values())
         except ValueError as error:
-            raise ModelError(f"the {name} of '{builder.path(force)}' makes no curve: {error}") from None
+            raise ModelError(
+                f"the {name} of '{builder.path(force)}' makes no curve: {error}"
+            ) from None
 
     return Vector(size, read)
 
@@ -78,8 +85,16 @@ def require(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
     usual = (
         PENNATION,
         Number("maximum_pennation_angle", lambda x: 0.0 <= x <= 0.5 * pi, "is not from 0 to pi/2"),
-        Number("minimum_activation", lambda x: 0.0 <= x < 1.0 - SIGNIFICANT, "is not from 0 to less than 1"),
-        Number("min_control", lambda x: not x < least, f"is below its minimum_activation, {least:g}; raise it"),
+        Number(
+            "minimum_activation",
+            lambda x: 0.0 <= x < 1.0 - SIGNIFICANT,
+            "is not from 0 to less than 1",
+        ),
+        Number(
+            "min_control",
+            lambda x: not x < least,
+            f"is below its minimum_activation, {least:g}; raise it",
+        ),
     )
     for number in (*usual, *numbers):
         number.read(builder, force)
@@ -88,7 +103,9 @@ def require(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
 def _told(known: Mapping[str, float]) -> str:
     off = known["length"] - known["tendon_slack_length"] - known["optimal_fiber_length"]
     # A search that is not for a fiber length has none to tell.
-    fibers = f", with fibers of {known['fiber_length']:.4g} m" if known["fiber_length"] > 0.0 else ""
+    fibers = (
+        f", with fibers of {known['fiber_length']:.4g} m" if known["fiber_length"] > 0.0 else ""
+    )
     return (
         f", whose path of {known['length']:.4g} m is {abs(off):.3g} m {'longer' if off > 0.0 else 'shorter'} than its "
         f"tendon_slack_length and optimal_fiber_length together{fibers}"
@@ -96,7 +113,11 @@ def _told(known: Mapping[str, float]) -> str:
 
 
 def muscle(
-    component: type, law: Callable[..., Any], rates: tuple[str, ...], *parameters: Parameter, **more: Any
+    component: type,
+    law: Callable[..., Any],
+    rates: tuple[str, ...],
+    *parameters: Parameter,
+    **more: Any,
 ) -> Kind:
     """The kind of a muscle.
 

@@ -22,8 +22,9 @@ from osimlite.simulation.elements.muscle import height, muscle
 from osimlite.simulation.elements.parameters import Fields, Number, Parameter, positive
 
 Forces = Callable[[float, float, Any, Any], tuple[float, float, float]]
-"""Active force at full activation, passive force and the tendon's, normalized; from a normalized fiber length, a strain
-of the tendon, and numbers and curves that are the muscle's own."""
+"""Active force at full activation, passive force and the tendon's, normalized; from a normalized
+fiber length, a strain of the tendon, and numbers and curves that are the muscle's own.
+"""
 
 Fibers = tuple[float, float, float, float]
 
@@ -43,15 +44,31 @@ def recorded(
     """What is recorded of every muscle; nobody knows of a factor by velocity."""
     cos, active, passive, tendon = fibers
     tension, passive_force = m.strength * tendon, m.strength * passive
-    return tension, now.activation, now.fiber_length, cos, active, nan, tension / cos - passive_force, passive_force
+    return (
+        tension,
+        now.activation,
+        now.fiber_length,
+        cos,
+        active,
+        nan,
+        tension / cos - passive_force,
+        passive_force,
+    )
 
 
 def isometric_length(
-    length: float, start: float, activation: float, m: OldMuscle, forces: Forces, own: Any, curves: Any
+    length: float,
+    start: float,
+    activation: float,
+    m: OldMuscle,
+    forces: Forces,
+    own: Any,
+    curves: Any,
 ) -> float:
     """The fiber length, m, where fibers at rest and tendon are in equilibrium, as computeIsometricForce of OpenSim.
 
-    To 0.01 N, or where the search has got to after its rounds; fibers stand upright where the path is too short.
+    To 0.01 N, or where the search has got to after its rounds; fibers stand upright where the path
+    is too short.
 
     Args:
         length: of the path, m.
@@ -80,11 +97,14 @@ def isometric_length(
     return guess.length
 
 
-def strongest(now: MuscleInputs, start: float, m: OldMuscle, forces: Forces, own: Any, curves: Any) -> float:
+def strongest(
+    now: MuscleInputs, start: float, m: OldMuscle, forces: Forces, own: Any, curves: Any
+) -> float:
     """Force (N) in equilibrium at rest, fully activated, times a factor by the rate of the path.
 
-    It is what OpenSim takes for the active force along a rigid tendon; see calcInextensibleTendonActiveFiberForce of
-    ActivationFiberLengthMuscle_Deprecated. Args as of `isometric_length`.
+    It is what OpenSim takes for the active force along a rigid tendon; see
+    calcInextensibleTendonActiveFiberForce of ActivationFiberLengthMuscle_Deprecated. Args as of
+    `isometric_length`.
     """
     if now.length < m.slack:
         return 0.0

@@ -123,7 +123,9 @@ class Numbers(Parameter):
         """They, one by one."""
         return [f"p[{number + k}]" for k in range(self.count)]
 
-    def pack(self, value: Sequence[float], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(
+        self, value: Sequence[float], tail: Tail, where: str
+    ) -> tuple[Sequence[int], Sequence[float]]:
         """They."""
         return (), value
 
@@ -145,7 +147,10 @@ class Fields(Parameter):
     @property
     def names(self) -> tuple[str, ...]:
         """Of the properties, and of the fields that are none."""
-        return (*(item.name for item in self.properties), *self.type._fields[len(self.properties) :])
+        return (
+            *(item.name for item in self.properties),
+            *self.type._fields[len(self.properties) :],
+        )
 
     def read(self, builder: ElementBuilder, force: Any) -> Any:
         """The tuple."""
@@ -162,7 +167,9 @@ class Fields(Parameter):
         """What makes it."""
         return {self.type.__name__: self.type}
 
-    def pack(self, value: Sequence[float], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(
+        self, value: Sequence[float], tail: Tail, where: str
+    ) -> tuple[Sequence[int], Sequence[float]]:
         """Its numbers."""
         return (), value
 
@@ -197,7 +204,9 @@ class Curve(Parameter):
         """Its table."""
         return [f"at(p, i[{head}])"]
 
-    def pack(self, value: Function, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(
+        self, value: Function, tail: Tail, where: str
+    ) -> tuple[Sequence[int], Sequence[float]]:
         """Place of the table."""
         return (tail.put_numbers(table_of_one(value, f"the {self.name} of {where}")),), ()
 
@@ -234,7 +243,9 @@ class Together(Parameter):
     def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
         """Their integers and numbers, one after another."""
         packed = [term.pack(own, tail, where) for term, own in zip(self.terms, value, strict=True)]
-        return [place for ints, _ in packed for place in ints], [x for _, numbers in packed for x in numbers]
+        return [place for ints, _ in packed for place in ints], [
+            x for _, numbers in packed for x in numbers
+        ]
 
 
 @dataclass(frozen=True)
@@ -267,8 +278,8 @@ class Expression(Parameter):
 class Expressions(Parameter):
     """Properties that are formulas in the same variables.
 
-    The law is given the steps of each, with their count and the place of its constants before them; the numbers that
-    these places count from; and the registers that they share.
+    The law is given the steps of each, with their count and the place of its constants before them;
+    the numbers that these places count from; and the registers that they share.
     """
 
     names: tuple[str, ...]  # of the properties
@@ -283,7 +294,9 @@ class Expressions(Parameter):
         """Steps, numbers, registers."""
         return [f"at(i, i[{head}])", "p", f"at(found, i[{head + 1}])"]
 
-    def pack(self, value: Sequence[Formula], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(
+        self, value: Sequence[Formula], tail: Tail, where: str
+    ) -> tuple[Sequence[int], Sequence[float]]:
         """Places of the steps and of the registers."""
         ints: list[int] = []
         most = 0
@@ -333,6 +346,8 @@ class ReflexControl(Control):
         """What adds."""
         return {"with_reflex": with_reflex}
 
-    def pack(self, value: tuple[int, float], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(
+        self, value: tuple[int, float], tail: Tail, where: str
+    ) -> tuple[Sequence[int], Sequence[float]]:
         """Number and gain."""
         return value[:1], value[1:]

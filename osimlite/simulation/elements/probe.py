@@ -1,13 +1,14 @@
 """One declaration for each kind of probe; packing, kernel, integrals and columns follow from it.
 
-A probe adds up, or lists, what a law gives for each of its subjects: actuators or muscles. The law is a scalar function
-of floats; it is given what the record of the subject has, a curve if there is one, and a named tuple of numbers. The
-kernel of a kind is written from this. It runs with the forces where the probe integrates, since the integrals are
-states then, and otherwise when somebody asks.
+A probe adds up, or lists, what a law gives for each of its subjects: actuators or muscles. The law
+is a scalar function of floats; it is given what the record of the subject has, a curve if there is
+one, and a named tuple of numbers. The kernel of a kind is written from this. It runs with the
+forces where the probe integrates, since the integrals are states then, and otherwise when somebody
+asks.
 
-The integers of the item are: count of the subjects, place among the results of the first (-1 if there is only the sum),
-count of the integrals, the first of them in y, place of the curve, and for each subject the places in the work vector
-of what the law is given.
+The integers of the item are: count of the subjects, place among the results of the first (-1 if
+there is only the sum), count of the integrals, the first of them in y, place of the curve, and for
+each subject the places in the work vector of what the law is given.
 """
 
 from __future__ import annotations
@@ -49,10 +50,11 @@ class Reading(NamedTuple):
 
     labels: tuple[str, ...]  # of its results
     subjects: tuple[Subject, ...] = ()  # what the law is called for
-    # place among the results of that of the first subject; -1 if the sum is all there is. The sum is the first result
-    # unless the subjects begin there.
+    # place among the results of that of the first subject; -1 if the sum is all there is. The sum
+    # is the first result unless the subjects begin there.
     first: int = -1
-    constant: float = 0.0  # that the sum begins with; it is the second result if the subjects begin after it
+    # that the sum begins with; it is the second result if the subjects begin after it
+    constant: float = 0.0
     curve: Function | None = None  # that the law is given
     details: Any = ()  # what a measure must know
 
@@ -68,8 +70,8 @@ class ProbeKind:
     # names of what it is given of a subject: of its record, or "actuation", "speed" and "control"
     reads: tuple[str, ...] = ()
     numbers: Any = tuple  # the tuple that it is given last
-    # computes the results in the place of a law, from the probe, the system after its forces were evaluated, and for
-    # what time (s) and state that was
+    # computes the results in the place of a law, from the probe, the system after its forces were
+    # evaluated, and for what time (s) and state that was
     measure: Callable[[DeclaredProbe, Any, float, Sequence[float]], Sequence[float]] | None = None
     has_curve: bool = False  # whether the law is given a curve
 
@@ -123,7 +125,8 @@ class DeclaredProbe(Silent):
     gain: float  # factor of what is reported
     initial: tuple[float, ...]  # where integrals start
     reading: Reading  # what it reads
-    # for each subject and each thing that it reads, the element whose record has it, and where there
+    # for each subject and each thing that it reads, the element whose record has it, and where
+    # there
     places: tuple[tuple[tuple[str, int], ...], ...] = ()
     numbers: tuple[tuple[float, ...], ...] = ()  # that the law is given of each subject
 
@@ -163,7 +166,9 @@ class DeclaredProbe(Silent):
         ]
 
 
-def probe_elements(builder: ElementBuilder, elements: Sequence[ForceElement]) -> list[DeclaredProbe]:
+def probe_elements(
+    builder: ElementBuilder, elements: Sequence[ForceElement]
+) -> list[DeclaredProbe]:
     """The probes of a model that are enabled, in its order; those that cannot be computed are told of and left out.
 
     Components whose outputs are reported are among them.
@@ -188,7 +193,9 @@ def probe_elements(builder: ElementBuilder, elements: Sequence[ForceElement]) ->
     return result
 
 
-def _made(kind: ProbeKind, builder: ElementBuilder, probe: Any, elements: Mapping[str, ForceElement]) -> DeclaredProbe:
+def _made(
+    kind: ProbeKind, builder: ElementBuilder, probe: Any, elements: Mapping[str, ForceElement]
+) -> DeclaredProbe:
     path, reading = builder.path(probe), kind.read(builder, probe)
     # A component with outputs has values, and no operations.
     operation, gain = getattr(probe, "probe_operation", "value"), float(getattr(probe, "gain", 1.0))
@@ -199,7 +206,9 @@ def _made(kind: ProbeKind, builder: ElementBuilder, probe: Any, elements: Mappin
         # As in OpenSim, which says that it is an error.
         initial = (0.0,) * len(reading.labels)
     subjects = [_subject(kind, builder, probe, subject, elements) for subject in reading.subjects]
-    builder.check(probe, [gain, reading.constant, *initial, *(x for _, numbers in subjects for x in numbers)])
+    builder.check(
+        probe, [gain, reading.constant, *initial, *(x for _, numbers in subjects for x in numbers)]
+    )
     return DeclaredProbe(
         type(probe),
         path,
@@ -214,7 +223,11 @@ def _made(kind: ProbeKind, builder: ElementBuilder, probe: Any, elements: Mappin
 
 
 def _subject(
-    kind: ProbeKind, builder: ElementBuilder, probe: Any, subject: Subject, elements: Mapping[str, ForceElement]
+    kind: ProbeKind,
+    builder: ElementBuilder,
+    probe: Any,
+    subject: Subject,
+    elements: Mapping[str, ForceElement],
 ) -> tuple[tuple[tuple[str, int], ...], tuple[float, ...]]:
     """Where what the law is given of a subject stands, and its numbers."""
     actuator, numbers = subject
@@ -231,7 +244,9 @@ def _subject(
     for name in kind.reads:
         place = known.get(name)
         if place is None and name != "control":
-            raise builder.unsupported(probe, f" of '{path}', of which no {name.replace('_', ' ')} is known")
+            raise builder.unsupported(
+                probe, f" of '{path}', of which no {name.replace('_', ' ')} is known"
+            )
         places.append(control if place is None else (path, place))
     return tuple(places), tuple(map(float, numbers))
 
@@ -242,7 +257,9 @@ def kind_of_probe(component: type) -> Any:
     return getattr(module_of("probes", component), "PROBE", None)
 
 
-def members_of(builder: ElementBuilder, probe: Any, words: Sequence[Any], path: str, kind: str) -> list[Any]:
+def members_of(
+    builder: ElementBuilder, probe: Any, words: Sequence[Any], path: str, kind: str
+) -> list[Any]:
     """The components in a set that a probe names; the one word `all` means all.
 
     Args:

@@ -46,5 +46,7 @@ def signal(builder: ElementBuilder, controller: Any, text: str) -> Function | No
             )
         if len(table.times) < 2:
             raise ModelError("the table has one row; give it at least two", file=table.file)
-        return TableColumn(tuple(table.times.tolist()), tuple(table[channel].tolist()), builder.path(source))
+        return TableColumn(
+            tuple(table.times.tolist()), tuple(table[channel].tolist()), builder.path(source)
+        )
     return None

@@ -14,7 +14,9 @@ from osimlite.simulation.elements.parameters import Fields, Number, positive
 ACTIVATION = State("activation")
 
 
-def smooth_fields(timed: Callable[[ElementBuilder, Any], Any] = lambda builder, force: force) -> Fields:
+def smooth_fields(
+    timed: Callable[[ElementBuilder, Any], Any] = lambda builder, force: force,
+) -> Fields:
     """The numbers of such a muscle; `timed` gives the one that has its constants of activation."""
 
     def others(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
@@ -48,6 +50,10 @@ def check_smooth(builder: ElementBuilder, force: Any) -> None:
     Raises:
         ModelError: a property has no meaning; it is named.
     """
-    times = "activation_time_constant", "deactivation_time_constant", "activation_dynamics_smoothing"
+    times = (
+        "activation_time_constant",
+        "deactivation_time_constant",
+        "activation_dynamics_smoothing",
+    )
     for number in (PENNATION, *map(positive, (*times, "default_activation"))):
         number.read(builder, force)

@@ -57,7 +57,10 @@ class TriangleMesh:
             case ".stl" | ".stla":
                 return cls.of_corners(stl_corners(content, str(path)), str(path))
             case kind:
-                raise ModelError(f"osimlite, like OpenSim, does not read {kind} files; save it as .obj", file=str(path))
+                raise ModelError(
+                    f"osimlite, like OpenSim, does not read {kind} files; save it as .obj",
+                    file=str(path),
+                )
 
     @classmethod
     def of_corners(cls, corners: Array, file: str) -> TriangleMesh:
@@ -87,9 +90,13 @@ class TriangleMesh:
                 case [a, b, c, d]:
                     triangles += [(a, b, c), (c, d, a)]
                 case [_, _, _, *_] as many:
-                    triangles += [(a, b, len(points)) for a, b in zip(many, [*many[1:], many[0]], strict=True)]
+                    triangles += [
+                        (a, b, len(points)) for a, b in zip(many, [*many[1:], many[0]], strict=True)
+                    ]
                     points.append(polygons.points[around].mean(axis=0).tolist())
-        return cls._closed(np.array(points), np.array(triangles, dtype=np.int64).reshape(-1, 3), file)
+        return cls._closed(
+            np.array(points), np.array(triangles, dtype=np.int64).reshape(-1, 3), file
+        )
 
     @classmethod
     def _closed(cls, points: Array, triangles: Indices, file: str) -> TriangleMesh:
@@ -106,7 +113,10 @@ class TriangleMesh:
         result = cls(points, triangles)
         if not np.all(result.areas > 0.0):
             flat = np.count_nonzero(~(result.areas > 0.0))
-            raise ModelError(f"the mesh has {flat} triangles without area; remove them in a mesh program", file=file)
+            raise ModelError(
+                f"the mesh has {flat} triangles without area; remove them in a mesh program",
+                file=file,
+            )
         corners = result.corners
         volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
         return result if volume > 0.0 else cls(points, triangles[:, ::-1])
@@ -153,7 +163,9 @@ class TriangleMesh:
     @cached_property
     def _reaches(self) -> Array:
         """Distance (t,) from the middle of each triangle to its farthest corner."""
-        return np.asarray(np.linalg.norm(self.corners - self.centroids[:, None], axis=2).max(axis=1))
+        return np.asarray(
+            np.linalg.norm(self.corners - self.centroids[:, None], axis=2).max(axis=1)
+        )
 
     @cached_property
     def is_one_piece(self) -> bool:
@@ -177,7 +189,8 @@ class TriangleMesh:
         squares = np.einsum("ij,ij->i", ways, ways)
         bound = np.full(len(places), np.inf)
         np.minimum.at(bound, which, squares)
-        # Where triangles meet, the one that is seen most from the front tells the inside from the outside.
+        # Where triangles meet, the one that is seen most from the front tells the inside from the
+        # outside.
         height = np.einsum("ij,ij->i", ways, self.normals[triangles])
         near = np.flatnonzero(squares <= _AS_NEAR * bound[which])
         order = near[np.lexsort((-np.abs(height[near]), which[near]))]
@@ -225,7 +238,9 @@ def _edges_cross(one: TriangleMesh, two: TriangleMesh) -> bool:
     normal = two.normals[triangle]
     divided = _dots(p - a, normal) * _dots(q - a, normal) <= 0.0
     hands = [_dots(q - p, np.cross(u - p, v - p)) for u, v in ((a, b), (b, c), (c, a))]
-    same = np.all([hand >= 0.0 for hand in hands], axis=0) | np.all([hand <= 0.0 for hand in hands], axis=0)
+    same = np.all([hand >= 0.0 for hand in hands], axis=0) | np.all(
+        [hand <= 0.0 for hand in hands], axis=0
+    )
     return bool(np.any(divided & same))
 
 

@@ -36,7 +36,9 @@ class KernelEngine(System):
         Simbody counts locked coordinates too, and the fourth number that it keeps for three angles.
         """
         count = len(self.mechanism.coordinates)
-        return count + sum(not body.mobilizer.speeds_are_rates for body in self.mechanism.bodies), count
+        return count + sum(
+            not body.mobilizer.speeds_are_rates for body in self.mechanism.bodies
+        ), count
 
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: Sequence[float]) -> list[float]:
@@ -53,10 +55,16 @@ class KernelEngine(System):
         return self.state.spread(udot, [0.0] * len(self.mechanism.coordinates))
 
     # ---------------------------------------------------------------------------------------------- motion
-    def stepper(self, t: float, y: Sequence[float], settings: Settings, observe: Observer) -> Stepper:
+    def stepper(
+        self, t: float, y: Sequence[float], settings: Settings, observe: Observer
+    ) -> Stepper:
         """What integrates from a state on: steps whose error is controlled, or fixed steps of semi-implicit Euler."""
         if settings.fixed_step is not None:
-            rates = None if all(body.mobilizer.speeds_are_rates for body in self.mechanism.bodies) else self._rates
+            rates = (
+                None
+                if all(body.mobilizer.speeds_are_rates for body in self.mechanism.bodies)
+                else self._rates
+            )
             return SemiImplicitEuler(
                 self.derivative,
                 t,
@@ -70,7 +78,14 @@ class KernelEngine(System):
             )
         bounds, held = settings.step_bounds, settings.held
         return ControlledSteps(
-            self, t, y, settings.accuracy, observe, settings.integrator, step_bounds=bounds, held=held
+            self,
+            t,
+            y,
+            settings.accuracy,
+            observe,
+            settings.integrator,
+            step_bounds=bounds,
+            held=held,
         )
 
     def projected(self, t: float, y: Sequence[float], tolerance: float) -> list[float] | None:

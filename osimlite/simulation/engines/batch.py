@@ -28,18 +28,13 @@ NO_KINDS, NO_LEVELS = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 7))
 class Batch:
     """Runs that differ in their starts or in their numbers.
 
-    Args:
-        engine: whose mechanism.
-        states: where the runs start (W, y).
-        options: how they go; watches are given as `kinds` and `levels`.
-        start: time from which they go on, s.
-        next_step: that is tried first, s.
-        vectors: numbers, one row for all or one for each run.
-        kinds: of the watches (k, 3).
-        levels: of the watches (k, 7).
-        most_logged: room for steps in the log, which all runs share.
-        start_holds: the constraints hold where the runs start; otherwise they start from the nearest such states.
-        held: of a controller that they go by, which writes into the numbers of each.
+    Args: engine: whose mechanism. states: where the runs start (W, y). options: how they go;
+        watches are given as `kinds` and `levels`. start: time from which they go on, s. next_step:
+        that is tried first, s. vectors: numbers, one row for all or one for each run. kinds: of the
+        watches (k, 3). levels: of the watches (k, 7). most_logged: room for steps in the log, which
+        all runs share. start_holds: the constraints hold where the runs start; otherwise they start
+        from the nearest such states. held: of a controller that they go by, which writes into the
+        numbers of each.
 
     Attributes:
         clocks: time and next step of each run, s (W, 2).
@@ -82,15 +77,31 @@ class Batch:
         if method.IS_IMPLICIT:
             program.link_responses(options.integrator)
             self._room += condensation_room(int(s[MODEL.DOFS]), int(s[MODEL.RESPONSES]))
-        sizes = options.most_tries, len(self._times), options.most_events, event, len(kinds), most_logged
+        sizes = (
+            options.most_tries,
+            len(self._times),
+            options.most_events,
+            event,
+            len(kinds),
+            most_logged,
+        )
         address = program.code.address(options.integrator)
         self._sizes = np.array((*sizes, start_holds, address, self._method_at), dtype=np.int64)
         self.clocks = np.empty((count, 2))
         self.clocks[:] = start, next_step
-        self.counts, self.endings = np.zeros((count, record.COUNTED), dtype=np.int64), np.zeros(count, dtype=np.int64)
+        self.counts, self.endings = (
+            np.zeros((count, record.COUNTED), dtype=np.int64),
+            np.zeros(count, dtype=np.int64),
+        )
         self.reports = np.full((count, len(self._times), size), np.nan)
-        self.events, self.peaks = np.zeros((count, options.most_events, event)), np.zeros((count, pairs, 2))
-        self.log, self.forces = np.empty((most_logged, 1 + 2 * size)), np.empty((most_logged, pairs, 3))
+        self.events, self.peaks = (
+            np.zeros((count, options.most_events, event)),
+            np.zeros((count, pairs, 2)),
+        )
+        self.log, self.forces = (
+            np.empty((most_logged, 1 + 2 * size)),
+            np.empty((most_logged, pairs, 3)),
+        )
 
     def allow(self, steps: int) -> None:
         """Let the next call end after so many steps, or when the log is full."""
@@ -109,9 +120,20 @@ class Batch:
         each = vectors.shape[1] if len(vectors) > 1 else 0
         own = self._sizes, self.clocks, self.counts, self.states
         records = self._times, self.reports, self.log, self.forces, self.events, self.peaks
-        law, more = ("run_several", ()) if self._held is None else ("run_by_reflexes", self._held.parts)
+        law, more = (
+            ("run_several", ()) if self._held is None else ("run_by_reflexes", self._held.parts)
+        )
         parts = *records, self._kinds, self._levels, self.endings, *more
-        self._call(law, vectors, room, each, *own, *parts, first, len(self.states) if last is None else last)
+        self._call(
+            law,
+            vectors,
+            room,
+            each,
+            *own,
+            *parts,
+            first,
+            len(self.states) if last is None else last,
+        )
 
     def hold(self, law: str, room: Floats, numbers: Floats, *parts: Any) -> int:
         """Compute by a law of :mod:`osimlite.mechanics.kernels.walks`, with what it takes besides.
@@ -122,7 +144,17 @@ class Batch:
             numbers: of the model (x,), which are changed.
             parts: as said.
         """
-        return self._call(law, numbers, room, self._sizes, self.clocks, self.counts, self.states, self.peaks, *parts)
+        return self._call(
+            law,
+            numbers,
+            room,
+            self._sizes,
+            self.clocks,
+            self.counts,
+            self.states,
+            self.peaks,
+            *parts,
+        )
 
     def _call(self, law: str, numbers: Floats, room: Floats, *parts: Any) -> int:
         room[self._method_at :][: len(self._settings)] = self._settings

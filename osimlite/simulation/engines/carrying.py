@@ -1,7 +1,8 @@
 """Numbers that carry their derivatives along several directions, as Python has them, and their rules.
 
-A kernel runs on such numbers from the text that it has, with functions of them in the place of Python's mathematics.
-What takes no derivatives from one (a comparison, an integer, a vector of floats) takes its value.
+A kernel runs on such numbers from the text that it has, with functions of them in the place of
+Python's mathematics. What takes no derivatives from one (a comparison, an integer, a vector of
+floats) takes its value.
 """
 
 from __future__ import annotations
@@ -103,7 +104,11 @@ class DualVector:
 
     def __getitem__(self, index: Any) -> Any:
         row = self._rows[index]
-        return DualVector(row) if isinstance(index, slice) else Carrying(float(row[0]), row[1:].tolist())
+        return (
+            DualVector(row)
+            if isinstance(index, slice)
+            else Carrying(float(row[0]), row[1:].tolist())
+        )
 
     def __setitem__(self, index: int, number: Any) -> None:
         row = self._rows[index]
@@ -134,7 +139,9 @@ def _compared(comparison: Callable[[float, float], bool]) -> Callable[[Any, Any]
     return lambda x, y: comparison(float(x), float(y))
 
 
-_RULES = {function: _through(function, slopes) for function, slopes in (SLOPES | ARITHMETIC).items()}
+_RULES = {
+    function: _through(function, slopes) for function, slopes in (SLOPES | ARITHMETIC).items()
+}
 for _name in ("neg", "abs"):
     setattr(Carrying, f"__{_name}__", _RULES[abs if _name == "abs" else operator.neg])
 for _name in ("add", "sub", "mul", "truediv", "mod", "pow"):
@@ -164,7 +171,9 @@ IN_PLACE: dict[Any, Any] = {
     is_nothing: _is_nothing,
     carrying: _begun,
     carrying_room: lambda vector, directions: [0.0] * len(vector),
-    slope_of: lambda number, direction: number.slopes[direction] if isinstance(number, Carrying) else 0.0,
+    slope_of: lambda number, direction: (
+        number.slopes[direction] if isinstance(number, Carrying) else 0.0
+    ),
 }
 """What stands in the place of functions where numbers carry derivatives."""
 
@@ -175,7 +184,11 @@ def carried_by(function: Any) -> Any:
     scope = dict(function.__globals__)
     for name in function.__code__.co_names:
         value = scope.get(name, float if name == "float" else None)
-        if isinstance(value, FunctionType) and value not in IN_PLACE and value.__module__.startswith("osimlite."):
+        if (
+            isinstance(value, FunctionType)
+            and value not in IN_PLACE
+            and value.__module__.startswith("osimlite.")
+        ):
             scope[name] = carried_by(value)
         elif callable(value):
             scope[name] = IN_PLACE.get(value, value)

@@ -1,7 +1,7 @@
 """The compiled engine: accelerations, steps and events in machine code.
 
-What is compiled are the functions of :mod:`osimlite.mechanics.kernels` with the force laws and the step control that
-they call. The code serves every model: models and parameters are arrays.
+What is compiled are the functions of :mod:`osimlite.mechanics.kernels` with the force laws and the
+step control that they call. The code serves every model: models and parameters are arrays.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Laws that a C++ compiler compiles one by one: edited ones, and those of a user's own types of forces.
 
-Each becomes a small shared library, which is kept in a folder that only the user can write in. Its name has the digest
-of the law's sources. A checksum tells damage; who wrote a file is told by who can write there.
+Each becomes a small shared library, which is kept in a folder that only the user can write in. Its
+name has the digest of the law's sources. A checksum tells damage; who wrote a file is told by who
+can write there.
 """
 
 from __future__ import annotations
@@ -56,7 +57,11 @@ def load_function(symbol: str, function: Function, directions: int) -> int | Non
     file = _file_name(symbol, function, directions)
     for folder in cache_folders():
         code, checksum = read_private(folder / file), read_private(folder / f"{file}.sha256")
-        if code is not None and checksum is not None and hashlib.sha256(code).hexdigest().encode() == checksum:
+        if (
+            code is not None
+            and checksum is not None
+            and hashlib.sha256(code).hexdigest().encode() == checksum
+        ):
             try:
                 return _load(folder / file, symbol)
             except (OSError, AttributeError):
@@ -138,7 +143,9 @@ def _keep(library: Path) -> Path | None:
             return path
         except OsimliteError as error:
             refusals.append(str(error))
-    _warn_once(f"machine code is compiled anew in every run, since it can be kept nowhere: {'; '.join(refusals)}")
+    _warn_once(
+        f"machine code is compiled anew in every run, since it can be kept nowhere: {'; '.join(refusals)}"
+    )
     return None
 
 

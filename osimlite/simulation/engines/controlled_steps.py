@@ -43,24 +43,20 @@ _at_once: WeakKeyDictionary[KernelEngine, int] = WeakKeyDictionary()
 class ControlledSteps(Stepper):
     """Simbody's RungeKuttaMerson, the default integrator of OpenSim, or a method for stiff motion.
 
-    Merson's method propagates a fourth-order solution and estimates its error from an embedded third-order one
-    (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, table 4.1). A step is taken
-    if the norm of the error is at most `accuracy`, and repeated smaller if not. With the same derivatives, the steps
-    are OpenSim's to the last bit. The kernels take them (:mod:`osimlite.mechanics.kernels.runs`), many in one call
-    where a table of states is asked for.
+    Merson's method propagates a fourth-order solution and estimates its error from an embedded
+    third-order one (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I,
+    table 4.1). A step is taken if the norm of the error is at most `accuracy`, and repeated smaller
+    if not. With the same derivatives, the steps are OpenSim's to the last bit. The kernels take
+    them (:mod:`osimlite.mechanics.kernels.runs`), many in one call where a table of states is asked
+    for.
 
-    The methods for stiff motion, :mod:`osimlite.mechanics.kernels.multistep` and `rosenbrock`, keep the same norm of
-    the error that they estimate below `accuracy`.
+    The methods for stiff motion, :mod:`osimlite.mechanics.kernels.multistep` and `rosenbrock`, keep
+    the same norm of the error that they estimate below `accuracy`.
 
-    Args:
-        engine: whose mechanism.
-        t: initial time, s.
-        y: initial state.
-        accuracy: as OpenSim understands it.
-        observe: called with (time, state) for each step; of those that a table takes, once somebody wants to know.
-        integrator: which of `INTEGRATORS`.
-        step_bounds: shortest and longest step of Merson's method, s.
-        held: of a controller.
+    Args: engine: whose mechanism. t: initial time, s. y: initial state. accuracy: as OpenSim
+        understands it. observe: called with (time, state) for each step; of those that a table
+        takes, once somebody wants to know. integrator: which of `INTEGRATORS`. step_bounds:
+        shortest and longest step of Merson's method, s. held: of a controller.
 
     Attributes:
         attempted: steps tried so far, of which `taken` were accepted.
@@ -83,12 +79,25 @@ class ControlledSteps(Stepper):
         if not 0.0 < accuracy < 1.0:
             raise SettingError(f"The accuracy must lie between 0 and 1; {accuracy} does not.")
         super().__init__(engine.derivative, t, y, observe, engine.state.names)
-        self._engine, self._accuracy, self._integrator, self._step_bounds = engine, accuracy, integrator, step_bounds
+        self._engine, self._accuracy, self._integrator, self._step_bounds = (
+            engine,
+            accuracy,
+            integrator,
+            step_bounds,
+        )
         self._held = held
-        self.next_step = min(max(INITIAL_STEP, step_bounds[0]), step_bounds[1]) if held is None else held.next_step
+        self.next_step = (
+            min(max(INITIAL_STEP, step_bounds[0]), step_bounds[1])
+            if held is None
+            else held.next_step
+        )
         self._room: Floats | None = None
         self._put_off: list[tuple[Floats, Floats]] = []
-        self._seen: tuple[float, list[float], Sequence[float]] = (self.time, self.state, self.derivative)
+        self._seen: tuple[float, list[float], Sequence[float]] = (
+            self.time,
+            self.state,
+            self.derivative,
+        )
 
     @property
     def name(self) -> str:
@@ -173,7 +182,9 @@ class ControlledSteps(Stepper):
             started, before, taken = perf_counter(), self.time, self.taken
             ending = self._call(batch, steps)
             # As many as the time allows, but not many more than were tried.
-            more = min(8.0 * steps, (self.taken - taken) * CALL_SECONDS / (perf_counter() - started))
+            more = min(
+                8.0 * steps, (self.taken - taken) * CALL_SECONDS / (perf_counter() - started)
+            )
             steps = _at_once[self._engine] = min(max(1, int(more)), LOGGED_STEPS)
             yield (self.time - before) / max(self.taken - taken, 1)
 
@@ -187,7 +198,11 @@ class ControlledSteps(Stepper):
         batch.run(self._room)
         (ending,), logged = batch.endings.tolist(), int(count[record.LOGGED])
         log = batch.log[:logged].copy(), batch.forces[:logged].copy()
-        clock, state, counts = batch.clocks[0].tolist(), batch.states[0].tolist(), count[: record.REPORTED].tolist()
+        clock, state, counts = (
+            batch.clocks[0].tolist(),
+            batch.states[0].tolist(),
+            count[: record.REPORTED].tolist(),
+        )
         # Ctrl-C comes between calls of functions: with none here, all of these are set or none is.
         self._put_off += (log,)
         (self.time, self.next_step), self.state = clock, state
@@ -207,7 +222,10 @@ class ControlledSteps(Stepper):
         f0, size = self._evaluate(t0, y0), len(self._engine.order)
         # It may cease to exist behind this state.
         self._evaluate(t0 + h, [y + h * f for y, f in zip(y0, f0, strict=True)])
-        off = [abs(e) * (weight(y) if k >= size else 1.0) for k, (e, y) in enumerate(zip(errors, y0, strict=True))]
+        off = [
+            abs(e) * (weight(y) if k >= size else 1.0)
+            for k, (e, y) in enumerate(zip(errors, y0, strict=True))
+        ]
         index = max(range(len(off)), key=lambda k: off[k] if isfinite(off[k]) else inf)
         if not isfinite(off[index]):
             what = f"leaves the range of numbers in {self._name(index)}"

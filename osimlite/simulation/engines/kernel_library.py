@@ -1,7 +1,8 @@
 """The library of kernels that was compiled when osimlite was installed.
 
-A wheel has one library for each level of processors, an editable installation one for the processor that compiled it.
-Each carries a table: the digest of every kernel, and the files that these were computed from.
+A wheel has one library for each level of processors, an editable installation one for the processor
+that compiled it. Each carries a table: the digest of every kernel, and the files that these were
+computed from.
 """
 
 from __future__ import annotations
@@ -32,10 +33,8 @@ class KernelLibrary:
     Args:
         path: of the shared library.
 
-    Attributes:
-        path: as given.
-        table: its contents: "version", "target", "compiler", "sources" and "laws", and of a native one "features"
-            and "times".
+    Attributes: path: as given. table: its contents: "version", "target", "compiler", "sources" and
+        "laws", and of a native one "features" and "times".
 
     Raises:
         OSError: it cannot be loaded.

@@ -101,7 +101,9 @@ class _Compiled(Code):
     @cache  # noqa: B019 - there is one object
     def entry(self, function: str) -> Callable[..., int]:
         code = self._function(function)
-        return lambda *parts: code(*(part.ctypes.data if isinstance(part, np.ndarray) else part for part in parts))
+        return lambda *parts: code(
+            *(part.ctypes.data if isinstance(part, np.ndarray) else part for part in parts)
+        )
 
     def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
         code, addresses = self._function(function), [item.ctypes.data for item in arrays]
@@ -109,7 +111,10 @@ class _Compiled(Code):
 
     def _function(self, function: str) -> Callable[..., int]:
         parts = signature(law_function(function)).parameters.values()
-        kinds = [ctypes.c_void_p if part.annotation in ("Floats", "Ints") else ctypes.c_int64 for part in parts]
+        kinds = [
+            ctypes.c_void_p if part.annotation in ("Floats", "Ints") else ctypes.c_int64
+            for part in parts
+        ]
         # It runs without Python's lock.
         return ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(self.address(function))
 
@@ -130,7 +135,8 @@ class _Compiled(Code):
 class Tangents(_Compiled):
     """Machine code whose numbers carry derivatives, along several directions at once.
 
-    All arrays of floats have a row for each number: the number, and its derivatives. Python is given the numbers alone.
+    All arrays of floats have a row for each number: the number, and its derivatives. Python is
+    given the numbers alone.
 
     Args:
         directions: how many.
@@ -188,7 +194,9 @@ class _Python(Code):
 
     def entry(self, function: str) -> Callable[..., int]:
         kernel = law_function(function)
-        return lambda *parts: kernel(*(part.reshape(-1) if isinstance(part, np.ndarray) else part for part in parts))
+        return lambda *parts: kernel(
+            *(part.reshape(-1) if isinstance(part, np.ndarray) else part for part in parts)
+        )
 
     def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
         kernel = law_function(function)
@@ -226,7 +234,9 @@ class PythonTangents(_Python):
         """Return what stands for the address of a kernel in Python, which is given the numbers alone."""
 
         def called(*parts: Any) -> int:
-            return python(*(part.values if isinstance(part, DualVector) else part for part in parts))
+            return python(
+                *(part.values if isinstance(part, DualVector) else part for part in parts)
+            )
 
         return pointers.address(called), None
 
@@ -265,10 +275,8 @@ def warn_of_python(reason: str = "") -> None:
 class Program:
     """The structure of a packed model with the addresses of all that it calls, good in this process only.
 
-    Args:
-        packed: the model.
-        code: what runs it.
-        entries: names of the functions that will be called from outside, which are made ready with the rest.
+    Args: packed: the model. code: what runs it. entries: names of the functions that will be called
+        from outside, which are made ready with the rest.
 
     Attributes:
         ints: the structure and the addresses.

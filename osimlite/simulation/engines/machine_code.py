@@ -1,8 +1,9 @@
 """Addresses of the machine code of laws, wherever it comes from.
 
-A law comes from the library that was compiled at installation. An edited law, or one of a user's own type of force, is
-compiled alone by the C++ compiler of the machine, else by numba. The environment variable OSIMLITE_KERNELS names the
-only source to use: library, compiler, numba or python.
+A law comes from the library that was compiled at installation. An edited law, or one of a user's
+own type of force, is compiled alone by the C++ compiler of the machine, else by numba. The
+environment variable OSIMLITE_KERNELS names the only source to use: library, compiler, numba or
+python.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ def allows(source: str) -> bool:
     """
     only = os.environ.get(VARIABLE, "")
     if only and only not in SOURCES:
-        raise OsimliteError(f"{VARIABLE} is '{only}', which is no source of kernels{or_known(only, SOURCES)}")
+        raise OsimliteError(
+            f"{VARIABLE} is '{only}', which is no source of kernels{or_known(only, SOURCES)}"
+        )
     return only in ("", source)
 
 
@@ -103,7 +106,8 @@ def make_ready(names: Sequence[str]) -> None:
 
 def can_prepare(names: Iterable[str]) -> bool:
     """Return whether all laws are at hand, or there is something to compile them with."""
-    # The compiler is looked for last: to ask it for its version takes longer than all of a short simulation.
+    # The compiler is looked for last: to ask it for its version takes longer than all of a short
+    # simulation.
     missing = [name for name in names if not is_at_hand(name)]
     if not missing:
         return True
@@ -167,11 +171,15 @@ def explain_source() -> list[str]:
     if compiler is not None:
         sentences.append(f"{alone} compiled at first use by {compiler.name}")
     elif allows(NUMBA) and _has_numba():
-        sentences.append(f"no C++ compiler was found: {alone} compiled at first use by numba, without derivatives")
+        sentences.append(
+            f"no C++ compiler was found: {alone} compiled at first use by numba, without derivatives"
+        )
     elif library is None:
         sentences.append(f"no C++ compiler was found, numba is not installed: {PYTHON_COST}")
     else:
-        sentences.append(f"no C++ compiler was found, numba is not installed: with an edited kernel {PYTHON_COST}")
+        sentences.append(
+            f"no C++ compiler was found, numba is not installed: with an edited kernel {PYTHON_COST}"
+        )
     return sentences
 
 

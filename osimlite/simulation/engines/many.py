@@ -27,7 +27,10 @@ AT_ONCE = 8
 
 
 def run_many(
-    engine: CompiledEngine, states: ArrayLike, options: BatchOptions, numbers: ArrayLike | None = None
+    engine: CompiledEngine,
+    states: ArrayLike,
+    options: BatchOptions,
+    numbers: ArrayLike | None = None,
 ) -> Runs:
     """Compute a batch."""
     from concurrent.futures import ThreadPoolExecutor
@@ -56,8 +59,14 @@ def run_many(
     with ThreadPoolExecutor(options.threads or cores()) as pool:
         list(pool.map(work, range(0, count, AT_ONCE)))
     names = [*engine.contacts, *(watch.name for watch in options.watches)]
-    kept = [rows[:total] for rows, total in zip(batch.events, batch.counts[:, record.EVENTS], strict=True)]
-    named = [[(t, names[int(number)], begins > 0.0) for t, number, begins in rows[:, :3].tolist()] for rows in kept]
+    kept = [
+        rows[:total]
+        for rows, total in zip(batch.events, batch.counts[:, record.EVENTS], strict=True)
+    ]
+    named = [
+        [(t, names[int(number)], begins > 0.0) for t, number, begins in rows[:, :3].tolist()]
+        for rows in kept
+    ]
     at_events = [rows[:, 3:] for rows in kept] if options.event_states else []
     return Runs(
         batch.clocks[:, 0].copy(),
@@ -72,7 +81,10 @@ def run_many(
 
 
 def contact_places(
-    engine: CompiledEngine, states: ArrayLike, numbers: ArrayLike | None = None, rows: ArrayLike | None = None
+    engine: CompiledEngine,
+    states: ArrayLike,
+    numbers: ArrayLike | None = None,
+    rows: ArrayLike | None = None,
 ) -> Floats:
     """Where the surfaces of all contacts are (k, P, 9)."""
     vectors, given = _rows(engine, numbers), engine.state.table(states)
@@ -101,11 +113,15 @@ def _watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[Ints, Fl
     mechanism = engine.mechanism
     for row, watch in enumerate(watches):
         if bool(watch.coordinate) + bool(watch.body) + bool(watch.contact) != 1:
-            raise OsimliteError(f"the watch '{watch.name}' is on a coordinate, a body or a contact; name one of them")
+            raise OsimliteError(
+                f"the watch '{watch.name}' is on a coordinate, a body or a contact; name one of them"
+            )
         if watch.coordinate:
             place = mechanism.coordinate_index(watch.coordinate)
             if place not in engine.order:
-                raise OsimliteError(f"the watch '{watch.name}' looks at '{watch.coordinate}', which is locked")
+                raise OsimliteError(
+                    f"the watch '{watch.name}' looks at '{watch.coordinate}', which is locked"
+                )
             kinds[row] = record.COORDINATE, engine.order.index(place), watch.stops
             levels[row, 6] = watch.level
         elif watch.contact:

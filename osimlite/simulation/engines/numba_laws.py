@@ -1,6 +1,7 @@
 """Laws that numba compiles, where there is neither a compiled library nor a C++ compiler.
 
-Only what numba documents is used: `njit`, `cfunc` and `intrinsic`. Numba keeps what it compiled in files of its own.
+Only what numba documents is used: `njit`, `cfunc` and `intrinsic`. Numba keeps what it compiled in
+files of its own.
 """
 
 from __future__ import annotations
@@ -46,11 +47,14 @@ def compile_law(name: str) -> int:
         tools = _load_tools()
         kinds = [tools.kinds[part.annotation] for part in signature(function).parameters.values()]
         linked = _link(function, tools)
-        # Numba's cache does not notice an edited function that this one calls: the digest makes it another one.
+        # Numba's cache does not notice an edited function that this one calls: the digest makes it
+        # another one.
         linked.__qualname__ = f"{linked.__qualname__}_{compute_digest(function)}"
         sign = tools.numba.types.int64(*kinds)
         try:
-            _entries[name] = tools.numba.cfunc(sign, nopython=True, cache=True, error_model="numpy")(linked)
+            _entries[name] = tools.numba.cfunc(
+                sign, nopython=True, cache=True, error_model="numpy"
+            )(linked)
         except tools.numba.errors.NumbaError as error:
             raise CompilationError(f"numba cannot compile '{name}': {error}") from error
     address: int = _entries[name].address
@@ -63,11 +67,14 @@ class _Tools:
     def __init__(self, numba: ModuleType) -> None:
         config: Any = getattr(numba.core, "config", None)
         if hasattr(config, "_config_fname"):
-            # Numba reads `.numba_config.yaml` in the current folder again before each compilation; the folder may be
-            # a stranger's, and the file decides what is compiled and where it is cached.
+            # Numba reads `.numba_config.yaml` in the current folder again before each compilation;
+            # the folder may be a stranger's, and the file decides what is compiled and where it is
+            # cached.
             config._config_fname = ""
         types: Any = numba.types
-        intrinsic: Any = require("numba.extending", extra="jit", purpose="the compiled engine").intrinsic
+        intrinsic: Any = require(
+            "numba.extending", extra="jit", purpose="the compiled engine"
+        ).intrinsic
         ir: Any = require("llvmlite.ir", extra="jit", purpose="the compiled engine")
         self.numba: Any = numba
         self.kinds = {
@@ -83,15 +90,29 @@ class _Tools:
 
             return vector(vector, types.int64), generate
 
-        def call(context: Any, address: Any, model: Any, reals: Any, data: Any, y: Any, f: Any, place: Any) -> Any:
+        def call(
+            context: Any,
+            address: Any,
+            model: Any,
+            reals: Any,
+            data: Any,
+            y: Any,
+            f: Any,
+            place: Any,
+        ) -> Any:
             def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
                 parts = [context.get_value_type(part) for part in signature.args[1:]]
                 function = ir.FunctionType(context.get_value_type(types.int64), parts)
-                return builder.call(builder.inttoptr(arguments[0], function.as_pointer()), arguments[1:])
+                return builder.call(
+                    builder.inttoptr(arguments[0], function.as_pointer()), arguments[1:]
+                )
 
             return types.int64(types.int64, model, reals, data, y, f, types.int64), generate
 
-        self.replacements: dict[Any, Any] = {pointers.at: intrinsic(at), pointers.call: intrinsic(call)}
+        self.replacements: dict[Any, Any] = {
+            pointers.at: intrinsic(at),
+            pointers.call: intrinsic(call),
+        }
 
 
 @cache
@@ -117,7 +138,9 @@ def _to_module(record: Record) -> ModuleType:
 def _link(function: Any, tools: _Tools) -> Any:
     """Return a copy of a function in which calls within this package lead to compiled functions."""
     scope = dict(function.__globals__)
-    for called in {item.argval for item in dis.get_instructions(function) if item.opname == "LOAD_GLOBAL"}:
+    for called in {
+        item.argval for item in dis.get_instructions(function) if item.opname == "LOAD_GLOBAL"
+    }:
         value = scope.get(called)
         if isinstance(value, FunctionType) and value.__module__.startswith("osimlite."):
             scope[called] = tools.replacements.get(value) or _compile_callee(value)
@@ -125,7 +148,8 @@ def _link(function: Any, tools: _Tools) -> Any:
             scope[called] = _to_module(value)
     code = function.__code__
     if code.co_filename.startswith("<"):
-        # Numba keeps nothing of a function without a file; a written kernel belongs to the module that declares it.
+        # Numba keeps nothing of a function without a file; a written kernel belongs to the module
+        # that declares it.
         module = inspect.getsourcefile(__import__(function.__module__, fromlist=["_"]))
         code = code.replace(co_filename=module or code.co_filename)
     copy = FunctionType(code, scope, function.__name__, function.__defaults__, None)

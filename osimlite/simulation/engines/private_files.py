@@ -16,7 +16,9 @@ def read_private(path: Path) -> bytes | None:
     folder = Path(os.path.realpath(path.parent))
     if others_in(folder) is not None:
         return None
-    flags = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+    flags = os.O_RDONLY | sum(
+        getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY")
+    )
     try:
         with open(os.open(folder / path.name, flags), "rb") as stream:
             info = os.fstat(stream.fileno())
@@ -28,8 +30,8 @@ def read_private(path: Path) -> bytes | None:
 def write_private(path: Path, content: bytes) -> None:
     """Write a file that only the user can read and change, whole or not at all, and make its folder.
 
-    Raises:
-        OsimliteError: it cannot be written, or others can write in the folder or put another in its place.
+    Raises: OsimliteError: it cannot be written, or others can write in the folder or put another in
+        its place.
     """
     folder = Path(os.path.realpath(path.parent))
     try:
@@ -70,7 +72,8 @@ def others_in(folder: Path) -> str | None:
 
 def _others(info: os.stat_result, *, is_passage: bool = False) -> str | None:
     if sys.platform == "win32":
-        # A user's folders there are closed to others by lists of their own, which these bits do not tell.
+        # A user's folders there are closed to others by lists of their own, which these bits do not
+        # tell.
         return None
     if info.st_uid not in (0, os.geteuid()):
         return "belongs to another user"

@@ -1,7 +1,7 @@
 """What an engine is.
 
-An engine integrates only the coordinates that are free to move, in an order of its own: its `state` tells what the
-numbers of a state y = (q, u, z) are.
+An engine integrates only the coordinates that are free to move, in an order of its own: its `state`
+tells what the numbers of a state y = (q, u, z) are.
 """
 
 from __future__ import annotations
@@ -30,8 +30,10 @@ class Settings:
 
     accuracy: float = DEFAULT_ACCURACY  # as OpenSim understands it
     integrator: str = MERSON  # with error control, see `Options`
-    fixed_step: float | None = None  # s; the engine's own steps of this length instead of error control
-    route: str = "auto"  # the way to the accelerations, in the engine's words; "auto" lets it choose
+    # s; the engine's own steps of this length instead of error control
+    fixed_step: float | None = None
+    # the way to the accelerations, in the engine's words; "auto" lets it choose
+    route: str = "auto"
     show: bool = False  # whether to show the motion in a window while it is computed
     visuals: Visuals | None = None  # what bodies look like there
     # shortest and longest step (s) of Merson's method; the shortest is taken whatever its error
@@ -42,7 +44,8 @@ class Settings:
 class Engine(Protocol):
     """Computes the motion of one mechanism under its forces. Close it after use, or use it in a ``with`` statement.
 
-    Every method that takes a state raises an OsimliteError where it has another length than `state` says.
+    Every method that takes a state raises an OsimliteError where it has another length than `state`
+    says.
     """
 
     name: str  # of the engine
@@ -53,15 +56,15 @@ class Engine(Protocol):
     contacts: tuple[str, ...]  # names of the contacts, by number
     columns: tuple[str, ...]  # labels of the force records
     probes: tuple[DeclaredProbe, ...]  # of the model
-    # after an evaluation: the last entry has the bits of the contacts that touch; entry i is the force (N, in ground)
-    # of contact i if it does
+    # after an evaluation: the last entry has the bits of the contacts that touch; entry i is the
+    # force (N, in ground) of contact i if it does
     loads: list[object]
 
     def derivative(self, t: float, y: list[float]) -> list[float]:
         """(qdot, udot, zdot) at a state.
 
-        Raises:
-            SimulationError: a motion that nothing forbids moves no mass, or speeds are not defined in a pose.
+        Raises: SimulationError: a motion that nothing forbids moves no mass, or speeds are not
+            defined in a pose.
         """
 
     def acceleration(self, t: float, q: Sequence[float], u: Sequence[float]) -> list[float]:
@@ -70,7 +73,9 @@ class Engine(Protocol):
         The auxiliary states are where they start.
         """
 
-    def equilibrated(self, t: float, y: Sequence[float], numbers: Floats | None = None) -> list[float]:
+    def equilibrated(
+        self, t: float, y: Sequence[float], numbers: Floats | None = None
+    ) -> list[float]:
         """A state with the auxiliary states that have an equilibrium in it.
 
         Args:

@@ -50,7 +50,9 @@ class NumbersOnly:
         self._builder = ElementBuilder(model, engine.mechanism, folder, wrapping=wrapping)
         freedoms = {place: number for number, place in enumerate(engine.order)}
         self._places = Places(engine.mechanism, freedoms, engine.placements)
-        self._items = {element.path: element.items(self._places) for element in engine.forces.elements}
+        self._items = {
+            element.path: element.items(self._places) for element in engine.forces.elements
+        }
         # The numbers of all items are the last ones before those of the controls, in their order.
         controls = engine.structure[MODEL.CONTROLS]
         end = engine.structure[controls + ITEM.NUMBERS] if controls > 0 else len(engine.numbers)
@@ -62,12 +64,14 @@ class NumbersOnly:
     def renewed(self, owners: Sequence[Component]) -> Renewed | None:
         """The model with what its forces and bodies are now; None if more has changed than numbers.
 
-        Args:
-            owners: forces, controllers, bodies and the model itself, if a property of theirs has changed.
+        Args: owners: forces, controllers, bodies and the model itself, if a property of theirs has
+            changed.
         """
         made: dict[str, Any] = {}
         owners, controls = list(owners), self._forces.controls
-        controllers = [self._builder.path(owner) for owner in owners if isinstance(owner, Controller)]
+        controllers = [
+            self._builder.path(owner) for owner in owners if isinstance(owner, Controller)
+        ]
         if controllers:
             for path in controllers:
                 # Others may have files that are read no more.
@@ -75,9 +79,18 @@ class NumbersOnly:
             self._builder.controls = ModelControls(self._builder)
             controls = self._builder.controls.controls
             # The gain of a reflex is a number of the muscle.
-            owners += [self._components[path] for path in self._builder.controls.reflexes if path in self._items]
-        sharing = {type(owner) for owner in owners if getattr(kind_of_class(type(owner)), "shares", False)}
-        for force in (*owners, *(other for each in sharing for other in self._model.components(each))):
+            owners += [
+                self._components[path]
+                for path in self._builder.controls.reflexes
+                if path in self._items
+            ]
+        sharing = {
+            type(owner) for owner in owners if getattr(kind_of_class(type(owner)), "shares", False)
+        }
+        for force in (
+            *owners,
+            *(other for each in sharing for other in self._model.components(each)),
+        ):
             if isinstance(force, Force):
                 element = self._builder.element(force)
                 made[element.path] = element
@@ -89,13 +102,19 @@ class NumbersOnly:
             if not only_forces:
                 # The mass of the model has a say in what muscles use.
                 return None
-            made |= {probe.path: probe for probe in probe_elements(self._builder, self._forces.elements)}
+            made |= {
+                probe.path: probe for probe in probe_elements(self._builder, self._forces.elements)
+            }
         elements = tuple(made.get(element.path, element) for element in self._forces.elements)
         forces = replace(self._forces, elements=elements, controls=controls)
         mechanism = self._mechanism if only_forces else self._with_masses()
         if mechanism is None:
             return None
-        numbers = self._with_forces(made, forces.controls) if only_forces else self._packed(mechanism, forces)
+        numbers = (
+            self._with_forces(made, forces.controls)
+            if only_forces
+            else self._packed(mechanism, forces)
+        )
         return None if numbers is None else Renewed(mechanism, forces, numbers, self._engine)
 
     def _with_forces(self, made: Mapping[str, Any], controls: Controls) -> Floats | None:
@@ -128,7 +147,9 @@ class NumbersOnly:
             if not isinstance(component, Body):
                 return None
             bodies.append(replace(body, mass_properties=mass_properties(component, body.path)))
-        return replace(mechanism, bodies=tuple(bodies), gravity=np.array(self._model.gravity, dtype=float))
+        return replace(
+            mechanism, bodies=tuple(bodies), gravity=np.array(self._model.gravity, dtype=float)
+        )
 
     def _packed(self, mechanism: Mechanism, forces: Forces) -> Floats | None:
         packed = pack(mechanism, forces)

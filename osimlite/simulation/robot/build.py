@@ -33,39 +33,46 @@ def build_robot(
 ) -> Robot:
     """Spread a mechanism out into one-axis joints.
 
-    Args:
-        mechanism: what to spread out.
-        locked: whether a locked coordinate becomes a fixed joint or stays a joint that moves; or which coordinates
-            become fixed joints, by their places in the mechanism.
-        body_frames: give every body a link whose frame is the body's own. Where the body's frame is off the axis of
-            its joint, that takes a massless link at the axis and a fixed joint; without it the body's link has its
-            frame at the joint, which saves a link, and `Link.bodies` tells where the body is.
-        at: coordinate values at which locked coordinates are fixed; their defaults if left out.
-        visuals: shapes by absolute path of the body (or ``"/ground"``), placed in the body's frame.
-        collisions: what bodies touch others with, likewise.
+    Args: mechanism: what to spread out. locked: whether a locked coordinate becomes a fixed joint
+        or stays a joint that moves; or which coordinates become fixed joints, by their places in
+        the mechanism. body_frames: give every body a link whose frame is the body's own. Where the
+        body's frame is off the axis of its joint, that takes a massless link at the axis and a
+        fixed joint; without it the body's link has its frame at the joint, which saves a link, and
+        `Link.bodies` tells where the body is. at: coordinate values at which locked coordinates are
+        fixed; their defaults if left out. visuals: shapes by absolute path of the body (or
+        ``"/ground"``), placed in the body's frame. collisions: what bodies touch others with,
+        likewise.
     """
     values = mechanism.values({} if at is None else at)
     if isinstance(locked, str):
-        locked = [k for k, info in enumerate(mechanism.coordinates) if info.locked and locked == "fixed"]
+        locked = [
+            k for k, info in enumerate(mechanism.coordinates) if info.locked and locked == "fixed"
+        ]
     return _Builder(mechanism, locked, body_frames, values).robot(visuals or {}, collisions or {})
 
 
 class _Builder:
-    def __init__(self, mechanism: Mechanism, still: Collection[int], body_frames: bool, values: Array) -> None:
+    def __init__(
+        self, mechanism: Mechanism, still: Collection[int], body_frames: bool, values: Array
+    ) -> None:
         self.mechanism = mechanism
         self.body_frames = body_frames
         self.values = values
         self.still = frozenset(still)
-        # Bodies and coordinates have the first call on their own names; what has to be invented steps aside.
+        # Bodies and coordinates have the first call on their own names; what has to be invented
+        # steps aside.
         self.taken = {WORLD}
         self.body_names = [self._unique(body.name) for body in mechanism.bodies]
         self.coordinate_names = [
-            None if k in self.still else self._unique(info.name) for k, info in enumerate(mechanism.coordinates)
+            None if k in self.still else self._unique(info.name)
+            for k, info in enumerate(mechanism.coordinates)
         ]
         self.links: list[Link] = []
         self.joints: list[RobotJoint] = []
 
-    def robot(self, visuals: Mapping[str, Sequence[Visual]], collisions: Mapping[str, Sequence[Visual]]) -> Robot:
+    def robot(
+        self, visuals: Mapping[str, Sequence[Visual]], collisions: Mapping[str, Sequence[Visual]]
+    ) -> Robot:
         ground = "/ground"
         self.links.append(
             Link(
@@ -99,7 +106,9 @@ class _Builder:
         off_axis = bool(motions) and self.body_frames and not np.array_equal(last, np.eye(4))
         for place, (motion, origin) in enumerate(zip(motions, frames, strict=True)):
             carries_body = place == len(motions) - 1 and not off_axis
-            joint = self._joint(motion, mobilizer, origin, parent, "" if carries_body else None, name)
+            joint = self._joint(
+                motion, mobilizer, origin, parent, "" if carries_body else None, name
+            )
             if not carries_body:
                 self.links.append(Link(joint.child))
             self.joints.append(joint)
@@ -107,7 +116,9 @@ class _Builder:
         if not motions or off_axis:
             suffix = "_frame" if off_axis else ""
             joint_name = self._unique(mobilizer.joint.rsplit("/", 1)[1] + suffix)
-            self.joints.append(RobotJoint(joint_name, "fixed", parent, name, last, source=mobilizer.joint))
+            self.joints.append(
+                RobotJoint(joint_name, "fixed", parent, name, last, source=mobilizer.joint)
+            )
             last = np.eye(4)
         properties = body.mass_properties
         self.links.append(
@@ -122,7 +133,13 @@ class _Builder:
         return name, last
 
     def _joint(
-        self, motion: AxisMotion, mobilizer: Mobilizer, origin: Array, parent: str, child: str | None, body_name: str
+        self,
+        motion: AxisMotion,
+        mobilizer: Mobilizer,
+        origin: Array,
+        parent: str,
+        child: str | None,
+        body_name: str,
     ) -> RobotJoint:
         places = tuple(mobilizer.coordinates[place] for place in motion.coordinates)
         name = self.coordinate_names[places[0]] if motion.coordinate is not None else None
@@ -157,11 +174,15 @@ class _Builder:
                     frames.append(np.eye(4))
         return motions, frames
 
-    def _simplified(self, part: Fixed | AxisMotion, own: Sequence[int]) -> Iterator[Fixed | AxisMotion]:
+    def _simplified(
+        self, part: Fixed | AxisMotion, own: Sequence[int]
+    ) -> Iterator[Fixed | AxisMotion]:
         """The same motion with what is constant in it taken out."""
         if isinstance(part, Fixed):
             yield part
-        elif _is_constant(part.function) or all(own[place] in self.still for place in part.coordinates):
+        elif _is_constant(part.function) or all(
+            own[place] in self.still for place in part.coordinates
+        ):
             yield Fixed(part.placed(self.values[own]))
         elif part.function == IDENTITY or (line := as_line(part.function)) is None:
             yield part
@@ -186,7 +207,8 @@ class _Builder:
 def _carry_back(motions: list[AxisMotion], frames: list[Array]) -> None:
     """Move the last fixed transform in front of the last motion if that leaves the product unchanged.
 
-    A translation lets any transform pass, a rotation one that does not leave its axis; the axis turns with it.
+    A translation lets any transform pass, a rotation one that does not leave its axis; the axis
+    turns with it.
     """
     motion, last = motions[-1], frames[-1]
     turn, shift = last[:3, :3], last[:3, 3]

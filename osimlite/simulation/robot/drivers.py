@@ -40,10 +40,15 @@ class Composed(f.Function):
 def coordinate_drivers(robot: Robot) -> dict[int, Driver]:
     """For every coordinate that does not move freely, what decides it: a lock, or couplers of one coordinate.
 
-    A coupler of several coordinates is not followed, and couplers in a circle leave the first coordinate free.
+    A coupler of several coordinates is not followed, and couplers in a circle leave the first
+    coordinate free.
     """
     infos, values = robot.mechanism.coordinates, robot.mechanism.values({})
-    result = {place: Driver(None, f.Constant(float(values[place]))) for place, info in enumerate(infos) if info.locked}
+    result = {
+        place: Driver(None, f.Constant(float(values[place])))
+        for place, info in enumerate(infos)
+        if info.locked
+    }
     steps = {item.dependent: item for item in couplers(robot) if len(item.independent) == 1}
 
     def drive(place: int, above: frozenset[int]) -> Driver:

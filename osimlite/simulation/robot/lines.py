@@ -28,8 +28,8 @@ class Line(NamedTuple):
 def as_line(function: f.Function) -> Line | None:
     """The straight line that a function of one argument is, or None.
 
-    Splines count if they are straight to the last digit, as one through two points is, or one through points of equal
-    height.
+    Splines count if they are straight to the last digit, as one through two points is, or one
+    through points of equal height.
     """
     match function:
         case f.Linear(rate, start):
@@ -38,8 +38,13 @@ def as_line(function: f.Function) -> Line | None:
             return Line(weight, start)
         case f.Polynomial((*high, slope, start)) if not any(high):
             return Line(slope, start)
-        case f.MultivariatePolynomial(coefficients, powers) if all(len(item) == 1 for item in powers):
-            factors = {power: coefficient for coefficient, (power,) in zip(coefficients, powers, strict=True)}
+        case f.MultivariatePolynomial(coefficients, powers) if all(
+            len(item) == 1 for item in powers
+        ):
+            factors = {
+                power: coefficient
+                for coefficient, (power,) in zip(coefficients, powers, strict=True)
+            }
             if not any(factor for power, factor in factors.items() if power > 1):
                 return Line(factors.get(1, 0.0), factors.get(0, 0.0))
         case f.Scaled(scale, inner):

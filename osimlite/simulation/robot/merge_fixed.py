@@ -12,8 +12,8 @@ from osimlite.simulation.robot.robot import Link, Robot
 def merge_fixed(robot: Robot) -> Robot:
     """The same robot without fixed joints: what a fixed joint carries becomes part of the link that carries it.
 
-    A massless link that stands between two joints takes the name of the body it gets. What is fixed to ground
-    becomes part of the root link; its mass is left out, since the root does not move.
+    A massless link that stands between two joints takes the name of the body it gets. What is fixed
+    to ground becomes part of the root link; its mass is left out, since the root does not move.
     """
     links = {link.name: link for link in robot.links}
     # For every link, the link it became part of and its frame there.
@@ -35,7 +35,9 @@ def merge_fixed(robot: Robot) -> Robot:
     return replace(
         robot,
         links=tuple(replace(links[name], name=names[name]) for name in kept),
-        joints=tuple(replace(joint, parent=names[joint.parent], child=names[joint.child]) for joint in joints),
+        joints=tuple(
+            replace(joint, parent=names[joint.parent], child=names[joint.child]) for joint in joints
+        ),
     )
 
 

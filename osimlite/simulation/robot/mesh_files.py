@@ -41,7 +41,8 @@ class MeshFiles:
     """Mesh files for a robot, each once, and each written from what was read of it."""
 
     folders: MeshFolders = field(default_factory=MeshFolders)  # where files may be
-    files: dict[str, bytes] = field(default_factory=dict)  # contents by name relative to the robot's own file
+    # contents by name relative to the robot's own file
+    files: dict[str, bytes] = field(default_factory=dict)
     _made: dict[tuple[object, ...], str] = field(default_factory=dict)
 
     def copy(self, name: str, signs: Signs = (1.0, 1.0, 1.0)) -> MeshCopy:
@@ -56,7 +57,9 @@ class MeshFiles:
         """
         kind = Path(name.replace("\\", "/")).suffix.lower()
         if kind not in _WRITTEN:
-            raise MeshProblem(f"left out: osimlite, like OpenSim, does not read {kind or 'such'} files")
+            raise MeshProblem(
+                f"left out: osimlite, like OpenSim, does not read {kind or 'such'} files"
+            )
         try:
             source = self.folders.find(name)
             if source is None:

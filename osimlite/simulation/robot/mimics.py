@@ -18,14 +18,17 @@ class Mimic(NamedTuple):
 
 def couplers(robot: Robot) -> list[Coupler]:
     """The constraints that make one coordinate a function of others."""
-    return [constraint for constraint in robot.mechanism.constraints if isinstance(constraint, Coupler)]
+    return [
+        constraint for constraint in robot.mechanism.constraints if isinstance(constraint, Coupler)
+    ]
 
 
 def mimics(robot: Robot) -> dict[str, Mimic]:
     """The joints whose value is a straight line of another's, by name.
 
-    That is so where several motions of a joint are driven by one coordinate, and where a coupler makes a coordinate a
-    straight line of another. A leader never follows another joint itself: most readers do not look further.
+    That is so where several motions of a joint are driven by one coordinate, and where a coupler
+    makes a coordinate a straight line of another. A leader never follows another joint itself: most
+    readers do not look further.
     """
     leads = leaders(robot)
     follows: dict[int, tuple[int, Line]] = {}

@@ -95,7 +95,9 @@ def _renamed(robot: Robot, links: Mapping[str, str], joints: Mapping[str, str]) 
         robot,
         links=tuple(replace(link, name=links[link.name]) for link in robot.links),
         joints=tuple(
-            replace(joint, name=joints[joint.name], parent=links[joint.parent], child=links[joint.child])
+            replace(
+                joint, name=joints[joint.name], parent=links[joint.parent], child=links[joint.child]
+            )
             for joint in robot.joints
         ),
     )

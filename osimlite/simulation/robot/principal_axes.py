@@ -12,13 +12,19 @@ from osimlite.mechanics.multibody.spatial import Array
 def principal_axes(inertia: Array) -> tuple[Array, Array]:
     """Moments (3,) and axes (3, 3), as columns of a rotation matrix, with axes @ diag(moments) @ axes.T = inertia.
 
-    A tensor that is diagonal already keeps its axes; otherwise they are numbered so that they turn least.
+    A tensor that is diagonal already keeps its axes; otherwise they are numbered so that they turn
+    least.
     """
     if not np.any(inertia - np.diag(np.diag(inertia))):
         return np.diag(inertia).copy(), np.eye(3)
     moments, axes = np.linalg.eigh(inertia)
     weights = np.abs(axes).tolist()
-    order = list(max(permutations(range(3)), key=lambda p: sum(weights[row][place] for row, place in enumerate(p))))
+    order = list(
+        max(
+            permutations(range(3)),
+            key=lambda p: sum(weights[row][place] for row, place in enumerate(p)),
+        )
+    )
     moments, axes = moments[order], axes[:, order]
     axes = axes * np.where(np.diag(axes) < 0.0, -1.0, 1.0)
     if np.linalg.det(axes) < 0.0:
@@ -30,8 +36,8 @@ def principal_axes(inertia: Array) -> tuple[Array, Array]:
 def breaks_triangle_rule(moments: Array) -> bool:
     """Whether one principal moment exceeds the sum of the others, or is negative: no body has such an inertia.
 
-    Readers react differently (Bullet takes zero instead). A thin rod or plate, for which the rule holds with
-    equality, passes up to rounding.
+    Readers react differently (Bullet takes zero instead). A thin rod or plate, for which the rule
+    holds with equality, passes up to rounding.
     """
     small, middle, large = np.sort(moments).tolist()
     return bool(small < 0.0 or large > (small + middle) * (1.0 + 1e-12))

@@ -14,7 +14,10 @@ def range_limits(robot: Robot) -> Robot:
         line = as_line(joint.function)
         if joint.kind == "fixed" or len(joint.coordinates) != 1 or line is None:
             return joint
-        low, high = (line.slope * end + line.start for end in robot.mechanism.coordinates[joint.coordinates[0]].range)
+        low, high = (
+            line.slope * end + line.start
+            for end in robot.mechanism.coordinates[joint.coordinates[0]].range
+        )
         return replace(joint, limits=(min(low, high), max(low, high)))
 
     return replace(robot, joints=tuple(limited(joint) for joint in robot.joints))

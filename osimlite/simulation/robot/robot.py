@@ -2,13 +2,16 @@
 
 How it corresponds to the mechanism it was built from:
 
-- The root link, "world", is ground. Every body has one link; `Link.bodies` says by absolute path which bodies a link
-  carries and where their frames are in the link's frame (identity unless `body_frames` was off or links were merged).
-- A joint of the model is a chain of joints here: one per single-axis motion of its mobilizer, in their order, with
-  massless links (mass and inertia zero) between them. Nothing depends on names: `RobotJoint.coordinates` are places
-  in `Mechanism.coordinates`, and the joint's value is `RobotJoint.function` of them. Most often that function is the
-  identity, and then `RobotJoint.coordinate` is the one place, and the joint is named after the coordinate.
-- `Robot.joint_values(q)` gives the values of all moving joints by name, for joints driven by any function.
+- The root link, "world", is ground. Every body has one link; `Link.bodies` says by absolute path
+  which bodies a link carries and where their frames are in the link's frame (identity unless
+  `body_frames` was off or links were merged).
+- A joint of the model is a chain of joints here: one per single-axis motion of its mobilizer, in
+  their order, with massless links (mass and inertia zero) between them. Nothing depends on names:
+  `RobotJoint.coordinates` are places in `Mechanism.coordinates`, and the joint's value is
+  `RobotJoint.function` of them. Most often that function is the identity, and then
+  `RobotJoint.coordinate` is the one place, and the joint is named after the coordinate.
+- `Robot.joint_values(q)` gives the values of all moving joints by name, for joints driven by any
+  function.
 - A locked coordinate is a fixed joint at its value unless asked otherwise.
 """
 
@@ -38,7 +41,9 @@ class Link:
 
     name: str  # unique among links and joints
     mass: float = 0.0  # kg; 0 for a link that only stands between two joints
-    center: Array = field(default_factory=lambda: np.zeros(3))  # mass centre (3,) in the link frame, m
+    center: Array = field(
+        default_factory=lambda: np.zeros(3)
+    )  # mass centre (3,) in the link frame, m
     # (3, 3) about the mass centre along the axes of the link frame, kg·m²
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
     visuals: tuple[Visual, ...] = ()  # what it looks like
@@ -51,8 +56,8 @@ class Link:
 class RobotJoint:
     """A joint that moves along or about one axis, or not at all.
 
-    The child link's frame in the parent link's frame is `origin`, then the motion by the joint's value along or about
-    `axis`.
+    The child link's frame in the parent link's frame is `origin`, then the motion by the joint's
+    value along or about `axis`.
     """
 
     name: str  # unique among links and joints
@@ -60,13 +65,16 @@ class RobotJoint:
     parent: str  # name of the link it starts from
     child: str  # name of the link it moves
     origin: Array  # (4, 4), the joint in the parent link
-    axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))  # unit vector (3,) in the joint's frame
+    axis: Array = field(
+        default_factory=lambda: np.array((0.0, 0.0, 1.0))
+    )  # unit vector (3,) in the joint's frame
     # places in the mechanism of the coordinates that decide the value; empty for a fixed joint
     coordinates: tuple[int, ...] = ()
     function: Function = IDENTITY  # the joint's value (rad, m) as a function of these coordinates
     limits: tuple[float, float] | None = None  # hard limits of the value, or None
     effort: float | None = None  # greatest force (N, N·m) that a program may put on it, or None
-    velocity: float | None = None  # greatest rate (m/s, rad/s) that a program may ask of it, or None
+    # greatest rate (m/s, rad/s) that a program may ask of it, or None
+    velocity: float | None = None
     source: str = ""  # absolute path of the model's joint that it is a part of
 
     @property
@@ -109,7 +117,11 @@ class Robot:
     @cached_property
     def joint_of(self) -> dict[int, RobotJoint]:
         """The joint whose value is the coordinate, by the coordinate's place in the mechanism, where there is one."""
-        return {joint.coordinate: joint for joint in reversed(self.moving) if joint.coordinate is not None}
+        return {
+            joint.coordinate: joint
+            for joint in reversed(self.moving)
+            if joint.coordinate is not None
+        }
 
     def joint_values(self, q: Values) -> dict[str, float]:
         """Values (rad, m) of all moving joints by name, at coordinate values `q` of the mechanism."""

@@ -41,7 +41,8 @@ Shape = Box | Ball | Tube | MeshFile
 class Visual:
     """A shape at `origin` (4, 4) in the frame of what it belongs to.
 
-    `source` is the absolute path of the model's geometry, `color` red, green, blue and opacity from 0 to 1.
+    `source` is the absolute path of the model's geometry, `color` red, green, blue and opacity from
+    0 to 1.
     """
 
     shape: Shape

@@ -2,20 +2,24 @@
 
 What is written so that readers take the same mechanics from it:
 
-- Links and joints one to one, so a reader's joints are `Robot.joints` by name (readers number them in orders of
-  their own) and its links `Robot.links`. The root link "world" is massless and fixed.
-- Every link has its ``<inertial>``: the origin stands at the mass centre and its axes are the principal axes, so the
-  tensor is diagonal. A link that only stands between two joints says mass 0 and inertia 0; left out, some readers
-  take 1 kg.
-- A rotation without hard limits is a ``continuous`` joint. A ``prismatic`` joint must have limits: `UNLIMITED` where
-  the model has none. OpenSim's coordinate ranges limit no motion, so they are no limits here unless the robot says so.
-- A joint driven by a multiple of the coordinate of another joint says so with ``<mimic>``; any other function cannot
-  be said.
-- MuJoCo refuses a body without mass that moves. A ``<mujoco>`` element, which other readers skip, tells it to give
-  such bodies `LEAST_MASS`, and to look for mesh files where the text says they are.
-- PyBullet tells the frames of links in single precision and their inertial frames (mass centre, principal axes) in
-  double: who needs more than 1e-7 has to start from the latter and take out the ``<inertial>`` origin.
-- No ``<collision>``: contact in OpenSim is a force between a few named surfaces, not a property of shapes.
+- Links and joints one to one, so a reader's joints are `Robot.joints` by name (readers number them
+  in orders of their own) and its links `Robot.links`. The root link "world" is massless and fixed.
+- Every link has its ``<inertial>``: the origin stands at the mass centre and its axes are the
+  principal axes, so the tensor is diagonal. A link that only stands between two joints says mass 0
+  and inertia 0; left out, some readers take 1 kg.
+- A rotation without hard limits is a ``continuous`` joint. A ``prismatic`` joint must have limits:
+  `UNLIMITED` where the model has none. OpenSim's coordinate ranges limit no motion, so they are no
+  limits here unless the robot says so.
+- A joint driven by a multiple of the coordinate of another joint says so with ``<mimic>``; any
+  other function cannot be said.
+- MuJoCo refuses a body without mass that moves. A ``<mujoco>`` element, which other readers skip,
+  tells it to give such bodies `LEAST_MASS`, and to look for mesh files where the text says they
+  are.
+- PyBullet tells the frames of links in single precision and their inertial frames (mass centre,
+  principal axes) in double: who needs more than 1e-7 has to start from the latter and take out the
+  ``<inertial>`` origin.
+- No ``<collision>``: contact in OpenSim is a force between a few named surfaces, not a property of
+  shapes.
 """
 
 from __future__ import annotations
@@ -55,7 +59,9 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
     """
     out, unique = _Writer(), UniqueNames()
     with_visuals = [visual for link in robot.links for visual in link.visuals] if visuals else []
-    materials = {color: _material_name(color) for color in sorted({visual.color for visual in with_visuals})}
+    materials = {
+        color: _material_name(color) for color in sorted({visual.color for visual in with_visuals})
+    }
     out.line('<?xml version="1.0" encoding="utf-8"?>')
     with out.element("robot", {"name": robot.name}):
         with out.element("mujoco"):
@@ -72,7 +78,9 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
                         _write_shape(out, visual)
                         out.empty("material", {"name": materials[visual.color]})
                 for collision in link.collisions:
-                    with out.element("collision", {"name": unique(collision.source.rsplit("/", 1)[-1])}):
+                    with out.element(
+                        "collision", {"name": unique(collision.source.rsplit("/", 1)[-1])}
+                    ):
                         _write_shape(out, collision)
         following = mimics(robot)
         for joint in robot.joints:
@@ -94,8 +102,8 @@ def numbers(values: Sequence[float] | Array) -> str:
 def roll_pitch_yaw(rotation: Array) -> tuple[float, float, float]:
     """Angles (rad) with Rz(yaw) Ry(pitch) Rx(roll) = rotation, exact to rounding for any rotation.
 
-    Yaw comes first and is taken out before the others are computed; at a pitch of ±90 degrees, where roll and yaw do
-    the same, that still gives a pair that fits.
+    Yaw comes first and is taken out before the others are computed; at a pitch of ±90 degrees,
+    where roll and yaw do the same, that still gives a pair that fits.
     """
     r = rotation.tolist()
     yaw = math.atan2(r[1][0], r[0][0])
@@ -111,7 +119,9 @@ def _write_inertial(out: _Writer, link: Link) -> None:
     with out.element("inertial"):
         out.empty("origin", {"xyz": numbers(link.center), "rpy": numbers(roll_pitch_yaw(axes))})
         out.empty("mass", {"value": number(link.mass)})
-        out.empty("inertia", {"ixx": ixx, "ixy": "0", "ixz": "0", "iyy": iyy, "iyz": "0", "izz": izz})
+        out.empty(
+            "inertia", {"ixx": ixx, "ixy": "0", "ixz": "0", "iyy": iyy, "iyz": "0", "izz": izz}
+        )
 
 
 def _write_shape(out: _Writer, shape: Visual) -> None:
@@ -148,11 +158,15 @@ def _write_joint(out: _Writer, joint: RobotJoint, mimic: Mimic | None) -> None:
             out.empty("limit", {"lower": number(lower), "upper": number(upper), **strength})
         if mimic is not None:
             offset = {"offset": number(mimic.line.start)} if mimic.line.start else {}
-            out.empty("mimic", {"joint": mimic.leader, "multiplier": number(mimic.line.slope), **offset})
+            out.empty(
+                "mimic", {"joint": mimic.leader, "multiplier": number(mimic.line.slope), **offset}
+            )
 
 
 def _write_origin(out: _Writer, matrix: Array) -> None:
-    out.empty("origin", {"xyz": numbers(matrix[:3, 3]), "rpy": numbers(roll_pitch_yaw(matrix[:3, :3]))})
+    out.empty(
+        "origin", {"xyz": numbers(matrix[:3, 3]), "rpy": numbers(roll_pitch_yaw(matrix[:3, :3]))}
+    )
 
 
 def _material_name(color: tuple[float, float, float, float]) -> str:
@@ -184,7 +198,9 @@ class _Writer:
         return "\n".join(self._lines) + "\n"
 
     def _start(self, tag: str, attributes: Attributes, end: str) -> None:
-        for line in _wrapped([f"<{tag}", *(f"{name}={quoted(value)}" for name, value in attributes.items())], end):
+        for line in _wrapped(
+            [f"<{tag}", *(f"{name}={quoted(value)}" for name, value in attributes.items())], end
+        ):
             self.line(line)
 
 

@@ -38,7 +38,9 @@ GREATEST = 3e38
 class Note(Protocol):
     """Is told what a shape cannot say; `osimlite.translate.fidelity.Fidelity.add` is one."""
 
-    def __call__(self, kind: str, component: str, cannot_say: str, done: str, detail: str = "") -> None:
+    def __call__(
+        self, kind: str, component: str, cannot_say: str, done: str, detail: str = ""
+    ) -> None:
         """Take note of it; the arguments are those of a record of the translation."""
 
 
@@ -72,7 +74,9 @@ def collect_visuals(
 
 
 class _Collector:
-    def __init__(self, model: Model, mechanism: Mechanism, note: Note, mesh_files: MeshFiles) -> None:
+    def __init__(
+        self, model: Model, mechanism: Mechanism, note: Note, mesh_files: MeshFiles
+    ) -> None:
         self.tree = model.tree()
         self.mechanism = mechanism
         self.note = note
@@ -101,10 +105,17 @@ class _Collector:
         shape, placed = made
         surface = appearance.surface_properties
         if surface.representation != 3 or surface.texture:
-            note("appearance", path, "a shape drawn as points or lines, or with a texture", "filled, in its colour")
+            note(
+                "appearance",
+                path,
+                "a shape drawn as points or lines, or with a texture",
+                "filled, in its colour",
+            )
         body, where = self.mechanism.frames[frame]
         owner = "/ground" if body < 0 else self.mechanism.bodies[body].path
-        red, green, blue, opacity = (min(max(part, 0.0), 1.0) for part in (*appearance.color, appearance.opacity))
+        red, green, blue, opacity = (
+            min(max(part, 0.0), 1.0) for part in (*appearance.color, appearance.opacity)
+        )
         visual = Visual(shape, where @ placed, (red, green, blue, opacity), path)
         self.found.by_body.setdefault(owner, []).append(visual)
 
@@ -114,17 +125,27 @@ class _Collector:
         scale = tuple(abs(factor) for factor in geometry.scale_factors)
         match geometry:
             case Brick():
-                x, y, z = sizes = tuple(2.0 * half * by for half, by in zip(geometry.half_lengths, scale, strict=True))
+                x, y, z = sizes = tuple(
+                    2.0 * half * by for half, by in zip(geometry.half_lengths, scale, strict=True)
+                )
                 return (Box((x, y, z)), here) if self._drawn(path, sizes) else None
             case Sphere() | Ellipsoid():
                 own = (geometry.radius,) * 3 if isinstance(geometry, Sphere) else geometry.radii
-                a, b, c = sizes = tuple(radius * factor for radius, factor in zip(own, scale, strict=True))
+                a, b, c = sizes = tuple(
+                    radius * factor for radius, factor in zip(own, scale, strict=True)
+                )
                 if not self._drawn(path, sizes):
                     return None
                 if a == b == c:
                     return Ball(a), here
                 file = self.mesh_files.stretched("ellipsoid", ball(), (a, b, c))
-                note("ellipsoid", path, "an ellipsoid", "written as a mesh file", f"{file}, half axes {sizes} m")
+                note(
+                    "ellipsoid",
+                    path,
+                    "an ellipsoid",
+                    "written as a mesh file",
+                    f"{file}, half axes {sizes} m",
+                )
                 return MeshFile(file), here
             case Cylinder():
                 # OpenSim's X, Y, Z are the X, Z, -Y of a frame in which the cylinder lies along Z.
@@ -138,7 +159,13 @@ class _Collector:
                 if a == b:
                     return Tube(a, length), _Y_TO_Z
                 file = self.mesh_files.stretched("elliptic_cylinder", tube(), (a, b, length))
-                note("elliptic-cylinder", path, "a cylinder that is not round", "written as a mesh file", file)
+                note(
+                    "elliptic-cylinder",
+                    path,
+                    "a cylinder that is not round",
+                    "written as a mesh file",
+                    file,
+                )
                 return MeshFile(file), _Y_TO_Z
             case Mesh():
                 return self._mesh(geometry, path)
@@ -150,11 +177,15 @@ class _Collector:
         if all(0.0 < size < GREATEST for size in sizes):
             return True
         given = " ".join(f"{size:g}" for size in sizes)
-        self.note("visual", path, "a shape whose size is no positive number", "left out", f"{given} m")
+        self.note(
+            "visual", path, "a shape whose size is no positive number", "left out", f"{given} m"
+        )
         return False
 
     def _mesh(self, geometry: Mesh, path: str) -> tuple[Shape, Array] | None:
-        shape = mesh_shape(geometry.mesh_file, path, self.mesh_files, self.note, geometry.scale_factors)
+        shape = mesh_shape(
+            geometry.mesh_file, path, self.mesh_files, self.note, geometry.scale_factors
+        )
         return None if shape is None else (shape, np.eye(4))
 
 
@@ -194,7 +225,11 @@ def mesh_shape(
         note("mesh", path, "a mesh whose file cannot be taken", str(problem), name)
         return None
     if copy.converted:
-        form = "VTK's format" if copy.source.suffix.lower() == ".vtp" else "a form that not every program reads"
+        form = (
+            "VTK's format"
+            if copy.source.suffix.lower() == ".vtp"
+            else "a form that not every program reads"
+        )
         note("mesh-format", path, f"a mesh in {form}", copy.converted, f"{name} as {copy.file}")
     if copy.misspelt:
         note(

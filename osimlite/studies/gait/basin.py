@@ -54,8 +54,9 @@ class Basin:
 def perturbed(step_map: StepMap, state: ArrayLike, part: float, count: int, seed: int) -> Floats:
     """Random starts (count, y) near a state.
 
-    Every value and every speed, as far as it is not neutral, is multiplied by a number that lies within `part` of 1;
-    then the walker is lifted or lowered until the foot that stands is as deep in the ground as it was.
+    Every value and every speed, as far as it is not neutral, is multiplied by a number that lies
+    within `part` of 1; then the walker is lifted or lowered until the foot that stands is as deep
+    in the ground as it was.
 
     Args:
         step_map: of the walker.
@@ -68,9 +69,13 @@ def perturbed(step_map: StepMap, state: ArrayLike, part: float, count: int, seed
     change = np.random.default_rng(seed).uniform(-part, part, (count, len(here))) * here
     engine, footing = step_map.engine, step_map.footing
     _, depths = along_slope(engine, here[None])
-    deepest = [max(float(depths[0, engine.contacts.index(name)]) for name in foot) for foot in footing.feet]
+    deepest = [
+        max(float(depths[0, engine.contacts.index(name)]) for name in foot) for foot in footing.feet
+    ]
     foot = int(np.argmax(deepest))
-    return stood(engine, footing, here + change @ (step_map.basis @ step_map.basis.T), deepest[foot], foot)
+    return stood(
+        engine, footing, here + change @ (step_map.basis @ step_map.basis.T), deepest[foot], foot
+    )
 
 
 def walks_from(
@@ -95,9 +100,13 @@ def walks_from(
     result: list[Walk] = []
     for first in range(0, len(states), AT_ONCE):
         result += walk_many(
-            step_map.engine, states[first : first + AT_ONCE], 1.5 * wanted * cycle.period, footing=step_map.footing,
-            accuracy=accuracy, threads=step_map.threads,
-        )  # fmt: skip
+            step_map.engine,
+            states[first : first + AT_ONCE],
+            1.5 * wanted * cycle.period,
+            footing=step_map.footing,
+            accuracy=accuracy,
+            threads=step_map.threads,
+        )
         if progress is not None:
             progress(len(result), len(states))
     return result
@@ -117,17 +126,11 @@ def find_basin(
 ) -> Basin:
     """Let walkers start on a grid around a cycle.
 
-    Args:
-        step_map: of the walker.
-        cycle: its cycle.
-        x: what changes along the columns: a coordinate, or with ``/speed`` behind its name its speed. By default the
-            speed of the first joint of the leg that strikes.
-        y: likewise along the rows; by default of the other leg.
-        reach: how far from the cycle, rad, m or per second.
-        grid: values of each.
-        wanted: steps after which a walker walks.
-        accuracy: of the integrator.
-        progress: called now and then.
+    Args: step_map: of the walker. cycle: its cycle. x: what changes along the columns: a
+        coordinate, or with ``/speed`` behind its name its speed. By default the speed of the first
+        joint of the leg that strikes. y: likewise along the rows; by default of the other leg.
+        reach: how far from the cycle, rad, m or per second. grid: values of each. wanted: steps
+        after which a walker walks. accuracy: of the integrator. progress: called now and then.
 
     Raises:
         OsimliteError: there is no such coordinate, or nothing to take by default.
@@ -137,7 +140,9 @@ def find_basin(
     # A default that is named for the other axis gives way to the other default.
     free = [other[0] if other[0] not in named else other[1] for other in (defaults, defaults[::-1])]
     places = [other if place is None else place for place, other in zip(named, free, strict=True)]
-    axes = [_axis(step_map.engine, place, float(cycle.state[place]), reach, grid) for place in places]
+    axes = [
+        _axis(step_map.engine, place, float(cycle.state[place]), reach, grid) for place in places
+    ]
     columns, rows = np.meshgrid(axes[0].values, axes[1].values)
     states = np.tile(cycle.state, (grid * grid, 1))
     states[:, places[0]], states[:, places[1]] = columns.ravel(), rows.ravel()
@@ -157,7 +162,9 @@ def _leg_speeds(step_map: StepMap) -> tuple[int, int]:
     """Places of the speeds of the first joints of the two legs."""
     n = len(step_map.engine.order)
     if step_map.exchange is None:
-        raise OsimliteError("the legs are not alike; name what the basin is drawn over with --basin-x and --basin-y")
+        raise OsimliteError(
+            "the legs are not alike; name what the basin is drawn over with --basin-x and --basin-y"
+        )
     first = next(k for k in range(n) if step_map.exchange[k] != k)
     return n + first, n + int(step_map.exchange[first])
 

@@ -34,7 +34,13 @@ def _draw(basin: Basin, path: Path, title: str) -> Path:
     x, y = basin.x.values, basin.y.values
     extent = (x[0] - half[0], x[-1] + half[0], y[0] - half[1], y[-1] + half[1])
     image = axes.imshow(
-        basin.steps, origin="lower", extent=extent, aspect="auto", cmap="viridis", vmin=0, vmax=basin.wanted
+        basin.steps,
+        origin="lower",
+        extent=extent,
+        aspect="auto",
+        cmap="viridis",
+        vmin=0,
+        vmax=basin.wanted,
     )
     axes.plot(*basin.center, marker="o", mfc="#d55e00", mec="white", ms=8)
     axes.annotate(
@@ -48,7 +54,11 @@ def _draw(basin: Basin, path: Path, title: str) -> Path:
     )
     axes.set_xlabel(basin.x.label)
     axes.set_ylabel(basin.y.label)
-    axes.set_title(f"{title}: {100.0 * basin.part:.0f} % of {basin.steps.size} starts walk", loc="left", fontsize=11)
+    axes.set_title(
+        f"{title}: {100.0 * basin.part:.0f} % of {basin.steps.size} starts walk",
+        loc="left",
+        fontsize=11,
+    )
     bar = figure.colorbar(image, ax=axes)
     bar.set_label(f"steps, {basin.wanted} or more count as walking")
     bar.set_ticks(np.linspace(0, basin.wanted, 5).round().astype(int))

@@ -18,8 +18,8 @@ MOST_STEPS = 30
 DIFFERENCE = 3e-5
 """By how much the reduced state is moved to differentiate the map.
 
-With less, steps of the integrator that come and go show in the multipliers (half a percent at 1e-5 for the steady
-walker); with more, the map's curvature does (two parts in a thousand at 1e-4).
+With less, steps of the integrator that come and go show in the multipliers (half a percent at 1e-5
+for the steady walker); with more, the map's curvature does (two parts in a thousand at 1e-4).
 """
 
 
@@ -29,11 +29,13 @@ class Cycle:
 
     state: Floats  # at the heel strike of the first foot, in the engine's order (y,)
     length: float  # of a step along the slope, from foot to foot, m
-    # of the walker in a step, along the slope; feet that roll while they stand take it further than `length`, m
+    # of the walker in a step, along the slope; feet that roll while they stand take it further than
+    # `length`, m
     way: float
     period: float  # of a step, s
-    # Floquet multipliers (of a step, or of a stride if the legs differ) without those of the neutral directions, the
-    # largest first; that of the direction of the motion itself, zero, is among them
+    # Floquet multipliers (of a step, or of a stride if the legs differ) without those of the
+    # neutral directions, the largest first; that of the direction of the motion itself, zero, is
+    # among them
     multipliers: NDArray[np.complex128]
     neutral: int  # how many directions are neutral
     residual: float  # how far the map moves the state
@@ -71,11 +73,8 @@ def find_cycle(
 ) -> Cycle:
     """Find a fixed point of the step map by Newton's method, with steps halved until they help.
 
-    Args:
-        step_map: of the walker.
-        state: where to begin (y,), at a heel strike of the first foot; by default where the map was made.
-        converged: largest residual.
-        most_steps: Newton steps.
+    Args: step_map: of the walker. state: where to begin (y,), at a heel strike of the first foot;
+        by default where the map was made. converged: largest residual. most_steps: Newton steps.
         settle: walk so many steps first.
 
     Raises:
@@ -93,10 +92,14 @@ def find_cycle(
     taken, slope = 0, None
     while size > converged:
         if taken == most_steps:
-            raise OsimliteError(f"no cycle of '{name}' is found after {taken} steps of Newton; still {size:.2g} off")
+            raise OsimliteError(
+                f"no cycle of '{name}' is found after {taken} steps of Newton; still {size:.2g} off"
+            )
         slope = step_matrix(step_map, step_map.expand(reduced))
         if not np.isfinite(slope).all():
-            raise OsimliteError(f"'{name}' makes no step from near the start; give a start that walks")
+            raise OsimliteError(
+                f"'{name}' makes no step from near the start; give a start that walks"
+            )
         move = np.linalg.solve(slope - np.eye(len(reduced)), -miss)
         part, last = 1.0, size
         while True:
@@ -105,14 +108,20 @@ def find_cycle(
                 break
             part /= 2.0
         if not off < last:
-            raise OsimliteError(f"no cycle of '{name}' is found from there; the best is {last:.2g} off")
+            raise OsimliteError(
+                f"no cycle of '{name}' is found from there; the best is {last:.2g} off"
+            )
         reduced, miss, size = reduced + part * move, there, off
         taken += 1
     state_found = step_map.expand(reduced)
     images = step_map(state_found[None])
     engine, per_stride = step_map.engine, step_map.exchange is None
     feet = [engine.contacts.index(name) for foot in step_map.footing.feet for name in foot]
-    before, after = along_slope(engine, np.array([state_found, images.states[0]]))[0][:, feet].mean(axis=1).tolist()
+    before, after = (
+        along_slope(engine, np.array([state_found, images.states[0]]))[0][:, feet]
+        .mean(axis=1)
+        .tolist()
+    )
     values = np.linalg.eigvals(step_matrix(step_map, state_found)).astype(np.complex128)
     return Cycle(
         state_found,

@@ -1,11 +1,12 @@
 """The search for walkers that keep on walking: which start, with which numbers of the model, repeats itself.
 
-1. Random starts of random models: each walker stands with a foot at rest on the ground. Kept are those that make two
-   steps, the ones first whose second step ended most like the first.
-2. From the best of them, the start and the numbers are moved together until the step ends where it began (least squares
-   by a trust region, then Newton's method), which is a cycle.
-3. The numbers of the best cycle are led on, from cycle to cycle, to where its largest multiplier is small, and then to
-   where most of the walkers that start near it walk (`osimlite.studies.gait.stability`).
+1. Random starts of random models: each walker stands with a foot at rest on the ground. Kept are
+   those that make two steps, the ones first whose second step ended most like the first.
+2. From the best of them, the start and the numbers are moved together until the step ends where it
+   began (least squares by a trust region, then Newton's method), which is a cycle.
+3. The numbers of the best cycle are led on, from cycle to cycle, to where its largest multiplier is
+   small, and then to where most of the walkers that start near it walk
+   (`osimlite.studies.gait.stability`).
 """
 
 from __future__ import annotations
@@ -97,18 +98,19 @@ class Found:
     numbers: dict[str, float]  # by the names of the variables
     cycle: Cycle  # that it walks in
     walking: float  # which part of the walkers that start near it walk; 0 where nobody asked
-    cost: float  # the less, the better: the largest multiplier, and below what is stable enough, less by `walking`
+    # the less, the better: the largest multiplier, and below what is stable enough, less by
+    # `walking`
+    cost: float
 
 
 class CycleSearch:
     """Looks for cycles of the models of a plan.
 
-    Args:
-        plan: what is varied: starts, from which the walkers are drawn, and numbers of the model, which are searched.
-        feet: contacts of each foot; found by the structure of the model if left out.
-        stable: largest multiplier that is small enough; below it, what counts is how many walk from near the cycle.
-        perturb: how near: every value and speed is changed by this part at most.
-        threads: how many work.
+    Args: plan: what is varied: starts, from which the walkers are drawn, and numbers of the model,
+        which are searched. feet: contacts of each foot; found by the structure of the model if left
+        out. stable: largest multiplier that is small enough; below it, what counts is how many walk
+        from near the cycle. perturb: how near: every value and speed is changed by this part at
+        most. threads: how many work.
 
     Attributes:
         footing: the feet.
@@ -133,7 +135,9 @@ class CycleSearch:
         self._starts = [place for place, item in free if isinstance(item.target, Start)]
         self._numbers = [place for place, item in free if not isinstance(item.target, Start)]
         if not self._starts:
-            raise SettingError("walkers are drawn at random; vary some values and speeds of coordinates at the start")
+            raise SettingError(
+                "walkers are drawn at random; vary some values and speeds of coordinates at the start"
+            )
         self._least = [item.low for item in plan.variables]
         given: Any = self.variants.given.engine
         self.footing: FootContacts = find_footing(given, feet)
@@ -169,7 +173,9 @@ class CycleSearch:
 
     def rounded(self, fractions: Floats, digits: int) -> Floats:
         """Where the numbers lie when they have so many digits (k,)."""
-        numbers = {name: float(f"{number:.{digits}g}") for name, number in self.numbers(fractions).items()}
+        numbers = {
+            name: float(f"{number:.{digits}g}") for name, number in self.numbers(fractions).items()
+        }
         return self.fractions(numbers)
 
     def model(self, fractions: Floats, start: Mapping[str, tuple[float, float]]) -> Model:
@@ -193,7 +199,9 @@ class CycleSearch:
         return variant.engine
 
     # ---------------------------------------------------------------------------------------- random starts
-    def candidates(self, count: int, seed: int, progress: Progress | None = None) -> list[Candidate]:
+    def candidates(
+        self, count: int, seed: int, progress: Progress | None = None
+    ) -> list[Candidate]:
         """Draw walkers, and keep those that make two steps without a scuff between, the most alike first.
 
         Args:
@@ -214,7 +222,10 @@ class CycleSearch:
         models = rng.random((-(-count // ALIKE), len(self._numbers)))
         starts = rng.random((count, len(self._starts)))
         fractions = np.repeat(models, ALIKE, axis=0)[:count]
-        states, vectors = np.zeros((count, engine.state.size)), np.zeros((count, len(engine.numbers)))
+        states, vectors = (
+            np.zeros((count, engine.state.size)),
+            np.zeros((count, len(engine.numbers))),
+        )
         variants: list[Variant] = []
         made = np.ones(count, dtype=bool)
         for row in range(count):
@@ -233,11 +244,19 @@ class CycleSearch:
         states, vectors, fractions = states[made], vectors[made], fractions[made]
         if not len(states):
             return []
-        states = self.variants.started(engine, variants, planted(engine, self.footing, states, numbers=vectors))
+        states = self.variants.started(
+            engine, variants, planted(engine, self.footing, states, numbers=vectors)
+        )
         walks = walk_many(
-            engine, states, FIRST_SECONDS, footing=self.footing, numbers=vectors, accuracy=1e-3,
-            most_tries=MOST_TRIES, threads=self.threads,
-        )  # fmt: skip
+            engine,
+            states,
+            FIRST_SECONDS,
+            footing=self.footing,
+            numbers=vectors,
+            accuracy=1e-3,
+            most_tries=MOST_TRIES,
+            threads=self.threads,
+        )
         pairs = (self._alike(walk, row) for walk, row in zip(walks, fractions, strict=True))
         return [pair for pair in pairs if pair is not None]
 
@@ -248,7 +267,11 @@ class CycleSearch:
         if self._first is None:
             engine = self.engine(fractions)
             self._first = StepMap(
-                engine, walk.steps[0].state, footing=self.footing, accuracy=ROUGH, threads=self.threads
+                engine,
+                walk.steps[0].state,
+                footing=self.footing,
+                accuracy=ROUGH,
+                threads=self.threads,
             )
         swap, best = self._first.exchange, None
         strikes = [
@@ -258,7 +281,9 @@ class CycleSearch:
         ]
         for (start, one), (end, two) in pairwise(strikes):
             miss = self._distance(self._first, one, two)
-            if (best is None or miss < best.miss) and not any(start < scuff.time < end for scuff in walk.scuffs):
+            if (best is None or miss < best.miss) and not any(
+                start < scuff.time < end for scuff in walk.scuffs
+            ):
                 best = Candidate(fractions, one.copy(), miss)
         return best
 
@@ -267,7 +292,9 @@ class CycleSearch:
         difference = step_map.basis @ step_map.reduce(two - one)
         n = len(step_map.engine.order)
         others = *difference[:n], *difference[2 * n :]
-        return float(np.hypot(np.linalg.norm(others), SLOWER * np.linalg.norm(difference[n : 2 * n])))
+        return float(
+            np.hypot(np.linalg.norm(others), SLOWER * np.linalg.norm(difference[n : 2 * n]))
+        )
 
     # ---------------------------------------------------------------------------------------- cycles
     def close(self, candidate: Candidate) -> Found | None:
@@ -276,10 +303,18 @@ class CycleSearch:
         try:
             problem = _Closing(self, candidate)
             solved = optimize.least_squares(
-                problem.miss, problem.start, problem.derivative, method="dogbox", bounds=problem.bounds,
+                problem.miss,
+                problem.start,
+                problem.derivative,
+                method="dogbox",
+                bounds=problem.bounds,
                 x_scale=problem.scale,
-                max_nfev=MOST_MOVES, xtol=1e-8, ftol=1e-8, gtol=1e-14, callback=problem.watch,
-            )  # fmt: skip
+                max_nfev=MOST_MOVES,
+                xtol=1e-8,
+                ftol=1e-8,
+                gtol=1e-14,
+                callback=problem.watch,
+            )
             if np.linalg.norm(solved.fun) > CLOSE:
                 return None
             fractions, _, state = problem.at(solved.x)
@@ -300,7 +335,10 @@ class CycleSearch:
         """
         step_map = self.step_map(fractions, state, TIGHT if fine else FINE)
         result = find_cycle(
-            step_map, state, converged=CONVERGED if fine else NEAR, most_steps=MOST_STEPS if fine else 8
+            step_map,
+            state,
+            converged=CONVERGED if fine else NEAR,
+            most_steps=MOST_STEPS if fine else 8,
         )
         cost, walking = result.largest + SCUFFED * result.scuffs, 0.0
         if cost < self.stable or fine:
@@ -335,7 +373,12 @@ def along(step_map: StepMap, cycle: Cycle, parts: Sequence[float]) -> Floats:
     """
     times = [part * cycle.period for part in parts]
     runs = run_many(
-        step_map.engine, cycle.state[None], cycle.period, report_times=times, accuracy=TIGHT, threads=step_map.threads
+        step_map.engine,
+        cycle.state[None],
+        cycle.period,
+        report_times=times,
+        accuracy=TIGHT,
+        threads=step_map.threads,
     )
     return upright(runs.reports[0], step_map.neutral)
 
@@ -353,7 +396,10 @@ class _Closing:
         inside = np.clip(candidate.fractions, 1e-3, 1.0 - 1e-3)
         self.start = np.concatenate((reduced, inside))
         many = np.full(self._size, np.inf)
-        self.bounds = np.concatenate((-many, 0.0 * inside)), np.concatenate((many, 1.0 + 0.0 * inside))
+        self.bounds = (
+            np.concatenate((-many, 0.0 * inside)),
+            np.concatenate((many, 1.0 + 0.0 * inside)),
+        )
         self.scale = np.concatenate((np.ones(self._size), np.full(len(inside), NUMBERS_REACH)))
 
     def _map(self, fractions: Floats, state: Floats) -> StepMap:

@@ -19,7 +19,8 @@ _OF_A_FOOT = re.compile(r"foot|feet|toe|heel|calc|sole|ball|hallux|met(a|\d)", r
 class FootContacts:
     """The contacts of a walker with the ground."""
 
-    feet: tuple[tuple[str, ...], ...]  # the contacts of each foot, by the names that the engine has for them
+    # the contacts of each foot, by the names that the engine has for them
+    feet: tuple[tuple[str, ...], ...]
     falls: tuple[str, ...]  # contacts that end the walk
 
     @property
@@ -41,20 +42,22 @@ class _Sole:
 def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> FootContacts:
     """Tell the feet from what must not touch the ground.
 
-    The bodies that touch the ground and carry no other body that does are the ends of the legs. On each, the contact
-    farthest from the joint is the foot, and so is any other that is at least half as far; only if these leave a
-    doubt (an end without one that is clearly farthest, or a contact farther up whose name is that of a part of the
-    foot) do names decide. Every other contact with the ground ends the walk.
+    The bodies that touch the ground and carry no other body that does are the ends of the legs. On
+    each, the contact farthest from the joint is the foot, and so is any other that is at least half
+    as far; only if these leave a doubt (an end without one that is clearly farthest, or a contact
+    farther up whose name is that of a part of the foot) do names decide. Every other contact with
+    the ground ends the walk.
 
-    Args:
-        engine: of the model.
-        feet: the contacts of each foot, with + between those of one foot, instead of looking for them.
+    Args: engine: of the model. feet: the contacts of each foot, with + between those of one foot,
+        instead of looking for them.
 
     Raises:
         OsimliteError: a contact does not exist or is named twice, or the model has no two legs.
     """
     if not engine.contacts:
-        raise OsimliteError(f"'{engine.mechanism.name}' has no contact forces, so that nothing walks")
+        raise OsimliteError(
+            f"'{engine.mechanism.name}' has no contact forces, so that nothing walks"
+        )
     soles = _soles(engine)
     known = [sole.contact for sole in soles]
     if feet:
@@ -67,12 +70,18 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
                     f"{or_known(contact, known) if known else '; none does'}"
                 )
             if named.count(contact) > 1:
-                raise OsimliteError(f"'{contact}' is given to the feet twice; name it once, for one of them")
+                raise OsimliteError(
+                    f"'{contact}' is given to the feet twice; name it once, for one of them"
+                )
         if len(given) < 2:
-            raise OsimliteError(f"a walk needs two feet, not only '{feet[0]}'; name the contacts of each")
+            raise OsimliteError(
+                f"a walk needs two feet, not only '{feet[0]}'; name the contacts of each"
+            )
     else:
         given = _feet(engine.mechanism, soles)
-    return FootContacts(given, tuple(name for name in known if not any(name in foot for foot in given)))
+    return FootContacts(
+        given, tuple(name for name in known if not any(name in foot for foot in given))
+    )
 
 
 def _feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...], ...]:
@@ -80,7 +89,9 @@ def _feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...]
     above = {body: set(_above(mechanism, body)) for body in bodies}
     ends = sorted(body for body in bodies if not any(body in above[other] for other in bodies))
     if not ends:
-        raise OsimliteError(f"no sphere of '{mechanism.name}' touches a half space; feet are spheres on the ground")
+        raise OsimliteError(
+            f"no sphere of '{mechanism.name}' touches a half space; feet are spheres on the ground"
+        )
     if len(ends) != 2:
         names = listed(mechanism.bodies[end].name for end in ends)
         raise OsimliteError(
@@ -110,7 +121,10 @@ def _soles(engine: BatchEngine) -> list[_Sole]:
             plane, sphere = element.surfaces[pair.first], element.surfaces[pair.second]
             if plane.is_half_space and not sphere.radii and sphere.body != GROUND:
                 held = engine.mechanism.bodies[sphere.body].mobilizer.child_frame[:3, 3]
-                reach = sum((a - b) ** 2 for a, b in zip(sphere.center, held.tolist(), strict=True)) ** 0.5
+                reach = (
+                    sum((a - b) ** 2 for a, b in zip(sphere.center, held.tolist(), strict=True))
+                    ** 0.5
+                )
                 name = element.pair_name(index)
                 result.append(_Sole(name, f"{name} {sphere.name}", sphere.body, reach))
     return result

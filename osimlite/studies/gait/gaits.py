@@ -40,7 +40,8 @@ class Gait:
     """A walker that was found."""
 
     found: Found  # its numbers and its cycle
-    start: dict[str, tuple[float, float]]  # value and speed of each coordinate at the start, by name
+    # value and speed of each coordinate at the start, by name
+    start: dict[str, tuple[float, float]]
     walk: Walk  # from there
     candidates: int  # how many of the random walkers made two steps
     cycles: int  # how many cycles were found among them, and on the way to the most stable
@@ -67,35 +68,36 @@ def find_gait(
 ) -> Gait:
     """Look for numbers of a model, and a start, with which it walks in the most stable cycle that is found.
 
-    Args:
-        plan: what is varied: values and speeds of coordinates, from which random starts are drawn, and numbers of the
-            model.
-        folder: where `best.osim`, `cycles.csv` and `summary.json` are written.
-        feet: contacts of each foot; found by the structure of the model if left out.
-        samples: random walkers.
-        tries: how many of the best are led to a cycle.
-        enough: cycles after which no more of them are.
-        budget: sets of numbers that are tried on the way to the most stable cycle.
-        stable: largest multiplier that is small enough; below it, what counts is how many walk from near the cycle.
-        perturb: how near: every value and speed is changed by this part at most.
-        digits: that the numbers of the model are rounded to.
-        start_digits: that the start is rounded to; None for all of them.
-        seed: what makes the search the same again.
-        force: replace what another search has left in the folder.
-        threads: how many work.
-        stage: called as work is done.
+    Args: plan: what is varied: values and speeds of coordinates, from which random starts are
+        drawn, and numbers of the model. folder: where `best.osim`, `cycles.csv` and `summary.json`
+        are written. feet: contacts of each foot; found by the structure of the model if left out.
+        samples: random walkers. tries: how many of the best are led to a cycle. enough: cycles
+        after which no more of them are. budget: sets of numbers that are tried on the way to the
+        most stable cycle. stable: largest multiplier that is small enough; below it, what counts is
+        how many walk from near the cycle. perturb: how near: every value and speed is changed by
+        this part at most. digits: that the numbers of the model are rounded to. start_digits: that
+        the start is rounded to; None for all of them. seed: what makes the search the same again.
+        force: replace what another search has left in the folder. threads: how many work. stage:
+        called as work is done.
 
-    Raises:
-        SettingError: a number has no meaning, or the folder has files of another search.
+    Raises: SettingError: a number has no meaning, or the folder has files of another search.
         SimulationError: no cycle was found, or the best is lost when the numbers are rounded.
-        UnsupportedError: constraints act on the model.
-        OsimliteError: the plan cannot be run, the model has no two feet, or the folder cannot be written to.
+        UnsupportedError: constraints act on the model. OsimliteError: the plan cannot be run, the
+        model has no two feet, or the folder cannot be written to.
     """
     settings = {
-        **plan.settings(), "feet": None if feet is None else list(feet), "samples": samples, "tries": tries,
-        "enough": enough, "budget": budget, "stable": stable, "perturb": perturb, "digits": digits,
-        "start_digits": start_digits, "seed": seed,
-    }  # fmt: skip
+        **plan.settings(),
+        "feet": None if feet is None else list(feet),
+        "samples": samples,
+        "tries": tries,
+        "enough": enough,
+        "budget": budget,
+        "stable": stable,
+        "perturb": perturb,
+        "digits": digits,
+        "start_digits": start_digits,
+        "seed": seed,
+    }
     _check_numbers(settings)
     tell = stage or (lambda *_: None)
     with folder_to_fill(folder) as where:
@@ -103,12 +105,16 @@ def find_gait(
             _spare(where, settings)
         search = CycleSearch(plan, feet, stable=stable, perturb=perturb, threads=threads)
         refuse_constraints(search.variants.given.engine.mechanism)
-        candidates = search.candidates(samples, seed, lambda done, of: tell("random walkers", done, of))
+        candidates = search.candidates(
+            samples, seed, lambda done, of: tell("random walkers", done, of)
+        )
         if not candidates:
             raise SimulationError(
                 f"none of {samples} random walkers made two steps; widen the ranges, or draw more (--samples)"
             )
-        cycles = closed(search, candidates[:tries], enough, lambda done, of: tell("closing cycles", done, of))
+        cycles = closed(
+            search, candidates[:tries], enough, lambda done, of: tell("closing cycles", done, of)
+        )
         improvement = Improvement(search, min(cycles, key=cost), digits)
         if search.names:
             improvement.run(budget, seed, lambda done, of: tell("making it stable", done, of))
@@ -154,7 +160,10 @@ def _spare(folder: Path, wanted: dict[str, Any]) -> None:
 
 
 def closed(
-    search: CycleSearch, candidates: Sequence[Candidate], enough: int, progress: Progress | None = None
+    search: CycleSearch,
+    candidates: Sequence[Candidate],
+    enough: int,
+    progress: Progress | None = None,
 ) -> list[Found]:
     """The cycles that candidates are led to.
 
@@ -198,10 +207,13 @@ def rounded(search: CycleSearch, found: Found, digits: int) -> Found:
         ) from None
 
 
-def started(search: CycleSearch, found: Found, digits: int | None) -> tuple[dict[str, tuple[float, float]], Walk]:
+def started(
+    search: CycleSearch, found: Found, digits: int | None
+) -> tuple[dict[str, tuple[float, float]], Walk]:
     """A start between two steps of a cycle, by the names of the coordinates, and the walk from there.
 
-    Of some moments of the step, the first is taken from which, after rounding, it walks on without a scuff.
+    Of some moments of the step, the first is taken from which, after rounding, it walks on without
+    a scuff.
 
     Args:
         search: that found it.
@@ -213,11 +225,18 @@ def started(search: CycleSearch, found: Found, digits: int | None) -> tuple[dict
     states = along(step_map, found.cycle, ordered)[[ordered.index(part) for part in PHASES]]
     states[np.abs(states) < 1e-12] = 0.0
     if digits is not None:
-        states = np.array([[float(f"{number:.{digits}g}") for number in row] for row in states.tolist()])
+        states = np.array(
+            [[float(f"{number:.{digits}g}") for number in row] for row in states.tolist()]
+        )
     # A file says where coordinates start, and the auxiliary states follow.
     states = engine.state.started(states)
     walks = walk_many(
-        engine, states, WALK_SECONDS, footing=search.footing, accuracy=WALK_ACCURACY, threads=search.threads
+        engine,
+        states,
+        WALK_SECONDS,
+        footing=search.footing,
+        accuracy=WALK_ACCURACY,
+        threads=search.threads,
     )
     best = max(range(len(walks)), key=lambda k: (walks[k].walks and not walks[k].scuffs, -k))
     return _named(engine, states[best]), walks[best]
@@ -229,26 +248,42 @@ def _named(engine: Any, state: Floats) -> dict[str, tuple[float, float]]:
     return dict(zip(names, zip(values.tolist(), speeds.tolist(), strict=True), strict=True))
 
 
-def _write(folder: Path, search: CycleSearch, gait: Gait, cycles: Sequence[Found], settings: dict[str, Any]) -> None:
+def _write(
+    folder: Path, search: CycleSearch, gait: Gait, cycles: Sequence[Found], settings: dict[str, Any]
+) -> None:
     model = search.model(gait.found.fractions, gait.start)
     write(model, folder / BEST)
     heads = [*search.names, "largest_multiplier", "walking", "step_length_m", "period_s", "scuffs"]
     rows = [",".join(heads)]
     for each in sorted(cycles, key=cost):
         cycle = each.cycle
-        numbers = [*each.numbers.values(), cycle.largest, each.walking, cycle.length, cycle.period, cycle.scuffs]
+        numbers = [
+            *each.numbers.values(),
+            cycle.largest,
+            each.walking,
+            cycle.length,
+            cycle.period,
+            cycle.scuffs,
+        ]
         rows.append(",".join(repr(number) for number in numbers))
     write_atomically(folder / CYCLES, "\n".join(rows) + "\n")
     result, walk = gait.found, gait.walk
     summary = {
         "numbers": result.numbers,
-        "start": {name: {"value": value, "speed": speed} for name, (value, speed) in gait.start.items()},
+        "start": {
+            name: {"value": value, "speed": speed} for name, (value, speed) in gait.start.items()
+        },
         "largest_multiplier": result.cycle.largest,
         "walking": result.walking,
         "step_length_m": result.cycle.length,
         "period_s": result.cycle.period,
         "residual": result.cycle.residual,
-        "walk": {"steps": len(walk.steps), "scuffs": len(walk.scuffs), "end_s": walk.end, "ending": walk.ending},
+        "walk": {
+            "steps": len(walk.steps),
+            "scuffs": len(walk.scuffs),
+            "end_s": walk.end,
+            "ending": walk.ending,
+        },
         "candidates": gait.candidates,
         "settings": settings,
     }

@@ -42,9 +42,9 @@ def time_to_fall(engine: Any, feet: Sequence[str] | None = None) -> Measure:
 def progress(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """How many steps were made before the first scuff, and how near the next one was: what a search can climb.
 
-    The part after the point is the mean of two numbers below one. One is how near the foot came to where its step would
-    have counted, when it scuffed or the run ended: 1/2 if it lacked as much again as the shortest step. The other is
-    how long it had gone on by then: 1/2 for a second.
+    The part after the point is the mean of two numbers below one. One is how near the foot came to
+    where its step would have counted, when it scuffed or the run ended: 1/2 if it lacked as much
+    again as the shortest step. The other is how long it had gone on by then: 1/2 for a second.
     """
     footing = _footing("progress", engine, feet)
     contacts = [[engine.contacts.index(name) for name in foot] for foot in footing.feet]
@@ -66,7 +66,9 @@ def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
         raise SettingError("a walker is planted with --engine compiled only")
     footing = find_footing(engine, feet)
 
-    def place(states: Floats, numbers: Floats | None, started: Callable[[Floats], Floats]) -> Floats:
+    def place(
+        states: Floats, numbers: Floats | None, started: Callable[[Floats], Floats]
+    ) -> Floats:
         resting = at_rest(engine, footing, states, numbers=numbers)
         return started(stood(engine, footing, resting, PRESSED, -1, numbers=numbers))
 
@@ -83,9 +85,15 @@ def _progress(walk: Walk, places: Sequence[float]) -> float:
     return walk.clean_steps + 0.5 * (near + until / (until + 1.0))
 
 
-def _measure(name: str, engine: Any, feet: Sequence[str] | None, number: Callable[[Walk], float]) -> Measure:
+def _measure(
+    name: str, engine: Any, feet: Sequence[str] | None, number: Callable[[Walk], float]
+) -> Measure:
     footing = _footing(name, engine, feet)
-    return _made(name, footing, lambda batch: np.array([number(walk) for walk in _walks(footing, batch)], float))
+    return _made(
+        name,
+        footing,
+        lambda batch: np.array([number(walk) for walk in _walks(footing, batch)], float),
+    )
 
 
 def _footing(name: str, engine: Any, feet: Sequence[str] | None) -> FootContacts:

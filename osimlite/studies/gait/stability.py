@@ -24,9 +24,11 @@ cost = attrgetter("cost")
 class Improvement:
     """Leads a cycle to the numbers at which it costs least.
 
-    The search (cma) goes in turns, each from the best so far. As long as no cycle is stable enough, the numbers are not
-    rounded: the valley of small multipliers is narrow, and between rounded numbers it has steps on which a search
-    stays. From then on they are, so that the region that counts is that of the numbers which will be written.
+    The search (cma) goes in turns, each from the best so far. As long as no cycle is stable enough,
+    the numbers are not
+    rounded: the valley of small multipliers is narrow, and between rounded numbers it has steps on
+    which a search stays. From then on they are, so that the region that counts is that of the
+    numbers which will be written.
 
     Args:
         search: that knows the cycle of a model.
@@ -72,7 +74,10 @@ class Improvement:
         while tried < budget:
             rounds = self._is_enough(self.best)
             with suppress(BudgetExhausted):
-                look(ask, Search(self.best.fractions, FIRST_REACH, None, seed, True, budget, TOLERANCE))
+                look(
+                    ask,
+                    Search(self.best.fractions, FIRST_REACH, None, seed, True, budget, TOLERANCE),
+                )
             seed += 1
 
     def _is_enough(self, found: Found) -> bool:

@@ -40,7 +40,10 @@ def carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
         if np.ptp(way, axis=0).max() > 1e-9 or np.linalg.norm(way[0]) < 1e-3:
             continue
         places.append(index)
-        if lift is None and (along_slope(engine, moved)[1][:, contacts] - depths < -0.1 * APART).all():
+        if (
+            lift is None
+            and (along_slope(engine, moved)[1][:, contacts] - depths < -0.1 * APART).all()
+        ):
             lift = index
     return Carriers(tuple(places), lift)
 
@@ -56,13 +59,10 @@ def stood(
 ) -> Floats:
     """States (W, y) lifted or lowered until one foot is so deep (m) in the ground.
 
-    Args:
-        engine: of the model.
-        footing: its feet.
-        states: what to lift; as they are if no coordinate lifts the walker.
-        depth: of the deepest contact of the foot.
-        foot: which one; -1 for the deeper.
-        numbers: of models of the same structure, one row for each state; by default the engine's own.
+    Args: engine: of the model. footing: its feet. states: what to lift; as they are if no
+        coordinate lifts the walker. depth: of the deepest contact of the foot. foot: which one; -1
+        for the deeper. numbers: of models of the same structure, one row for each state; by default
+        the engine's own.
     """
     lift = carriers(engine, footing).lift
     if lift is None:
@@ -72,18 +72,23 @@ def stood(
     contacts = [engine.contacts.index(name) for names in feet for name in names]
     one = states.copy()
     one[:, lift] += APART
-    now, then = (along_slope(engine, moved, numbers, rows)[1][:, contacts] for moved in (states, one))
+    now, then = (
+        along_slope(engine, moved, numbers, rows)[1][:, contacts] for moved in (states, one)
+    )
     chosen = np.arange(len(states)), now.argmax(axis=1)
     placed = states.copy()
     placed[:, lift] += (depth - now[chosen]) * APART / (then[chosen] - now[chosen])
     return placed
 
 
-def planted(engine: BatchEngine, footing: FootContacts, states: Floats, *, numbers: Floats | None = None) -> Floats:
+def planted(
+    engine: BatchEngine, footing: FootContacts, states: Floats, *, numbers: Floats | None = None
+) -> Floats:
     """States (W, y) put on the ground with the deeper foot, which is at rest there.
 
-    The walker is lifted or lowered until that foot only just touches; then the speeds of the coordinates that carry it
-    as a whole are those with which the centre of this foot's deepest contact does not move.
+    The walker is lifted or lowered until that foot only just touches; then the speeds of the
+    coordinates that carry it as a whole are those with which the centre of this foot's deepest
+    contact does not move.
 
     Args:
         engine: of the model.
@@ -123,7 +128,8 @@ def planted(engine: BatchEngine, footing: FootContacts, states: Floats, *, numbe
 def upright(states: Floats, neutral: Floats) -> Floats:
     """States (..., y) moved along the neutral directions (y, m) until the first entries that can be are zero.
 
-    A walker that may be anywhere, and whose trunk may be turned in any way, is then at the origin and not turned.
+    A walker that may be anywhere, and whose trunk may be turned in any way, is then at the origin
+    and not turned.
     """
     chosen: list[int] = []
     for index in range(len(neutral)):
@@ -132,7 +138,9 @@ def upright(states: Floats, neutral: Floats) -> Floats:
     return states - np.linalg.solve(neutral[chosen], states[..., chosen].T).T @ neutral.T
 
 
-def _centres(engine: BatchEngine, states: Floats, numbers: Floats | None = None, rows: Ints | None = None) -> Floats:
+def _centres(
+    engine: BatchEngine, states: Floats, numbers: Floats | None = None, rows: Ints | None = None
+) -> Floats:
     """Centres of the contacts' second surfaces (k, P, 3), in ground."""
     return engine.contact_places(states, numbers, rows)[..., 6:]
 

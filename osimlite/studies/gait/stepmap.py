@@ -1,8 +1,9 @@
 """The step map: from one heel strike to the next.
 
-The Poincaré section is the moment at which a foot begins to touch the ground. A state in it is written for the first
-foot as the one that has just touched down; where the legs are alike, they change parts after every step, so that the
-map goes from step to step, and otherwise from stride to stride.
+The Poincaré section is the moment at which a foot begins to touch the ground. A state in it is
+written for the first foot as the one that has just touched down; where the legs are alike, they
+change parts after every step, so that the map goes from step to step, and otherwise from stride to
+stride.
 """
 
 from __future__ import annotations
@@ -106,13 +107,14 @@ class StepMap:
         if step.foot != 0:
             self.start = self._other_leg(self.start)
 
-    def varied(self, engine: BatchEngine, near: ArrayLike, accuracy: float | None = None) -> StepMap:
+    def varied(
+        self, engine: BatchEngine, near: ArrayLike, accuracy: float | None = None
+    ) -> StepMap:
         """The step map of a model with other numbers, whose reduced states are as near to these as they can be.
 
-        Args:
-            engine: of that model, of the same structure.
-            near: a state from which it makes a step, and where reduced states are along the neutral directions (y,).
-            accuracy: of the integrator; by default the same.
+        Args: engine: of that model, of the same structure. near: a state from which it makes a
+            step, and where reduced states are along the neutral directions (y,). accuracy: of the
+            integrator; by default the same.
 
         Raises:
             OsimliteError: it makes no step from there, or has more or fewer neutral directions.
@@ -135,9 +137,15 @@ class StepMap:
     def _first_step(self, near: Floats) -> tuple[Step, Floats]:
         """The first step from a state, and states on the way there (k, y)."""
         runs = run_many(
-            self.engine, near[None], self.longest, accuracy=self.accuracy,
-            watches=falls(self.footing), most_events=room_for(self.longest), event_states=True, threads=1,
-        )  # fmt: skip
+            self.engine,
+            near[None],
+            self.longest,
+            accuracy=self.accuracy,
+            watches=falls(self.footing),
+            most_events=room_for(self.longest),
+            event_states=True,
+            threads=1,
+        )
         (walk,) = walks_of(self.engine, near[None], runs, self.footing)
         if not walk.steps:
             how = f"it fell on {walk.fell_on}" if walk.fell_on else "none"
@@ -154,7 +162,9 @@ class StepMap:
             return state[self.exchange]
         images = self._single(state[None], 1)
         if np.isnan(images.states).any():
-            raise OsimliteError(f"'{self.engine.mechanism.name}' makes one step only; give another start")
+            raise OsimliteError(
+                f"'{self.engine.mechanism.name}' makes one step only; give another start"
+            )
         return images.states[0]
 
     def land(self, state: Floats, foot: int) -> Floats:
@@ -197,10 +207,15 @@ class StepMap:
         foot = self.footing.feet[trailing]
         stops = [Watch("strike", contact=foot[0], stops=1)] if len(foot) == 1 else []
         runs = run_many(
-            self.engine, states[rows], self.longest, accuracy=self.accuracy,
-            watches=[*falls(self.footing), *stops], most_events=room_for(self.longest), event_states=True,
+            self.engine,
+            states[rows],
+            self.longest,
+            accuracy=self.accuracy,
+            watches=[*falls(self.footing), *stops],
+            most_events=room_for(self.longest),
+            event_states=True,
             threads=self.threads,
-        )  # fmt: skip
+        )
         walks = walks_of(self.engine, states[rows], runs, self.footing)
         for row, walk in zip(rows.tolist(), walks, strict=True):
             step = next((step for step in walk.steps if step.foot == trailing), None)

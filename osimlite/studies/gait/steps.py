@@ -1,7 +1,7 @@
 """Steps, scuffs and falls of a walk.
 
-A step is the other foot touching down far enough ahead along the slope after long enough in the air. Any other
-touch-down is a scuff. Anything but a foot on the ground ends the walk.
+A step is the other foot touching down far enough ahead along the slope after long enough in the
+air. Any other touch-down is a scuff. Anything but a foot on the ground ends the walk.
 """
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ class Walk:
     """What became of a walker."""
 
     end: float = 0.0  # when the walk or the simulation ended, s
-    ending: str = "walking"  # "walking" if it was still on its feet, "fell", or why the simulation ended
+    # "walking" if it was still on its feet, "fell", or why the simulation ended
+    ending: str = "walking"
     fell_on: str = ""  # contact that ended the walk
     steps: list[Step] = field(default_factory=list)  # in the order of time
     scuffs: list[Scuff] = field(default_factory=list)  # likewise
@@ -111,9 +112,17 @@ def walk_many(
     """
     feet = footing or find_footing(engine)
     runs = run_many(
-        engine, states, to, numbers=numbers, accuracy=accuracy, watches=falls(feet), most_events=room_for(to),
-        event_states=True, most_tries=most_tries, threads=threads,
-    )  # fmt: skip
+        engine,
+        states,
+        to,
+        numbers=numbers,
+        accuracy=accuracy,
+        watches=falls(feet),
+        most_events=room_for(to),
+        event_states=True,
+        most_tries=most_tries,
+        threads=threads,
+    )
     return walks_of(engine, states, runs, feet, numbers=numbers, room=room_for(to))
 
 
@@ -153,7 +162,9 @@ def walks_of(
             contact = footing.falls[int(np.argmax(depths[k, fatal]))]
             result.append(Walk(0.0, "fell", contact))
             continue
-        walk = follow(footing, engine.contacts, events, runs.event_states[k], reached[part], depths[k] > 0.0)
+        walk = follow(
+            footing, engine.contacts, events, runs.event_states[k], reached[part], depths[k] > 0.0
+        )
         if walk.walks:
             ending = ENDINGS[int(runs.endings[k])]
             walk.end = float(runs.times[k])
@@ -205,9 +216,20 @@ def follow(
         if was_down:
             continue
         here = float(along[places[name]])
-        others = [float(along[foot].max()) for other, foot in enumerate(feet) if other != number and down[other]]
-        # With no foot on the ground, the one that made the last step is what the step is measured from.
-        behind = max(others) if others else float(along[feet[last]].max()) if 0 <= last != number else here
+        others = [
+            float(along[foot].max())
+            for other, foot in enumerate(feet)
+            if other != number and down[other]
+        ]
+        # With no foot on the ground, the one that made the last step is what the step is measured
+        # from.
+        behind = (
+            max(others)
+            if others
+            else float(along[feet[last]].max())
+            if 0 <= last != number
+            else here
+        )
         length, air = here - behind, time - lifted[number]
         if first_place is None:
             first_place = here
@@ -221,7 +243,10 @@ def follow(
 
 
 def along_slope(
-    engine: BatchEngine, states: Floats, vectors: Floats | None = None, rows: ArrayLike | None = None
+    engine: BatchEngine,
+    states: Floats,
+    vectors: Floats | None = None,
+    rows: ArrayLike | None = None,
 ) -> tuple[Floats, Floats]:
     """How far down the slope the spheres of the contacts are, and how deep in the ground.
 
@@ -238,11 +263,16 @@ def along_slope(
     """
     table = np.array(engine.numbers if vectors is None else vectors, dtype=np.float64, order="C")
     table = table.reshape(-1, table.shape[-1])
-    which = np.zeros(len(states), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
+    which = (
+        np.zeros(len(states), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
+    )
     places = engine.contact_places(states, table, which)
     origin, normal, center = places[..., :3], places[..., 3:6], places[..., 6:]
     gravity = table[:, :3]
-    pull = gravity[which][:, None, :] - np.sum(gravity[which][:, None, :] * normal, axis=2, keepdims=True) * normal
+    pull = (
+        gravity[which][:, None, :]
+        - np.sum(gravity[which][:, None, :] * normal, axis=2, keepdims=True) * normal
+    )
     slope = np.linalg.norm(pull, axis=2)
     level = slope < 1e-6 * np.maximum(np.linalg.norm(gravity, axis=1)[which], 1e-12)[:, None]
     forward = np.array((1.0, 0.0, 0.0)) - normal[..., :1] * normal

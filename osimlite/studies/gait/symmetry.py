@@ -24,8 +24,9 @@ UNEVEN = 10.0
 def leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayLike) -> Ints | None:
     """The places (y,) from which the state is taken when the legs change parts, or None if they are not alike.
 
-    The coordinates of one leg, from where the legs part to the foot, change places with those of the other, and
-    auxiliary states with those that do the same there. Whether that makes no difference to the motion is tried out.
+    The coordinates of one leg, from where the legs part to the foot, change places with those of
+    the other, and auxiliary states with those that do the same there. Whether that makes no
+    difference to the motion is tried out.
 
     Args:
         engine: of the model.
@@ -75,10 +76,8 @@ def leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayLike) 
 def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> None:
     """Complete the places (y,) that the legs exchange, which are known for values and speeds.
 
-    Args:
-        engine: of the model.
-        source: changed where an auxiliary state does what another does when the legs have changed parts.
-        states: at which to try (k, y).
+    Args: engine: of the model. source: changed where an auxiliary state does what another does when
+        the legs have changed parts. states: at which to try (k, y).
     """
     first = 2 * len(engine.order)
     if first == engine.state.size:
@@ -110,8 +109,9 @@ def _effects(engine: BatchEngine, state: Floats) -> Floats:
 def neutral_directions(engine: BatchEngine, states: ArrayLike) -> Floats:
     """Directions (y, m) of the state in which the motion goes on unchanged, but for going that way; orthonormal.
 
-    A walker may be anywhere along an even slope; a body that hangs in its mass centre turns as fast as it pleases. The
-    derivative does not change in these directions or changes along one of them, at all of the states.
+    A walker may be anywhere along an even slope; a body that hangs in its mass centre turns as fast
+    as it pleases. The derivative does not change in these directions or changes along one of them,
+    at all of the states.
 
     Args:
         engine: of the model.
@@ -139,7 +139,8 @@ def neutral_directions(engine: BatchEngine, states: ArrayLike) -> Floats:
 def derivative_matrix(engine: BatchEngine, state: Floats) -> tuple[Floats, float]:
     """Derivative (y, y) of the rate of change of the state by the state, and how even that is.
 
-    Evenness: the part by which the differences to either side are unlike; much where a contact only just touches.
+    Evenness: the part by which the differences to either side are unlike; much where a contact only
+        just touches.
     """
     columns, uneven = [], []
     here = np.array(engine.derivative(0.0, state.tolist()))

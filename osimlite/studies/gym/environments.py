@@ -35,19 +35,24 @@ class _Observed:
             *simulation.state.paths,
         )
         self.shown = [
-            *(info.name for info in order), *(f"{info.name}/speed" for info in order),
+            *(info.name for info in order),
+            *(f"{info.name}/speed" for info in order),
             *("/".join(path.split("/")[-2:]) for path in simulation.state.paths),
-        ]  # fmt: skip
+        ]
         for name in task.hidden:
             if name not in self.shown:
                 near = did_you_mean(name, self.shown)
-                raise gymnasium.error.Error(f"nothing is called '{name}' that could be hidden{near}")
+                raise gymnasium.error.Error(
+                    f"nothing is called '{name}' that could be hidden{near}"
+                )
         self._visible = [k for k, name in enumerate(self.shown) if name not in task.hidden]
         self.labels = tuple(self.shown[k] for k in self._visible)
         paths = self.copies.controls
         tree = simulation.model.tree()
         limits = [(tree.at(path).min_control, tree.at(path).max_control) for path in paths]
-        low, high = self._limits = np.clip(np.array(limits, dtype=np.float32).reshape(-1, 2).T, -1.0, 1.0)
+        low, high = self._limits = np.clip(
+            np.array(limits, dtype=np.float32).reshape(-1, 2).T, -1.0, 1.0
+        )
         # What is below the least excitation is the least.
         self.actions = gymnasium.spaces.Box(np.minimum(low, 0.0), high, dtype=np.float32)
         self.observations = gymnasium.spaces.Box(-FAR, FAR, (len(self._visible),), dtype=np.float32)
@@ -66,14 +71,18 @@ class _Observed:
 
     def observed(self) -> Any:
         """(w, o)."""
-        states = np.nan_to_num(self.copies.states[:, self._visible], nan=0.0, posinf=FAR, neginf=-FAR)
+        states = np.nan_to_num(
+            self.copies.states[:, self._visible], nan=0.0, posinf=FAR, neginf=-FAR
+        )
         return np.clip(states, -FAR, FAR).astype(np.float32)
 
     def step(self, actions: Any) -> tuple[Array, Any]:
         """Rewards (w,) and which copies have failed (w,)."""
         given = np.asarray(actions, dtype=float)
         if given.shape != (wanted := (self.count, len(self.copies.controls))):
-            raise gymnasium.error.InvalidAction(f"actions have the shape {wanted}, not {given.shape}")
+            raise gymnasium.error.InvalidAction(
+                f"actions have the shape {wanted}, not {given.shape}"
+            )
         controls = np.clip(given, *self._limits)
         before = self.seen(controls)
         going = self.copies.step(controls)
@@ -87,17 +96,23 @@ class _Observed:
         from osimlite.studies.gym.pictures import picture_of
 
         simulation = self.copies.simulation
-        return picture_of(simulation, np.array(simulation.state.values(self.copies.states[which].tolist())))
+        return picture_of(
+            simulation, np.array(simulation.state.values(self.copies.states[which].tolist()))
+        )
 
 
-def _task(task: Task | Callable[[], Task] | None, model: Any, reward: Any, choices: dict[str, Any]) -> Task:
+def _task(
+    task: Task | Callable[[], Task] | None, model: Any, reward: Any, choices: dict[str, Any]
+) -> Task:
     known = [field.name for field in fields(Task) if field.name not in ("model", "reward")]
     for name in choices:
         if name not in known:
             raise gymnasium.error.Error(f"a task has no '{name}'{or_known(name, known)}")
     if task is not None:
         if model is not None:
-            raise gymnasium.error.Error("this environment has its model; take osimlite/Model-v0 for another")
+            raise gymnasium.error.Error(
+                "this environment has its model; take osimlite/Model-v0 for another"
+            )
         made = task if isinstance(task, Task) else task()
         return replace(made, **choices, **({} if reward is None else {"reward": reward}))
     if model is None or reward is None:
@@ -114,16 +129,14 @@ def _mode(mode: str | None) -> str | None:
 class MuscleEnv(gymnasium.Env[Any, Any]):
     """One copy of a model that is to learn something.
 
-    Args:
-        task: what, or the function that makes it.
-        model: instead, a model or its file, with `reward`, a function of what was seen before and after a step
-            (:class:`osimlite.studies.gym.tasks.Seen`), and attributes of :class:`osimlite.studies.gym.tasks.Task` as `choices`.
-        reward: as said.
-        render_mode: "rgb_array" or None.
-        choices: as said.
+    Args: task: what, or the function that makes it. model: instead, a model or its file, with
+        `reward`, a function of what was seen before and after a step
+        (:class:`osimlite.studies.gym.tasks.Seen`), and attributes of
+        :class:`osimlite.studies.gym.tasks.Task` as `choices`. reward: as said. render_mode:
+        "rgb_array" or None. choices: as said.
 
-    Observations are the values of coordinates (rad, m), generalized speeds, and states of muscles, named by `labels`;
-    actions are the controls of the actuators, named by `controls`.
+    Observations are the values of coordinates (rad, m), generalized speeds, and states of muscles,
+    named by `labels`; actions are the controls of the actuators, named by `controls`.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012 - as gymnasium has it
@@ -143,7 +156,9 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
         self.labels, self.controls = self._all.labels, self._all.copies.controls
         self._steps = 0
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode."""
         super().reset(seed=seed)
         self._all.begin(0, self.np_random)
@@ -154,7 +169,13 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
         """Hold controls (c,) for a step."""
         rewards, over = self._all.step(np.asarray(action)[None])
         self._steps += 1
-        return self._all.observed()[0], float(rewards[0]), bool(over[0]), self._steps >= self._all.most, {}
+        return (
+            self._all.observed()[0],
+            float(rewards[0]),
+            bool(over[0]),
+            self._steps >= self._all.most,
+            {},
+        )
 
     def render(self) -> Any:
         """The pose as an image (h, w, 3); None without a mode."""
@@ -189,7 +210,10 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     ) -> None:
         self.num_envs, self.render_mode = num_envs, _mode(render_mode)
         self._all = _Observed(_task(task, model, reward, choices), num_envs)
-        self.single_observation_space, self.single_action_space = self._all.observations, self._all.actions
+        self.single_observation_space, self.single_action_space = (
+            self._all.observations,
+            self._all.actions,
+        )
         batch = gymnasium.vector.utils.batch_space
         self.observation_space = batch(self.single_observation_space, num_envs)
         self.action_space = batch(self.single_action_space, num_envs)
@@ -204,7 +228,9 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         """Begin an episode of each copy; of a seed the k-th has that plus k."""
         if seed is not None or not self._random:
             seeds = (
-                seed if isinstance(seed, list) else [None if seed is None else seed + k for k in range(self.num_envs)]
+                seed
+                if isinstance(seed, list)
+                else [None if seed is None else seed + k for k in range(self.num_envs)]
             )
             self._random = [gymnasium.utils.seeding.np_random(each)[0] for each in seeds]
         for k, rng in enumerate(self._random):
@@ -232,7 +258,11 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
 
     def render(self) -> Any:
         """The poses of all copies as images; None without a mode."""
-        return tuple(self._all.picture(k) for k in range(self.num_envs)) if self.render_mode == "rgb_array" else None
+        return (
+            tuple(self._all.picture(k) for k in range(self.num_envs))
+            if self.render_mode == "rgb_array"
+            else None
+        )
 
     def close_extras(self, **kwargs: Any) -> None:
         """Free what the copies hold."""

@@ -19,7 +19,9 @@ FRAME = np.array([[-1.1, -1.1, -0.5], [1.1, 1.1, 0.5]])
 
 def picture_of(simulation: Simulation, q: Array, size: tuple[int, int] = SIZE) -> Any:
     """A pose (n,) as pixels (h, w, 3)."""
-    scene: Scene = simulation.__dict__.setdefault("_shown", build_scene(simulation.model, simulation.mechanism))
+    scene: Scene = simulation.__dict__.setdefault(
+        "_shown", build_scene(simulation.model, simulation.mechanism)
+    )
     pose = simulation.mechanism.at(q)
     points = pose.origins[0] + FRAME
     camera = Camera.around(points, scene.up, np.array([0.15, 0.1, 1.0]), size[0] / size[1])

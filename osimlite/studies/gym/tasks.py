@@ -19,8 +19,9 @@ from osimlite.schema.model import Model
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """All copies after a step, by names: coordinates ("knee_angle_r"), speeds ("knee_angle_r/speed"), states of muscles
-    ("soleus_r/activation"), each (w,)."""
+    """All copies after a step, by names: coordinates ("knee_angle_r"), speeds
+    ("knee_angle_r/speed"), states of muscles ("soleus_r/activation"), each (w,).
+    """
 
     columns: dict[str, Array]
     controls: Array  # that were held (w, c)
@@ -34,16 +35,11 @@ class Seen:
 class Task:
     """A task for learners.
 
-    Attributes:
-        model: makes what moves.
-        reward: of a step (w,), given what was seen before and after it.
-        is_over: which copies (w,) have failed.
-        hidden: coordinates whose values are not observed, such as how far a walker has come.
-        start: makes the state of a copy (y,) from the default one, the names of the states and a random generator.
-        seconds: of an episode.
-        step: for which controls are held, s.
-        accuracy: of the integrator.
-        integrator: which.
+    Attributes: model: makes what moves. reward: of a step (w,), given what was seen before and
+        after it. is_over: which copies (w,) have failed. hidden: coordinates whose values are not
+        observed, such as how far a walker has come. start: makes the state of a copy (y,) from the
+        default one, the names of the states and a random generator. seconds: of an episode. step:
+        for which controls are held, s. accuracy: of the integrator. integrator: which.
     """
 
     model: Callable[[], Model]
@@ -108,7 +104,9 @@ def walk2d() -> Task:
     def is_over(seen: Seen) -> NDArray[np.bool_]:
         return (seen["pelvis_ty"] < 0.7) | (np.abs(seen["pelvis_tilt"]) > 0.8)
 
-    return Task(_human, reward, is_over, hidden=("pelvis_tx",), start=_shaken(0.01), integrator=CONTACT)
+    return Task(
+        _human, reward, is_over, hidden=("pelvis_tx",), start=_shaken(0.01), integrator=CONTACT
+    )
 
 
 def jump() -> Task:
@@ -121,9 +119,14 @@ def jump() -> Task:
         return (seen["pelvis_ty"] < 0.4) | (np.abs(seen["pelvis_tilt"]) > 1.5)
 
     return Task(
-        lambda: jumper(driven=False), reward, is_over, hidden=("pelvis_tx",), start=_shaken(0.002), seconds=1.0,
+        lambda: jumper(driven=False),
+        reward,
+        is_over,
+        hidden=("pelvis_tx",),
+        start=_shaken(0.002),
+        seconds=1.0,
         integrator=CONTACT,
-    )  # fmt: skip
+    )
 
 
 WANTED = 1.2

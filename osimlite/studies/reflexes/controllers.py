@@ -1,8 +1,8 @@
-"""Reflexes of muscles and coordinates, on while a leg is in some state: SCONE's GaitStateController; functions of time;
-noise.
+"""Reflexes of muscles and coordinates, on while a leg is in some state: SCONE's
+GaitStateController; functions of time; noise.
 
-All reflexes are sums of terms ``gain * (sensor - offset)`` with a delay, functions of time sums of terms ``gain * (t -
-start)**power``, which the kernels add.
+All reflexes are sums of terms ``gain * (sensor - offset)`` with a delay, functions of time sums of
+terms ``gain * (t - start)**power``, which the kernels add.
 """
 
 from __future__ import annotations
@@ -53,7 +53,9 @@ Powers = Iterable[tuple[int, Array, Array]]
 def _whole(node: Node, key: str, least: int) -> int:
     number = node.number(key)
     if number not in range(least, MOST_POINTS + 1):
-        raise node.error(f"'{key}' must be a whole number from {least} to {MOST_POINTS}, not {number:g}")
+        raise node.error(
+            f"'{key}' must be a whole number from {least} to {MOST_POINTS}, not {number:g}"
+        )
     return int(number)
 
 
@@ -64,7 +66,9 @@ def _points(node: Node, parameters: Parameters, before: str) -> tuple[Array, Arr
     if node.get("control_point_dt") is None and count > 1:
         raise node.error("several control points need 'control_point_dt'")
     values = [parameters.of(node, "control_point_y", 0.0, f"{before}Y{k}") for k in range(count)]
-    spans = [parameters.of(node, "control_point_dt", 0.0, f"{before}DT{k}") for k in range(count - 1)]
+    spans = [
+        parameters.of(node, "control_point_dt", 0.0, f"{before}DT{k}") for k in range(count - 1)
+    ]
     if np.any(np.array(spans) <= 0.0):
         raise node.error("'control_point_dt' must be positive")
     return np.cumsum([np.zeros_like(values[0]), *spans], axis=0), np.array(values)
@@ -88,7 +92,9 @@ def _polynomial(node: Node, parameters: Parameters, before: str) -> Powers:
     degree = _whole(node, "degree" if node.get("order") is None else "order", 0)
     for k in range(degree + 1):
         node.text(f"coefficient{k}")
-    gains = [parameters.of(node, f"coefficient{k}", 0.0, f"{before}C{k}") for k in range(degree + 1)]
+    gains = [
+        parameters.of(node, f"coefficient{k}", 0.0, f"{before}C{k}") for k in range(degree + 1)
+    ]
     return [(k, np.zeros_like(gain), gain) for k, gain in enumerate(gains)]
 
 
@@ -139,11 +145,16 @@ class Reflexes:
             elif name == FEED_FORWARD:
                 self._read_functions(part, parameters)
             elif name == "ReflexController":
-                self.symmetric, self._is_sided = part.flag("symmetric", False), part.flag("dual_sided", True)
+                self.symmetric, self._is_sided = (
+                    part.flag("symmetric", False),
+                    part.flag("dual_sided", True),
+                )
                 for leg in (0, 1) if self._is_sided else (0,):
                     self._add_reflexes(part, parameters, "", leg, (1 << len(STATES)) - 1)
             elif self._has_states:
-                raise part.error("legs are in the states of one GaitStateController, and this is another one")
+                raise part.error(
+                    "legs are in the states of one GaitStateController, and this is another one"
+                )
             else:
                 self._has_states = self._is_sided = True
                 self._read_states(part, parameters)
@@ -155,14 +166,20 @@ class Reflexes:
         self._is_noisy, noise = True, self._limits[:, LIMITS.SEED :]
         noise[:, 0] = seed = node.number("random_seed", 123.0)
         if not (seed.is_integer() and abs(seed) < LARGEST_SEED):
-            raise node.error(f"'random_seed' must be a whole number of up to 15 digits, not {seed:g}")
-        for place, key in enumerate(("base_noise", "proportional_noise", "sensor_noise", "proportional_sensor_noise")):
+            raise node.error(
+                f"'random_seed' must be a whole number of up to 15 digits, not {seed:g}"
+            )
+        for place, key in enumerate(
+            ("base_noise", "proportional_noise", "sensor_noise", "proportional_sensor_noise")
+        ):
             noise[:, 1 + place] = width = node.number(key, 0.0)
             if width < 0.0:
                 raise node.error(f"'{key}' must not be negative, and is {width:g}")
         node.expect_all_asked(f"a {NOISE}")
         if node.file.endswith(".scone"):
-            tell("noise is as large as SCONE's, but not the same: its numbers depend on the compiler of SCONE")
+            tell(
+                "noise is as large as SCONE's, but not the same: its numbers depend on the compiler of SCONE"
+            )
 
     def _read_functions(self, node: Node, parameters: Parameters) -> None:
         """What excites actuators over time, the same on both sides if it is symmetric."""
@@ -173,14 +190,20 @@ class Reflexes:
         if len(found) != 1:
             raise node.error(f"a {FEED_FORWARD} needs one function: {listed(list(FUNCTIONS))}")
         kind, function = found[0]
-        names = {k: n for k, n in enumerate(self.walkers.names) if matches(n, include) and not matches(n, exclude)}
+        names = {
+            k: n
+            for k, n in enumerate(self.walkers.names)
+            if matches(n, include) and not matches(n, exclude)
+        }
         if not names:
             raise node.error(f"no actuator is in '{include}' and not in '{exclude}'")
         for target, name in names.items():
             before = name[:-2] if symmetric and name.endswith(SIDES) else name
             for power, start, gain in FUNCTIONS[kind](function, parameters, f"{before}."):
                 term = target, -1, power, 0, (1 << len(STATES)) - 1, -1
-                self.terms.append(Part(term, start, gain * self.walkers.step**power, np.zeros_like(gain)))
+                self.terms.append(
+                    Part(term, start, gain * self.walkers.step**power, np.zeros_like(gain))
+                )
         function.expect_all_asked(f"a {kind}")
 
     def _read_states(self, node: Node, parameters: Parameters) -> None:
@@ -190,17 +213,31 @@ class Reflexes:
             if node.flag(key, False):
                 raise node.error(f"{key} is not done here")
         self._swings_from_stance = node.flag("allow_stance_swing_transition", False)
-        self._limits[:, LIMITS.DELAY] = node.number("leg_load_sensor_delay", 0.0) / self.walkers.step
+        self._limits[:, LIMITS.DELAY] = (
+            node.number("leg_load_sensor_delay", 0.0) / self.walkers.step
+        )
         for leg, side in enumerate(SIDES):
             length = node.number("override_leg_length", self.walkers.legs[leg].length)
             prefix = "" if self.symmetric else f"leg{leg}{side}."
-            of = {name: parameters.of(node, name, value, prefix + name) for name, value in (
-                ("stance_load_threshold", 0.1), ("landing_threshold", 0.0), ("late_stance_threshold", 0.0),
-                ("liftoff_threshold", NEVER),
-            )}  # fmt: skip
+            of = {
+                name: parameters.of(node, name, value, prefix + name)
+                for name, value in (
+                    ("stance_load_threshold", 0.1),
+                    ("landing_threshold", 0.0),
+                    ("late_stance_threshold", 0.0),
+                    ("liftoff_threshold", NEVER),
+                )
+            }
             stance, swing = of["stance_load_threshold"], node.get("swing_load_threshold")
-            loads = stance, stance if swing is None else parameters.read(swing, prefix + "swing_load_threshold")
-            ahead = (length * of[f"{name}_threshold"] for name in ("late_stance", "liftoff", "landing"))
+            loads = (
+                stance,
+                stance
+                if swing is None
+                else parameters.read(swing, prefix + "swing_load_threshold"),
+            )
+            ahead = (
+                length * of[f"{name}_threshold"] for name in ("late_stance", "liftoff", "landing")
+            )
             first = 1 + LIMITS.OF_LEG * leg
             self._limits[:, first : first + LIMITS.OF_LEG] = np.column_stack([*loads, *ahead])
         conditional = node.get("ConditionalControllers")
@@ -228,7 +265,9 @@ class Reflexes:
                     self._add_reflexes(controller, parameters, prefix, leg, states)
         node.expect_all_asked("a ConditionalController")
 
-    def _add_reflexes(self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int) -> None:
+    def _add_reflexes(
+        self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int
+    ) -> None:
         symmetric = node.flag("symmetric", self.symmetric)
         blocks = [node, *(block for _, block in node.all_of("Reflexes"))]
         for block in blocks:
@@ -247,7 +286,9 @@ class Reflexes:
         beside = f" or '{own}{SIDES[leg]}'" if self._is_sided else ""
         raise node.error(f"the model has no '{own}'{beside}{or_known(own, names)}")
 
-    def _begin(self, node: Node, prefix: str, leg: int, symmetric: bool, kind: Kind) -> tuple[int, int, str]:
+    def _begin(
+        self, node: Node, prefix: str, leg: int, symmetric: bool, kind: Kind
+    ) -> tuple[int, int, str]:
         """Numbers of the target and of the source, and what stands before the names of parameters."""
         for key in ("min_control_value", "max_control_value", *kind.refused):
             if node.get(key) is not None:
@@ -277,7 +318,9 @@ class Reflexes:
         if np.any(delay < 0.0):
             raise node.error(f"a delay of {delay.min():g} s knows what is to come")
         if not np.all(delay <= LONGEST):
-            raise node.error(f"a delay of {delay.max():g} s is more than {LONGEST:g} s, the longest that is remembered")
+            raise node.error(
+                f"a delay of {delay.max():g} s is more than {LONGEST:g} s, the longest that is remembered"
+            )
         return delay
 
     def _sensor(self, source: Source) -> int:
@@ -285,7 +328,14 @@ class Reflexes:
         return self.sources.setdefault(source, len(self.sources))
 
     def _add_reflex(
-        self, name: str, node: Node, parameters: Parameters, prefix: str, leg: int, states: int, symmetric: bool
+        self,
+        name: str,
+        node: Node,
+        parameters: Parameters,
+        prefix: str,
+        leg: int,
+        states: int,
+        symmetric: bool,
     ) -> None:
         kind = KINDS[name]
         node.asked.update(kind.settings)
@@ -294,7 +344,11 @@ class Reflexes:
         gate = self._gate(node, parameters, before, leg) if name == CONDITIONAL else -1
         written = {key for key, _ in node.parts}
         for letter, feel, rest, is_free in kind.channels:
-            keys = {f"K{letter}", f"{letter}0", *(() if is_free is None else (f"allow_neg_{letter}",))}
+            keys = {
+                f"K{letter}",
+                f"{letter}0",
+                *(() if is_free is None else (f"allow_neg_{letter}",)),
+            }
             node.asked |= keys
             if written.isdisjoint(keys):
                 continue
@@ -303,12 +357,17 @@ class Reflexes:
                 key: parameters.of(node, key, value, before + key)
                 for key, value in (settings if kind.corrects else settings[::-1])
             }
-            gain, free = found[f"K{letter}"], is_free is None or node.flag(f"allow_neg_{letter}", is_free)
+            gain, free = (
+                found[f"K{letter}"],
+                is_free is None or node.flag(f"allow_neg_{letter}", is_free),
+            )
             if np.any(gain != 0.0) or f"{before}K{letter}" in parameters.found:
                 source = feel(self.walkers, node, number, SIDES[leg] if self._is_sided else "")
                 held = FREE if free else OF_RESULT if kind.corrects else OF_SENSOR
                 term = target, self._sensor(source), held, leg, states, gate
-                self.terms.append(Part(term, delay, -gain if kind.corrects else gain, found[f"{letter}0"]))
+                self.terms.append(
+                    Part(term, delay, -gain if kind.corrects else gain, found[f"{letter}0"])
+                )
         constant = parameters.of(node, "C0", 0.0, f"{before}C0")
         if np.any(constant != 0.0) or f"{before}C0" in parameters.found:
             zero = np.zeros_like(constant)
@@ -324,30 +383,51 @@ class Reflexes:
         start = f"{before[:-1]}-{name}."
         delay = self._delay(node, parameters, start)
         low, high = (
-            parameters.of(node, f"pos_{end}", way, f"{start}pos_{end}") for end, way in (("min", -1e12), ("max", 1e12))
+            parameters.of(node, f"pos_{end}", way, f"{start}pos_{end}")
+            for end, way in (("min", -1e12), ("max", 1e12))
         )
-        value, speed = (self._sensor(feel(self.walkers, node, number, "")) for feel in (VALUE, SPEED))
+        value, speed = (
+            self._sensor(feel(self.walkers, node, number, "")) for feel in (VALUE, SPEED)
+        )
         self._gates.append(Part((value, speed), delay, low, high))
         return len(self._gates) - 1
 
     def compiled(self) -> tuple[Ints, Array]:
-        """What the kernels go by (see :mod:`osimlite.mechanics.kernels.reflexes`): integers, and of each candidate the
-        numbers (w, r)."""
+        """What the kernels go by (see :mod:`osimlite.mechanics.kernels.reflexes`): integers, and of
+        each candidate the numbers (w, r).
+        """
         # What goes by sensors is added first.
         parts = [*sorted(self.terms, key=lambda term: term.ints[TERM.SENSOR] < 0), *self._gates]
         delays = [part.delay / self.walkers.step for part in parts]
         each = [(delay, part.first, part.second) for delay, part in zip(delays, parts, strict=True)]
-        numbers = np.column_stack([self._limits, *(column for columns in each for column in columns)])
-        felt = (np.max(delay) for part, delay in zip(parts, delays, strict=True) if part.ints[TERM.SENSOR] >= 0)
+        numbers = np.column_stack(
+            [self._limits, *(column for columns in each for column in columns)]
+        )
+        felt = (
+            np.max(delay)
+            for part, delay in zip(parts, delays, strict=True)
+            if part.ints[TERM.SENSOR] >= 0
+        )
         kept = int(np.ceil(max([*felt, self._limits[0, LIMITS.DELAY]]))) + 2
         ints, more = [number for part in parts for number in part.ints], list[float]()
         for source in self.sources:
-            ints += source.kind, source.place, numbers.shape[1] + len(more) if source.numbers else source.more
+            ints += (
+                source.kind,
+                source.place,
+                numbers.shape[1] + len(more) if source.numbers else source.more,
+            )
             more += source.numbers
         numbers = np.column_stack([numbers, np.tile(more, (len(numbers), 1))])
         head, sensors = np.zeros(REFLEXES.HEAD, dtype=np.int64), len(self.sources)
         head[: REFLEXES.ROOM + 1] = (
-            *(len(self.terms), len(self._gates), kept, sensors, self._has_states, self._swings_from_stance),
+            *(
+                len(self.terms),
+                len(self._gates),
+                kept,
+                sensors,
+                self._has_states,
+                self._swings_from_stance,
+            ),
             *(numbers.shape[1], LEGS + kept * sensors),
         )
         head[REFLEXES.IS_NOISY] = self._is_noisy

@@ -27,14 +27,14 @@ from osimlite.studies.reflexes.walkers import Felt
 class Feedback:
     """A controller for ``osimlite.simulate(model, controller=Feedback("hold.yaml"))``.
 
-    It computes the controls of the actuators that its reflexes name at every control step, and holds them between; what
-    else drives these adds to it.
+    It computes the controls of the actuators that its reflexes name at every control step, and
+    holds them between; what else drives these adds to it.
 
-    Args:
-        given: file with a ReflexController, GaitStateController, FeedForwardController or CompositeController, alone or
-            in a scenario: SCONE's or YAML; or the same as data of Python. Beside one that stands alone there may be an
-            `init`, and `fixed_control_step_size` and what legs are called, which a scenario has in its ModelOpenSim4.
-        values: of its parameters, or a file of them (.par); others stand for the best that `init` has, or their means.
+    Args: given: file with a ReflexController, GaitStateController, FeedForwardController or
+        CompositeController, alone or in a scenario: SCONE's or YAML; or the same as data of Python.
+        Beside one that stands alone there may be an `init`, and `fixed_control_step_size` and what
+        legs are called, which a scenario has in its ModelOpenSim4. values: of its parameters, or a
+        file of them (.par); others stand for the best that `init` has, or their means.
 
     Attributes:
         step: for which controls are held, s.
@@ -44,7 +44,9 @@ class Feedback:
     """
 
     def __init__(
-        self, given: str | Path | Mapping[str, Any], values: Mapping[str, float] | str | Path = MappingProxyType({})
+        self,
+        given: str | Path | Mapping[str, Any],
+        values: Mapping[str, float] | str | Path = MappingProxyType({}),
     ) -> None:
         if isinstance(given, Mapping):
             self._told, top, folder = "data of Python", settings_of(given), Path()
@@ -80,7 +82,9 @@ class Feedback:
         """The parameters, for a model with its engine."""
         _, _, parameters = self._read(model, engine)
         found, values = parameters.found.values(), self._values
-        return [Gain(each.name, values.get(each.name, each.mean), each.low, each.high) for each in found]
+        return [
+            Gain(each.name, values.get(each.name, each.mean), each.low, each.high) for each in found
+        ]
 
     def with_values(self, values: Mapping[str, float]) -> Self:
         """The same with other values of some parameters."""
@@ -90,21 +94,26 @@ class Feedback:
 
     def par(self) -> str:
         """The values of parameters that are given, as a file (.par)."""
-        return "".join(par_line(Parameter(name, x, AUTO * abs(x), 0.0, 0.0), x) for name, x in self._values.items())
+        return "".join(
+            par_line(Parameter(name, x, AUTO * abs(x), 0.0, 0.0), x)
+            for name, x in self._values.items()
+        )
 
     def _read(self, model: Model, engine: Any) -> tuple[Felt, Reflexes, Parameters]:
         felt, parameters = Felt(model, engine, 1, self.step, self._legs), Parameters(self._values)
         reflexes = Reflexes(self._node, self._kind, felt, parameters)
         for name in self._values:
             if name not in parameters.found and name not in self._begun:
-                raise SettingError(f"the controller has no parameter '{name}'{or_known(name, parameters.found)}")
+                raise SettingError(
+                    f"the controller has no parameter '{name}'{or_known(name, parameters.found)}"
+                )
         return felt, reflexes, parameters
 
     def held(self, model: Model, engine: Any) -> Held:
         """What the kernels go by, for a model with its engine.
 
-        Raises:
-            OsimliteError: the model has not what a reflex names, or a value belongs to no parameter.
+        Raises: OsimliteError: the model has not what a reflex names, or a value belongs to no
+            parameter.
         """
         felt, reflexes, parameters = self._read(model, engine)
         plan, numbers = reflexes.compiled()

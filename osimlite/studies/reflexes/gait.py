@@ -22,15 +22,12 @@ BRIEF = 0.05
 class Strides(NamedTuple):
     """Of whole strides, from one foot's touch to the next of the same, without the first ones of a walk.
 
-    Attributes:
-        number: of strides of both legs.
-        touches: of the ground by both feet, the first ones included; SCONE counts scuffs among its steps, too.
-        time, length: of one, s and m, on average.
-        stance: part of a stride in which a foot is on the ground; left, right.
-        both: part of the time in which both are.
-        humps: largest force in the first half of a stance, least between, and largest in the second half; over the
-            weight, on average.
-        peak: largest force on a foot, over the weight.
+    Attributes: number: of strides of both legs. touches: of the ground by both feet, the first ones
+        included; SCONE counts scuffs among its steps, too. time, length: of one, s and m, on
+        average. stance: part of a stride in which a foot is on the ground; left, right. both: part
+        of the time in which both are. humps: largest force in the first half of a stance, least
+        between, and largest in the second half; over the weight, on average. peak: largest force on
+        a foot, over the weight.
     """
 
     number: int
@@ -46,12 +43,9 @@ class Strides(NamedTuple):
 class Gait(NamedTuple):
     """The walk of a first candidate.
 
-    Attributes:
-        distance: that the mass centre went, m.
-        speed: of it, m/s.
-        centre, pelvis: height on average, least, and largest, m; of the mass centre, and of the origin of the body that
-            the legs hang on.
-        strides: None of a walk that has not three of each leg.
+    Attributes: distance: that the mass centre went, m. speed: of it, m/s. centre, pelvis: height on
+        average, least, and largest, m; of the mass centre, and of the origin of the body that the
+        legs hang on. strides: None of a walk that has not three of each leg.
     """
 
     distance: float
@@ -63,7 +57,9 @@ class Gait(NamedTuple):
     def told(self) -> dict[str, str]:
         """In words."""
         names = ("mass centre", self.centre), ("pelvis", self.pelvis)
-        high = (f"{name} {mean:.3f} m ({low:.3f} to {high:.3f})" for name, (mean, low, high) in names)
+        high = (
+            f"{name} {mean:.3f} m ({low:.3f} to {high:.3f})" for name, (mean, low, high) in names
+        )
         words = {"way": f"{self.distance:.3f} m, {self.speed:.3f} m/s", "heights": ", ".join(high)}
         if self.strides is not None:
             each = self.strides
@@ -71,9 +67,13 @@ class Gait(NamedTuple):
             words["strides"] = (
                 f"{each.number}, of {each.time:.3f} s and {each.length:.3f} m; {each.touches} steps without scuffs"
             )
-            words["stance"] = f"{left:.1f} % of a stride left, {right:.1f} % right; both feet {100.0 * each.both:.1f} %"
+            words["stance"] = (
+                f"{left:.1f} % of a stride left, {right:.1f} % right; both feet {100.0 * each.both:.1f} %"
+            )
             first, dip, second = each.humps
-            words["ground"] = f"{first:.2f} weights, {dip:.2f}, {second:.2f} in a stance; at most {each.peak:.2f}"
+            words["ground"] = (
+                f"{first:.2f} weights, {dip:.2f}, {second:.2f} in a stance; at most {each.peak:.2f}"
+            )
         return words
 
 
@@ -88,8 +88,16 @@ def gait_of(scenario: Scenario, walked: Walked) -> Gait | None:
     centre = centers_of_mass(walkers.engine, moments)[:, :3]
     pelvis = stations(walkers.engine, moments, walkers.legs[0].base, np.zeros(3))[:, :3]
     far, times = centre[-1, 0] - centre[0, 0], walked.states.times
-    upper, lower = ((float(y.mean()), float(y.min()), float(y.max())) for y in (centre[:, 1], pelvis[:, 1]))
-    return Gait(float(far), float(far / times[-1]), upper, lower, strides_of(times, centre[:, 0], walked.loads.rows))
+    upper, lower = (
+        (float(y.mean()), float(y.min()), float(y.max())) for y in (centre[:, 1], pelvis[:, 1])
+    )
+    return Gait(
+        float(far),
+        float(far / times[-1]),
+        upper,
+        lower,
+        strides_of(times, centre[:, 0], walked.loads.rows),
+    )
 
 
 def strides_of(times: Array, way: Array, loads: Array) -> Strides | None:
@@ -118,10 +126,14 @@ def strides_of(times: Array, way: Array, loads: Array) -> Strides | None:
             humps.append((there[one], there[one : two + 1].min(), there[two]))
     start, end = min(begins[0] for begins in spans), max(begins[-1] for begins in spans)
     count = sum(len(begins) - 1 for begins in spans)
-    time, length = (sum(row[begins[-1]] - row[begins[0]] for begins in spans) / count for row in (times, way))
+    time, length = (
+        sum(row[begins[-1]] - row[begins[0]] for begins in spans) / count for row in (times, way)
+    )
     both, peak = float(touches[start:end].all(axis=1).mean()), float(loads[start:end].max())
     found = tuple(np.mean(humps, axis=0).tolist())
-    return Strides(count, float(time), float(length), tuple(stance), both, found, peak, count + 2 * len(spans))
+    return Strides(
+        count, float(time), float(length), tuple(stance), both, found, peak, count + 2 * len(spans)
+    )
 
 
 def _steady(on: Any, times: Array) -> None:

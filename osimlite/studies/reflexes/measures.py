@@ -1,7 +1,7 @@
 """What a walk is judged by: SCONE's measures, of all candidates at once.
 
-Each class of measures is one class here, found by its name. While candidates walk, the kernels note what measures ask
-for (:mod:`osimlite.mechanics.kernels.criteria`); the results are made of that.
+Each class of measures is one class here, found by its name. While candidates walk, the kernels note
+what measures ask for (:mod:`osimlite.mechanics.kernels.criteria`); the results are made of that.
 """
 
 from __future__ import annotations
@@ -70,7 +70,9 @@ class Criteria:
 
     def compiled(self) -> tuple[Ints, Array]:
         """Integers and numbers, as the kernels take them."""
-        return np.array([len(self._ints) // CRITERION.SIZE, *self._ints], dtype=np.int64), np.array(self._numbers)
+        return np.array([len(self._ints) // CRITERION.SIZE, *self._ints], dtype=np.int64), np.array(
+            self._numbers
+        )
 
 
 class Measure(ABC):
@@ -83,20 +85,29 @@ class Measure(ABC):
         above: that it is a part of.
         side: ending of the names of what it is about, if it is about one side.
 
-    Attributes:
-        name: of it.
-        start, stop: between which it is on, s.
-        report: what it says besides; of efforts by power that (W/kg), and what a way takes (J/(kg m)).
-        terms: what it and those that it is made of add, by their names.
-        minimize: whether it is to become small; of a class, what it is without a setting.
+    Attributes: name: of it. start, stop: between which it is on, s. report: what it says besides;
+        of efforts by power that (W/kg), and what a way takes (J/(kg m)). terms: what it and those
+        that it is made of add, by their names. minimize: whether it is to become small; of a class,
+        what it is without a setting.
     """
 
     minimize = True
 
     def __init__(
-        self, node: Node, walkers: Walkers, criteria: Criteria, above: Measure | None = None, side: str = ""
+        self,
+        node: Node,
+        walkers: Walkers,
+        criteria: Criteria,
+        above: Measure | None = None,
+        side: str = "",
     ) -> None:
-        self.node, self.walkers, self.criteria, self.side, self.count = node, walkers, criteria, side, walkers.count
+        self.node, self.walkers, self.criteria, self.side, self.count = (
+            node,
+            walkers,
+            criteria,
+            side,
+            walkers.count,
+        )
         self.name = node.text("name", "") or self.default_name()
         self.weight = node.number("weight", 1.0)
         threshold, soft = node.get("threshold"), node.get("soft_threshold")
@@ -145,7 +156,9 @@ class Measure(ABC):
 
     def average(self, first: int) -> Array:
         """Of a number over time (w,)."""
-        total, span, last = (self.noted(first, place) for place in (NOTED.TOTAL, NOTED.SPAN, NOTED.VALUE))
+        total, span, last = (
+            self.noted(first, place) for place in (NOTED.TOTAL, NOTED.SPAN, NOTED.VALUE)
+        )
         return np.divide(total, span, out=last.copy(), where=span > 0.0)
 
 
@@ -166,7 +179,9 @@ class GaitMeasure(Measure):
                 raise node.error(f"{key} is not done here")
         self.walkers.expect_legs()
         numbers = (("termination_height", 0.5), ("load_threshold", 0.1), ("min_step_duration", 0.1))
-        self._first = self.criteria.add(GAIT, 0, self, *(node.number(key, value) for key, value in numbers))
+        self._first = self.criteria.add(
+            GAIT, 0, self, *(node.number(key, value) for key, value in numbers)
+        )
 
     def result(self, times: Array, duration: float) -> Array:
         """As `Measure` says."""
@@ -185,12 +200,21 @@ class GaitMeasure(Measure):
                 if number < first or dt <= 0.0:
                     continue
                 speed = far / dt
-                off = speed - self.low if speed < self.low else speed - self.high if speed > self.high else 0.0
+                off = (
+                    speed - self.low
+                    if speed < self.low
+                    else speed - self.high
+                    if speed > self.high
+                    else 0.0
+                )
                 good += dt * min(max(1.0 - abs(off) / wanted, -1.0), 1.0)
                 time, length = time + dt, length + far
             if times[k] < duration and (row[GAIT_NOTED.FALLEN] or self.always):
                 time += duration - float(times[k])
-            result[k], speeds[k] = 1.0 - good / time if time else 1.0, length / time if time else 0.0
+            result[k], speeds[k] = (
+                1.0 - good / time if time else 1.0,
+                length / time if time else 0.0,
+            )
             counts[k] = len(steps)
         self.report = {"speed": speeds, "steps": counts}
         return result
@@ -207,18 +231,28 @@ class JumpMeasure(Measure):
             if node.get(key) is not None:
                 raise node.error(f"'{key}' of a JumpMeasure is not done here")
         self.walkers.expect_legs()
-        self.negates, at_peak = node.flag("negate_result", False), node.flag("terminate_on_peak", True)
-        numbers = node.number("termination_height", 0.5), node.number("prepare_time", 0.2), float(at_peak)
+        self.negates, at_peak = (
+            node.flag("negate_result", False),
+            node.flag("terminate_on_peak", True),
+        )
+        numbers = (
+            node.number("termination_height", 0.5),
+            node.number("prepare_time", 0.2),
+            float(at_peak),
+        )
         self._first = self.criteria.add(JUMP, 0, self, *numbers)
 
     def result(self, times: Array, duration: float) -> Array:
         """As `Measure` says; of one that has not taken off, where it would be after a second."""
         start, here, peak, prepared, does = (
-            self.noted(self._first, getattr(JUMP_NOTED, name)) for name in ("START", "HERE", "PEAK", "PREPARED", "DOES")
+            self.noted(self._first, getattr(JUMP_NOTED, name))
+            for name in ("START", "HERE", "PEAK", "PREPARED", "DOES")
         )
         early = 100.0 * np.maximum(prepared - start, 0.0)
         self.report = {"jump height": 100.0 * peak, "early rise": early}
-        found = np.where(does == PREPARES, 100.0 * (start + (here - start) / times), 100.0 * peak - early)
+        found = np.where(
+            does == PREPARES, 100.0 * (start + (here - start) / times), 100.0 * peak - early
+        )
         return -found if self.negates else found
 
 
@@ -229,11 +263,16 @@ class EffortMeasure(Measure):
         """As `Measure` says."""
         kind, walkers = node.text("measure_type"), self.walkers
         if kind not in EFFORTS:
-            raise node.error(f"effort of the type '{kind}' is not done here{or_known(kind, EFFORTS)}")
+            raise node.error(
+                f"effort of the type '{kind}' is not done here{or_known(kind, EFFORTS)}"
+            )
         self.by_distance = node.flag("use_cost_of_transport", False)
         self.least_distance = node.number("min_distance", 1.0)
         self.by_muscle = node.flag("use_average_per_muscle", False)
-        tension, density = node.number("specific_tension", 0.25e6), node.number("muscle_density", 1059.7)
+        tension, density = (
+            node.number("specific_tension", 0.25e6),
+            node.number("muscle_density", 1059.7),
+        )
         slow = node.number("default_muscle_slow_twitch_ratio", 0.5)
         masses = walkers.strengths / tension * density * walkers.optimal
         for key in ("use_symmetric_fiber_ratios", "store_individual_muscle_efforts"):
@@ -245,11 +284,16 @@ class EffortMeasure(Measure):
 
     def result(self, times: Array, duration: float) -> Array:
         """As `Measure` says."""
-        total, start, here = (self.noted(self._first, k) for k in (NOTED.TOTAL, NOTED.START, NOTED.HERE))
+        total, start, here = (
+            self.noted(self._first, k) for k in (NOTED.TOTAL, NOTED.START, NOTED.HERE)
+        )
         far = np.maximum(self.least_distance, np.abs(here - start))
         if self._kind == WANG:
             mass = self.walkers.mass
-            self.report = {"power": self.average(self._first) / mass, "transport": total / (mass * far)}
+            self.report = {
+                "power": self.average(self._first) / mass,
+                "transport": total / (mass * far),
+            }
         found = total / (self.walkers.mass * far) if self.by_distance else self.average(self._first)
         return found / len(self.walkers.names) if self.by_muscle else found
 
@@ -274,7 +318,10 @@ class Penalty(Measure):
 
     def result(self, times: Array, duration: float) -> Array:
         """As `Measure` says."""
-        places, total = {"sum": NOTED.TOTAL, "highest": NOTED.HIGHEST, "lowest": NOTED.LOWEST}, np.zeros(self.count)
+        places, total = (
+            {"sum": NOTED.TOTAL, "highest": NOTED.HIGHEST, "lowest": NOTED.LOWEST},
+            np.zeros(self.count),
+        )
         for mode, first in self._asked:
             total += self.noted(first, places[mode]) if mode in places else self.average(first)
         return total
@@ -294,9 +341,11 @@ class DofMeasure(Penalty):
         infos = {info.name: info for info in self.walkers.mechanism.coordinates}
         factor = 180.0 / np.pi if node.flag("in_degrees", infos[name].unit == "rad") else 1.0
         for what, first, scale in (
-            ("position", SENSES.VALUES, factor), ("velocity", SENSES.SPEEDS, factor),
-            ("force", SENSES.MOMENTS, 1.0), ("limit_torque", SENSES.MOMENTS, 1.0),
-        ):  # fmt: skip
+            ("position", SENSES.VALUES, factor),
+            ("velocity", SENSES.SPEEDS, factor),
+            ("force", SENSES.MOMENTS, 1.0),
+            ("limit_torque", SENSES.MOMENTS, 1.0),
+        ):
             part = node.get(what)
             if part is not None:
                 self.penalize(part, NUMBER, int(senses[first]) + names.index(name), scale)
@@ -344,6 +393,13 @@ class CompositeMeasure(Measure):
 
 MEASURES: dict[str, Any] = {
     cls.__name__: cls
-    for cls in (GaitMeasure, JumpMeasure, EffortMeasure, DofMeasure, ReactionForceMeasure, CompositeMeasure)
+    for cls in (
+        GaitMeasure,
+        JumpMeasure,
+        EffortMeasure,
+        DofMeasure,
+        ReactionForceMeasure,
+        CompositeMeasure,
+    )
 }
 """By the names that scenarios have for them."""

@@ -15,7 +15,9 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.settings import Node, parse_finite
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_FORM = re.compile(rf"(?P<mean>{_NUMBER})?(?:~(?P<std>{_NUMBER})?)?(?:<(?P<low>{_NUMBER}),(?P<high>{_NUMBER})>)?$")
+_FORM = re.compile(
+    rf"(?P<mean>{_NUMBER})?(?:~(?P<std>{_NUMBER})?)?(?:<(?P<low>{_NUMBER}),(?P<high>{_NUMBER})>)?$"
+)
 AUTO = 0.1
 """A standard deviation that nothing tells, as part of the mean."""
 
@@ -39,9 +41,8 @@ class Parameter(NamedTuple):
 class Parameters:
     """The values of the parameters of some candidates, and which parameters there are.
 
-    Args:
-        values: by name, of each candidate (w,), or one for all; those without stand for their means.
-        count: of candidates.
+    Args: values: by name, of each candidate (w,), or one for all; those without stand for their
+        means. count: of candidates.
 
     Attributes:
         found: all that were asked for.
@@ -79,7 +80,9 @@ class Parameters:
         text = part.value
         match = _FORM.match(text)
         if match is None or not text:
-            raise part.error(f"'{name}' must be a number or a parameter such as 1~0.1<0,2>, not '{text}'")
+            raise part.error(
+                f"'{name}' must be a number or a parameter such as 1~0.1<0,2>, not '{text}'"
+            )
         if "~" not in text and match["low"] is None:
             return np.full(self.count, float(text))
         mean, std = match["mean"], match["std"]
@@ -88,13 +91,20 @@ class Parameters:
         if mean is None:
             raise part.error(f"the parameter '{name}' has no mean")
         low, high = (
-            float(match[end]) if match[end] is not None else way for end, way in (("low", -np.inf), ("high", np.inf))
+            float(match[end]) if match[end] is not None else way
+            for end, way in (("low", -np.inf), ("high", np.inf))
         )
-        return self._asked(part, name, float(mean), np.nan if std is None else float(std), low, high)
+        return self._asked(
+            part, name, float(mean), np.nan if std is None else float(std), low, high
+        )
 
-    def _asked(self, part: Node, name: str, mean: float, std: float, low: float, high: float) -> Array:
+    def _asked(
+        self, part: Node, name: str, mean: float, std: float, low: float, high: float
+    ) -> Array:
         if not low <= mean <= high:
-            raise part.error(f"the parameter '{name}' begins at {mean:g}, which is not from {low:g} to {high:g}")
+            raise part.error(
+                f"the parameter '{name}' begins at {mean:g}, which is not from {low:g} to {high:g}"
+            )
         std = self.auto * abs(mean) if np.isnan(std) else std
         self.found.setdefault(name, Parameter(name, mean, std, low, high))
         value = self.values.get(name, mean)
@@ -117,7 +127,9 @@ def read_par(path: str | Path) -> dict[str, tuple[float, float, float]]:
     try:
         text = read_file(path).decode()
     except UnicodeDecodeError as error:
-        message = f"the file is not UTF-8: byte {error.start + 1} is {error.object[error.start]:#04x}"
+        message = (
+            f"the file is not UTF-8: byte {error.start + 1} is {error.object[error.start]:#04x}"
+        )
         raise DocumentError(message, file=str(path)) from None
     result = {}
     for number, line in enumerate(text.splitlines(), 1):

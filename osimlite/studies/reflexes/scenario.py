@@ -23,7 +23,11 @@ from osimlite.studies.reflexes.settings import Node, found_file, matches, read_s
 from osimlite.studies.reflexes.walkers import Walkers
 
 OPTIMIZERS = "CmaOptimizer", "CmaPoolOptimizer"
-INTEGRATORS = {"SemiExplicitEuler2": "euler2", "RungeKuttaMerson": "merson", "Rosenbrock": "rosenbrock"}
+INTEGRATORS = {
+    "SemiExplicitEuler2": "euler2",
+    "RungeKuttaMerson": "merson",
+    "Rosenbrock": "rosenbrock",
+}
 """By the names of SCONE; the last is ours."""
 POPULATION, GENERATIONS = 16, 1000
 """Of a search whose scenario says nothing."""
@@ -76,18 +80,13 @@ class Walked:
 class Scenario:
     """What walks, by which reflexes, and how it is judged.
 
-    Args:
-        given: file of a scenario, SCONE's or YAML; or the same as data of Python, whose files are in the folder that
-            the program runs in.
-        model: that walks, in the place of a `model_file`.
+    Args: given: file of a scenario, SCONE's or YAML; or the same as data of Python, whose files are
+        in the folder that the program runs in. model: that walks, in the place of a `model_file`.
 
-    Attributes:
-        model: that walks.
-        controller: name and part of what excites the muscles.
-        measure: name and part of what judges.
-        begun: parameters that a file of the scenario begins with: best, mean and standard deviation.
-        duration: of a walk, s.
-        population, generations, seed: of a search.
+    Attributes: model: that walks. controller: name and part of what excites the muscles. measure:
+        name and part of what judges. begun: parameters that a file of the scenario begins with:
+        best, mean and standard deviation. duration: of a walk, s. population, generations, seed: of
+        a search.
 
     Raises:
         DocumentError: it has something that is not done here; its name and line are told.
@@ -107,11 +106,17 @@ class Scenario:
         self._objective = objective
         self.duration = objective.number("max_duration", 1e3)
         if not self.duration > 0.0:
-            raise objective.error(f"a walk of {self.duration:g} s is none; max_duration is to be positive")
+            raise objective.error(
+                f"a walk of {self.duration:g} s is none; max_duration is to be positive"
+            )
         settings = objective.get("ModelOpenSim4")
         if settings is None:
-            other = next((name for name, _ in objective.parts if name.startswith("Model")), "no model")
-            raise objective.error(f"of models only ModelOpenSim4 is done here, and this has {other}")
+            other = next(
+                (name for name, _ in objective.parts if name.startswith("Model")), "no model"
+            )
+            raise objective.error(
+                f"of models only ModelOpenSim4 is done here, and this has {other}"
+            )
         self.settings: Node = settings
         if model is None:
             model = read(found_file(settings.text("model_file"), self.folder))
@@ -119,7 +124,9 @@ class Scenario:
         self.model = model
         self.step = control_step(settings)
         if self.duration < self.step:
-            raise objective.error(f"a walk of {self.duration:g} s is shorter than a control step of {self.step:g} s")
+            raise objective.error(
+                f"a walk of {self.duration:g} s is shorter than a control step of {self.step:g} s"
+            )
         self.begun = begun(self.optimizer, self.folder)
         if found is not None:
             self.population = self.optimizer.count("lambda", POPULATION, 1, MAX_POPULATION)
@@ -133,23 +140,41 @@ class Scenario:
 
     def _refuse(self) -> None:
         objective, settings = self._objective, self.settings
-        for key in ("initial_load_dof", "state_init_file", "integration_method", "integration_accuracy", "initial_load",
-                    "initial_state_offset", "initial_state_offset_exclude", "initial_state_offset_include",
-                    "initial_state_offset_symmetric", "leg_upper_body", "leg_lower_body", "leg_contact_force",
-                    "initial_equilibration_activation", "max_integration_step_size"):  # fmt: skip
+        for key in (
+            "initial_load_dof",
+            "state_init_file",
+            "integration_method",
+            "integration_accuracy",
+            "initial_load",
+            "initial_state_offset",
+            "initial_state_offset_exclude",
+            "initial_state_offset_include",
+            "initial_state_offset_symmetric",
+            "leg_upper_body",
+            "leg_lower_body",
+            "leg_contact_force",
+            "initial_equilibration_activation",
+            "max_integration_step_size",
+        ):
             settings.get(key)
         settings.expect_all_asked("a ModelOpenSim4")
         controller, measure = objective.one_of(*CONTROLLERS), objective.one_of(*MEASURES)
         if controller is None:
-            other = next((name for name, _ in objective.parts if name.endswith("Controller")), "none")
-            raise objective.error(f"of controllers {listed(list(CONTROLLERS))} are done here, and this has {other}")
+            other = next(
+                (name for name, _ in objective.parts if name.endswith("Controller")), "none"
+            )
+            raise objective.error(
+                f"of controllers {listed(list(CONTROLLERS))} are done here, and this has {other}"
+            )
         if measure is None:
             raise objective.error(f"a measure is needed: {listed(list(MEASURES))}")
         self.controller, self.measure = controller, measure
         objective.expect_all_asked("a SimulationObjective", tuple(MEASURES))
         method = settings.text("integration_method", "SemiExplicitEuler2")
         if method not in INTEGRATORS:
-            raise settings.error(f"there is no integrator '{method}'{or_known(method, INTEGRATORS)}")
+            raise settings.error(
+                f"there is no integrator '{method}'{or_known(method, INTEGRATORS)}"
+            )
         self._integrator = INTEGRATORS[method]
 
     # ---------------------------------------------------------------------------------------------- candidates
@@ -185,10 +210,14 @@ class Scenario:
             SettingError: the duration is shorter than a control step.
         """
         if duration is not None and not duration >= self.step:
-            raise SettingError(f"a walk of {duration:g} s is shorter than a control step of {self.step:g} s")
+            raise SettingError(
+                f"a walk of {duration:g} s is shorter than a control step of {self.step:g} s"
+            )
         length = self.duration if duration is None else duration
         if not length <= MAX_STEPS * self.step:
-            message = f"a walk of {length:g} s has more than {MAX_STEPS} control steps of {self.step:g} s"
+            message = (
+                f"a walk of {length:g} s has more than {MAX_STEPS} control steps of {self.step:g} s"
+            )
             raise SettingError(message)
         parameters = Parameters(values, count)
         for name, value in values.items():
@@ -197,7 +226,9 @@ class Scenario:
         candidates = Candidates(self, parameters, length)
         for name in values:
             if name not in parameters.found and name not in self.begun:
-                raise SettingError(f"the scenario has no parameter '{name}'{or_known(name, parameters.found)}")
+                raise SettingError(
+                    f"the scenario has no parameter '{name}'{or_known(name, parameters.found)}"
+                )
         return candidates.walk()
 
     def walkers(self, count: int) -> Walkers:
@@ -238,7 +269,9 @@ class Candidates:
         walkers.go_by(*reflexes.compiled(), *criteria.compiled(), criteria.room)
         node = scenario.settings
         load = node.number("initial_load", 0.2)
-        height = walkers.places.get(node.text("initial_load_dof", "/jointset/ground_pelvis/pelvis_ty/value"))
+        height = walkers.places.get(
+            node.text("initial_load_dof", "/jointset/ground_pelvis/pelvis_ty/value")
+        )
         if load > 0.0 and height is not None:
             for k in range(walkers.count):
                 _carry(walkers, k, height, load)
@@ -254,7 +287,9 @@ class Candidates:
         offset = node.get("initial_state_offset")
         if offset is not None:
             included = node.text("initial_state_offset_include", "*")
-            excluded = node.text("initial_state_offset_exclude", "") + ";*/activation;*/fiber_length"
+            excluded = (
+                node.text("initial_state_offset_exclude", "") + ";*/activation;*/fiber_length"
+            )
             symmetric = node.flag("initial_state_offset_symmetric", False)
             for path, place in walkers.places.items():
                 if matches(path, included) and not matches(path, excluded):
@@ -273,9 +308,18 @@ class Candidates:
         for block, ending in (("values", "value"), ("velocities", "speed")):
             part = top.get(block)
             for name, node in part.parts if part is not None else ():
-                place = next((at for full, at in walkers.places.items() if full.endswith(f"/{name}/{ending}")), None)
+                place = next(
+                    (
+                        at
+                        for full, at in walkers.places.items()
+                        if full.endswith(f"/{name}/{ending}")
+                    ),
+                    None,
+                )
                 if place is None:
-                    raise node.error(f"the model has no coordinate '{name}'{or_known(name, walkers.coordinates)}")
+                    raise node.error(
+                        f"the model has no coordinate '{name}'{or_known(name, walkers.coordinates)}"
+                    )
                 try:
                     walkers.copies.states[:, place] = float(node.value)
                 except ValueError:
@@ -295,10 +339,22 @@ class Candidates:
             going = np.flatnonzero(walkers.progress[:, GOING]).tolist()
             if not going:
                 break
-        rows.append(np.concatenate([walkers.copies.states[0], walkers.excitations[0], walkers.loads()[0]])[None])
+        rows.append(
+            np.concatenate([walkers.copies.states[0], walkers.excitations[0], walkers.loads()[0]])[
+                None
+            ]
+        )
         times = walkers.step * walkers.progress[:, STEPS].astype(np.float64)
-        results = self.measure.weighted(times, self.duration) * (1.0 if self.measure.minimize else -1.0)
-        return Walked(results, times, self.measure.terms, self.measure.report, *self._tables(np.concatenate(rows)))
+        results = self.measure.weighted(times, self.duration) * (
+            1.0 if self.measure.minimize else -1.0
+        )
+        return Walked(
+            results,
+            times,
+            self.measure.terms,
+            self.measure.report,
+            *self._tables(np.concatenate(rows)),
+        )
 
     def _tables(self, rows: Array) -> tuple[StoTable, StoTable, StoTable]:
         walkers = self.walkers

@@ -67,22 +67,25 @@ def search(
     Returns:
         The best parameters.
 
-    Raises:
-        MissingDependency: cma is not installed.
-        SettingError: nothing is looked for, there are too few candidates, or the folder has the best of another search.
+    Raises: MissingDependency: cma is not installed. SettingError: nothing is looked for, there are
+        too few candidates, or the folder has the best of another search.
     """
     generations = scenario.generations if generations is None else generations
     population = scenario.population if population is None else population
     seed = scenario.seed if seed is None else seed
     if population < FEWEST or generations < 1:
-        raise SettingError(f"a search takes {FEWEST} candidates in a generation at least, and one generation")
+        raise SettingError(
+            f"a search takes {FEWEST} candidates in a generation at least, and one generation"
+        )
     strategy = require("cma", extra="optimize", purpose="the search for parameters")
     own = scenario.parameters()
     if not own:
         raise SettingError("the scenario has no parameters, which are written as 1~0.1<0,2>")
     path = Path(folder) / BEST
     if not resume and path.exists():
-        raise SettingError(f"'{path}' is there already: go on with it (--resume), or take another folder")
+        raise SettingError(
+            f"'{path}' is there already: go on with it (--resume), or take another folder"
+        )
     best, least = np.array([each.mean for each in own]), np.inf
     if resume:
         known, names = read_par(path), [each.name for each in own]
@@ -91,15 +94,24 @@ def search(
             raise SettingError(f"{whose} has no parameter '{name}': they are of different searches")
         # As it was written there, a mean can be beyond the bounds of now.
         own = [
-            each._replace(mean=float(np.clip(known[each.name][1], each.low, each.high)), std=known[each.name][2])
+            each._replace(
+                mean=float(np.clip(known[each.name][1], each.low, each.high)),
+                std=known[each.name][2],
+            )
             for each in own
         ]
         best = np.array([known[name][0] for name in names])
-        least = float(scenario.walk({each.name: value for each, value in zip(own, best, strict=True)}).results[0])
+        least = float(
+            scenario.walk(
+                {each.name: value for each, value in zip(own, best, strict=True)}
+            ).results[0]
+        )
     make_folder(Path(folder))
     scale = np.array([each.std if each.std > 0.0 else 1e-6 for each in own])
     middle = np.array([each.mean for each in own])
-    lows, highs = ((np.array([getattr(each, end) for each in own]) - middle) / scale for end in ("low", "high"))
+    lows, highs = (
+        (np.array([getattr(each, end) for each in own]) - middle) / scale for end in ("low", "high")
+    )
     options = {"bounds": [lows, highs], "popsize": population, "seed": seed + 1, "verbose": -9}
     es = strategy.CMAEvolutionStrategy(np.zeros(len(own)), 1.0, options)
     begin = time.perf_counter()
@@ -107,18 +119,30 @@ def search(
         for number in range(1, generations + 1):
             points = np.array(es.ask())
             values = middle + scale * points
-            walked = scenario.walk({each.name: values[:, k] for k, each in enumerate(own)}, population)
+            walked = scenario.walk(
+                {each.name: values[:, k] for k, each in enumerate(own)}, population
+            )
             es.tell(list(points), walked.results.tolist())
             place = int(np.argmin(walked.results))
             if walked.results[place] < least:
                 best, least = values[place], float(walked.results[place])
                 mean = middle + scale * es.result.xfavorite
                 stds = scale * es.sigma * np.sqrt(np.diag(es.C))
-                found = [each._replace(mean=m, std=s) for each, m, s in zip(own, mean, stds, strict=True)]
+                found = [
+                    each._replace(mean=m, std=s) for each, m, s in zip(own, mean, stds, strict=True)
+                ]
                 write_atomically(path, "".join(map(par_line, found, best)))
             if tell is not None:
                 rate = 60.0 * number / (time.perf_counter() - begin)
-                tell(Generation(number, least, float(np.median(walked.results)), float(walked.times.max()), rate))
+                tell(
+                    Generation(
+                        number,
+                        least,
+                        float(np.median(walked.results)),
+                        float(walked.times.max()),
+                        rate,
+                    )
+                )
             if es.stop():
                 break
     except KeyboardInterrupt:

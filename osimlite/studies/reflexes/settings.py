@@ -1,6 +1,7 @@
 """Trees of keys and values: files of SCONE (.scone, .zml) with includes and constants, YAML, data of Python.
 
-In YAML and Python a key that stands several times has a list of what stands below it; `include` names another file.
+In YAML and Python a key that stands several times has a list of what stands below it; `include`
+names another file.
 """
 
 from __future__ import annotations
@@ -139,7 +140,9 @@ class Node:
         try:
             x, y, z = map(parse_finite, text.split())
         except ValueError:
-            raise (self.get(key) or self).error(f"'{key}' must be three numbers, as [ 0 0 1 ], not '{text}'") from None
+            raise (self.get(key) or self).error(
+                f"'{key}' must be three numbers, as [ 0 0 1 ], not '{text}'"
+            ) from None
         return np.array([x, y, z])
 
     def all_of(self, *names: str) -> Iterator[tuple[str, Node]]:
@@ -155,7 +158,9 @@ class Node:
         """
         found = [*self.all_of(*names)]
         if len(found) > 1:
-            raise found[1][1].error(f"'{found[1][0]}' stands beside '{found[0][0]}'; join them in a composite one")
+            raise found[1][1].error(
+                f"'{found[1][0]}' stands beside '{found[0][0]}'; join them in a composite one"
+            )
         return found[0] if found else None
 
     def error(self, message: str) -> DocumentError:
@@ -200,7 +205,9 @@ class _Budget:
     def take_part(self, node: Node) -> None:
         self.parts -= 1
         if self.parts < 0:
-            raise node.error(f"the scenario has more than {MAX_PARTS} parts with all that it includes")
+            raise node.error(
+                f"the scenario has more than {MAX_PARTS} parts with all that it includes"
+            )
 
 
 def read_settings(path: str | Path) -> Node:
@@ -227,7 +234,10 @@ def _parts_of(key: str, value: Any) -> Iterator[tuple[str, Node]]:
         for item in value:
             yield from _parts_of(key, item)
     else:
-        yield key, Node(" ".join(map(str, value)) if isinstance(value, list | tuple) else str(value))
+        yield (
+            key,
+            Node(" ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)),
+        )
 
 
 def _read(path: Path, base: Path, constants: dict[str, str], depth: int, budget: _Budget) -> Node:
@@ -235,7 +245,9 @@ def _read(path: Path, base: Path, constants: dict[str, str], depth: int, budget:
     try:
         text = read_file(path).decode()
     except UnicodeDecodeError as error:
-        message = f"the file is not UTF-8: byte {error.start + 1} is {error.object[error.start]:#04x}"
+        message = (
+            f"the file is not UTF-8: byte {error.start + 1} is {error.object[error.start]:#04x}"
+        )
         raise DocumentError(message, file=str(path)) from None
     if depth > MAX_INCLUDE_DEPTH:
         raise DocumentError("the files include one another without end", file=str(path))
@@ -252,7 +264,9 @@ def _read(path: Path, base: Path, constants: dict[str, str], depth: int, budget:
         found = _TOKEN.match(text, place)
         if found is None:
             raise DocumentError(
-                f"a quotation mark is not closed: {text[place : place + 20]!r}", file=str(path), line=line
+                f"a quotation mark is not closed: {text[place : place + 20]!r}",
+                file=str(path),
+                line=line,
             )
         if found["token"] is not None:
             tokens.append((found["token"], line))
@@ -266,7 +280,9 @@ def _read(path: Path, base: Path, constants: dict[str, str], depth: int, budget:
     return top
 
 
-def _fill_from_yaml(node: Node, found: Any, path: Path, base: Path, depth: int, level: int, budget: _Budget) -> None:
+def _fill_from_yaml(
+    node: Node, found: Any, path: Path, base: Path, depth: int, level: int, budget: _Budget
+) -> None:
     """Put below a node what a mapping of YAML has."""
     if found.id != "mapping":
         raise node.error("keys with values are wanted")
@@ -279,7 +295,9 @@ def _fill_from_yaml(node: Node, found: Any, path: Path, base: Path, depth: int, 
         if key.value == "include":
             if value.id != "scalar":
                 raise DocumentError(
-                    "'include' must be the name of one file", file=node.file, line=value.start_mark.line + 1
+                    "'include' must be the name of one file",
+                    file=node.file,
+                    line=value.start_mark.line + 1,
                 )
             included = _resolve_include(value.value, path, base)
             node.parts += _read(included, base, {}, depth + 1, budget).parts
@@ -287,7 +305,9 @@ def _fill_from_yaml(node: Node, found: Any, path: Path, base: Path, depth: int, 
         several = value.value if value.id == "sequence" else [value]
         if value.id == "sequence" and all(item.id == "scalar" for item in several):
             words = " ".join(item.value for item in several)
-            node.parts.append((key.value, Node(words, file=node.file, line=value.start_mark.line + 1)))
+            node.parts.append(
+                (key.value, Node(words, file=node.file, line=value.start_mark.line + 1))
+            )
             continue
         for item in several:
             budget.take_part(node)
@@ -314,7 +334,9 @@ class _Reader:
 
     def next(self) -> str:
         if self.place >= len(self.tokens):
-            raise DocumentError("the file ends in the middle of something", file=str(self.path), line=self.line())
+            raise DocumentError(
+                "the file ends in the middle of something", file=str(self.path), line=self.line()
+            )
         self.place += 1
         return self.tokens[self.place - 1][0]
 
@@ -358,11 +380,15 @@ class _Reader:
                 words.append(word.strip('"'))
             return " ".join(words)
         if value in ("{", "}", "="):
-            raise DocumentError(f"a value is wanted, not '{value}'", file=str(self.path), line=self.line())
+            raise DocumentError(
+                f"a value is wanted, not '{value}'", file=str(self.path), line=self.line()
+            )
         if value.startswith("$"):
             if value not in self.constants:
                 near = did_you_mean(value, self.constants)
-                raise DocumentError(f"there is no constant '{value}'{near}", file=str(self.path), line=self.line())
+                raise DocumentError(
+                    f"there is no constant '{value}'{near}", file=str(self.path), line=self.line()
+                )
             return self.constants[value]
         return value.strip('"')
 

@@ -41,18 +41,16 @@ class Source(NamedTuple):
 
 
 Feel = Callable[[Felt, Node, int, str], Source]
-"""Makes the source of a reflex: for a model, from what is written, the number of what has the name that is the
-`source`, and the side that the reflex is on, if any."""
+"""Makes the source of a reflex: for a model, from what is written, the number of what has the name
+that is the `source`, and the side that the reflex is on, if any.
+"""
 
 
 class Channel(NamedTuple):
     """A part of a reflex: ``K`` and a letter are its gain, the letter and ``0`` its offset.
 
-    Attributes:
-        letter: of it.
-        feel: makes the source.
-        rest: offset without a setting.
-        is_free: whether it may be negative without a setting; None where there is no setting for that.
+    Attributes: letter: of it. feel: makes the source. rest: offset without a setting. is_free:
+        whether it may be negative without a setting; None where there is no setting for that.
     """
 
     letter: str
@@ -64,13 +62,10 @@ class Channel(NamedTuple):
 class Kind(NamedTuple):
     """A kind of reflexes.
 
-    Attributes:
-        names: what a source is called, in the order of its numbers.
-        channels: which are added up.
-        corrects: whether it is a gain times what is missing to the offset, instead of what is beyond it.
-        is_own: whether without a source the target is that.
-        settings: of the sources.
-        refused: settings of SCONE that are not done here.
+    Attributes: names: what a source is called, in the order of its numbers. channels: which are
+        added up. corrects: whether it is a gain times what is missing to the offset, instead of
+        what is beyond it. is_own: whether without a source the target is that. settings: of the
+        sources. refused: settings of SCONE that are not done here.
     """
 
     names: Callable[[Felt], list[str]]
@@ -95,13 +90,19 @@ def _bodies(felt: Felt) -> list[str]:
 
 def _of_muscle(what: str, first: int) -> Feel:
     def feel(felt: Felt, node: Node, number: int, side: str) -> Source:
-        return Source(f"{felt.paths[number].removeprefix('/')}.{what}", IN_ROW, int(felt.senses[first]) + number)
+        return Source(
+            f"{felt.paths[number].removeprefix('/')}.{what}",
+            IN_ROW,
+            int(felt.senses[first]) + number,
+        )
 
     return feel
 
 
 def _spindle(felt: Felt, node: Node, number: int, side: str) -> Source:
-    length, speed = (int(felt.senses[first]) + number for first in (SENSES.LENGTHS, SENSES.VELOCITIES))
+    length, speed = (
+        int(felt.senses[first]) + number for first in (SENSES.LENGTHS, SENSES.VELOCITIES)
+    )
     return Source(f"{felt.paths[number].removeprefix('/')}.spindle", SPINDLE, length, speed)
 
 
@@ -109,7 +110,9 @@ def coordinate(what: str, first: int) -> Feel:
     """Of a coordinate a number of the row."""
 
     def feel(felt: Felt, node: Node, number: int, side: str) -> Source:
-        return Source(f"{felt.coordinates[number]}.{what}", IN_ROW, int(felt.senses[first]) + number)
+        return Source(
+            f"{felt.coordinates[number]}.{what}", IN_ROW, int(felt.senses[first]) + number
+        )
 
     return feel
 
@@ -133,7 +136,9 @@ def _point(what: str, kind: int) -> Feel:
             raise node.error("'direction' is 0 0 0, along which nothing is felt")
         link, frame = felt.engine.placements[number]
         numbers = *(frame[:3, :3] @ offset + frame[:3, 3]), *direction
-        return Source(f"{_bodies(felt)[number]}.{what}{_told(offset, direction)}", kind, link, 0, numbers)
+        return Source(
+            f"{_bodies(felt)[number]}.{what}{_told(offset, direction)}", kind, link, 0, numbers
+        )
 
     return feel
 
@@ -152,14 +157,18 @@ def _axis(felt: Felt, node: Node, number: int, side: str) -> Array:
 def _angle(felt: Felt, node: Node, number: int, side: str) -> Source:
     axis, (link, frame) = _axis(felt, node, number, side), felt.engine.placements[number]
     if np.count_nonzero(axis) != 1:
-        raise node.error("angles are about [ 1 0 0 ], [ 0 1 0 ] or [ 0 0 1 ]; about another 'axis' there is only KV")
+        raise node.error(
+            "angles are about [ 1 0 0 ], [ 0 1 0 ] or [ 0 0 1 ]; about another 'axis' there is only KV"
+        )
     name = f"{_bodies(felt)[number]}.angle{_told(axis)}"
     return Source(name, ANGLE, link, 0, (*np.ravel(frame[:3, :3].T), *axis))
 
 
 def _turn(felt: Felt, node: Node, number: int, side: str) -> Source:
     axis, (link, frame) = _axis(felt, node, number, side), felt.engine.placements[number]
-    return Source(f"{_bodies(felt)[number]}.turn{_told(axis)}", TURN, link, 0, tuple(frame[:3, :3] @ axis))
+    return Source(
+        f"{_bodies(felt)[number]}.turn{_told(axis)}", TURN, link, 0, tuple(frame[:3, :3] @ axis)
+    )
 
 
 _OF_MUSCLES = (
@@ -175,7 +184,14 @@ KINDS = {
     "DofReflex": Kind(
         _coordinates,
         (Channel("P", VALUE), Channel("V", SPEED)),
-        refused=("source_parent", "mirror_left", "KA", "condition", "filter_cutoff_frequency", "P0_source"),
+        refused=(
+            "source_parent",
+            "mirror_left",
+            "KA",
+            "condition",
+            "filter_cutoff_frequency",
+            "P0_source",
+        ),
     ),
     "BodyPointReflex": Kind(
         _bodies,

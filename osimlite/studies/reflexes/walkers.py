@@ -51,14 +51,11 @@ LAGGING = "euler2", "merson"
 class Felt:
     """What is felt of a model, and what is driven: names, legs, and the plan of a row.
 
-    Args:
-        model: whose.
-        engine: of it.
-        count: of its copies, each of which has numbers of its own.
-        step: for which controls are held, s.
-        lags: whether control steps begin with the derivative that the one before has ended with.
-        legs: without the side the names of the bodies of upper legs (`upper`), of feet (`lower`; empty for those two
-            below), and of the forces of feet (`contact`).
+    Args: model: whose. engine: of it. count: of its copies, each of which has numbers of its own.
+        step: for which controls are held, s. lags: whether control steps begin with the derivative
+        that the one before has ended with. legs: without the side the names of the bodies of upper
+        legs (`upper`), of feet (`lower`; empty for those two below), and of the forces of feet
+        (`contact`).
 
     Attributes:
         names: of the actuators, muscles first.
@@ -82,14 +79,18 @@ class Felt:
         self.mechanism: Mechanism = engine.mechanism
         tree, known = model.tree(), engine.forces.controls.names
         # Of an actuator with several controls the path has a number behind.
-        owners: list[Any] = [tree.by_path.get(path) or tree.by_path[path.rpartition("_")[0]] for path in known]
+        owners: list[Any] = [
+            tree.by_path.get(path) or tree.by_path[path.rpartition("_")[0]] for path in known
+        ]
         self.order = sorted(range(len(known)), key=lambda k: not isinstance(owners[k], Muscle))
         self.paths = [known[k] for k in self.order]
         self.names = [path.rpartition("/")[2] for path in self.paths]
         self.muscles: list[Any] = [owners[k] for k in self.order if isinstance(owners[k], Muscle)]
         self.optimal = np.array([item.optimal_fiber_length for item in self.muscles])
         self.strengths = np.array([item.max_isometric_force for item in self.muscles])
-        self.least, self.most = np.transpose([_bounds(owners[k]) for k in self.order]).reshape(2, -1)
+        self.least, self.most = np.transpose([_bounds(owners[k]) for k in self.order]).reshape(
+            2, -1
+        )
         self.mass = self.mechanism.total_mass
         self.weight = self.mass * float(np.linalg.norm(self.mechanism.gravity))
         infos = self.mechanism.coordinates
@@ -124,15 +125,25 @@ class Felt:
         sizes = m, m, m, m, m, n, n, n, legs, 3 * b, 3, 1
         head = m, n, legs, len(limits) // 2, b, len(self.names), len(known)
         plan = [*head, 0, *np.cumsum(sizes).tolist()]
-        plan += [place for path in self.paths[:m] for place in engine.places_of(path, OF_MUSCLES)] + limits
+        plan += [
+            place for path in self.paths[:m] for place in engine.places_of(path, OF_MUSCLES)
+        ] + limits
         plan += [placement.link for placement in engine.placements]
-        plan += [number for leg in self.legs for number in (leg.base, leg.foot, leg.pairs.start, leg.pairs.stop)]
+        plan += [
+            number
+            for leg in self.legs
+            for number in (leg.base, leg.foot, leg.pairs.start, leg.pairs.stop)
+        ]
         return np.array(plan, dtype=np.int64), known
 
     def _legs(self, upper: str, lower: str, contact: str) -> list[Leg]:
         names = [body.name for body in self.mechanism.bodies]
-        parents = {body.name: names[body.parent] for body in self.mechanism.bodies if body.parent != GROUND}
-        at_rest = self.mechanism.at(np.array([info.default_value for info in self.mechanism.coordinates]))
+        parents = {
+            body.name: names[body.parent] for body in self.mechanism.bodies if body.parent != GROUND
+        }
+        at_rest = self.mechanism.at(
+            np.array([info.default_value for info in self.mechanism.coordinates])
+        )
         origins = {name: at_rest.origins[k] for k, name in enumerate(names)}
         elements = [item for item in self.engine.forces.elements if isinstance(item, PairContact)]
         first = np.cumsum([0, *(len(item.pairs) for item in elements)])
@@ -144,17 +155,25 @@ class Felt:
         for side in SIDES:
             top = f"{upper}{side}"
             below = {name: parents.get(parents.get(name, ""), "") for name in names}
-            foot = f"{lower}{side}" if lower else next((name for name, far in below.items() if far == top), "")
+            foot = (
+                f"{lower}{side}"
+                if lower
+                else next((name for name, far in below.items() if far == top), "")
+            )
             if top not in names or foot not in names or f"{contact}{side}" not in pairs:
                 continue
             length, here = 0.0, foot
             while here != top and here in parents:
-                length += float(np.linalg.norm(origins[here] - origins.get(parents[here], np.zeros(3))))
+                length += float(
+                    np.linalg.norm(origins[here] - origins.get(parents[here], np.zeros(3)))
+                )
                 here = parents[here]
             base = parents.get(top, "")
             if base not in names:
                 raise ModelError(f"'{top}' hangs on no body")
-            legs.append(Leg(side, names.index(base), names.index(foot), pairs[f"{contact}{side}"], length))
+            legs.append(
+                Leg(side, names.index(base), names.index(foot), pairs[f"{contact}{side}"], length)
+            )
         self._legs_named = upper, contact
         return legs
 
@@ -216,7 +235,9 @@ class Walkers(Felt):
         super().__init__(model, self.copies.engine, count, step, legs, lags=integrator in LAGGING)
         others = self.names[len(self.muscles) :]
         if others:
-            raise ModelError(f"{listed(others)} are no muscles, and efforts of muscles alone are known")
+            raise ModelError(
+                f"{listed(others)} are no muscles, and efforts of muscles alone are known"
+            )
         state, size = self.copies.simulation.state, len(self.coordinates)
         infos = self.mechanism.coordinates
         self.places = {
@@ -225,7 +246,10 @@ class Walkers(Felt):
             **{path: 2 * size + n for n, path in enumerate(state.paths)},
         }
         self._activations = np.array([self.places[f"{path}/activation"] for path in self.paths])
-        self.rows, self.excitations = np.zeros((count, self.senses[SENSES.SIZE])), np.zeros((count, len(self.names)))
+        self.rows, self.excitations = (
+            np.zeros((count, self.senses[SENSES.SIZE])),
+            np.zeros((count, len(self.names))),
+        )
         self.progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
         self._driven: Ints = self.copies.places[self.order]
 

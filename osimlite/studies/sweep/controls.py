@@ -8,7 +8,8 @@
 ``soleus_r/control@scale``     factor of what the PrescribedControllers of the model make it
 =============================  ===========================================================================
 
-All of it becomes functions of PrescribedControllers, so that the model that is written does the same in OpenSim.
+All of it becomes functions of PrescribedControllers, so that the model that is written does the
+same in OpenSim.
 """
 
 from __future__ import annotations
@@ -102,7 +103,9 @@ def nodes_of(name: str) -> list[str]:
         first, _, rest = word.partition(":")
         last, _, number = rest.partition(":")
         if not number.isdigit() or int(number) < 2:
-            raise SettingError(f"nodes are given as @FIRST:LAST:COUNT, with a count of two or more; got '{name}'")
+            raise SettingError(
+                f"nodes are given as @FIRST:LAST:COUNT, with a count of two or more; got '{name}'"
+            )
         times = np.linspace(_time(name, first), _time(name, last), int(number)).tolist()
     elif "," in word:
         times = [_time(name, part) for part in word.split(",")]
@@ -131,11 +134,13 @@ def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) 
         interpolation: one of `INTERPOLATIONS`.
         to: how long the runs last, s.
 
-    Raises:
-        SettingError: there is no such interpolation, or a cubic has too few nodes, or goes on beyond them.
+    Raises: SettingError: there is no such interpolation, or a cubic has too few nodes, or goes on
+        beyond them.
     """
     if interpolation not in INTERPOLATIONS:
-        raise SettingError(f"there is no interpolation '{interpolation}'{or_known(interpolation, INTERPOLATIONS)}")
+        raise SettingError(
+            f"there is no interpolation '{interpolation}'{or_known(interpolation, INTERPOLATIONS)}"
+        )
     if interpolation != "cubic":
         return
     for actuator, parts in _by_actuator(controls, NODE).items():
@@ -157,11 +162,15 @@ def controller_of(model: Model, controls: Mapping[str, Any]) -> PrescribedContro
     Raises:
         SettingError: there is no such actuator, or a control is something else.
     """
-    actuators = {key: item.path for item in model.components(Actuator) for key in (item.name, item.path)}
+    actuators = {
+        key: item.path for item in model.components(Actuator) for key in (item.name, item.path)
+    }
     made = _controller(model, "given", [actuators.get(key, key) for key in controls])
     for name, given in controls.items():
         if name not in actuators:
-            raise SettingError(f"the model has no actuator '{name}' to control{did_you_mean(name, actuators)}")
+            raise SettingError(
+                f"the model has no actuator '{name}' to control{did_you_mean(name, actuators)}"
+            )
         if isinstance(given, tuple):
             times, values = (np.asarray(numbers, dtype=float).tolist() for numbers in given)
             y = (values[0], *values, values[-1])
@@ -169,7 +178,9 @@ def controller_of(model: Model, controls: Mapping[str, Any]) -> PrescribedContro
         elif isinstance(given, int | float):
             made.ControlFunctions.objects.append(Constant(value=float(given)))
         else:
-            raise SettingError(f"the control of '{name}' is {given!r}; a sweep takes numbers and tables")
+            raise SettingError(
+                f"the control of '{name}' is {given!r}; a sweep takes numbers and tables"
+            )
     return made
 
 
@@ -208,7 +219,9 @@ class VariedControls:
         for kind in (OFFSET, NODE, SWITCH):
             if parts := _by_actuator(controls, kind):
                 made = _controller(model, kind, list(parts))
-                made.ControlFunctions.objects += [self._function(kind, own, interpolation) for own in parts.values()]
+                made.ControlFunctions.objects += [
+                    self._function(kind, own, interpolation) for own in parts.values()
+                ]
                 self.controllers.append(model.add(made))
 
     def put(self, values: Values) -> None:
@@ -216,7 +229,9 @@ class VariedControls:
         for function, name, made in self._puts:
             setattr(function, name, made(values))
 
-    def _function(self, kind: str, parts: Sequence[tuple[float, int]], interpolation: str) -> Function:
+    def _function(
+        self, kind: str, parts: Sequence[tuple[float, int]], interpolation: str
+    ) -> Function:
         times, places = zip(*parts, strict=True)
         function: Function
         if kind == OFFSET:
@@ -226,12 +241,18 @@ class VariedControls:
             # Switches may pass each other: what counts is when something is switched.
             x, y = (BEFORE, *(0.0 for _ in places)), (float(k % 2) for k in range(len(places) + 1))
             function = PiecewiseConstantFunction(x=x, y=tuple(y))
-            self._puts.append((function, "x", lambda values: (BEFORE, *sorted(values[k] for k in places))))
+            self._puts.append(
+                (function, "x", lambda values: (BEFORE, *sorted(values[k] for k in places)))
+            )
         else:
             if interpolation == "cubic":
                 function = GCVSpline(half_order=2, x=times, weights=(1.0,) * len(times))
             else:
-                made = PiecewiseLinearFunction if interpolation == "linear" else PiecewiseConstantFunction
+                made = (
+                    PiecewiseLinearFunction
+                    if interpolation == "linear"
+                    else PiecewiseConstantFunction
+                )
                 function, places = made(x=_around(times)), (places[0], *places, places[-1])
             function.y = (0.0,) * len(places)
             self._puts.append((function, "y", lambda values: tuple(values[k] for k in places)))
@@ -243,7 +264,8 @@ class VariedControls:
         for controller in model.components(PrescribedController):
             functions = controller.ControlFunctions.objects
             targets = [
-                model.tree().target(controller, "socket_actuators", word) for word in controller.socket_actuators
+                model.tree().target(controller, "socket_actuators", word)
+                for word in controller.socket_actuators
             ]
             for number, (target, own) in enumerate(zip(targets, functions, strict=False)):
                 if target is not None and target.path == actuator:

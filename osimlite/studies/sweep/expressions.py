@@ -1,8 +1,8 @@
 """Measures that are written as expressions of what changes during a run.
 
-``max(center_of_mass_Y) - 0.01*integral(soleus_r/activation^2)``: what stands for a number at all times is made one by
-`max`, `min`, `mean`, `start`, `end` or `integral` (over time in s) of its values at the times of the reports and at the
-end of the run.
+``max(center_of_mass_Y) - 0.01*integral(soleus_r/activation^2)``: what stands for a number at all
+times is made one by `max`, `min`, `mean`, `start`, `end` or `integral` (over time in s) of its
+values at the times of the reports and at the end of the run.
 
 ================================  ===========================================================================
 ``time``                          s
@@ -100,7 +100,9 @@ class Expression:
                 f"the measure '{text}' is no expression; write it as in max(NAME) - 2*end(NAME)"
             ) from None
         if np.ndim(self._number(np.arange(2.0), [np.ones(2)] * len(self._quantities))):
-            raise SettingError(f"the measure '{text}' changes during a run; say what of it, as in max({text})")
+            raise SettingError(
+                f"the measure '{text}' changes during a run; say what of it, as in max({text})"
+            )
 
     def of(self, engine: Any, moments: Moments) -> float:
         """The number of a run.
@@ -110,7 +112,9 @@ class Expression:
             moments: of the run, two or more.
         """
         times = np.array([t for t, _ in moments])
-        return float(self._number(times, [quantity(engine, moments) for quantity in self._quantities]))
+        return float(
+            self._number(times, [quantity(engine, moments) for quantity in self._quantities])
+        )
 
     def _number(self, times: Floats, columns: Sequence[Floats]) -> Any:
         with np.errstate(all="ignore"):
@@ -142,7 +146,9 @@ class Expression:
 def quantities(engine: Any) -> Mapping[str, Quantity]:
     """What can be looked at during the runs of a model, by name; of several with one name the first."""
     mechanism, count = engine.mechanism, len(engine.order)
-    result: dict[str, Quantity] = {"time": lambda engine, moments: np.array([t for t, _ in moments])}
+    result: dict[str, Quantity] = {
+        "time": lambda engine, moments: np.array([t for t, _ in moments])
+    }
     places = {place: number for number, place in enumerate(engine.order)}
     for place, info in enumerate(mechanism.coordinates):
         value = partial(_state, places[place]) if place in places else partial(_still, place)
@@ -164,13 +170,19 @@ def quantities(engine: Any) -> Mapping[str, Quantity]:
             more += [(f"{name}_{letter}", partial(_axis, motion, axis))]
             more += [(f"{name}_{letter}/speed", partial(_axis, motion, 3 + axis))]
     more += [(label, partial(_force, number)) for number, label in enumerate(engine.columns)]
-    more += [(label, partial(_probe, number)) for number, label in enumerate(probe_labels(engine.probes))]
+    more += [
+        (label, partial(_probe, number)) for number, label in enumerate(probe_labels(engine.probes))
+    ]
     return dict(reversed(more)) | result
 
 
 def driven_names(engine: Any) -> set[str]:
     """Names of what depends on the controls of that moment, besides on the state."""
-    controls = {f"{name}/control" for path in engine.forces.controls.names for name in (path, path.rpartition("/")[2])}
+    controls = {
+        f"{name}/control"
+        for path in engine.forces.controls.names
+        for name in (path, path.rpartition("/")[2])
+    }
     return controls | {*engine.columns, *probe_labels(engine.probes)}
 
 
@@ -179,7 +191,9 @@ def _state(place: int, engine: Any, moments: Moments) -> Floats:
 
 
 def _still(place: int | None, engine: Any, moments: Moments) -> Floats:
-    return np.full(len(moments), 0.0 if place is None else engine.mechanism.coordinates[place].default_value)
+    return np.full(
+        len(moments), 0.0 if place is None else engine.mechanism.coordinates[place].default_value
+    )
 
 
 def _control(place: int, engine: Any, moments: Moments) -> Floats:
@@ -206,5 +220,7 @@ def _body(number: int, engine: Any, moments: Moments) -> Floats:
     return stations(engine, moments, number, engine.mechanism.bodies[number].mass_properties.center)
 
 
-def _axis(motion: Callable[[Any, Moments], Floats], axis: int, engine: Any, moments: Moments) -> Floats:
+def _axis(
+    motion: Callable[[Any, Moments], Floats], axis: int, engine: Any, moments: Moments
+) -> Floats:
     return motion(engine, moments)[:, axis]

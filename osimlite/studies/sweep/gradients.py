@@ -1,8 +1,9 @@
 """The derivatives of what is wanted of a run, by the numbers that a search varies.
 
-A motion is followed along its very steps with exact derivatives, in machine code. What a measure makes of the states
-at the times of the reports and at the end is a formula, and so is what a variable makes of the numbers of a model:
-these are differences, good to 1e-9 where the formulas are smooth.
+A motion is followed along its very steps with exact derivatives, in machine code. What a measure
+makes of the states at the times of the reports and at the end is a formula, and so is what a
+variable makes of the numbers of a model: these are differences, good to 1e-9 where the formulas are
+smooth.
 """
 
 from __future__ import annotations
@@ -44,7 +45,9 @@ class _Events(list[Any]):
     """Of a run beside another one, which nobody knows."""
 
     def _refuse(self, *_: object) -> NoReturn:
-        raise UnsupportedError("events of a run have no derivatives; take another measure, or another --method")
+        raise UnsupportedError(
+            "events of a run have no derivatives; take another measure, or another --method"
+        )
 
     __iter__ = __len__ = __getitem__ = __contains__ = _refuse
 
@@ -55,24 +58,33 @@ class Gradients:
     Args:
         plan: its first measure is meant.
 
-    Raises:
-        SettingError: the plan has other steps than Merson's, or something that ends a run before its time.
-        UnsupportedError: the measure is of events.
+    Raises: SettingError: the plan has other steps than Merson's, or something that ends a run
+        before its time. UnsupportedError: the measure is of events.
     """
 
     def __init__(self, plan: Plan) -> None:
         if plan.engine != "compiled" or plan.integrator != MERSON:
-            raise SettingError("--method gradient follows Merson's steps of the compiled engine; choose no others")
+            raise SettingError(
+                "--method gradient follows Merson's steps of the compiled engine; choose no others"
+            )
         if plan.controller is not None:
-            raise SettingError("what a controller holds between its steps has no derivatives; take another --method")
+            raise SettingError(
+                "what a controller holds between its steps has no derivatives; take another --method"
+            )
         if plan.stops:
-            raise SettingError("--method gradient is for runs that last their time; leave out --below and --above")
+            raise SettingError(
+                "--method gradient is for runs that last their time; leave out --below and --above"
+            )
         self._plan, self._variants = plan, Variants(plan)
         given = self._variants.given
         self._measure = measure(plan.measures[0], given.engine, plan.feet)
         if self._measure.watches:
-            raise UnsupportedError(f"'{self._measure.name}' is of events; take another measure, or another --method")
-        self._times = [0.0, plan.to] if plan.interval is None else report_times(plan.to, plan.interval)
+            raise UnsupportedError(
+                f"'{self._measure.name}' is of events; take another measure, or another --method"
+            )
+        self._times = (
+            [0.0, plan.to] if plan.interval is None else report_times(plan.to, plan.interval)
+        )
         self._steps: tuple[bytes, Steps] | None = None
 
     def at(self, values: Sequence[float], free: Sequence[int]) -> Array:
@@ -82,14 +94,19 @@ class Gradients:
             OsimliteError: there is no run with these values, or it has no derivatives.
         """
         here = self._near(list(values))
-        sizes = [PART * (self._plan.variables[place].high - self._plan.variables[place].low) for place in free]
+        sizes = [
+            PART * (self._plan.variables[place].high - self._plan.variables[place].low)
+            for place in free
+        ]
         changes = np.array([by for size in sizes for by in (size, -size)])
         near = [
             self._near([x + by * (number == place) for number, x in enumerate(values)])
             for by, place in zip(changes.tolist(), np.repeat(free, 2).tolist(), strict=True)
         ]
         if any(item.variant.structure != here.variant.structure for item in near):
-            raise UnsupportedError("models with other values have other equations, and no derivatives between them")
+            raise UnsupportedError(
+                "models with other values have other equations, and no derivatives between them"
+            )
 
         def slopes(rows: Sequence[Array] | Array) -> Array:
             """By each variable, of what is near."""
@@ -97,21 +114,30 @@ class Gradients:
             result: Array = (both[:, 0] - both[:, 1]) / (2.0 * np.array(sizes)[:, None])
             return result
 
-        dy, dx = slopes([item.start for item in near]).T, slopes([item.variant.numbers for item in near]).T
+        dy, dx = (
+            slopes([item.start for item in near]).T,
+            slopes([item.variant.numbers for item in near]).T,
+        )
         runs = self._run(here)
         steps, (times, states) = self._steps_of(here.variant), self._motion(here)
         steps.take(here.variant.numbers, dx)
-        moved = followed(steps, times, states, dy, self._times, self._plan.accuracy, here.variant.state.names)
+        moved = followed(
+            steps, times, states, dy, self._times, self._plan.accuracy, here.variant.state.names
+        )
         count, by = len(near), np.repeat(np.arange(len(free)), 2)
         reports = np.repeat(runs.reports, count, axis=0)
         if self._plan.interval is not None:
             reports += changes[:, None, None] * moved[:, :, by].transpose(2, 0, 1)
         ends = runs.states + changes[:, None] * moved[-1][:, by].T
         beside = Runs(
-            np.repeat(runs.times, count), ends, np.repeat(runs.endings, count),
-            np.repeat(runs.counts, count, axis=0), reports, [_Events() for _ in near],
+            np.repeat(runs.times, count),
+            ends,
+            np.repeat(runs.endings, count),
+            np.repeat(runs.counts, count, axis=0),
+            reports,
+            [_Events() for _ in near],
             np.full((count, *runs.peaks.shape[1:]), np.nan),
-        )  # fmt: skip
+        )
         batch = Batch(
             here.variant.engine,
             lambda number: near[number].variant.engine,
@@ -134,14 +160,22 @@ class Gradients:
     def _near(self, values: list[float]) -> _Near:
         variant = self._variants.variant(values)
         start = self._variants.start(variant, values)
-        return _Near(values, variant, self._variants.placed(variant.engine, [variant], start[None])[0])
+        return _Near(
+            values, variant, self._variants.placed(variant.engine, [variant], start[None])[0]
+        )
 
     def _run(self, here: _Near) -> Runs:
         plan = self._plan
         return run_many(
-            here.variant.engine, here.start[None], plan.to, accuracy=plan.accuracy, integrator=plan.integrator,
-            report_times=self._times if plan.interval is not None else [], most_tries=MOST_TRIES, threads=1,
-        )  # fmt: skip
+            here.variant.engine,
+            here.start[None],
+            plan.to,
+            accuracy=plan.accuracy,
+            integrator=plan.integrator,
+            report_times=self._times if plan.interval is not None else [],
+            most_tries=MOST_TRIES,
+            threads=1,
+        )
 
     def _motion(self, here: _Near) -> tuple[list[float], Array]:
         """Times (s,) and states (s, y) at the ends of all steps of a run."""
@@ -151,7 +185,9 @@ class Gradients:
             times.append(t)
             states.append(y)
 
-        stepper = here.variant.engine.stepper(0.0, here.start.tolist(), Settings(self._plan.accuracy), note)
+        stepper = here.variant.engine.stepper(
+            0.0, here.start.tolist(), Settings(self._plan.accuracy), note
+        )
         stepper.table([self._plan.to])
         stepper.catch_up()
         if stepper.ended is not None:
@@ -162,5 +198,8 @@ class Gradients:
         if self._steps is None or self._steps[0] != variant.structure:
             engine = variant.engine
             packed = pack(engine.mechanism, replace(engine.forces, controls=engine.driving))
-            self._steps = variant.structure, Steps(packed, engine.forces, range(len(variant.state.names)))
+            self._steps = (
+                variant.structure,
+                Steps(packed, engine.forces, range(len(variant.state.names))),
+            )
         return self._steps[1]

@@ -1,12 +1,13 @@
 """What is kept of a run: one number for each measure.
 
-A measure of your own is a function of a :class:`Run` that returns a number, named as ``module:function`` or
-``file.py:function``::
+A measure of your own is a function of a :class:`Run` that returns a number, named as
+``module:function`` or ``file.py:function``::
 
     def drop(run):
         return run.start["Pelvis_ty"] - run.end["Pelvis_ty"]
 
-or an expression, as :mod:`osimlite.studies.sweep.expressions` has them: ``start(Pelvis_ty) - end(Pelvis_ty)``.
+or an expression, as :mod:`osimlite.studies.sweep.expressions` has them: ``start(Pelvis_ty) -
+end(Pelvis_ty)``.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ class Batch:
     values: Floats  # of the variables (W, d)
     names: Sequence[str]  # of the variables
     report_times: Floats  # at which states were kept, s
-    memory: dict[str, Any] = field(default_factory=dict)  # where measures leave for each other what they have found
+    # where measures leave for each other what they have found
+    memory: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
@@ -68,7 +70,8 @@ class Measure:
     name: str  # of the column
     of: Callable[[Batch], Any]  # computes them (W,); not a number where there is none
     watches: tuple[Watch, ...] = ()  # what it needs to have watched
-    room: Callable[[float], int] = lambda to: 0  # how many events of a run of so many seconds it looks at
+    # how many events of a run of so many seconds it looks at
+    room: Callable[[float], int] = lambda to: 0
     event_states: bool = False  # whether it looks at the states there
 
 
@@ -98,8 +101,10 @@ class Run:
     start: State  # initial state
     end: State  # last state
     time: float  # at which it ended, s
-    times: Floats  # moments up to the end at which the state was kept, if a report interval was asked for, s
-    events: Sequence[tuple[float, str, bool]]  # time (s), name of a contact or of what was watched, whether it begins
+    # moments up to the end at which the state was kept, if a report interval was asked for, s
+    times: Floats
+    # time (s), name of a contact or of what was watched, whether it begins
+    events: Sequence[tuple[float, str, bool]]
     largest_forces: Mapping[str, float]  # N, by contact
     engine: Any = field(repr=False)  # that computed it, with its `mechanism`
     states: Floats = field(repr=False)
@@ -109,7 +114,9 @@ class Run:
         """What a name in an expression stands for, at the times."""
         if name not in self.quantities:
             raise SettingError(f"a run has no '{name}'{did_you_mean(name, self.quantities)}")
-        return self.quantities[name](self.engine, list(zip(self.times, self.states.tolist(), strict=True)))
+        return self.quantities[name](
+            self.engine, list(zip(self.times, self.states.tolist(), strict=True))
+        )
 
     @cached_property
     def mechanism(self) -> Any:
@@ -120,10 +127,8 @@ class Run:
 def measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """The measure that is meant by a name, ``NAME/value`` or ``NAME/speed`` at the end, an expression or a function.
 
-    Args:
-        spec: what is meant.
-        engine: of the model.
-        feet: contacts of each foot, for the measures of a walker; found by the structure of the model if left out.
+    Args: spec: what is meant. engine: of the model. feet: contacts of each foot, for the measures
+        of a walker; found by the structure of the model if left out.
 
     Raises:
         SettingError: there is none of that name, or the model has nothing of the kind.
@@ -143,7 +148,9 @@ def measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> Measur
         except ModelError as error:
             raise SettingError(f"there is no measure '{name}': {error.message}") from None
         return Measure(name, partial(_ends, place, locked))
-    raise SettingError(f"there is no measure '{name}'{or_known(name, registry.measure_names(), 'module:function')}")
+    raise SettingError(
+        f"there is no measure '{name}'{or_known(name, registry.measure_names(), 'module:function')}"
+    )
 
 
 def is_expression(spec: Any) -> bool:
@@ -170,16 +177,22 @@ def measure_name(spec: Any) -> str:
 def distance(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """How far the first free coordinate that slides has come, m."""
     infos = engine.mechanism.coordinates
-    place = next((k for k, j in enumerate(engine.order) if infos[j].motion_type == "translational"), None)
+    place = next(
+        (k for k, j in enumerate(engine.order) if infos[j].motion_type == "translational"), None
+    )
     if place is None:
-        raise SettingError("no coordinate of the model slides, so that it has no distance; take another measure")
+        raise SettingError(
+            "no coordinate of the model slides, so that it has no distance; take another measure"
+        )
     return Measure("distance", lambda batch: batch.runs.states[:, place] - batch.starts[:, place])
 
 
 @registry.measure()
 def largest_force(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """The largest force of any contact at the end of a step, N."""
-    return Measure("largest_force", lambda batch: batch.runs.peaks[:, :, 0].max(axis=1, initial=0.0))
+    return Measure(
+        "largest_force", lambda batch: batch.runs.peaks[:, :, 0].max(axis=1, initial=0.0)
+    )
 
 
 @registry.measure()
@@ -207,7 +220,10 @@ def _expressed(expression: Expression, batch: Batch) -> list[float]:
     runs, times = batch.runs, batch.report_times
     for k, (end, state) in enumerate(zip(runs.times.tolist(), runs.states.tolist(), strict=True)):
         kept = int(np.searchsorted(times, end))
-        moments = [*zip(times[:kept].tolist(), runs.reports[k, :kept].tolist(), strict=True), (end, state)]
+        moments = [
+            *zip(times[:kept].tolist(), runs.reports[k, :kept].tolist(), strict=True),
+            (end, state),
+        ]
         result.append(expression.of(batch.engine_of(k), moments))
     return result
 
@@ -253,5 +269,7 @@ def _function(name: str) -> Callable[[Run], float]:
     module = module_of_file(Path(place)) if place.endswith(".py") else module_named(place)
     result = getattr(module, function, None)
     if not callable(result):
-        raise SettingError(f"'{place}' has no function '{function}'{did_you_mean(function, vars(module))}")
+        raise SettingError(
+            f"'{place}' has no function '{function}'{did_you_mean(function, vars(module))}"
+        )
     return result

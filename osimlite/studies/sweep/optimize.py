@@ -62,7 +62,9 @@ class Objective:
     def sign(self) -> float:
         """What makes a cost of the measure."""
         known = registry.measure_named(measure_name(self.measure))
-        wanted = bool(known and known.is_maximized) if self.is_maximized is None else self.is_maximized
+        wanted = (
+            bool(known and known.is_maximized) if self.is_maximized is None else self.is_maximized
+        )
         return -1.0 if wanted else 1.0
 
 
@@ -115,25 +117,18 @@ def optimize(
 ) -> Optimum:
     """Look for the values of the variables that serve an objective best.
 
-    Args:
-        plan: what is run; its measures are kept in the history too.
-        objective: what is wanted.
-        folder: where `history.parquet`, `best.osim`, `summary.json`, and of a controller `best.par`, are written.
-        method: one of `METHODS` in :mod:`osimlite.studies.sweep.search`.
-        budget: runs that are allowed.
-        popsize: runs between two decisions of the method.
-        seed: what makes the search the same again.
-        sigma: how far from where it begins the method looks at first, as a fraction of the ranges; `sobol-cma` has
-            looked all over them before.
-        tolerance: of the cost and of the points (as fractions of the ranges), at which the search ends.
-        is_bounded: whether the ranges are bounds, or say only where to begin.
-        start: values to begin at, of all variables or by name; for others those of the model where they are within the
-            ranges, else the middle.
-        resume: go on with an interrupted search, or with a finished one and a larger budget.
-        force: replace what another search has left in the folder.
-        workers: as of a sweep.
-        cluster: as of a sweep.
-        progress: called as runs are done.
+    Args: plan: what is run; its measures are kept in the history too. objective: what is wanted.
+        folder: where `history.parquet`, `best.osim`, `summary.json`, and of a controller
+        `best.par`, are written. method: one of `METHODS` in :mod:`osimlite.studies.sweep.search`.
+        budget: runs that are allowed. popsize: runs between two decisions of the method. seed: what
+        makes the search the same again. sigma: how far from where it begins the method looks at
+        first, as a fraction of the ranges; `sobol-cma` has looked all over them before. tolerance:
+        of the cost and of the points (as fractions of the ranges), at which the search ends.
+        is_bounded: whether the ranges are bounds, or say only where to begin. start: values to
+        begin at, of all variables or by name; for others those of the model where they are within
+        the ranges, else the middle. resume: go on with an interrupted search, or with a finished
+        one and a larger budget. force: replace what another search has left in the folder. workers:
+        as of a sweep. cluster: as of a sweep. progress: called as runs are done.
 
     Raises:
         Interrupted: by the keyboard; the search can be resumed.
@@ -146,7 +141,9 @@ def optimize(
     if not free:
         raise SettingError("there is nothing to search: every variable has one value only")
     if budget < 1 or (popsize is not None and popsize < 2):
-        raise SettingError("a search has a budget of at least one run, and a population of at least two")
+        raise SettingError(
+            "a search has a budget of at least one run, and a population of at least two"
+        )
     if not 0 <= seed < 2**32:
         raise SettingError(f"the seed is a whole number from 0 to {2**32 - 1}, not {seed}")
     if tolerance is not None and not (isfinite(tolerance) and tolerance >= 0.0):
@@ -159,13 +156,27 @@ def optimize(
     variants = Variants(plan)
     point = _start(plan, variants, free, start, is_bounded)
     wanted = {
-        **plan.settings(), "objective": names[0], "sign": objective.sign, "method": method, "popsize": popsize,
-        "seed": seed, "sigma": sigma, "tolerance": tolerance, "bounded": is_bounded, "start": point.tolist(),
-    }  # fmt: skip
+        **plan.settings(),
+        "objective": names[0],
+        "sign": objective.sign,
+        "method": method,
+        "popsize": popsize,
+        "seed": seed,
+        "sigma": sigma,
+        "tolerance": tolerance,
+        "bounded": is_bounded,
+        "start": point.tolist(),
+    }
     with folder_to_fill(folder) as where, pool(plan, workers=workers, cluster=cluster) as workforce:
-        evaluations = _Evaluations(plan, free, objective.sign, is_bounded, budget, workforce, progress)
+        evaluations = _Evaluations(
+            plan, free, objective.sign, is_bounded, budget, workforce, progress
+        )
         partial = _open(
-            where / HISTORY, schema(plan.columns("evaluation", "batch"), wanted), resume, force, evaluations
+            where / HISTORY,
+            schema(plan.columns("evaluation", "batch"), wanted),
+            resume,
+            force,
+            evaluations,
         )
         evaluations.partial, ended = partial, ""
         try:
@@ -201,7 +212,9 @@ def _start(
         value = start.get(item.name, present[place])
         within = value is not None and (item.low <= value <= item.high or not is_bounded)
         if item.name in start and not within:
-            raise SettingError(f"'{item.name}' cannot start at {value}, outside {item.low:g} to {item.high:g}")
+            raise SettingError(
+                f"'{item.name}' cannot start at {value}, outside {item.low:g} to {item.high:g}"
+            )
         if value is not None and item.is_log and value <= 0.0:
             within = False
         result.append(item.fraction(value) if value is not None and within else 0.5)
@@ -218,7 +231,9 @@ def found_by(folder: str | Path) -> dict[str, float]:
     try:
         return {name: float(value) for name, value in json.loads(read_file(path))["values"].items()}
     except (OsimliteError, ValueError, LookupError, AttributeError, TypeError, RecursionError):
-        raise OsimliteError(f"'{path}' is not the summary of a search; name the folder of one") from None
+        raise OsimliteError(
+            f"'{path}' is not the summary of a search; name the folder of one"
+        ) from None
 
 
 def _open(path: Path, table: Any, resume: bool, force: bool, evaluations: _Evaluations) -> Partial:
@@ -275,7 +290,9 @@ class _Evaluations:
         """Take what was found before."""
         columns = batch.to_pydict()
         values = [columns[item.name] for item in self.plan.variables]
-        result = zip(zip(*values, strict=True), columns["status"], columns[self.objective], strict=True)
+        result = zip(
+            zip(*values, strict=True), columns["status"], columns[self.objective], strict=True
+        )
         self._note(columns["status"], columns["reason"])
         self._history += [(list(row), status, value) for row, status, value in result]
         # What is there is not forgotten, even if fewer runs are asked for now.
@@ -317,8 +334,8 @@ class _Evaluations:
     def slopes(self, gradients: Any) -> Callable[[Floats], Floats]:
         """The derivatives of the cost by points (d,) of the cube.
 
-        Args:
-            gradients: what finds those of the objective, see :func:`osimlite.studies.sweep.registry.gradients`.
+        Args: gradients: what finds those of the objective, see
+            :func:`osimlite.studies.sweep.registry.gradients`.
         """
 
         def at(point: Floats) -> Floats:
@@ -355,11 +372,18 @@ class _Evaluations:
         numbers = np.arange(first, first + len(values)), np.full(len(values), self.batches)
         self.partial.add([*numbers, *values.T, *block.columns])
         self._note(block.status, block.reasons)
-        return list(zip(values.tolist(), block.status, block.measures[self.objective].tolist(), strict=True))
+        return list(
+            zip(values.tolist(), block.status, block.measures[self.objective].tolist(), strict=True)
+        )
 
 
 def _finish(
-    where: Path, plan: Plan, variants: Variants, evaluations: _Evaluations, wanted: dict[str, Any], ended: str
+    where: Path,
+    plan: Plan,
+    variants: Variants,
+    evaluations: _Evaluations,
+    wanted: dict[str, Any],
+    ended: str,
 ) -> Optimum:
     if evaluations.best is None:
         if evaluations.reason:

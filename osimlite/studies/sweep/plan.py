@@ -63,7 +63,8 @@ class Plan:
 
     text: str  # the model as .osim
     variables: tuple[Variable, ...]  # what differs
-    measures: tuple[Any, ...] = DEFAULT_MEASURES  # names of measures, `module:function`, or functions
+    # names of measures, `module:function`, or functions
+    measures: tuple[Any, ...] = DEFAULT_MEASURES
     to: float = 2.0  # how long a run lasts, s
     engine: str = "compiled"  # that computes it, by name
     accuracy: float = DEFAULT_ACCURACY  # of the integrator
@@ -72,12 +73,14 @@ class Plan:
     stops: tuple[Stop, ...] = ()  # what ends a run before
     # whether the walker is put on the ground with the deeper foot, at rest there, before each run
     is_planted: bool = False
-    # contacts of each foot of a walker, as `find_footing` takes them; found by its structure if left out
+    # contacts of each foot of a walker, as `find_footing` takes them; found by its structure if
+    # left out
     feet: tuple[str, ...] | None = None
     # time between the moments that a measure of one's own can look at (s), None for none
     report_interval: float | None = None
     equilibrate: bool = False  # start muscles where fiber and tendon are in equilibrium
-    interpolation: str = "linear"  # what is between the nodes of a control: "linear", "steps" or "cubic"
+    # what is between the nodes of a control: "linear", "steps" or "cubic"
+    interpolation: str = "linear"
     skip_unsupported: bool = False  # leave out forces that cannot be computed
     make: Maker | None = None  # makes the model from parameters, where some of them are varied
     folder: str | None = None  # of the model's file, where the files are that it names
@@ -90,7 +93,9 @@ class Plan:
     @property
     def interval(self) -> float | None:
         """Time between the states that are kept, s: what was asked for, or else what an expression needs."""
-        return self.report_interval or (REPORT_INTERVAL if any(map(is_expression, self.measures)) else None)
+        return self.report_interval or (
+            REPORT_INTERVAL if any(map(is_expression, self.measures)) else None
+        )
 
     def packed(self) -> bytes:
         """The plan for other processes.
@@ -168,15 +173,13 @@ def plan(
 ) -> Plan:
     """Make a plan.
 
-    Args:
-        source: the model, or what makes it from the parameters that it is given.
-        vary: ranges by name, see :mod:`osimlite.studies.sweep.variables`; if nothing differs by them, all other parameters of a
-            controller do, between their bounds.
-        parameters: that `source` takes, with their defaults.
-        below: levels that end a run when a coordinate falls below them: rad, m, or a text such as "30deg".
-        above: levels that end a run when a coordinate rises above them, likewise.
-        controls: that every run has: by the name or path of an actuator a number, or ``(times, values)``.
-        choices: further attributes of :class:`Plan`.
+    Args: source: the model, or what makes it from the parameters that it is given. vary: ranges by
+        name, see :mod:`osimlite.studies.sweep.variables`; if nothing differs by them, all other
+        parameters of a controller do, between their bounds. parameters: that `source` takes, with
+        their defaults. below: levels that end a run when a coordinate falls below them: rad, m, or
+        a text such as "30deg". above: levels that end a run when a coordinate rises above them,
+        likewise. controls: that every run has: by the name or path of an actuator a number, or
+        ``(times, values)``. choices: further attributes of :class:`Plan`.
 
     Raises:
         SettingError: a name means nothing, or a number has no meaning.
@@ -189,13 +192,21 @@ def plan(
     mechanism = build_mechanism(model)
     gains: list[Gain] = []
     if (controller := choices.get("controller")) is not None:
-        own = {name: choices[name] for name in ("skip_unsupported", "wrapping", "folder") if choices.get(name)}
+        own = {
+            name: choices[name]
+            for name in ("skip_unsupported", "wrapping", "folder")
+            if choices.get(name)
+        }
         gains = controller.gains(model, Simulation(model, **own).engine)
         if not (vary or gains):
-            raise SettingError("say what to vary; the controller has no parameters, which are written as ~2<0,20>")
+            raise SettingError(
+                "say what to vary; the controller has no parameters, which are written as ~2<0,20>"
+            )
     result = variables(vary, model, mechanism, parameters, gains)
     if all(item.is_fixed for item in result):
-        held = {name for item in result if isinstance(item.target, Gains) for name in item.target.parts}
+        held = {
+            name for item in result if isinstance(item.target, Gains) for name in item.target.parts
+        }
         rest = {gain.name: _bounds(gain) for gain in gains if gain.name not in held}
         result = variables({**vary, **rest}, model, mechanism, parameters, gains)
     for item in result:
@@ -203,11 +214,17 @@ def plan(
     needs_maker = any(isinstance(item.target, Parameter) for item in result)
     make = source if needs_maker and not isinstance(source, Model) else None
     made = Plan(to_text(model), result, make=make)
-    if not any(info.motion_type == "translational" and not info.locked for info in mechanism.coordinates):
+    if not any(
+        info.motion_type == "translational" and not info.locked for info in mechanism.coordinates
+    ):
         # Only who asks for the distance by name is told that the model has none.
         made = replace(made, measures=tuple(name for name in made.measures if name != "distance"))
     made = replace(made, **{name: value for name, value in choices.items() if value is not None})
-    for name, value in (("to", made.to), ("accuracy", made.accuracy), ("report_interval", made.report_interval)):
+    for name, value in (
+        ("to", made.to),
+        ("accuracy", made.accuracy),
+        ("report_interval", made.report_interval),
+    ):
         if value is not None and not (isfinite(value) and value > 0.0):
             raise SettingError(f"'{name}' is a positive number, not {value:g}")
     if made.accuracy >= 1.0:
@@ -248,7 +265,9 @@ def _stop(mechanism: Mechanism, name: str, given: float | str, is_below: bool) -
     if name not in infos:
         raise SettingError(f"there is no coordinate '{name}'{did_you_mean(name, infos)}")
     if infos[name].locked:
-        raise SettingError(f"the coordinate '{name}' is locked, so that it stops nothing; name one that moves")
+        raise SettingError(
+            f"the coordinate '{name}' is locked, so that it stops nothing; name one that moves"
+        )
     level = in_units_of(mechanism, name, given)
     if not isfinite(level):
         raise SettingError(f"the level of '{name}' that stops a run is a number, not {given}")

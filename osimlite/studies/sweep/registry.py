@@ -1,9 +1,9 @@
 """What is asked for by name: measures, and ways to start. Who has some registers them, by the names of the functions.
 
-A measure is made of an engine and the contacts of each foot (None: found by the structure of the model). So is a start:
-a function of states (k, y), the numbers of their engines (None: all those of the engine), and what gives auxiliary
-states their start; it returns the states at which the runs begin. Both raise OsimliteError of a model that has nothing
-of the kind.
+A measure is made of an engine and the contacts of each foot (None: found by the structure of the
+model). So is a start: a function of states (k, y), the numbers of their engines (None: all those of
+the engine), and what gives auxiliary states their start; it returns the states at which the runs
+begin. Both raise OsimliteError of a model that has nothing of the kind.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Results as a table in a file: Parquet when it is whole, and until then a file to which rows are added.
 
-The partial file is one record after another: Arrow's schema, with the settings, then batches of rows in the order of
-the runs. Each begins with its length and a checksum. Whatever has become of the file, what comes from the first damaged
-record on is cut off, said, and computed again.
+The partial file is one record after another: Arrow's schema, with the settings, then batches of
+rows in the order of the runs. Each begins with its length and a checksum. Whatever has become of
+the file, what comes from the first damaged record on is cut off, said, and computed again.
 """
 
 from __future__ import annotations
@@ -46,7 +46,10 @@ def _arrow() -> Any:
 def schema(columns: Mapping[str, str], settings: Mapping[str, Any]) -> Any:
     """Of a table: type of each column by its name ("int64", "float64" or "string"), and the settings."""
     pa = _arrow()
-    fields = [pa.field(name, getattr(pa, kind)(), nullable=kind != "int64") for name, kind in columns.items()]
+    fields = [
+        pa.field(name, getattr(pa, kind)(), nullable=kind != "int64")
+        for name, kind in columns.items()
+    ]
     return pa.schema(fields, metadata={KEY: json.dumps(settings).encode()})
 
 
@@ -61,11 +64,14 @@ def settings_of(path: str | Path) -> dict[str, Any]:
     if not Path(path).exists():
         raise no_such(path)
     try:
-        # By the stream: of a name, pyarrow thinks that what is before a colon is a protocol, and that all is UTF-8.
+        # By the stream: of a name, pyarrow thinks that what is before a colon is a protocol, and
+        # that all is UTF-8.
         with open_file(path) as stream:
             return _settings_in(pq.read_schema(stream))
     except (ValueError, OSError):
-        raise OsimliteError("this file is not the results of a sweep; give them another name", file=str(path)) from None
+        raise OsimliteError(
+            "this file is not the results of a sweep; give them another name", file=str(path)
+        ) from None
 
 
 def _settings_in(table: Any) -> dict[str, Any]:
@@ -85,7 +91,11 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     for name in {**old, **new}:
         a, b = old.get(name), new.get(name)
         if a != b:
-            is_brief = not isinstance(a, list | dict) and not isinstance(b, list | dict) and name != "model"
+            is_brief = (
+                not isinstance(a, list | dict)
+                and not isinstance(b, list | dict)
+                and name != "model"
+            )
             result.append(f"{name} ({a} before, {b} now)" if is_brief else name)
     return result
 
@@ -150,11 +160,15 @@ class Partial:
     def __init__(self, path: Path, table: Any, *, resume: bool = False) -> None:
         self.path, self.schema, self.rows = path, table, 0
         if path.is_dir():
-            raise OsimliteError("cannot write the file: this is a folder; name a file in it", file=str(path))
+            raise OsimliteError(
+                "cannot write the file: this is a folder; name a file in it", file=str(path)
+            )
         self.partial = partial_of(path)
         is_there = self.partial.exists()
         if is_there and not resume:
-            raise SettingError(f"interrupted work is in '{self.partial}'; go on with --resume, or remove that file")
+            raise SettingError(
+                f"interrupted work is in '{self.partial}'; go on with --resume, or remove that file"
+            )
         try:
             self._lock = _locked(self.partial)
             try:
@@ -167,13 +181,16 @@ class Partial:
                 self._let_go()
                 raise
         except OSError as error:
-            raise OsimliteError(f"cannot write here: {error.strerror}", file=str(self.partial)) from None
+            raise OsimliteError(
+                f"cannot write here: {error.strerror}", file=str(self.partial)
+            ) from None
 
     def add(self, columns: Sequence[Any]) -> None:
         """Add rows, column by column."""
         pa = _arrow()
         arrays = [
-            pa.array(column, field.type, from_pandas=False) for column, field in zip(columns, self.schema, strict=True)
+            pa.array(column, field.type, from_pandas=False)
+            for column, field in zip(columns, self.schema, strict=True)
         ]
         batch = pa.record_batch(arrays, schema=self.schema)
         with defer_sigint():
@@ -181,7 +198,8 @@ class Partial:
                 self._put(batch)
             except OSError as error:
                 raise OsimliteError(
-                    f"cannot write here: {error.strerror}; make room, then go on with --resume", file=str(self.partial)
+                    f"cannot write here: {error.strerror}; make room, then go on with --resume",
+                    file=str(self.partial),
                 ) from None
             self.rows += batch.num_rows
 
@@ -193,7 +211,9 @@ class Partial:
         """
         end = _batches(self.partial, take)
         if end < self.partial.stat().st_size:
-            raise OsimliteError("the file was damaged meanwhile; go on with --resume", file=str(self.partial))
+            raise OsimliteError(
+                "the file was damaged meanwhile; go on with --resume", file=str(self.partial)
+            )
 
     def _put(self, item: Any) -> None:
         body = item.serialize().to_pybytes()
@@ -232,7 +252,9 @@ class Partial:
                 put(1)
             put_in_place(beside, self.path)
         except OSError as error:
-            raise OsimliteError(f"cannot write the file: {error.strerror or error}", file=str(self.path)) from None
+            raise OsimliteError(
+                f"cannot write the file: {error.strerror or error}", file=str(self.path)
+            ) from None
         finally:
             beside.unlink(missing_ok=True)
         self.partial.unlink()
@@ -247,7 +269,8 @@ class Partial:
             # What was lost to a full disk has been told of; and there may be no stream yet.
             self.stream.close()
         if removing:
-            # Windows removes no file that is open, and others may write one as soon as the lock is gone.
+            # Windows removes no file that is open, and others may write one as soon as the lock is
+            # gone.
             self.partial.unlink(missing_ok=True)
         if self._lock.is_locked:
             with suppress(OSError):
@@ -373,7 +396,9 @@ def damage_told(path: str | Path) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError):
-        raise OsimliteError("the results are damaged; remove the file, and run anew", file=str(path)) from None
+        raise OsimliteError(
+            "the results are damaged; remove the file, and run anew", file=str(path)
+        ) from None
 
 
 class Range(NamedTuple):
@@ -406,12 +431,18 @@ def ranges(path: str | Path, names: Sequence[str]) -> dict[str, Range]:
                 column, numbers = column[good], runs[good]
                 low, high = int(column.argmin()), int(column.argmax())
                 new = Range(
-                    float(column[low]), int(numbers[low]), float(column[high]), int(numbers[high]), float(column.mean())
+                    float(column[low]),
+                    int(numbers[low]),
+                    float(column[high]),
+                    int(numbers[high]),
+                    float(column.mean()),
                 )
                 old, before = result.get(name, new), counts[name]
                 counts[name] = before + len(column)
                 lower = min((old, new), key=lambda item: item.least)
                 upper = max((old, new), key=lambda item: item.most)
                 mean = (old.mean * before + new.mean * len(column)) / counts[name]
-                result[name] = Range(lower.least, lower.run_of_least, upper.most, upper.run_of_most, mean)
+                result[name] = Range(
+                    lower.least, lower.run_of_least, upper.most, upper.run_of_most, mean
+                )
     return result

@@ -46,7 +46,9 @@ def interrupted(partial: Partial, runs: str) -> Interrupted:
     """What is said of a file that is not whole, after so many runs."""
     if partial.rows == 0:
         return Interrupted("interrupted before any run was saved")
-    return Interrupted(f"interrupted after {runs}, which are in '{partial.partial}'; go on with --resume")
+    return Interrupted(
+        f"interrupted after {runs}, which are in '{partial.partial}'; go on with --resume"
+    )
 
 
 @dataclass
@@ -77,7 +79,12 @@ class Outcome(ResultTable):
 
 def settings(plan: Plan, samples: Samples) -> dict[str, Any]:
     """All that the results of a sweep depend on."""
-    return {**plan.settings(), "sampler": samples.sampler, "samples": samples.count, "seed": samples.seed}
+    return {
+        **plan.settings(),
+        "sampler": samples.sampler,
+        "samples": samples.count,
+        "seed": samples.seed,
+    }
 
 
 def sweep(
@@ -93,8 +100,8 @@ def sweep(
 ) -> Outcome:
     """Run all samples of a plan, and write one row for each.
 
-    The rows are in the order of the samples, and the same however many work at them, here or elsewhere. Until all are
-    there, they are kept in ``<output>.partial``.
+    The rows are in the order of the samples, and the same however many work at them, here or
+    elsewhere. Until all are there, they are kept in ``<output>.partial``.
 
     Args:
         plan: what is run.
@@ -106,15 +113,15 @@ def sweep(
         cluster: address of a Dask scheduler whose workers do it instead.
         progress: called as runs are done.
 
-    Raises:
-        Interrupted: by the keyboard; the sweep can be resumed.
-        OsimliteError: the model cannot be simulated, there are results of other settings, or the cluster cannot be
-            reached.
+    Raises: Interrupted: by the keyboard; the sweep can be resumed. OsimliteError: the model cannot
+        be simulated, there are results of other settings, or the cluster cannot be reached.
     """
     path, started = Path(output), time.perf_counter()
     if path.suffix.lower() in OTHER_TABLES:
         better = path.with_suffix(".parquet").name
-        raise SettingError(f"the results are a Parquet file, not '{path.name}'; name the file '{better}'")
+        raise SettingError(
+            f"the results are a Parquet file, not '{path.name}'; name the file '{better}'"
+        )
     wanted = settings(plan, samples)
     table = schema(plan.columns("run"), wanted)
     # Who goes on with an interrupted sweep was asked before it began.
@@ -140,7 +147,12 @@ class _Work:
     """Gives out samples, and saves what comes back in their order."""
 
     def __init__(
-        self, samples: Samples, workforce: Pool, partial: Partial, outcome: Outcome, progress: Progress | None
+        self,
+        samples: Samples,
+        workforce: Pool,
+        partial: Partial,
+        outcome: Outcome,
+        progress: Progress | None,
     ) -> None:
         self.samples, self.pool, self.partial, self.outcome = samples, workforce, partial, outcome
         self.progress = progress
@@ -170,7 +182,10 @@ class _Work:
     def _give_out(self) -> None:
         # One run that takes long must not let all that comes after it pile up.
         farthest = self.saved + 64 * max(LARGEST_TASK, self.size)
-        while self.next < min(self.samples.count, farthest) and self.under_way < AHEAD * self.pool.workers:
+        while (
+            self.next < min(self.samples.count, farthest)
+            and self.under_way < AHEAD * self.pool.workers
+        ):
             values = self.samples.block(self.next, self.size)
             self.values[self.next] = values
             self.pool.submit(self.next, values)
@@ -186,7 +201,9 @@ class _Work:
         self.size = max(1, min(wanted, 4 * self.size, LARGEST_TASK, max(fair, FIRST_TASK)))
         self.outcome.status.update(block.status)
         self.outcome.reasons.update(
-            reason for status, reason in zip(block.status, block.reasons, strict=True) if status == "failed" and reason
+            reason
+            for status, reason in zip(block.status, block.reasons, strict=True)
+            if status == "failed" and reason
         )
         if len(self.outcome.reasons) > 1000:
             self.outcome.reasons = Counter(dict(self.outcome.reasons.most_common(100)))

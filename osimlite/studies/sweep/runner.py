@@ -48,7 +48,10 @@ class Block:
             [word for block in blocks for word in block.status],
             [words for block in blocks for words in block.reasons],
             np.concatenate([block.times for block in blocks]),
-            {name: np.concatenate([block.measures[name] for block in blocks]) for name in blocks[0].measures},
+            {
+                name: np.concatenate([block.measures[name] for block in blocks])
+                for name in blocks[0].measures
+            },
         )
 
     @property
@@ -78,7 +81,9 @@ class _Look:
 
     def __init__(self, plan: Plan, engine: Any) -> None:
         self.measures = [measure(spec, engine, plan.feet) for spec in plan.measures]
-        expressions = [spec for spec in plan.measures if plan.controller is not None and is_expression(spec)]
+        expressions = [
+            spec for spec in plan.measures if plan.controller is not None and is_expression(spec)
+        ]
         for spec in expressions:
             for name in sorted(Expression(spec, engine).names & driven_names(engine)):
                 raise SettingError(
@@ -86,10 +91,18 @@ class _Look:
                     "controller a sweep keeps states alone"
                 )
         stops = [
-            Watch(stop.words, coordinate=stop.coordinate, level=stop.level, stops=-1 if stop.is_below else 1)
+            Watch(
+                stop.words,
+                coordinate=stop.coordinate,
+                level=stop.level,
+                stops=-1 if stop.is_below else 1,
+            )
             for stop in plan.stops
         ]
-        self.watches = list({item.name: item for made in self.measures for item in made.watches}.values()) + stops
+        self.watches = (
+            list({item.name: item for made in self.measures for item in made.watches}.values())
+            + stops
+        )
         if self.watches and plan.engine != "compiled":
             raise SettingError("what stops a run needs --engine compiled")
         # Without room for events, none is looked for.
@@ -154,12 +167,16 @@ class Runner:
         engine = (given if first.structure == given.structure else first).engine
         look = self._look(first.structure, engine)
         variants = [sample.variant for sample in group]
-        starts = self.variants.placed(engine, variants, np.stack([sample.start for sample in group]))
+        starts = self.variants.placed(
+            engine, variants, np.stack([sample.start for sample in group])
+        )
         runs, why = self._simulate(engine, look, variants, starts)
         for number, sample in enumerate(group):
             block.status[sample.place], block.reasons[sample.place] = why[number]
             block.times[sample.place] = runs.times[number]
-        good = np.array([number for number, (status, _) in enumerate(why) if status != FAILED], dtype=int)
+        good = np.array(
+            [number for number, (status, _) in enumerate(why) if status != FAILED], dtype=int
+        )
         if len(good) == 0:
             return
         chosen = [group[number].variant for number in good]
@@ -196,10 +213,14 @@ class Runner:
                     self._measure(made, batch.part(number), np.array([row]), block)
             else:
                 block.status[rows[0]] = FAILED
-                block.reasons[rows[0]] = f"the measure '{made.name}' failed with {type(error).__name__}: {error}"
+                block.reasons[rows[0]] = (
+                    f"the measure '{made.name}' failed with {type(error).__name__}: {error}"
+                )
 
     # --------------------------------------------------------------------------------------------- motions
-    def _simulate(self, engine: Any, look: _Look, variants: Sequence[Variant], starts: Floats) -> tuple[Runs, Endings]:
+    def _simulate(
+        self, engine: Any, look: _Look, variants: Sequence[Variant], starts: Floats
+    ) -> tuple[Runs, Endings]:
         if self.plan.engine != "compiled":
             return self._one_by_one(engine, variants, starts)
         from osimlite.simulation.many import ENDINGS, run_many
@@ -220,22 +241,38 @@ class Runner:
             held=[variant.held for variant in variants if variant.held is not None],
         )
         why: Endings = []
-        for number, (ending, state) in enumerate(zip(runs.endings.tolist(), runs.states, strict=True)):
+        for number, (ending, state) in enumerate(
+            zip(runs.endings.tolist(), runs.states, strict=True)
+        ):
             words, t = ENDINGS[ending], runs.times[number]
             if words == "done" and np.isfinite(state).all():
                 why.append((DONE, None))
             elif words == "stopped":
                 why.append((STOPPED, self._what_stopped(engine, look, runs.events[number], state)))
             elif words == "too many steps":
-                why.append((FAILED, f"{MOST_TRIES} steps came no further than t = {t:.9g} s; ask for less accuracy"))
+                why.append(
+                    (
+                        FAILED,
+                        f"{MOST_TRIES} steps came no further than t = {t:.9g} s; ask for less accuracy",
+                    )
+                )
             else:
-                why.append((FAILED, f"the motion cannot be computed beyond t = {t:.9g} s; ask for more accuracy"))
+                why.append(
+                    (
+                        FAILED,
+                        f"the motion cannot be computed beyond t = {t:.9g} s; ask for more accuracy",
+                    )
+                )
         return runs, why
 
     def _numbers(self, variants: Sequence[Variant]) -> Floats | None:
-        return None if self.variants.is_fixed else np.stack([variant.numbers for variant in variants])
+        return (
+            None if self.variants.is_fixed else np.stack([variant.numbers for variant in variants])
+        )
 
-    def _what_stopped(self, engine: Any, look: _Look, events: Sequence[tuple[float, str, bool]], state: Floats) -> str:
+    def _what_stopped(
+        self, engine: Any, look: _Look, events: Sequence[tuple[float, str, bool]], state: Floats
+    ) -> str:
         """The watch that ended a run: the last event, if there was room for it, or the level that the state is at."""
         last = events[-1][1] if events else ""
         if any(watch.stops and watch.name == last for watch in look.watches):
@@ -244,7 +281,9 @@ class Runner:
         names = {stop.words: abs(y[stop.coordinate] - stop.level) for stop in self.plan.stops}
         return min(names, key=lambda name: names[name])
 
-    def _one_by_one(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> tuple[Runs, Endings]:
+    def _one_by_one(
+        self, engine: Any, variants: Sequence[Variant], starts: Floats
+    ) -> tuple[Runs, Endings]:
         """With an engine that computes one motion at a time."""
         plan = self.plan
         why: Endings = []
@@ -260,7 +299,9 @@ class Runner:
             infos = [simulation.mechanism.coordinates[place] for place in order]
             may = [k for k, info in enumerate(infos) if info.prescribed is None and not info.locked]
             row = starts[number].tolist()
-            auxiliary = dict(zip(simulation.state.paths, simulation.state.auxiliary(row), strict=True))
+            auxiliary = dict(
+                zip(simulation.state.paths, simulation.state.auxiliary(row), strict=True)
+            )
             try:
                 trajectory = simulation.run(
                     plan.to,
@@ -275,15 +316,20 @@ class Runner:
                 why.append((FAILED, str(error)))
                 continue
             why.append((DONE, None))
-            history = simulation.state.rows(trajectory.values, trajectory.speeds, trajectory.auxiliary)
+            history = simulation.state.rows(
+                trajectory.values, trajectory.speeds, trajectory.auxiliary
+            )
             times[number], states[number] = trajectory.times[-1], history[-1]
             if len(self._report_times):
                 reports[number] = history
             summary = trajectory.summary
             events[number] = [
-                (event["time_s"], event["contact"], event["event"] == "begin") for event in summary["contact_events"]
+                (event["time_s"], event["contact"], event["event"] == "begin")
+                for event in summary["contact_events"]
             ]
             for name, largest in summary["largest_contact_forces"].items():
                 peaks[number, contacts.index(name)] = largest["force_N"], largest["time_s"]
         still = np.zeros(size, dtype=np.int64)
-        return Runs(times, states, still, np.zeros((size, 3), dtype=np.int64), reports, events, peaks), why
+        return Runs(
+            times, states, still, np.zeros((size, 3), dtype=np.int64), reports, events, peaks
+        ), why

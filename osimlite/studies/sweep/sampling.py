@@ -1,7 +1,7 @@
 """Where the runs of a sweep are: grids and samples of the unit cube, any part of which can be had without the rest.
 
-Row i depends on the settings and on i alone. A sweep of any length needs memory for one block only, and can go on
-where it was interrupted.
+Row i depends on the settings and on i alone. A sweep of any length needs memory for one block only,
+and can go on where it was interrupted.
 """
 
 from __future__ import annotations
@@ -53,30 +53,37 @@ class Samples:
         if self.sampler == "grid":
             return self._grid(first, last, varied)
         if self.sampler == "sobol":
-            return self.memory.setdefault("sobol", Sobol(self.seed, len(varied))).points(first, last)
+            return self.memory.setdefault("sobol", Sobol(self.seed, len(varied))).points(
+                first, last
+            )
         numbers = _uniform(self.seed, first, last, len(varied))
         if self.sampler == "random":
             return numbers
-        layers = [_shuffled(first, last, self.count, self.seed, column) for column in range(len(varied))]
+        layers = [
+            _shuffled(first, last, self.count, self.seed, column) for column in range(len(varied))
+        ]
         return (np.stack(layers, axis=1) + numbers) / self.count
 
     def _grid(self, first: int, last: int, varied: Sequence[int]) -> Floats:
         """The last variable changes fastest."""
         counts = [self.variables[place].count or 1 for place in varied]
         places = np.unravel_index(np.arange(first, last), counts)
-        return np.stack([place / (count - 1) for place, count in zip(places, counts, strict=True)], axis=1)
+        return np.stack(
+            [place / (count - 1) for place, count in zip(places, counts, strict=True)], axis=1
+        )
 
 
 def samples(
-    variables: Sequence[Variable], sampler: str | None = None, count: int | None = None, seed: int = 0
+    variables: Sequence[Variable],
+    sampler: str | None = None,
+    count: int | None = None,
+    seed: int = 0,
 ) -> Samples:
     """Choose the runs.
 
-    Args:
-        variables: what varies.
-        sampler: by default a grid if every variable has a number of values and no `count` is given, else Sobol's.
-        count: how many runs; of a grid, as many as it has.
-        seed: of random samples.
+    Args: variables: what varies. sampler: by default a grid if every variable has a number of
+        values and no `count` is given, else Sobol's. count: how many runs; of a grid, as many as it
+        has. seed: of random samples.
 
     Raises:
         SettingError: what is asked for does not go together.
@@ -97,17 +104,23 @@ def samples(
     if sampler == "grid":
         bare = [item.name for item in varied if item.count is None]
         if bare:
-            raise SettingError(f"a grid needs the number of values of {listed(bare)}, as in {bare[0]}=LOW:HIGH:COUNT")
+            raise SettingError(
+                f"a grid needs the number of values of {listed(bare)}, as in {bare[0]}=LOW:HIGH:COUNT"
+            )
         whole = prod(item.count or 1 for item in varied)
         if count not in (None, whole):
-            raise SettingError(f"the grid has {whole} points, not {count}; leave out the number of samples")
+            raise SettingError(
+                f"the grid has {whole} points, not {count}; leave out the number of samples"
+            )
         return Samples(tuple(variables), sampler, whole, seed)
     if count is None:
         raise SettingError("say how many samples are wanted, as in --samples 1000")
     if count < 1:
         raise SettingError(f"the number of samples is above zero, not {count}")
     if sampler == "sobol" and count > MOST_SOBOL:
-        raise SettingError(f"Sobol's sequence has {MOST_SOBOL} points; take --sampler random for more")
+        raise SettingError(
+            f"Sobol's sequence has {MOST_SOBOL} points; take --sampler random for more"
+        )
     return Samples(tuple(variables), sampler, count, seed)
 
 
@@ -127,7 +140,9 @@ class Sobol:
         head = np.zeros((0, self._width))
         if self._points is None or first < self._next:
             qmc: Any = require("scipy.stats.qmc", extra="sweep", purpose="Sobol's sequence")
-            self._points = qmc.Sobol(self._width, scramble=True, rng=np.random.default_rng(self._seed))
+            self._points = qmc.Sobol(
+                self._width, scramble=True, rng=np.random.default_rng(self._seed)
+            )
             # Asked for more than one at first, scipy warns of numbers that are no power of two.
             start, self._next = self._points.random(1), 1
             head = start if first == 0 else head
@@ -152,7 +167,8 @@ def _uniform(seed: int, first: int, last: int, width: int) -> Floats:
 def _shuffled(first: int, last: int, count: int, seed: int, column: int) -> Floats:
     """Entries first ... last - 1 of a random order of 0 ... count - 1, the rest of which is never made.
 
-    A Feistel network permutes the numbers of 2k bits; those beyond `count` go through it again until they are below.
+    A Feistel network permutes the numbers of 2k bits; those beyond `count` go through it again
+    until they are below.
     """
     half = max(1, -(-(count - 1).bit_length() // 2))
     mask = np.uint64((1 << half) - 1)

@@ -1,7 +1,7 @@
 """Methods that look for the least cost, each as a function that asks for the costs of points of the unit cube.
 
-All are deterministic: with the same seed and the same answers they ask the same questions, which is how an interrupted
-search goes on.
+All are deterministic: with the same seed and the same answers they ask the same questions, which is
+how an interrupted search goes on.
 """
 
 from __future__ import annotations
@@ -34,22 +34,28 @@ class Search(NamedTuple):
     seed: int  # what makes it the same again
     is_bounded: bool  # whether points stay within the cube
     budget: int  # evaluations that are allowed
-    tolerance: float | None = None  # of cost and points, at which the search ends; None for that of the method
-    slopes: Callable[[Floats], Floats] | None = None  # derivatives (d,) of the cost at a point, if it has any
+    # of cost and points, at which the search ends; None for that of the method
+    tolerance: float | None = None
+    # derivatives (d,) of the cost at a point, if it has any
+    slopes: Callable[[Floats], Floats] | None = None
 
 
 def cma(ask: Ask, search: Search, *, keeps_best: bool = False) -> str:
     """Covariance matrix adaptation (Hansen's pycma); why it ended.
 
-    Args:
-        ask: tells costs.
-        search: how.
-        keeps_best: let the first point be one of the first population, and the best so far a parent of every other.
+    Args: ask: tells costs. search: how. keeps_best: let the first point be one of the first
+        population, and the best so far a parent of every other.
     """
     strategy = require("cma", extra="optimize", purpose="the search by cma")
     _needs_two(search)
     source = np.random.RandomState(search.seed)
-    options: dict[str, Any] = {"verbose": -9, "verb_log": 0, "verb_disp": 0, "randn": source.randn, "seed": np.nan}
+    options: dict[str, Any] = {
+        "verbose": -9,
+        "verb_log": 0,
+        "verb_disp": 0,
+        "randn": source.randn,
+        "seed": np.nan,
+    }
     if search.popsize is not None:
         options["popsize"] = search.popsize
     if search.is_bounded:
@@ -70,24 +76,31 @@ def cma(ask: Ask, search: Search, *, keeps_best: bool = False) -> str:
 def sobol_cma(ask: Ask, search: Search) -> str:
     """A look at two populations of Sobol's points and the start, then cma from the best of them; why it ended.
 
-    Where the budget is small and the cost has many valleys, as that of a walker has, this gets farther than cma from
-    the start alone, and never ends worse than it began; with thousands of runs, cma alone may get farther. The look
-    does not depend on the budget, so that a search can go on with a larger one.
+    Where the budget is small and the cost has many valleys, as that of a walker has, this gets
+    farther than cma from the start alone, and never ends worse than it began; with thousands of
+    runs, cma alone may get farther. The look does not depend on the budget, so that a search can go
+    on with a larger one.
     """
     _needs_two(search)
     size = search.popsize or 4 + int(3.0 * np.log(len(search.start)))
     points = Sobol(search.seed, len(search.start)).points(0, LOOKS * size)
     points[0] = search.start
-    costs = np.concatenate([ask(points[first : first + size]) for first in range(0, len(points), size)])
+    costs = np.concatenate(
+        [ask(points[first : first + size]) for first in range(0, len(points), size)]
+    )
     best = points[int(np.argmin(costs))]
     return cma(ask, search._replace(start=best, popsize=size), keeps_best=True)
 
 
 def differential_evolution(ask: Ask, search: Search) -> str:
     """Differential evolution (scipy's); why it ended."""
-    optimize = require("scipy.optimize", extra="sweep", purpose="the search by differential evolution")
+    optimize = require(
+        "scipy.optimize", extra="sweep", purpose="the search by differential evolution"
+    )
     if not search.is_bounded:
-        raise SettingError("differential evolution stays within the ranges; take --method cma to leave them")
+        raise SettingError(
+            "differential evolution stays within the ranges; take --method cma to leave them"
+        )
     rng, size = np.random.default_rng(search.seed), len(search.start)
     first = rng.random((max(5, search.popsize or 10 * size), size))
     first[0] = search.start
@@ -112,13 +125,21 @@ def nelder_mead(ask: Ask, search: Search) -> str:
     size, tolerance = len(search.start), search.tolerance if search.tolerance is not None else 1e-6
     simplex = np.tile(search.start, (size + 1, 1))
     for k in range(size):
-        simplex[k + 1, k] += search.sigma if simplex[k + 1, k] + search.sigma <= 1.0 else -search.sigma
+        simplex[k + 1, k] += (
+            search.sigma if simplex[k + 1, k] + search.sigma <= 1.0 else -search.sigma
+        )
     result = optimize.minimize(
         lambda point: float(ask(point[None])[0]),
         search.start,
         method="Nelder-Mead",
         bounds=[(0.0, 1.0)] * size if search.is_bounded else None,
-        options={"initial_simplex": simplex, "maxfev": 10**9, "maxiter": 10**9, "xatol": tolerance, "fatol": tolerance},
+        options={
+            "initial_simplex": simplex,
+            "maxfev": 10**9,
+            "maxiter": 10**9,
+            "xatol": tolerance,
+            "fatol": tolerance,
+        },
     )
     return f"converged: {result.message}"
 

@@ -14,7 +14,8 @@
 ``slope``                               gravity tilted in the plane of x and y: a floor that falls towards +x
 ======================================  ==========================================================
 
-A parameter of that name is meant by `slope` if there is one. A locked coordinate is held at the value that it is given.
+A parameter of that name is meant by `slope` if there is one. A locked coordinate is held at the
+value that it is given.
 """
 
 from __future__ import annotations
@@ -124,7 +125,9 @@ class Variable:
     def fraction(self, value: float) -> float:
         """Where a value lies, 0 at low and 1 at high."""
         if self.is_log:
-            return (math.log(value) - math.log(self.low)) / (math.log(self.high) - math.log(self.low))
+            return (math.log(value) - math.log(self.low)) / (
+                math.log(self.high) - math.log(self.low)
+            )
         return (value - self.low) / (self.high - self.low)
 
     def stretch(self, value: float) -> float:
@@ -177,8 +180,8 @@ def variables(
         parameters: of the function that makes it, with their defaults.
         gains: of a controller.
 
-    Raises:
-        SettingError: a name means nothing (the nearest is told), a range is none, or a unit does not fit.
+    Raises: SettingError: a name means nothing (the nearest is told), a range is none, or a unit
+        does not fit.
     """
     result: list[Variable] = []
     for names, given in ranges.items():
@@ -199,7 +202,9 @@ def variables(
     for item in result:
         for part in getattr(item.target, "parts", (item.target,)):
             if part in taken:
-                raise SettingError(f"'{taken[part]}' and '{item.name}' are the same number; vary one of them")
+                raise SettingError(
+                    f"'{taken[part]}' and '{item.name}' are the same number; vary one of them"
+                )
             taken[part] = item.name
     return tuple(result)
 
@@ -219,16 +224,24 @@ def refuse_counts(found: Sequence[Variable]) -> None:
 
 
 def _target(
-    name: str, model: Model, mechanism: Mechanism, parameters: Mapping[str, Any], gains: Sequence[Gain]
+    name: str,
+    model: Model,
+    mechanism: Mechanism,
+    parameters: Mapping[str, Any],
+    gains: Sequence[Gain],
 ) -> tuple[Target, str] | None:
     """What a name means, and in what unit; None if nothing."""
     front, _, last = name.rpartition("/")
     for key, is_speed in ((name, False), (front, last == "speed")):
-        if (key == name or last in ("value", "speed")) and (meant := named(key, mechanism.coordinates)):
+        if (key == name or last in ("value", "speed")) and (
+            meant := named(key, mechanism.coordinates)
+        ):
             return _coordinates(name, meant, is_speed, model)
     if name in parameters:
         default = parameters[name]
-        return Parameter(name, float(default) if type(default) in (int, float) else None), "parameter"
+        return Parameter(
+            name, float(default) if type(default) in (int, float) else None
+        ), "parameter"
     if own := named(name, gains):
         return Gains(tuple(gain.name for gain in own), own[0].value), "parameter"
     route, _, word = name.partition("@")
@@ -238,7 +251,9 @@ def _target(
         return made, made.unit
     if word in ("", SCALE) and (result := places(model, route)):
         unit = result[0].unit
-        if unit.startswith("rad | m") and (infos := named(result[0].component, mechanism.coordinates)):
+        if unit.startswith("rad | m") and (
+            infos := named(result[0].component, mechanism.coordinates)
+        ):
             unit = infos[0].unit or "rad | m"
         return Property(result, bool(word)), "" if word else unit
     if name == "slope":
@@ -246,20 +261,33 @@ def _target(
     return None
 
 
-def _unknown(name: str, model: Model, mechanism: Mechanism, parameters: Sequence[str]) -> SettingError:
+def _unknown(
+    name: str, model: Model, mechanism: Mechanism, parameters: Sequence[str]
+) -> SettingError:
     """The error for a name that means nothing."""
     route = name.partition("@")[0]
     if named(route, model.components(Actuator)):
-        return SettingError(f"'{name}' is an actuator: vary '{route}/control', or one of its properties")
-    known = [f"{info.name}{what}" for info in mechanism.coordinates for what in ("", "/speed")] + [*parameters, "slope"]
+        return SettingError(
+            f"'{name}' is an actuator: vary '{route}/control', or one of its properties"
+        )
+    known = [f"{info.name}{what}" for info in mechanism.coordinates for what in ("", "/speed")] + [
+        *parameters,
+        "slope",
+    ]
     known += [f"{info.path}{what}" for info in mechanism.coordinates for what in ("", "/speed")]
-    known += [f"{key}/control" for item in model.components(Actuator) for key in (item.name, item.path)]
+    known += [
+        f"{key}/control" for item in model.components(Actuator) for key in (item.name, item.path)
+    ]
     known += spellings(model) if "/" in name else []
     near = did_you_mean(name, known)
-    return SettingError(f"there is no coordinate, parameter, control or number '{name}' to vary{near}")
+    return SettingError(
+        f"there is no coordinate, parameter, control or number '{name}' to vary{near}"
+    )
 
 
-def _coordinates(name: str, infos: Sequence[CoordinateInfo], is_speed: bool, model: Model) -> tuple[Target, str]:
+def _coordinates(
+    name: str, infos: Sequence[CoordinateInfo], is_speed: bool, model: Model
+) -> tuple[Target, str]:
     unit, locked = infos[0].unit or "rad | m", [info for info in infos if info.locked]
     if locked and is_speed:
         raise SettingError(
@@ -268,12 +296,20 @@ def _coordinates(name: str, infos: Sequence[CoordinateInfo], is_speed: bool, mod
     if not locked:
         return Start(tuple(info.path for info in infos), is_speed), unit
     if len(locked) < len(infos):
-        raise SettingError(f"of '{name}', '{locked[0].name}' is locked and others are not; vary these one by one")
+        raise SettingError(
+            f"of '{name}', '{locked[0].name}' is locked and others are not; vary these one by one"
+        )
     return Property(places(model, ",".join(info.path for info in infos) + "/default_value")), unit
 
 
 def _variable(name: str, target: Target, unit: str, given: Range) -> Variable:
-    parts = given.split(":") if isinstance(given, str) else [given] if isinstance(given, int | float) else list(given)
+    parts = (
+        given.split(":")
+        if isinstance(given, str)
+        else [given]
+        if isinstance(given, int | float)
+        else list(given)
+    )
     count, is_log = None, False
     if len(parts) > 1 and parts[-1] == "log":
         is_log = True
@@ -281,7 +317,9 @@ def _variable(name: str, target: Target, unit: str, given: Range) -> Variable:
     if len(parts) == 3:
         text = str(parts.pop())
         if not text.strip().isdigit() or int(text) < 1:
-            raise SettingError(f"the number of values of '{name}' is a whole number above zero, not '{text}'")
+            raise SettingError(
+                f"the number of values of '{name}' is a whole number above zero, not '{text}'"
+            )
         count = int(text)
     if len(parts) not in (1, 2):
         raise SettingError(f"'{name}' takes LOW:HIGH, LOW:HIGH:COUNT or one value, not '{given}'")
@@ -290,11 +328,17 @@ def _variable(name: str, target: Target, unit: str, given: Range) -> Variable:
     if len(parts) == 1:
         count = 1
     if low > high:
-        raise SettingError(f"the range of '{name}' ends below its start: {low:g} to {high:g}; turn it round")
+        raise SettingError(
+            f"the range of '{name}' ends below its start: {low:g} to {high:g}; turn it round"
+        )
     if is_log and low <= 0.0:
-        raise SettingError(f"'{name}' is spread by its logarithm, so that it must be above zero, not {low:g}")
+        raise SettingError(
+            f"'{name}' is spread by its logarithm, so that it must be above zero, not {low:g}"
+        )
     if count is not None and count > 1 and low == high:
-        raise SettingError(f"'{name}' cannot have {count} values between {low:g} and {high:g}; give it one")
+        raise SettingError(
+            f"'{name}' cannot have {count} values between {low:g} and {high:g}; give it one"
+        )
     if count == 1 and low != high:
         raise SettingError(f"'{name}' has one value only; give it as {name}=VALUE")
     return Variable(name, target, low, high, count, is_log)
@@ -304,7 +348,11 @@ def _refuse_mixed(name: str, ends: Sequence[object], unit: str) -> None:
     """Stop at ``20deg:40`` of what is in rad; zero is the same in every unit."""
     read = [quantity(str(part)) for part in ends]
     with_unit = [each.unit for each in read if each is not None and each.unit is not None]
-    bare = [each.number for each in read if each is not None and each.unit is None and each.number != 0.0]
+    bare = [
+        each.number
+        for each in read
+        if each is not None and each.unit is None and each.number != 0.0
+    ]
     if with_unit and bare and not unit.startswith(f"{with_unit[0]}"):
         raise SettingError(
             f"the range of '{name}' has a unit at one end only: {ends[0]}:{ends[-1]}; "
@@ -316,7 +364,9 @@ def _doubt(made: Variable, given: Range, mechanism: Mechanism) -> str:
     """Whether an angle of the start was written as a number of degrees."""
     assert isinstance(made.target, Start)
     ends = given.split(":")[:2] if isinstance(given, str) else [made.low, made.high]
-    infos = [mechanism.coordinates[mechanism.coordinate_index(path)] for path in made.target.coordinates]
+    infos = [
+        mechanism.coordinates[mechanism.coordinate_index(path)] for path in made.target.coordinates
+    ]
     odd = (suspect_value(info, made.name, end) for info in infos for end in ends)
     return next((words for words in odd if words), "")
 

@@ -1,8 +1,9 @@
 """The models of a sweep: those that a sample's properties and parameters make of the given one.
 
-A model is made afresh for each new set of numbers. For the compiled engine, only that is made which the numbers have a
-part in, where they belong to forces, are masses, mass centres or inertias of bodies, or gravity. The numbers are those
-of a model that is built from a file either way, since the same functions make them.
+A model is made afresh for each new set of numbers. For the compiled engine, only that is made which
+the numbers have a part in, where they belong to forces, are masses, mass centres or inertias of
+bodies, or gravity. The numbers are those of a model that is built from a file either way, since the
+same functions make them.
 """
 
 from __future__ import annotations
@@ -77,7 +78,12 @@ class Variants:
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
         targets = [item.target for item in plan.variables]
-        starts = [(k, part) for k, target in enumerate(targets) if isinstance(target, Start) for part in target.parts]
+        starts = [
+            (k, part)
+            for k, target in enumerate(targets)
+            if isinstance(target, Start)
+            for part in target.parts
+        ]
         self._starts = [(k, part.coordinates[0], part.is_speed) for k, part in starts]
         self._changes = [k for k, target in enumerate(targets) if not isinstance(target, Start)]
         self._gains = [k for k, target in enumerate(targets) if isinstance(target, Gains)]
@@ -121,8 +127,8 @@ class Variants:
     def start(self, variant: Variant, values: Sequence[float]) -> Floats:
         """Initial state of a sample (y,).
 
-        Raises:
-            OsimliteError: the model has no such coordinate, or holds it, or a muscle has no equilibrium.
+        Raises: OsimliteError: the model has no such coordinate, or holds it, or a muscle has no
+            equilibrium.
         """
         # An engine of its own is only made where the coordinates may be others.
         engine = (self.given if variant.structure == self.given.structure else variant).engine
@@ -154,10 +160,16 @@ class Variants:
         Raises:
             SimulationError: they are to start in equilibrium, and a muscle has none.
         """
-        rows = np.concatenate([variant.state.started(row[None]) for variant, row in zip(variants, states, strict=True)])
+        rows = np.concatenate(
+            [
+                variant.state.started(row[None])
+                for variant, row in zip(variants, states, strict=True)
+            ]
+        )
         if self._plan.equilibrate:
             for row, variant in zip(rows, variants, strict=True):
-                # An engine of its own is only made where it must be, and to tell why there is no equilibrium.
+                # An engine of its own is only made where it must be, and to tell why there is no
+                # equilibrium.
                 y, result = row.tolist(), None
                 if len(variant.numbers):
                     with suppress(SimulationError):
@@ -189,7 +201,9 @@ class Variants:
         setters = dict(self._setters)
         for index, item in enumerate(self._plan.variables):
             if isinstance(item.target, Start):
-                info = engine.mechanism.coordinates[engine.mechanism.coordinate_index(item.target.coordinates[0])]
+                info = engine.mechanism.coordinates[
+                    engine.mechanism.coordinate_index(item.target.coordinates[0])
+                ]
                 result.append(info.default_speed if item.target.is_speed else info.default_value)
             elif isinstance(item.target, Property):
                 result.append(1.0 if item.target.is_scaled else setters[index][0].get())
@@ -203,20 +217,31 @@ class Variants:
         """Make the initial state of a sample the default state of `model`."""
         coordinates: Any = self.model.tree().by_path
         for place, path, is_speed in self._starts:
-            setattr(coordinates[path], "default_speed_value" if is_speed else "default_value", float(values[place]))
+            setattr(
+                coordinates[path],
+                "default_speed_value" if is_speed else "default_value",
+                float(values[place]),
+            )
         if self._plan.is_planted:
             variant = self.variant(values)
             engine = variant.engine
             (row,) = self.placed(engine, [variant], self.start(variant, values)[None]).tolist()
             for number, place in enumerate(engine.order):
                 coordinate = coordinates[engine.mechanism.coordinates[place].path]
-                coordinate.default_value, coordinate.default_speed_value = row[number], row[number + len(engine.order)]
+                coordinate.default_value, coordinate.default_speed_value = (
+                    row[number],
+                    row[number + len(engine.order)],
+                )
 
     def controller(self, values: Sequence[float]) -> Feedback:
         """That of a sample."""
         assert self._plan.controller is not None
         variables = self._plan.variables
-        parts = ((name, values[k]) for k in self._gains for name in getattr(variables[k].target, "parts", ()))
+        parts = (
+            (name, values[k])
+            for k in self._gains
+            for name in getattr(variables[k].target, "parts", ())
+        )
         return self._plan.controller.with_values({name: float(value) for name, value in parts})
 
     def found(self, values: Sequence[float]) -> Model:
@@ -235,7 +260,9 @@ class Variants:
         """
         if self._parameters:
             assert self._plan.make is not None
-            names = {self._plan.variables[place].name: float(values[place]) for place in self._parameters}
+            names = {
+                self._plan.variables[place].name: float(values[place]) for place in self._parameters
+            }
             self._adopt(self._plan.make(names))
         if self._gains:
             self._controller = self.controller(values)
@@ -257,7 +284,9 @@ class Variants:
             target = self._plan.variables[place].target
             if isinstance(target, Property):
                 setters = [item.setter(model) for item in target.places]
-                self._setters.append((place, [item.scaling() for item in setters] if target.is_scaled else setters))
+                self._setters.append(
+                    (place, [item.scaling() for item in setters] if target.is_scaled else setters)
+                )
                 owners += [model.tree().by_path[item.component] for item in target.places]
             elif isinstance(target, Slope):
                 self._slopes.append(place)
@@ -268,9 +297,13 @@ class Variants:
         owners += self._controls.controllers
         if self._plan.controller is not None:
             # To which what it says is added, behind all else.
-            self._open = model.add(controller_of(model, {item.path: 0.0 for item in model.components(Actuator)}))
+            self._open = model.add(
+                controller_of(model, {item.path: 0.0 for item in model.components(Actuator)})
+            )
         can_renew = self._plan.engine == "compiled" and not self._parameters
-        self._owners = owners if can_renew and all(isinstance(item, RENEWED) for item in owners) else None
+        self._owners = (
+            owners if can_renew and all(isinstance(item, RENEWED) for item in owners) else None
+        )
 
     def _whole(self) -> Variant:
         plan = self._plan
@@ -286,11 +319,16 @@ class Variants:
         kind = (*(info.path for info in infos), *engine.order, *engine.contacts)
         structure = repr(kind).encode() + getattr(engine, "structure", np.zeros(0)).tobytes()
         numbers = getattr(engine, "numbers", np.zeros(0))
-        return self._controlled(Variant(simulation.state, structure, numbers, lambda: engine, simulation))
+        return self._controlled(
+            Variant(simulation.state, structure, numbers, lambda: engine, simulation)
+        )
 
     def _controlled(self, variant: Variant) -> Variant:
         if self._controller is not None:
-            variant.controller, variant.held = self._controller, self._controller.held(self.model, variant.engine)
+            variant.controller, variant.held = (
+                self._controller,
+                self._controller.held(self.model, variant.engine),
+            )
         return variant
 
     def _make(self, values: Sequence[float]) -> Variant:
@@ -301,7 +339,9 @@ class Variants:
         if self._owners is None:
             return self._whole()
         if self._renewal is None:
-            self._renewal = given.engine.renewal(self.model, Path(self._plan.folder or "."), self._plan.wrapping)
+            self._renewal = given.engine.renewal(
+                self.model, Path(self._plan.folder or "."), self._plan.wrapping
+            )
         made = self._renewal.renewed(self._owners)
         if made is None:
             return self._whole()

@@ -25,7 +25,11 @@ _DESCRIPTION = (
 
 def compute(analysis: Actuation, motion: Motion, tables: Tables) -> None:
     """Write three tables of the actuators that are on."""
-    actuators = [item for item in motion.model.force_set.objects if isinstance(item, Actuator) and item.appliesForce]
+    actuators = [
+        item
+        for item in motion.model.force_set.objects
+        if isinstance(item, Actuator) and item.appliesForce
+    ]
     for item in actuators:
         if item.control_count != 1:
             raise tables.job.unable(

@@ -19,7 +19,10 @@ def compute(analysis: BodyKinematics, motion: Motion, tables: Tables) -> None:
     """
     bodies, tree = motion.model.body_set.objects, motion.model.tree()
     places = {body.path: place for place, body in enumerate(motion.mechanism.bodies)}
-    local, total = analysis.express_results_in_body_local_frame, sum(body.mass for body in bodies) or 1.0
+    local, total = (
+        analysis.express_results_in_body_local_frame,
+        sum(body.mass for body in bodies) or 1.0,
+    )
     result, whole = [], np.zeros((3, len(motion.times), 3))
     for body in bodies:
         place = places[tree.path_of(body) or ""]
@@ -35,7 +38,9 @@ def compute(analysis: BodyKinematics, motion: Motion, tables: Tables) -> None:
     names = [body.name for body in bodies]
     chosen = motion.chosen(analysis.bodies, [*names, WHOLE], f"bodies of '{analysis.name}'")
     own = [place for place in chosen if place < len(names)]
-    columns = [f"{names[place]}_{what}" for place in own for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")]
+    columns = [
+        f"{names[place]}_{what}" for place in own for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")
+    ]
     parts = [np.empty((3, len(motion.times), 0)), *(result[place] for place in own)]
     if len(names) in chosen:
         parts.append(whole)
@@ -43,11 +48,17 @@ def compute(analysis: BodyKinematics, motion: Motion, tables: Tables) -> None:
     frame = "bodyLocal" if local else "global"
     for rows, (suffix, title) in zip(
         np.concatenate(parts, axis=2),
-        (("pos_global", "Positions"), (f"vel_{frame}", "Velocities"), (f"acc_{frame}", "Accelerations")),
+        (
+            ("pos_global", "Positions"),
+            (f"vel_{frame}", "Velocities"),
+            (f"acc_{frame}", "Accelerations"),
+        ),
         strict=True,
     ):
         description = _DESCRIPTION.format(motion.model.name, "body-local" if local else "ground")
-        tables.add(suffix, title, columns, rows, in_degrees=analysis.in_degrees, description=description)
+        tables.add(
+            suffix, title, columns, rows, in_degrees=analysis.in_degrees, description=description
+        )
 
 
 _DESCRIPTION = (

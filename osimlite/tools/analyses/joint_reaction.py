@@ -51,7 +51,9 @@ def compute(analysis: JointReaction, motion: Motion, tables: Tables) -> None:
         rows += [(back @ item[..., None])[..., 0] for item in (force, moment, place - origin)]
         root = f"{joint.name}_on_{_last(bases[side])}_in_{_last(frame)}"
         columns += [f"{root}_{ending}" for ending in _ENDINGS]
-    tables.add("ReactionLoads", _TITLE, columns, np.concatenate(rows, axis=1), description=_DESCRIPTION)
+    tables.add(
+        "ReactionLoads", _TITLE, columns, np.concatenate(rows, axis=1), description=_DESCRIPTION
+    )
 
 
 def _joints(analysis: JointReaction, model: Model, tables: Tables) -> list[Joint]:
@@ -63,11 +65,15 @@ def _joints(analysis: JointReaction, model: Model, tables: Tables) -> list[Joint
     known = {joint.name: joint for joint in every}
     for name in names:
         if name not in known:
-            raise tables.job.error(f"there is no joint '{name}' for '{analysis.name}'{did_you_mean(name, known)}")
+            raise tables.job.error(
+                f"there is no joint '{name}' for '{analysis.name}'{did_you_mean(name, known)}"
+            )
     return [known[name] for name in names]
 
 
-def _of_each(what: str, given: Sequence[object], joints: Sequence[Joint], tables: Tables) -> list[str]:
+def _of_each(
+    what: str, given: Sequence[object], joints: Sequence[Joint], tables: Tables
+) -> list[str]:
     """The word for each joint; one may be for all."""
     words = list(map(str, given))
     if len(words) == 1:
@@ -97,7 +103,9 @@ def _last(path: str) -> str:
     return path.rpartition("/")[2]
 
 
-def _overridden(analysis: JointReaction, motion: Motion, tables: Tables) -> tuple[Motion, Controls | None]:
+def _overridden(
+    analysis: JointReaction, motion: Motion, tables: Tables
+) -> tuple[Motion, Controls | None]:
     """The motion of a model whose actuators push as a file says, and what drives them.
 
     OpenSim does so if every actuator has a column; else it takes the forces of the states.
@@ -116,7 +124,8 @@ def _overridden(analysis: JointReaction, motion: Motion, tables: Tables) -> tupl
         )
         return motion, None
     model.controller_set.objects.clear()
-    # Probes are not needed here, and those of muscles would miss the forces that are replaced below.
+    # Probes are not needed here, and those of muscles would miss the forces that are replaced
+    # below.
     model.probe_set.objects.clear()
     places = {id(force): number for number, force in enumerate(model.force_set.objects)}
     for item in actuators:
@@ -129,7 +138,11 @@ def _overridden(analysis: JointReaction, motion: Motion, tables: Tables) -> tupl
     simulation = simulation_of(tables.job, model)
     forces = {item.name: (table.times, table[item.name]) for item in actuators}
     first, last = (float(time) for time in motion.times[[0, -1]])
-    controls = driven(simulation.forces.controls, forces, last, start=first, what=f"forces of '{path.name}'")
+    controls = driven(
+        simulation.forces.controls, forces, last, start=first, what=f"forces of '{path.name}'"
+    )
     simulation.engine.drive(controls)
     pairs = zip(motion.values.tolist(), motion.speeds.tolist(), strict=True)
-    return Motion(model, simulation, motion.times, np.array([simulation.state.pack(q, u) for q, u in pairs])), controls
+    return Motion(
+        model, simulation, motion.times, np.array([simulation.state.pack(q, u) for q, u in pairs])
+    ), controls

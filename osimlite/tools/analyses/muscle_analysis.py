@@ -22,13 +22,17 @@ _DESCRIPTION = (
 def compute(analysis: MuscleAnalysis, motion: Motion, tables: Tables) -> None:
     """Write a table for each quantity, and two for each coordinate."""
     every = list(motion.model.components(Muscle))
-    chosen = motion.chosen(analysis.muscle_list, [muscle.name for muscle in every], f"muscles of '{analysis.name}'")
+    chosen = motion.chosen(
+        analysis.muscle_list, [muscle.name for muscle in every], f"muscles of '{analysis.name}'"
+    )
     muscles = [every[place] for place in chosen]
     for muscle in muscles:
         why = "which it cannot analyse yet" if type(muscle) not in CHECKED else ""
         why = why or ("" if muscle.appliesForce else "which applies no force")
         if why:
-            raise tables.job.unable(f"'{analysis.name}' asks for '{muscle.name}', a {type(muscle).__name__}, {why}")
+            raise tables.job.unable(
+                f"'{analysis.name}' asks for '{muscle.name}', a {type(muscle).__name__}, {why}"
+            )
     names = [muscle.name for muscle in muscles]
     result = _of_all(motion, muscles)
     if not motion.mechanism.total_mass > np.finfo(float).eps:
@@ -61,8 +65,13 @@ def _add_moments(
     paths = Paths(motion.model)
     rows = [paths.names.index(tree.path_of(muscle) or "") for muscle in muscles]
     arms = paths.all_moment_arms(motion.values)[:, rows]
-    asked = ["all" if str(name).lower() == "all" else name for name in analysis.moment_arm_coordinate_list]
-    for place in motion.chosen(asked, [info.name for info in infos], f"coordinates of '{analysis.name}'"):
+    asked = [
+        "all" if str(name).lower() == "all" else name
+        for name in analysis.moment_arm_coordinate_list
+    ]
+    for place in motion.chosen(
+        asked, [info.name for info in infos], f"coordinates of '{analysis.name}'"
+    ):
         names, own = [muscle.name for muscle in muscles], arms[:, :, place]
         for what, result in (("MomentArm", own), ("Moment", own * tension)):
             title = f"{what}_{infos[place].name}"

@@ -28,12 +28,20 @@ def compute(analysis: ProbeReporter, motion: Motion, tables: Tables) -> None:
             )
     rows = motion.compute_balanced(_rows)
     # Components with outputs are reported in a run, and not here.
-    shown = [issubclass(probe.component, Probe) for probe in engine.probes for _ in probe.reading.labels]
-    labels = [label for label, is_shown in zip(probe_labels(engine.probes), shown, strict=True) if is_shown]
+    shown = [
+        issubclass(probe.component, Probe) for probe in engine.probes for _ in probe.reading.labels
+    ]
+    labels = [
+        label
+        for label, is_shown in zip(probe_labels(engine.probes), shown, strict=True)
+        if is_shown
+    ]
     tables.add("probes", "ModelProbes", labels, rows[:, shown], description=_DESCRIPTION)
 
 
 def _rows(motion: Motion) -> Array:
     """Return what all probes report at every time (t, m)."""
     rows = list(probe_rows(motion.simulation.engine, [*motion.moments], motion.steps))
-    return np.array(rows).reshape(len(motion.times), len(probe_labels(motion.simulation.engine.probes)))
+    return np.array(rows).reshape(
+        len(motion.times), len(probe_labels(motion.simulation.engine.probes))
+    )

@@ -14,4 +14,10 @@ _DESCRIPTION = f"\nThis file contains the states of a model during a simulation.
 def compute(analysis: StatesReporter, motion: Motion, tables: Tables) -> None:
     """Write the states in OpenSim's order."""
     states = motion.histories
-    tables.add("states", "ModelStates", list(states), np.column_stack([*states.values()]), description=_DESCRIPTION)
+    tables.add(
+        "states",
+        "ModelStates",
+        list(states),
+        np.column_stack([*states.values()]),
+        description=_DESCRIPTION,
+    )

@@ -22,13 +22,23 @@ def compute(analysis: StaticOptimization, motion: Motion, tables: Tables) -> Non
             f"'{analysis.name}' cannot be computed of a motion that was not measured; give it to an AnalyzeTool"
         )
     if not analysis.use_model_force_set:
-        raise job.unable(f"'{analysis.name}' has use_model_force_set off, with which OpenSim crashes; set it to true")
+        raise job.unable(
+            f"'{analysis.name}' has use_model_force_set off, with which OpenSim crashes; set it to true"
+        )
     muscles = "active" if analysis.use_muscle_physiology else "isometric"
-    problem = sharing_of(job, motion.model, motion.mechanism, exponent=analysis.activation_exponent, muscles=muscles)
+    problem = sharing_of(
+        job, motion.model, motion.mechanism, exponent=analysis.activation_exponent, muscles=muscles
+    )
     shared = problem.share(motion.times, motion.values, motion.speeds, motion.wanted)
     forces = problem.records(shared, motion.values, motion.speeds)
     activations = shared.table()
-    tables.add("activation", activations.name, activations.columns, activations.rows, description=_DESCRIPTION)
+    tables.add(
+        "activation",
+        activations.name,
+        activations.columns,
+        activations.rows,
+        description=_DESCRIPTION,
+    )
     tables.add("force", forces.name, forces.columns, forces.rows, description=DESCRIPTION)
     tables.add_text("controls.xml", "".join(control_set(activations)))
     tell(shared, analysis.name, tables)

@@ -54,9 +54,11 @@ def actuators_of(tool: Tool | None) -> Actuators:
     infos = {info.name: info for info in mechanism.coordinates}
     root = {mechanism.coordinates[place].name for place in root_of(mechanism)}
     joints = {infos[name].joint for name in root}
-    bodies = {body.name.rpartition("/")[2] for body in mechanism.bodies if any(
-        mechanism.coordinates[place].joint in joints for place in body.mobilizer.coordinates
-    )}  # fmt: skip
+    bodies = {
+        body.name.rpartition("/")[2]
+        for body in mechanism.bodies
+        if any(mechanism.coordinates[place].joint in joints for place in body.mobilizer.coordinates)
+    }
     for force in tool.forces:
         if isinstance(force, CoordinateActuator):
             name = str(force.coordinate or "").strip().rpartition("/")[2]
@@ -66,16 +68,26 @@ def actuators_of(tool: Tool | None) -> Actuators:
                 reserves[force.name] = name
         elif isinstance(force, PointActuator) and str(force.body).rpartition("/")[2] in bodies:
             residuals[force.name] = "N"
-        elif isinstance(force, TorqueActuator) and str(force.bodyA).rpartition("/")[2] in bodies | {"ground"}:
+        elif isinstance(force, TorqueActuator) and str(force.bodyA).rpartition("/")[2] in bodies | {
+            "ground"
+        }:
             if str(force.bodyB or "ground").rpartition("/")[2] in bodies | {"ground"}:
                 residuals[force.name] = "N m"
-        elif isinstance(force, Muscle) and force.appliesForce and not isinstance(force, BodyActuator):
+        elif (
+            isinstance(force, Muscle) and force.appliesForce and not isinstance(force, BodyActuator)
+        ):
             muscles.append(force.name)
     return Actuators(residuals, reserves, muscles)
 
 
 def residual_numbers(
-    folder: Folder, file: Path, units: Mapping[str, str], scale: Scale, what: str, *, is_final: bool = True
+    folder: Folder,
+    file: Path,
+    units: Mapping[str, str],
+    scale: Scale,
+    what: str,
+    *,
+    is_final: bool = True,
 ) -> Numbers:
     """Peaks and root mean squares of the columns with residuals."""
     table = folder.table(file)
@@ -83,27 +95,47 @@ def residual_numbers(
         if column in table.columns:
             values = np.abs(table[column])
             row = int(np.argmax(values))
-            rule, size = ("residual-force", scale.force) if unit == "N" else ("residual-moment", scale.moment)
-            of, where, at = f"{column} of {what}", f"at {table.times[row]:g} s", folder.place(file, row)
-            yield file, Number(rule, "peak", of, float(values[row]), unit, size, where, at, is_final)
+            rule, size = (
+                ("residual-force", scale.force)
+                if unit == "N"
+                else ("residual-moment", scale.moment)
+            )
+            of, where, at = (
+                f"{column} of {what}",
+                f"at {table.times[row]:g} s",
+                folder.place(file, row),
+            )
+            yield (
+                file,
+                Number(rule, "peak", of, float(values[row]), unit, size, where, at, is_final),
+            )
             rms = float(np.sqrt(np.mean(values**2)))
-            yield file, Number(rule, "rms", of, rms, unit, at=folder.place(file, 0), is_final=is_final)
+            yield (
+                file,
+                Number(rule, "rms", of, rms, unit, at=folder.place(file, 0), is_final=is_final),
+            )
 
 
 def dynamics_numbers(tool: Tool, *, is_final: bool) -> Numbers:
     """Residuals of inverse dynamics."""
     file = tool.result(tool.setup.output_gen_force_file)
     if file is None:
-        raise Missing(f"the forces of {tool} are missing ('{tool.setup.output_gen_force_file}'); run it")
+        raise Missing(
+            f"the forces of {tool} are missing ('{tool.setup.output_gen_force_file}'); run it"
+        )
     units = {}
     for place in root_of(tool.mechanism):
         info = tool.mechanism.coordinates[place]
         turning = info.motion_type == "rotational"
         units[f"{info.name}_{'moment' if turning else 'force'}"] = "N m" if turning else "N"
-    yield from residual_numbers(tool.folder, file, units, scale_of(tool), "inverse dynamics", is_final=is_final)
+    yield from residual_numbers(
+        tool.folder, file, units, scale_of(tool), "inverse dynamics", is_final=is_final
+    )
 
 
-def reserve_numbers(tool: Tool, file: Path, actuators: Actuators, others: Sequence[Tool]) -> Numbers:
+def reserve_numbers(
+    tool: Tool, file: Path, actuators: Actuators, others: Sequence[Tool]
+) -> Numbers:
     """Reserve actuators beside the moments that the motion takes at the joints that muscles cross."""
     table = tool.folder.table(file)
     own = {name: column for column, name in actuators.reserves.items() if column in table.columns}
@@ -127,7 +159,16 @@ def reserve_numbers(tool: Tool, file: Path, actuators: Actuators, others: Sequen
         rms = 100.0 * float(np.sqrt(np.mean(reserve**2) / np.mean(moment**2)))
         yield file, Number("reserve-moment", "rms", of, rms, "%", at=tool.folder.place(file, 0))
     if not judged:
-        yield file, Number("reserve-moment", "peak", "reserves of less than 1 N m, of their joint moments", 0.0, "%")
+        yield (
+            file,
+            Number(
+                "reserve-moment",
+                "peak",
+                "reserves of less than 1 N m, of their joint moments",
+                0.0,
+                "%",
+            ),
+        )
 
 
 def _crossed(tool: Tool) -> set[str]:
@@ -135,14 +176,18 @@ def _crossed(tool: Tool) -> set[str]:
     model, mechanism = tool.model, tool.mechanism
     paths = Paths(model)
     tree, names = model.tree(), paths.names
-    rows = [names.index(path) for path in map(tree.path_of, model.components(Muscle)) if path in names]
+    rows = [
+        names.index(path) for path in map(tree.path_of, model.components(Muscle)) if path in names
+    ]
     try:
         motion = tool.motion.values
         poses = motion[np.unique(np.linspace(0, len(motion) - 1, POSES).astype(int))]
     except Missing:
         poses = mechanism.values({})[None]
     arms = np.abs(paths.all_moment_arms(poses)[:, rows]).max(axis=(0, 1)) if rows else np.zeros(0)
-    return {info.name for info, arm in zip(mechanism.coordinates, arms, strict=bool(rows)) if arm > ARM}
+    return {
+        info.name for info, arm in zip(mechanism.coordinates, arms, strict=bool(rows)) if arm > ARM
+    }
 
 
 def _moments(tool: Tool, table: StoTable, others: Sequence[Tool]) -> dict[str, Array]:
@@ -155,9 +200,15 @@ def _moments(tool: Tool, table: StoTable, others: Sequence[Tool]) -> dict[str, A
     for tag in ("InverseDynamicsTool", "RRATool"):
         for other in (other for other in others if other.tag == tag):
             if tag == "RRATool":
-                name, columns = f"{other.setup.name}_Actuation_force.sto", actuators_of(other).reserves
+                name, columns = (
+                    f"{other.setup.name}_Actuation_force.sto",
+                    actuators_of(other).reserves,
+                )
             else:
-                name, columns = other.setup.output_gen_force_file, {f"{name}_moment": name for name in names}
+                name, columns = (
+                    other.setup.output_gen_force_file,
+                    {f"{name}_moment": name for name in names},
+                )
             file = other.result(name)
             known = None if file is None else tool.folder.table(file)
             if (
@@ -167,9 +218,14 @@ def _moments(tool: Tool, table: StoTable, others: Sequence[Tool]) -> dict[str, A
             ):
                 return {columns[label]: known[label] for label in known.columns if label in columns}
     if tool.input(*MOTIONS) is None:
-        raise Missing(f"there are no joint moments beside the reserves of {tool}; run inverse dynamics")
+        raise Missing(
+            f"there are no joint moments beside the reserves of {tool}; run inverse dynamics"
+        )
     known = inverse_dynamics(
-        tool.model, tool.motion, tool.input(LOADS), lowpass=tool.cutoff if tool.cutoff > 0.0 else None
+        tool.model,
+        tool.motion,
+        tool.input(LOADS),
+        lowpass=tool.cutoff if tool.cutoff > 0.0 else None,
     )
     return {name: known[f"{name}_moment"] for name in names if f"{name}_moment" in known.columns}
 
@@ -179,13 +235,32 @@ def activation_numbers(folder: Folder, file: Path, muscles: Sequence[str]) -> Nu
     table, most = folder.table(file), 0
     for place, label in enumerate(table.columns):
         name = label.removesuffix("/activation").removesuffix(".activation").rpartition("/")[2]
-        if name not in muscles or (label != name and not label.endswith(("/activation", ".activation"))):
+        if name not in muscles or (
+            label != name and not label.endswith(("/activation", ".activation"))
+        ):
             continue
         full = np.flatnonzero(table.rows[:, place] >= FULL)
         if len(full):
             most += 1
             share, time = 100.0 * len(full) / len(table.times), table.times[full[0]]
-            of, at = f"share of the time that '{name}' is fully active", folder.place(file, int(full[0]))
-            yield file, Number("full-activation", "share", of, share, "%", where=f"first at {time:g} s", at=at)
+            of, at = (
+                f"share of the time that '{name}' is fully active",
+                folder.place(file, int(full[0])),
+            )
+            yield (
+                file,
+                Number(
+                    "full-activation", "share", of, share, "%", where=f"first at {time:g} s", at=at
+                ),
+            )
     if not most:
-        yield file, Number("full-activation", "share", "share of the time that any muscle is fully active", 0.0, "%")
+        yield (
+            file,
+            Number(
+                "full-activation",
+                "share",
+                "share of the time that any muscle is fully active",
+                0.0,
+                "%",
+            ),
+        )

@@ -89,16 +89,14 @@ def check_trial(
 ) -> TrialReport:
     """Check finished trials: is the model strong enough, are the data good?
 
-    Args:
-        paths: folders with setups and what these wrote, by OpenSim or by :func:`osimlite.run`; or setups.
-        select: codes, beginnings of codes, or names of rules to run; all that are about trials if not given.
-        ignore: the same, of rules to leave out.
-        config: everything that can be set; `select` and `ignore` take its place.
-        written: results of the setups that are in another place.
-        progress: is told how many setups are done, of how many.
+    Args: paths: folders with setups and what these wrote, by OpenSim or by :func:`osimlite.run`; or
+        setups. select: codes, beginnings of codes, or names of rules to run; all that are about
+        trials if not given. ignore: the same, of rules to leave out. config: everything that can be
+        set; `select` and `ignore` take its place. written: results of the setups that are in
+        another place. progress: is told how many setups are done, of how many.
 
-    Returns:
-        Findings, as of :func:`osimlite.validate`; all numbers with their limits, and what was not looked at.
+    Returns: Findings, as of :func:`osimlite.validate`; all numbers with their limits, and what was
+        not looked at.
 
     Raises:
         MissingFileError: a path is not there.
@@ -127,15 +125,24 @@ def check_trial(
     findings: list[Finding] = []
     for file, own in numbers.items():
         looked[str(file)] = None
-        trial = Trial(str(file), Source.of_file(file).data, own, settings_of(str(file)).config_for(file, given))
+        trial = Trial(
+            str(file),
+            Source.of_file(file).data,
+            own,
+            settings_of(str(file)).config_for(file, given),
+        )
         findings += run(trial).findings
         report.verdicts += trial.verdicts
     for name in _documents(folder):
         own_config = settings_of(name).config_for(name, given)
         subject = subject_of(name, own_config)
-        findings += [item for item in run(subject, measure=False) if item.code.startswith(IN_SETUPS)]
+        findings += [
+            item for item in run(subject, measure=False) if item.code.startswith(IN_SETUPS)
+        ]
         looked[name] = None
-    report.findings = sorted(dict.fromkeys(findings), key=lambda item: (item.severity.rank, item.file or ""))
+    report.findings = sorted(
+        dict.fromkeys(findings), key=lambda item: (item.severity.rank, item.file or "")
+    )
     report.checked = len(looked)
     return report
 
@@ -162,7 +169,8 @@ def _measures(folder: Folder) -> Iterator[Measure]:
     looked: set[tuple[object, ...]] = set()
     claimed: set[Path] = set()
     followed = any(
-        tool.tag in ("RRATool", "CMCTool") and _results(tool, "_Actuation_force.sto") for tool in folder.tools
+        tool.tag in ("RRATool", "CMCTool") and _results(tool, "_Actuation_force.sto")
+        for tool in folder.tools
     )
     for tool in folder.tools:
         if tool.tag == "ScaleTool":
@@ -191,7 +199,10 @@ def _results(tool: Tool, ending: str) -> Path | None:
 def _of_inputs(tool: Tool, looked: set[tuple[object, ...]]) -> Iterator[Measure]:
     """What motion and loads say of each other, once for each pair of them."""
     try:
-        motion, loads = (tool.input(*tags) for tags in (("coordinates_file", "desired_kinematics_file"), (LOADS,)))
+        motion, loads = (
+            tool.input(*tags)
+            for tags in (("coordinates_file", "desired_kinematics_file"), (LOADS,))
+        )
     except Missing as error:
         yield "motion and loads", partial(_missing, error)
         return
@@ -223,14 +234,19 @@ def _of_tracking(tool: Tool, others: Sequence[Tool], claimed: set[Path]) -> Iter
     force, error = _results(tool, "_Actuation_force.sto"), _results(tool, "_pErr.sto")
     claimed.update(file for file in (force, error) if file is not None)
     if force is None:
-        gone = Missing(f"the forces of {tool} are missing ('{tool.setup.name}_Actuation_force.sto'); run it in OpenSim")
+        gone = Missing(
+            f"the forces of {tool} are missing ('{tool.setup.name}_Actuation_force.sto'); run it in OpenSim"
+        )
         yield "residuals", partial(_missing, gone)
     else:
         yield "residuals", partial(_residuals, tool, force)
         if tool.tag == "CMCTool":
             yield "reserves", partial(_reserves, tool, force, others)
     if error is None:
-        yield "errors of tracking", partial(_missing, Missing(f"'{tool.setup.name}_pErr.sto' of {tool} is missing"))
+        yield (
+            "errors of tracking",
+            partial(_missing, Missing(f"'{tool.setup.name}_pErr.sto' of {tool} is missing")),
+        )
     else:
         yield "errors of tracking", partial(tracking_numbers, folder, error, tool)
     motion = _results(tool, "_Kinematics_q.sto")
@@ -239,7 +255,10 @@ def _of_tracking(tool: Tool, others: Sequence[Tool], claimed: set[Path]) -> Iter
     if tool.tag == "CMCTool":
         states = _results(tool, "_states.sto") or _results(tool, "_controls.sto")
         if states is None:
-            yield "activations", partial(_missing, Missing(f"'{tool.setup.name}_states.sto' of {tool} is missing"))
+            yield (
+                "activations",
+                partial(_missing, Missing(f"'{tool.setup.name}_states.sto' of {tool} is missing")),
+            )
         else:
             claimed.add(states)
             yield "activations", partial(_activations, tool, states)
@@ -254,8 +273,13 @@ def _of_optimization(tool: Tool, others: Sequence[Tool], claimed: set[Path]) -> 
         for ending in ("force", "activation"):
             file = _results(tool, f"_{item.name}_{ending}.sto")
             if file is None:
-                gone = Missing(f"'{tool.setup.name}_{item.name}_{ending}.sto' of {tool} is missing; run it")
-                yield ("residuals and reserves" if ending == "force" else "activations"), partial(_missing, gone)
+                gone = Missing(
+                    f"'{tool.setup.name}_{item.name}_{ending}.sto' of {tool} is missing; run it"
+                )
+                yield (
+                    ("residuals and reserves" if ending == "force" else "activations"),
+                    partial(_missing, gone),
+                )
                 continue
             claimed.add(file)
             if ending == "force":
@@ -288,7 +312,10 @@ def _without_setup(folder: Folder, claimed: set[Path]) -> Iterator[Measure]:
         for file in folder.ending("_Actuation_force.sto", "_StaticOptimization_force.sto"):
             if file not in claimed:
                 units = actuators_of(None).residuals
-                yield "residuals", partial(residual_numbers, folder, file, units, Scale(), f"'{file.name}'")
+                yield (
+                    "residuals",
+                    partial(residual_numbers, folder, file, units, Scale(), f"'{file.name}'"),
+                )
         for file in folder.ending("_pErr.sto"):
             yield "errors of tracking", partial(tracking_numbers, folder, file, None)
     if "InverseKinematicsTool" not in has:

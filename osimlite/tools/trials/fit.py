@@ -51,11 +51,15 @@ def scale_numbers(tool: Tool) -> Numbers:
     if result is None:
         raise Missing(f"{tool} places no markers")
     # Markers that weigh less than a tenth of the others go where their segment takes them.
-    tasks = [task for task in placer.ik_task_set.objects if task.apply and isinstance(task, IKMarkerTask)]
+    tasks = [
+        task for task in placer.ik_task_set.objects if task.apply and isinstance(task, IKMarkerTask)
+    ]
     weights = {task.name: float(task.weight) for task in tasks}
     most = max(weights.values(), default=0.0)
     pose = result.pose
-    chosen = [place for place, name in enumerate(pose.markers) if weights.get(name, 1.0) > 0.1 * most]
+    chosen = [
+        place for place, name in enumerate(pose.markers) if weights.get(name, 1.0) > 0.1 * most
+    ]
     errors = pose.marker_errors[:, chosen]
     if not np.isfinite(errors).any():
         raise Missing(f"{tool} fits no marker")
@@ -63,7 +67,10 @@ def scale_numbers(tool: Tool) -> Numbers:
     of = "the errors of the markers in the static pose"
     for kind, value in (("rms", np.sqrt(np.nanmean(errors**2))), ("peak", np.nanmax(errors))):
         where = name if kind == "peak" else ""
-        yield tool.job.file, Number("scale-marker-error", kind, of, 100.0 * float(value), "cm", where=where)
+        yield (
+            tool.job.file,
+            Number("scale-marker-error", kind, of, 100.0 * float(value), "cm", where=where),
+        )
 
 
 def marker_numbers(tool: Tool) -> Numbers:
@@ -87,7 +94,11 @@ def marker_numbers(tool: Tool) -> Numbers:
     time = found["worst_time"]
     at = folder.at(file, time)
     where = f"{found['worst_marker']} at {time:g} s"
-    each = np.sqrt(np.nanmean(np.where(np.isfinite(motion.marker_errors), motion.marker_errors, np.nan) ** 2, axis=0))
+    each = np.sqrt(
+        np.nanmean(
+            np.where(np.isfinite(motion.marker_errors), motion.marker_errors, np.nan) ** 2, axis=0
+        )
+    )
     worst = f"most of {motion.markers[int(np.nanargmax(each))]}, {100.0 * np.nanmax(each):.3g} cm"
     yield file, Number("marker-error", "rms", of, rms, "cm", where=worst, at=folder.place(file, 0))
     yield file, Number("marker-error", "peak", of, peak, "cm", where=where, at=at)
@@ -95,11 +106,18 @@ def marker_numbers(tool: Tool) -> Numbers:
     pairs = [*_exchanged(tool, motion)]
     for one, other, frames in pairs:
         share, times = 100.0 * len(frames) / SAMPLES, motion.times[frames]
-        of = f"share of frames in which the markers '{one}' and '{other}' would fit better exchanged"
+        of = (
+            f"share of frames in which the markers '{one}' and '{other}' would fit better exchanged"
+        )
         where = f"from {times[0]:g} to {times[-1]:g} s"
         yield data, Number("swapped-markers", "share", of, share, "%", where=where)
     if not pairs:
-        yield data, Number("swapped-markers", "share", "share of frames with markers to exchange", 0.0, "%")
+        yield (
+            data,
+            Number(
+                "swapped-markers", "share", "share of frames with markers to exchange", 0.0, "%"
+            ),
+        )
 
 
 def error_numbers(folder: Folder, file: Path) -> Numbers:
@@ -110,7 +128,10 @@ def error_numbers(folder: Folder, file: Path) -> Numbers:
     row = int(np.argmax(table["marker_error_max"]))
     yield file, Number("marker-error", "rms", of, 100.0 * rms, "cm", at=folder.place(file, 0))
     peak, where = 100.0 * float(table["marker_error_max"][row]), f"at {table.times[row]:g} s"
-    yield file, Number("marker-error", "peak", of, peak, "cm", where=where, at=folder.place(file, row))
+    yield (
+        file,
+        Number("marker-error", "peak", of, peak, "cm", where=where, at=folder.place(file, row)),
+    )
 
 
 def _fitted(tool: Tool, file: Path) -> FittedMotion:
@@ -118,9 +139,15 @@ def _fitted(tool: Tool, file: Path) -> FittedMotion:
     model, mechanism = tool.model, tool.mechanism
     recorded = tool.folder.motion(file, tool.model_file)
     data = MarkerData.of(tool.needed("marker_file")).between(*both_of(tool.setup.time_range))
-    tasks = [task for task in tool.setup.ik_task_set.objects if task.apply and isinstance(task, IKMarkerTask)]
+    tasks = [
+        task
+        for task in tool.setup.ik_task_set.objects
+        if task.apply and isinstance(task, IKMarkerTask)
+    ]
     stations = marker_stations(model, mechanism)
-    names = data.shared([*stations], {task.name: task.weight for task in tasks if task.weight > 0.0} or None)
+    names = data.shared(
+        [*stations], {task.name: task.weight for task in tasks if task.weight > 0.0} or None
+    )
     after = np.clip(np.searchsorted(data.times, recorded.times), 1, max(1, len(data.times) - 1))
     after = np.minimum(after, len(data.times) - 1)
     before = np.maximum(after - 1, 0)
@@ -136,7 +163,14 @@ def _fitted(tool: Tool, file: Path) -> FittedMotion:
     places = np.array([[state.point(*stations[name]) for name in names] for state in states])
     nothing = np.zeros(len(values))
     return FittedMotion(
-        mechanism, recorded.times[near], values, tuple(names), data.only(names)[rows[near]], places, nothing, nothing
+        mechanism,
+        recorded.times[near],
+        values,
+        tuple(names),
+        data.only(names)[rows[near]],
+        places,
+        nothing,
+        nothing,
     )
 
 
@@ -152,20 +186,27 @@ def _exchanged(tool: Tool, motion: FittedMotion) -> Iterator[tuple[str, str, Arr
         return
     stations = marker_stations(tool.model, motion.mechanism)
     weights = {task.name: float(task.weight) for task in tool.setup.ik_task_set.objects}
-    fit = PoseFit(motion.mechanism, [Marker(stations[name], weights.get(name, 1.0)) for name in motion.markers])
+    fit = PoseFit(
+        motion.mechanism,
+        [Marker(stations[name], weights.get(name, 1.0)) for name in motion.markers],
+    )
 
     def cost(frame: int, pair: tuple[int, int] = (0, 0)) -> float:
         order = np.arange(len(motion.markers))
         order[list(pair)] = order[list(reversed(pair))]
         measured = motion.measured[frame : frame + 1, order].reshape(1, -1)
-        return float(fit.fit(measured, motion.times[frame : frame + 1], motion.values[frame]).costs[0])
+        return float(
+            fit.fit(measured, motion.times[frame : frame + 1], motion.values[frame]).costs[0]
+        )
 
     frames = np.unique(np.linspace(0, len(motion.times) - 1, SAMPLES).astype(int))
     own = {frame: cost(frame) for frame in (worst, *frames.tolist())}
     costs = {pair: cost(worst, pair) for pair in combinations(range(len(motion.markers)), 2)}
     one, other = min(costs, key=lambda pair: costs[pair])
     if costs[one, other] < BETTER * own[worst]:
-        better = [frame for frame in frames.tolist() if cost(frame, (one, other)) < BETTER * own[frame]]
+        better = [
+            frame for frame in frames.tolist() if cost(frame, (one, other)) < BETTER * own[frame]
+        ]
         yield motion.markers[one], motion.markers[other], np.array(better or [worst])
 
 
@@ -184,7 +225,12 @@ def range_numbers(tool: Tool, file: Path) -> Numbers:
         most = f"{_sized(info, low):.3g} to {_sized(info, high):.3g} {_unit(info)}"
         time, unit = float(motion.times[row]), _unit(info)
         where, of = f"at {time:g} s, the range is {most}", f"'{info.name}' beyond its range"
-        yield file, Number("beyond-range", "peak", of, size, unit, where=where, at=tool.folder.at(file, time))
+        yield (
+            file,
+            Number(
+                "beyond-range", "peak", of, size, unit, where=where, at=tool.folder.at(file, time)
+            ),
+        )
     if not beyond:
         yield file, Number("beyond-range", "peak", "coordinates beyond their ranges", 0.0, "deg")
 
@@ -195,12 +241,21 @@ def tracking_numbers(folder: Folder, file: Path, tool: Tool | None) -> Numbers:
     infos = {} if tool is None else {info.name: info for info in tool.mechanism.coordinates}
     for name in table.columns:
         info = infos.get(name)
-        turning = info.motion_type == "rotational" if info is not None else not name.endswith(("_tx", "_ty", "_tz"))
-        column = np.abs(table[name]) * (100.0 if not turning else 1.0 if table.in_degrees else degrees(1.0))
+        turning = (
+            info.motion_type == "rotational"
+            if info is not None
+            else not name.endswith(("_tx", "_ty", "_tz"))
+        )
+        column = np.abs(table[name]) * (
+            100.0 if not turning else 1.0 if table.in_degrees else degrees(1.0)
+        )
         row, unit = int(np.argmax(column)), "deg" if turning else "cm"
         of = f"the error of '{name}'"
         where, at = f"at {table.times[row]:g} s", folder.place(file, row)
-        yield file, Number("tracking-error", "peak", of, float(column[row]), unit, where=where, at=at)
+        yield (
+            file,
+            Number("tracking-error", "peak", of, float(column[row]), unit, where=where, at=at),
+        )
         kind, value = "rms" if turning else "rms-translation", float(np.sqrt(np.mean(column**2)))
         yield file, Number("tracking-error", kind, of, value, unit, at=folder.place(file, 0))
 
@@ -224,7 +279,11 @@ def filter_numbers(tool: Tool) -> Numbers:
         motion = filtered
     if _is_from_markers(file) and (share := _noise(motion, first, last)) is not None:
         of = "noise: the power of the accelerations above 15 Hz, of all"
-        how = f"the motion is filtered at {tool.cutoff:g} Hz" if tool.cutoff > 0.0 else "the motion is not filtered"
+        how = (
+            f"the motion is filtered at {tool.cutoff:g} Hz"
+            if tool.cutoff > 0.0
+            else "the motion is not filtered"
+        )
         yield tool.job.file, Number("filter-content", "noise", of, 100.0 * share, "%", side=how)
 
 
@@ -249,7 +308,9 @@ def _noise(motion: RecordedMotion, first: float, last: float) -> float | None:
         if np.ptp(values[:, place]) < MOVING[info.motion_type != "rotational"]:
             continue
         acceleration = np.interp(even, times, motion.rates[1][own, place])
-        power = np.abs(np.fft.rfft((acceleration - acceleration.mean()) * np.hanning(len(times)))) ** 2
+        power = (
+            np.abs(np.fft.rfft((acceleration - acceleration.mean()) * np.hanning(len(times)))) ** 2
+        )
         shares.append(float(power[frequencies > FAST].sum() / (power.sum() or 1.0)))
     return float(np.median(shares)) if shares else None
 

@@ -35,7 +35,10 @@ SETUPS = (
 """Classes of setups whose results are looked at."""
 ENDINGS = (".osim", ".xml", ".sto", ".mot", ".trc", ".c3d")
 MOTIONS = ("coordinates_file", "desired_kinematics_file")
-LOADS, CUTOFFS = "external_loads_file", ("lowpass_cutoff_frequency_for_coordinates", "lowpass_cutoff_frequency")
+LOADS, CUTOFFS = (
+    "external_loads_file",
+    ("lowpass_cutoff_frequency_for_coordinates", "lowpass_cutoff_frequency"),
+)
 
 
 class Missing(OsimliteError):
@@ -45,9 +48,9 @@ class Missing(OsimliteError):
 class Folder:
     """Folders and setups that a trial consists of.
 
-    Args:
-        paths: folders, of which everything below counts, or setups, of which the folder counts.
-        written: results of these setups, wherever they are; they count before others of their names.
+    Args: paths: folders, of which everything below counts, or setups, of which the folder counts.
+        written: results of these setups, wherever they are; they count before others of their
+        names.
 
     Raises:
         MissingFileError: a path is not there.
@@ -69,11 +72,18 @@ class Folder:
                     known = self._named.setdefault(file.name, [])
                     if file not in known:
                         known.append(file)
-                    if path.is_dir() and file.suffix.lower() == ".xml" and begins_as_ours(str(file)):
+                    if (
+                        path.is_dir()
+                        and file.suffix.lower() == ".xml"
+                        and begins_as_ours(str(file))
+                    ):
                         setups.setdefault(os.path.realpath(file), file)
             if not path.is_dir():
                 if type(read_any(path)).__name__ not in SETUPS:
-                    raise OsimliteError(f"this is no setup of {', '.join(SETUPS[:-1])} or {SETUPS[-1]}", file=str(path))
+                    raise OsimliteError(
+                        f"this is no setup of {', '.join(SETUPS[:-1])} or {SETUPS[-1]}",
+                        file=str(path),
+                    )
                 setups.setdefault(os.path.realpath(path), path)
         for file in setups.values():
             top = top_at(str(file))
@@ -215,7 +225,9 @@ class Tool:
     @property
     def cutoff(self) -> float:
         """Of the filter of that motion, Hz; negative for none."""
-        return next((float(getattr(self.setup, tag)) for tag in CUTOFFS if hasattr(self.setup, tag)), -1.0)
+        return next(
+            (float(getattr(self.setup, tag)) for tag in CUTOFFS if hasattr(self.setup, tag)), -1.0
+        )
 
     @cached_property
     def span(self) -> tuple[float, float]:
@@ -230,9 +242,17 @@ class Tool:
     @cached_property
     def forces(self) -> list[Force]:
         """The forces of the model, and those that the setup adds to them or puts in their place."""
-        result = [] if getattr(self.setup, "replace_force_set", False) else list(self.model.components(Force))
+        result = (
+            []
+            if getattr(self.setup, "replace_force_set", False)
+            else list(self.model.components(Force))
+        )
         for name in getattr(self.setup, "force_set_files", ()):
-            file = self.folder.near(self.job.place(name) or Path(name)) if name.strip() not in NONE else None
+            file = (
+                self.folder.near(self.job.place(name) or Path(name))
+                if name.strip() not in NONE
+                else None
+            )
             if file is not None:
                 result += self.job.read(file, ForceSet).objects
         return result

@@ -67,7 +67,9 @@ def _loads(items: Sequence[ExternalForce], table: StoTable) -> Iterator[Load]:
 def _three(table: StoTable, identifier: str | None) -> Array | None:
     """The three columns (t, 3) whose labels begin so."""
     start = (identifier or "").strip()
-    places = [place for place, label in enumerate(table.columns) if start and label.startswith(start)]
+    places = [
+        place for place, label in enumerate(table.columns) if start and label.startswith(start)
+    ]
     return table.rows[:, places] if len(places) == 3 else None
 
 
@@ -118,10 +120,15 @@ def feet_numbers(tool: Tool) -> Numbers:
         side = f"it acts {away[:, 0].mean():.2g} m from {own} and {away[:, 1:].min(axis=1).mean():.2g} m from {other}"
         at = None
         if isinstance(setup, Setup):
-            item = next((item for item in setup.named("ExternalForce") if item.name == load.item.name), None)
+            item = next(
+                (item for item in setup.named("ExternalForce") if item.name == load.item.name), None
+            )
             at = setup.position(item, tag="applied_to_body") if item is not None else None
         share = 100.0 * float(wrong.mean())
-        yield file, Number("swapped-feet", "share", of, share, "%", at=at, side=side if share else "")
+        yield (
+            file,
+            Number("swapped-feet", "share", of, share, "%", at=at, side=side if share else ""),
+        )
 
 
 def _mirrored(name: str) -> str:
@@ -131,7 +138,9 @@ def _mirrored(name: str) -> str:
     return (f"{stem}_{other}" if name.endswith(f"_{side}") else f"{other}_{stem}") if other else ""
 
 
-def _distances(motion: RecordedMotion, table: StoTable, load: Load, bodies: Sequence[str]) -> Array | None:
+def _distances(
+    motion: RecordedMotion, table: StoTable, load: Load, bodies: Sequence[str]
+) -> Array | None:
     """How far a load acts from the mass centres of bodies (t, b), m, at times at which it is large; None without."""
     assert load.point is not None
     sizes = np.linalg.norm(load.force, axis=1)
@@ -147,7 +156,10 @@ def _distances(motion: RecordedMotion, table: StoTable, load: Load, bodies: Sequ
         frame = str(load.item.point_expressed_in_body).rpartition("/")[2]
         if frame != "ground":
             point = mechanism.station_position(frame, point, q)
-        centres = [mechanism.station_position(name, places[name].mass_properties.center, q) for name in bodies]
+        centres = [
+            mechanism.station_position(name, places[name].mass_properties.center, q)
+            for name in bodies
+        ]
         result.append([float(np.linalg.norm(point - centre)) for centre in centres])
     return np.array(result)
 

@@ -28,7 +28,9 @@ def passive_numbers(tool: Tool, states: Path | None) -> Numbers:
     file = states or tool.input("states_file") or tool.needed(*MOTIONS)
     is_states = states is not None or file == tool.input("states_file")
     table = passive_forces(tool, file, is_states=is_states)
-    strengths = {muscle.name: float(muscle.max_isometric_force) for muscle in tool.model.components(Muscle)}
+    strengths = {
+        muscle.name: float(muscle.max_isometric_force) for muscle in tool.model.components(Muscle)
+    }
     told = 0
     for name in table.columns:
         column = np.where(np.isfinite(table[name]), table[name], 0.0)
@@ -42,7 +44,16 @@ def passive_numbers(tool: Tool, states: Path | None) -> Numbers:
             where = f"{column[row]:.4g} N at {time:g} s"
             yield file, Number("passive-force", "peak", of, share, "%", where=where, at=at)
     if not told:
-        yield file, Number("passive-force", "peak", "the passive force of any muscle, of its strength", 0.0, "%")
+        yield (
+            file,
+            Number(
+                "passive-force",
+                "peak",
+                "the passive force of any muscle, of its strength",
+                0.0,
+                "%",
+            ),
+        )
 
 
 def passive_forces(tool: Tool, file: Path, *, is_states: bool) -> StoTable:
@@ -54,7 +65,12 @@ def passive_forces(tool: Tool, file: Path, *, is_states: bool) -> StoTable:
         raise Missing(f"{tool} has no muscles, or '{file}' none of its times")
     analysis = MuscleAnalysis(name="muscles", moment_arm_coordinate_list=(), compute_moments=False)
     analysis.step_interval = max(1, count // MOST_ROWS)
-    setup = AnalyzeTool(name="trial", model_file=str(tool.model_file.absolute()), initial_time=first, final_time=last)
+    setup = AnalyzeTool(
+        name="trial",
+        model_file=str(tool.model_file.absolute()),
+        initial_time=first,
+        final_time=last,
+    )
     setup.solve_for_equilibrium_for_auxiliary_states = not is_states
     setattr(setup, "states_file" if is_states else "coordinates_file", str(file.absolute()))
     setup.lowpass_cutoff_frequency_for_coordinates = -1.0 if is_states else tool.cutoff

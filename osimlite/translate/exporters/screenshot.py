@@ -24,5 +24,9 @@ EXPORTER = Exporter(
     "view",
     "Write a picture (.png); needs no display.",
     _write,
-    (Choice("at", float | None, "The moment of the screenshot.", unit="SECONDS", shown="the first"),),
+    (
+        Choice(
+            "at", float | None, "The moment of the screenshot.", unit="SECONDS", shown="the first"
+        ),
+    ),
 )

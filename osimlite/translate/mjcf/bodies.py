@@ -1,8 +1,8 @@
 """Bodies and joints: every body of the model is one element, whatever joint carries it.
 
-Several joints in one element of MuJoCo move it one after the other, each about an anchor and an axis that it carries
-along. So a chain of one-axis joints needs no massless bodies between them: the anchors and axes are those of the chain
-at zero, seen from its end.
+Several joints in one element of MuJoCo move it one after the other, each about an anchor and an
+axis that it carries along. So a chain of one-axis joints needs no massless bodies between them: the
+anchors and axes are those of the chain at zero, seen from its end.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ def add_bodies(draft: Draft) -> None:
     """Add all bodies with their inertia and joints."""
     robot = draft.robot
     carriers = {joint.child: joint for joint in robot.joints}
-    bodies = {path: index for index, path in enumerate(body.path for body in draft.mechanism.bodies)} | {"/ground": -1}
+    bodies = {
+        path: index for index, path in enumerate(body.path for body in draft.mechanism.bodies)
+    } | {"/ground": -1}
     for link in robot.links:
         if not link.bodies:
             continue
@@ -44,7 +46,9 @@ def add_bodies(draft: Draft) -> None:
             while not chain or chain[0].parent not in draft.frames:
                 chain.insert(0, carriers[chain[0].parent if chain else link.name])
             element = _add_chain(draft, chain, link.name)
-            _add_inertia(draft, element, link, path, moves=any(part.kind != "fixed" for part in chain))
+            _add_inertia(
+                draft, element, link, path, moves=any(part.kind != "fixed" for part in chain)
+            )
             if path in draft.tree.by_path:
                 draft.fidelity.translated[path] = f"body {link.name}"
                 draft.fidelity.named(path, "body", path.rpartition("/")[2], link.name)
@@ -60,7 +64,9 @@ def add_frames(draft: Draft) -> None:
     """Add a site for every frame that is no body, so that it can be asked for."""
     for _, path in draft.components(PhysicalFrame):
         if path in draft.mechanism.frames:
-            draft.fidelity.translated[path] = f"site {draft.site(path, *draft.mechanism.frames[path], group=FRAMES)}"
+            draft.fidelity.translated[path] = (
+                f"site {draft.site(path, *draft.mechanism.frames[path], group=FRAMES)}"
+            )
 
 
 def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
@@ -70,7 +76,13 @@ def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
     if len(moving) > MOST_JOINTS:
         cut = moving[MOST_JOINTS]
         carrier = _add_chain(draft, chain[:cut], draft.name("body", f"{name}_carrier"))
-        add(carrier, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, LEAST_MASS))
+        add(
+            carrier,
+            "inertial",
+            pos=np.zeros(3),
+            mass=LEAST_MASS,
+            diaginertia=np.full(3, LEAST_MASS),
+        )
         return _add_chain(draft, chain[cut:], name)
     rest = np.eye(4)
     joints: list[tuple[RobotJoint, Array, Array]] = []
@@ -86,7 +98,14 @@ def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
     for joint, axis, anchor in reversed(joints):
         turns, place = joint.kind == "revolute", tidy(anchor)
         anchored = place if turns and place.any() else None
-        add(element, "joint", name=joint.name, type="hinge" if turns else "slide", axis=tidy(axis), pos=anchored)
+        add(
+            element,
+            "joint",
+            name=joint.name,
+            type="hinge" if turns else "slide",
+            axis=tidy(axis),
+            pos=anchored,
+        )
     return element
 
 

@@ -1,7 +1,8 @@
 """What a file of MuJoCo's, whoever wrote it, makes of the paths, muscles and bodies of a model.
 
-Muscles are matched by name, joints by the names of coordinates and bodies by their own. In each of many random poses
-joints are where the coordinates are, and those that follow others by an equality where that puts them.
+Muscles are matched by name, joints by the names of coordinates and bodies by their own. In each of
+many random poses joints are where the coordinates are, and those that follow others by an equality
+where that puts them.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ class MuscleCheck:
     name: str  # its own
     length: Error  # of the path, m
     arms: Mapping[str, Error]  # moment arms by coordinate, m or 1
-    force: Error | None = None  # isometric, fully active, over the greatest force; None for what is no muscle
+    # isometric, fully active, over the greatest force; None for what is no muscle
+    force: Error | None = None
     fiber: float | None = None  # optimal fiber length that the file implies, over the model's
     tendon: float | None = None  # tendon slack length that the file implies, minus the model's, m
 
@@ -55,8 +57,11 @@ class Check:
 
     muscles: tuple[MuscleCheck, ...]  # those that both have
     missing: tuple[str, ...] = ()  # names of forces along paths that the file does not have
-    coordinates: tuple[str, ...] = ()  # names of coordinates that move by themselves and that no joint of the file has
-    # places of the bodies that both have, moved onto each other as one in every pose; None without three
+    coordinates: tuple[
+        str, ...
+    ] = ()  # names of coordinates that move by themselves and that no joint of the file has
+    # places of the bodies that both have, moved onto each other as one in every pose; None without
+    # three
     bodies: Error | None = None
 
     def to_json(self) -> str:
@@ -132,7 +137,10 @@ class _Compiled:
         self.mujoco, self.model, self.data = mujoco, compiled, mujoco.MjData(compiled)
         self.names, self.free = joint_names(paths.mechanism), free_coordinates(paths.mechanism)
         kinds = mujoco.mjtObj
-        joints = ((k, mujoco.mj_name2id(compiled, kinds.mjOBJ_JOINT, name)) for k, name in enumerate(self.names))
+        joints = (
+            (k, mujoco.mj_name2id(compiled, kinds.mjOBJ_JOINT, name))
+            for k, name in enumerate(self.names)
+        )
         self.joints = {k: joint for k, joint in joints if joint >= 0}
         bodies = ((k, body.name) for k, body in enumerate(paths.mechanism.bodies))
         matched = ((k, mujoco.mj_name2id(compiled, kinds.mjOBJ_BODY, name)) for k, name in bodies)
@@ -147,7 +155,10 @@ class _Compiled:
         """The tendon of the actuator of a name, or of that name."""
         kinds = self.mujoco.mjtObj
         actuator = self.mujoco.mj_name2id(self.model, kinds.mjOBJ_ACTUATOR, name)
-        if actuator >= 0 and self.model.actuator_trntype[actuator] == self.mujoco.mjtTrn.mjTRN_TENDON:
+        if (
+            actuator >= 0
+            and self.model.actuator_trntype[actuator] == self.mujoco.mjtTrn.mjTRN_TENDON
+        ):
             return int(self.model.actuator_trnid[actuator, 0])
         tendon = self.mujoco.mj_name2id(self.model, kinds.mjOBJ_TENDON, name)
         return tendon if tendon >= 0 else None
@@ -166,11 +177,16 @@ class _Compiled:
             for joint, leader, polynomial in self.followers:
                 place, dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
                 value = (
-                    0.0 if leader < 0 else data.qpos[model.jnt_qposadr[leader]] - model.qpos0[model.jnt_qposadr[leader]]
+                    0.0
+                    if leader < 0
+                    else data.qpos[model.jnt_qposadr[leader]]
+                    - model.qpos0[model.jnt_qposadr[leader]]
                 )
                 data.qpos[place] = model.qpos0[place] + polyval(value, polynomial)
                 if leader >= 0:
-                    rates[:, dof] = polyval(value, polyder(polynomial)) * rates[:, model.jnt_dofadr[leader]]
+                    rates[:, dof] = (
+                        polyval(value, polyder(polynomial)) * rates[:, model.jnt_dofadr[leader]]
+                    )
         arms = np.empty((model.ntendon, len(self.free)))
         for column, rate in enumerate(rates):
             data.qvel[:] = rate
@@ -182,15 +198,23 @@ class _Compiled:
     def strength(self, name: str, muscle: Muscle, lengths: Array) -> dict[str, Any]:
         """The isometric force of a muscle at lengths of its path, and the lengths that it implies."""
         actuator = self.mujoco.mj_name2id(self.model, self.mujoco.mjtObj.mjOBJ_ACTUATOR, name)
-        if actuator < 0 or self.model.actuator_gaintype[actuator] != self.mujoco.mjtGain.mjGAIN_MUSCLE:
+        if (
+            actuator < 0
+            or self.model.actuator_gaintype[actuator] != self.mujoco.mjtGain.mjGAIN_MUSCLE
+        ):
             return {}
-        gain, bias = (row[actuator].copy() for row in (self.model.actuator_gainprm, self.model.actuator_biasprm))
+        gain, bias = (
+            row[actuator].copy()
+            for row in (self.model.actuator_gainprm, self.model.actuator_biasprm)
+        )
         if gain[2] < 0.0:
             gain[2] = gain[3] / self.model.actuator_acc0[actuator]
         curves = Curves.read(self.model.actuator_lengthrange[actuator], gain, bias)
         spread = np.sort(lengths)
         (wanted,) = isometric_tension(muscle, spread, (1.0,))
-        off = (curves.tension(spread, 1.0) - wanted)[np.isfinite(wanted)] / muscle.max_isometric_force
+        off = (curves.tension(spread, 1.0) - wanted)[
+            np.isfinite(wanted)
+        ] / muscle.max_isometric_force
         along = muscle.optimal_fiber_length * np.cos(muscle.pennation_angle_at_optimal)
         return {
             "force": Error.of(off, "Fmax") if len(off) else None,

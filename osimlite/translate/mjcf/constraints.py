@@ -21,7 +21,9 @@ def add_constraints(draft: Draft) -> None:
             make = _MAKERS.get(type(constraint))
             if make is None:
                 what = f"a {type(constraint).__name__}"
-                draft.fidelity.add("constraint", constraint.name, what, f"{LEFT_OUT}: MuJoCo has none")
+                draft.fidelity.add(
+                    "constraint", constraint.name, what, f"{LEFT_OUT}: MuJoCo has none"
+                )
             else:
                 draft.fidelity.translated[constraint.name] = make(draft, constraint)
 
@@ -36,9 +38,17 @@ def _sites(kind: str, draft: Draft, item: b.WeldConstraint | b.PointConstraint) 
 
 def _distance(draft: Draft, item: b.DistanceConstraint) -> str:
     """A tendon of constant length; MuJoCo counts from its length where all joints stand at zero."""
-    name = straight(draft, item.name, [draft.site(item.name, *end) for end in (item.first, item.second)])
+    name = straight(
+        draft, item.name, [draft.site(item.name, *end) for end in (item.first, item.second)]
+    )
     length = float(np.linalg.norm(draft.at_zero(item.first) - draft.at_zero(item.second)))
-    add(draft.section("equality"), "tendon", name=name, tendon1=name, polycoef=[item.distance - length, 0, 0, 0, 0])
+    add(
+        draft.section("equality"),
+        "tendon",
+        name=name,
+        tendon1=name,
+        polycoef=[item.distance - length, 0, 0, 0, 0],
+    )
     return f"equality {name}"
 
 
@@ -62,7 +72,9 @@ def _on_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
     equality = draft.name("equality", item.name)
     site = draft.site(item.name, *item.follower)
     add(speck, "site", name=draft.name("site", f"{item.name}_speck"))
-    add(draft.section("equality"), "connect", name=equality, site1=site, site2=speck[-1].get("name"))
+    add(
+        draft.section("equality"), "connect", name=equality, site1=site, site2=speck[-1].get("name")
+    )
     return f"equality {equality}"
 
 

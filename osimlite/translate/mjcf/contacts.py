@@ -25,7 +25,9 @@ from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf.draft import Draft, Unsayable, Value, add, pose
 from osimlite.translate.mjcf.scenery import TOUCHES
 
-_PLANE = np.array(((0.0, 0.0, -1.0, 0.0), (0.0, 1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
+_PLANE = np.array(
+    ((0.0, 0.0, -1.0, 0.0), (0.0, 1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+)
 """The frame (4, 4) of a plane, which faces its Z axis, in that of a half space, which faces its negative X axis."""
 
 ContactForce = HuntCrossleyForce | ElasticFoundationForce | SmoothSphereHalfSpaceForce
@@ -59,7 +61,9 @@ def add_contacts(draft: Draft) -> None:
 
 def _add_surface(draft: Draft, geometry: ContactGeometry, path: str) -> None:
     body, placed = draft.placement(geometry, "socket_frame")
-    made = _form(draft, geometry, path, still=not draft.bodies[body].xpath("ancestor-or-self::body/joint"))
+    made = _form(
+        draft, geometry, path, still=not draft.bodies[body].xpath("ancestor-or-self::body/joint")
+    )
     if made is None:
         return
     form, own = made
@@ -69,7 +73,9 @@ def _add_surface(draft: Draft, geometry: ContactGeometry, path: str) -> None:
     draft.fidelity.translated[path] = f"geom {name}"
 
 
-def _form(draft: Draft, geometry: ContactGeometry, path: str, *, still: bool) -> tuple[dict[str, Value], Array] | None:
+def _form(
+    draft: Draft, geometry: ContactGeometry, path: str, *, still: bool
+) -> tuple[dict[str, Value], Array] | None:
     """The attributes of the geom, and its frame (4, 4) in that of the geometry; None for a mesh without a file."""
     match geometry:
         case ContactSphere() if geometry.radius > 0.0:
@@ -88,7 +94,9 @@ def _form(draft: Draft, geometry: ContactGeometry, path: str, *, still: bool) ->
             shape = mesh_shape(geometry.filename, path, draft.mesh_files, draft.fidelity.add)
             if shape is None:
                 return None
-            draft.fidelity.add("contact-geometry", path, "a contact mesh", "its convex hull", shape.file)
+            draft.fidelity.add(
+                "contact-geometry", path, "a contact mesh", "its convex hull", shape.file
+            )
             return {"type": "mesh", "mesh": draft.mesh(shape.file, shape.scale)}, np.eye(4)
     raise Unsayable("MuJoCo has no such surface")
 
@@ -96,7 +104,9 @@ def _form(draft: Draft, geometry: ContactGeometry, path: str, *, still: bool) ->
 def _add_pairs(draft: Draft, force: ContactForce) -> Iterator[str]:
     """Add a pair for any two surfaces of a force that are on different bodies; their names."""
     for (one, first), (two, second) in combinations(_surfaces(draft, force), 2):
-        became = [draft.fidelity.translated.get(draft.tree.path_of(item) or "") for item in (one, two)]
+        became = [
+            draft.fidelity.translated.get(draft.tree.path_of(item) or "") for item in (one, two)
+        ]
         bodies = [draft.placement(item, "socket_frame").body for item in (one, two)]
         flat = isinstance(one, ContactHalfSpace) and isinstance(two, ContactHalfSpace)
         if flat or bodies[0] == bodies[1] or None in became:
@@ -106,7 +116,14 @@ def _add_pairs(draft: Draft, force: ContactForce) -> Iterator[str]:
         # Simbody's rule for two materials.
         slide = 2.0 * first * second / (first + second) if first + second else 0.0
         friction = (slide, slide, 0.0, 0.0, 0.0)
-        add(draft.section("contact"), "pair", name=name, geom1=geoms[0], geom2=geoms[1], friction=friction)
+        add(
+            draft.section("contact"),
+            "pair",
+            name=name,
+            geom1=geoms[0],
+            geom2=geoms[1],
+            friction=friction,
+        )
         yield name
 
 
@@ -123,5 +140,7 @@ def _surfaces(draft: Draft, force: ContactForce) -> Iterator[tuple[ContactGeomet
         for position, word in enumerate(parameters.geometry):
             result = draft.tree.resolve(Use(parameters, force, spec, word, position)).target
             if not isinstance(result, ContactGeometry):
-                raise ModelError(f"it names the contact geometry '{word}', which the model does not have")
+                raise ModelError(
+                    f"it names the contact geometry '{word}', which the model does not have"
+                )
             yield result, parameters.dynamic_friction

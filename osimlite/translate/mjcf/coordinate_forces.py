@@ -25,7 +25,9 @@ FAR = 1e6
 def actuator(draft: Draft, force: CoordinateActuator, path: str, **dynamics: Value) -> str:
     """A force on the joint in proportion to the control."""
     lead, _ = _lead(draft, force)
-    return scaled(draft, force, path, joint=lead.joint, gear=force.optimal_force / lead.line.slope, **dynamics)
+    return scaled(
+        draft, force, path, joint=lead.joint, gear=force.optimal_force / lead.line.slope, **dynamics
+    )
 
 
 def scaled(draft: Draft, force: CoordinateActuator | PathActuator, path: str, **on: Value) -> str:
@@ -40,7 +42,9 @@ def scaled(draft: Draft, force: CoordinateActuator | PathActuator, path: str, **
 
 def lagging_actuator(draft: Draft, force: ActivationCoordinateActuator, path: str) -> str:
     """The same with an activation that follows the control."""
-    made = actuator(draft, force, path, dyntype="filterexact", dynprm=force.activation_time_constant)
+    made = actuator(
+        draft, force, path, dyntype="filterexact", dynprm=force.activation_time_constant
+    )
     draft.activations[made.removeprefix("actuator ")] = force.default_activation
     return made
 
@@ -49,7 +53,9 @@ def spring(draft: Draft, force: SpringGeneralizedForce, path: str) -> str:
     """A spring and damper in the tendon that is the coordinate."""
     lead, _ = _lead(draft, force)
     rest = force.rest_length
-    return _tendon(draft, lead, path, (rest, rest), stiffness=force.stiffness, damping=force.viscosity)
+    return _tendon(
+        draft, lead, path, (rest, rest), stiffness=force.stiffness, damping=force.viscosity
+    )
 
 
 def limit(draft: Draft, force: CoordinateLimitForce, path: str) -> str:
@@ -63,7 +69,9 @@ def limit(draft: Draft, force: CoordinateLimitForce, path: str) -> str:
         made = _tendon(draft, lead, path, (ql, qu), stiffness=Ku)
     else:
         made = _tendon(draft, lead, f"{path}_upper", (-FAR, qu), stiffness=Ku)
-        made += " " + _tendon(draft, lead, f"{path}_lower", (ql, FAR), stiffness=Kl).removeprefix("tendon ")
+        made += " " + _tendon(draft, lead, f"{path}_lower", (ql, FAR), stiffness=Kl).removeprefix(
+            "tendon "
+        )
     beyond = np.linspace(0.0, 3.0 * t, 200)
     off = [limit_force(qu + d, 0.0, Ku, qu, Kl, ql, D, t) + Ku * d for d in beyond]
     off += [limit_force(ql - d, 0.0, Ku, qu, Kl, ql, D, t) - Kl * d for d in beyond]
@@ -89,7 +97,9 @@ def _tendon(draft: Draft, lead: Lead, path: str, slack: tuple[float, float], **l
     return f"tendon {name}"
 
 
-def _lead(draft: Draft, force: CoordinateActuator | SpringGeneralizedForce | CoordinateLimitForce) -> tuple[Lead, int]:
+def _lead(
+    draft: Draft, force: CoordinateActuator | SpringGeneralizedForce | CoordinateLimitForce
+) -> tuple[Lead, int]:
     """The joint of the coordinate that a force names, and the place of the coordinate."""
     if not force.coordinate:
         raise Unsayable("it names no coordinate")

@@ -15,10 +15,17 @@ from osimlite.translate.mjcf.draft import Draft, Follower
 def add_coordinates(draft: Draft) -> None:
     """Write ranges, which limit nothing, to the joints that are coordinates, and hold prescribed coordinates."""
     elements = {joint.get("name"): joint for joint in draft.section("worldbody").iter("joint")}
-    note, moving = draft.fidelity.add, {place for joint in draft.robot.moving for place in joint.coordinates}
+    note, moving = (
+        draft.fidelity.add,
+        {place for joint in draft.robot.moving for place in joint.coordinates},
+    )
     for place, info in enumerate(draft.mechanism.coordinates):
         lead = draft.leads.get(place)
-        done = "locked: a part of the body that carries it" if info.locked else "what its joints follow"
+        done = (
+            "locked: a part of the body that carries it"
+            if info.locked
+            else "what its joints follow"
+        )
         draft.fidelity.translated[info.path] = done if lead is None else f"joint {lead.joint}"
         if lead is None and place not in moving and not info.locked:
             note("coordinate", info.path, "a coordinate that moves nothing", "left out")
@@ -34,7 +41,9 @@ def add_coordinates(draft: Draft) -> None:
         if info.prescribed is not None and not info.locked and lead is not None:
             start = info.prescribed.evaluate(np.zeros(1))[0]
             exact = Composed(Linear(*lead.line), info.prescribed) if draft.options.driver else None
-            draft.follow(lead.joint, Follower(None, (lead.line.slope * start + lead.line.start,), exact))
+            draft.follow(
+                lead.joint, Follower(None, (lead.line.slope * start + lead.line.start,), exact)
+            )
             if exact is None:
                 note(
                     "prescribed",

@@ -27,30 +27,40 @@ PULLED = 0.1
 SHARE = 0.01
 """Inertia of a joint that is nothing but an argument, as a part of that of all it moves.
 
-The less, the nearer is the motion to the model's, but the softer are the equalities that follow the joint.
+The less, the nearer is the motion to the model's, but the softer are the equalities that follow the
+joint.
 """
 
 
 def add_couplings(draft: Draft) -> None:
     """Add an equality for every joint whose value a function of a coordinate or a coupler decides."""
     robot = draft.robot
-    draft.leads |= {place: Lead(joint.name, line) for place, (joint, line) in leaders(robot).items()}
+    draft.leads |= {
+        place: Lead(joint.name, line) for place, (joint, line) in leaders(robot).items()
+    }
     if not draft.options.driver:
         add_ellipsoids(draft)
     drivers = coordinate_drivers(robot)
-    by_coupler = {item.dependent: item.name for item in couplers(robot) if item.dependent in drivers}
+    by_coupler = {
+        item.dependent: item.name for item in couplers(robot) if item.dependent in drivers
+    }
     for joint in robot.moving:
         driver = joint_driver(joint, drivers)
         if joint.name in draft.followers:
             continue
         if driver is None:
             _hold(draft, joint)
-        elif driver.coordinate is None or draft.leads.get(driver.coordinate, (None,))[0] != joint.name:
+        elif (
+            driver.coordinate is None
+            or draft.leads.get(driver.coordinate, (None,))[0] != joint.name
+        ):
             whose = by_coupler.get(joint.coordinates[0]) if joint.function == IDENTITY else None
             _follow(draft, joint, driver, whose or joint.source)
     for place, path in by_coupler.items():
         names = " ".join(joint.name for joint in robot.moving if place in joint.coordinates)
-        draft.fidelity.translated[path] = f"equality {names}" if names else "what it binds is locked"
+        draft.fidelity.translated[path] = (
+            f"equality {names}" if names else "what it binds is locked"
+        )
     for item in couplers(robot):
         if item.dependent not in drivers:
             several = "a coordinate that is a function of several others, or of itself"
@@ -75,9 +85,14 @@ def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None
         drive, (outer,) = composition([function], (low, high))
         led = helper(draft, driver.coordinate, drive)
         assert led is not None
-        follower, done = Follower(led.joint, along(led.line, outer)), "a quartic of a quartic, fitted"
+        follower, done = (
+            Follower(led.joint, along(led.line, outer)),
+            "a quartic of a quartic, fitted",
+        )
         x = np.linspace(low, high, 400)
-        fit = Fit((), Error.of(Polynomial(outer)(Polynomial(drive)(x)) - sampled(function, x), unit))
+        fit = Fit(
+            (), Error.of(Polynomial(outer)(Polynomial(drive)(x)) - sampled(function, x), unit)
+        )
     if fit.error is not None and draft.options.driver:
         follower = follower._replace(function=exact)
     elif fit.error is not None:
@@ -97,7 +112,11 @@ def _argument(draft: Draft, place: int) -> Lead:
     info = draft.mechanism.coordinates[place]
     name = joint_names(draft.mechanism)[place]
     # The driver moves joints exactly, whatever equalities make of them.
-    inertia = SPECK * SPECK if draft.options.driver else max(SHARE * _inertia(draft, place), SPECK * SPECK)
+    inertia = (
+        SPECK * SPECK
+        if draft.options.driver
+        else max(SHARE * _inertia(draft, place), SPECK * SPECK)
+    )
     speck = draft.speck(name, draft.bodies[GROUND], np.eye(4), inertia)
     add(speck, "joint", name=name, type="hinge", axis="0 0 1")
     draft.fidelity.add(
@@ -139,7 +158,14 @@ def helper(draft: Draft, place: int, drive: Array) -> Lead | None:
     if np.array_equal(drive, (0.0, 1.0, 0.0, 0.0, 0.0)):
         return Lead(lead.joint, own)
     follower = Follower(lead.joint, along(own, drive))
-    name = next((name for name, each in draft.followers.items() if each == follower and name in draft.helpers), None)
+    name = next(
+        (
+            name
+            for name, each in draft.followers.items()
+            if each == follower and name in draft.helpers
+        ),
+        None,
+    )
     if name is None:
         name = draft.name("joint", f"{info.name}_helper")
         draft.helpers.add(name)
@@ -159,7 +185,11 @@ def along(line: Line, polynomial: Array) -> tuple[float, ...]:
 def _hold(draft: Draft, joint: RobotJoint) -> None:
     """Hold a joint that is a function of several coordinates where the default pose has it, but for the driver."""
     value = joint.value(draft.default_state[0])
-    leads = [lead for place in joint.coordinates if (lead := draft.leads.get(place)) and lead.line == (1.0, 0.0)]
+    leads = [
+        lead
+        for place in joint.coordinates
+        if (lead := draft.leads.get(place)) and lead.line == (1.0, 0.0)
+    ]
     if draft.options.driver and len(leads) == len(joint.coordinates):
         names = tuple(lead.joint for lead in leads)
         draft.follow(joint.name, Follower(None, (value,), joint.function, names))

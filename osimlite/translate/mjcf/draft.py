@@ -41,7 +41,8 @@ C = TypeVar("C", bound=Component)
 SPECK = 1e-3
 """Mass (kg) of a body that is there for a constraint alone.
 
-MuJoCo makes a constraint the softer, the lighter the lighter one of its bodies; this is a compromise.
+MuJoCo makes a constraint the softer, the lighter the lighter one of its bodies; this is a
+compromise.
 """
 
 
@@ -55,10 +56,14 @@ class Options:
 
     version: Version = 4  # of MuJoCo, whose first number decides what a side site means
     visuals: bool = True  # whether to say what bodies look like
-    contact: Contact = "native"  # whether contact forces become contacts of MuJoCo's own law, or nothing
-    fit: Fit = "none"  # what is fitted: nothing, what tendons go around, or that and the forces of muscles
-    spline: Spline = "series"  # what a joint follows that is no polynomial: one quartic, or a quartic of a quartic
-    driver: bool = False  # whether `osimlite.mjcf.Driver` moves the model, which computes functions and forces itself
+    # whether contact forces become contacts of MuJoCo's own law, or nothing
+    contact: Contact = "native"
+    # what is fitted: nothing, what tendons go around, or that and the forces of muscles
+    fit: Fit = "none"
+    # what a joint follows that is no polynomial: one quartic, or a quartic of a quartic
+    spline: Spline = "series"
+    # whether `osimlite.mjcf.Driver` moves the model, which computes functions and forces itself
+    driver: bool = False
 
 
 class Lead(NamedTuple):
@@ -71,8 +76,8 @@ class Lead(NamedTuple):
 class Follower(NamedTuple):
     """How a joint follows another: its value is the polynomial, constant first, of the leader's, or constant.
 
-    Where that is fitted, or held, the driver has the `function` that it exactly is: of the leader, of several joints
-    (`arguments`), or of time.
+    Where that is fitted, or held, the driver has the `function` that it exactly is: of the leader,
+    of several joints (`arguments`), or of time.
     """
 
     leader: str | None
@@ -100,7 +105,9 @@ def add(parent: _Element, tag: str, **attributes: Value) -> _Element:
     Raises:
         UnsupportedError: a number is not finite, which MJCF cannot say.
     """
-    said = {name.rstrip("_"): text(value) for name, value in attributes.items() if value is not None}
+    said = {
+        name.rstrip("_"): text(value) for name, value in attributes.items() if value is not None
+    }
     for name, words in said.items():
         if NOT_FINITE.intersection(words.split()) and not isinstance(attributes.get(name), str):
             raise UnsupportedError(
@@ -115,22 +122,32 @@ class Draft:
 
     model: Model  # the model
     robot: Robot  # its mechanism as one-axis joints; locked coordinates are fixed joints
-    fidelity: Fidelity  # the account; a pass puts components into `translated`, and what is lost into records
+    # the account; a pass puts components into `translated`, and what is lost into records
+    fidelity: Fidelity
     options: Options  # what the user chooses
     folder: Path | None  # where the model's file is, and the files that it names
     mesh_files: MeshFiles  # takes up the mesh files that the text names
     root: _Element = field(default_factory=lambda: Element("mujoco"))  # the element `<mujoco>`
-    # the element of each body by its index in the mechanism, of ground (-1) too. Its frame is the body's.
+    # the element of each body by its index in the mechanism, of ground (-1) too. Its frame is the
+    # body's.
     bodies: dict[int, _Element] = field(default_factory=dict)
-    # element and frame (4, 4) in it of those links of the robot that stand still in an element, by name
+    # element and frame (4, 4) in it of those links of the robot that stand still in an element, by
+    # name
     frames: dict[str, tuple[_Element, Array]] = field(default_factory=dict)
-    # the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it is locked
+    # the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it
+    # is locked
     leads: dict[int, Lead] = field(default_factory=dict)
-    followers: dict[str, Follower] = field(default_factory=dict)  # what equality constraints make of joints, by name
-    helpers: set[str] = field(default_factory=set)  # those of them that move nothing, but are what others follow
-    tendons: dict[str, Tied] = field(default_factory=dict)  # of paths, by the absolute path of their owners
-    activations: dict[str, float] = field(default_factory=dict)  # at the start, of the actuators that have one, by name
-    # values (rad, m) in the default pose of joints that a pass has added besides those of the robot, by name
+    # what equality constraints make of joints, by name
+    followers: dict[str, Follower] = field(default_factory=dict)
+    # those of them that move nothing, but are what others follow
+    helpers: set[str] = field(default_factory=set)
+    # of paths, by the absolute path of their owners
+    tendons: dict[str, Tied] = field(default_factory=dict)
+    activations: dict[str, float] = field(
+        default_factory=dict
+    )  # at the start, of the actuators that have one, by name
+    # values (rad, m) in the default pose of joints that a pass has added besides those of the
+    # robot, by name
     starts: dict[str, float] = field(default_factory=dict)
     start_note: str = ""  # where simulations have to start, if that is not everywhere
     _names: dict[str, set[str | None]] = field(default_factory=dict)
@@ -139,7 +156,10 @@ class Draft:
     def __post_init__(self) -> None:
         # Bodies and joints of the robot have names already, which no other may take.
         self._names["body"] = {link.name for link in self.robot.links}
-        self._names["joint"] = {*joint_names(self.mechanism), *(joint.name for joint in self.robot.joints)}
+        self._names["joint"] = {
+            *joint_names(self.mechanism),
+            *(joint.name for joint in self.robot.joints),
+        }
 
     @property
     def mechanism(self) -> Mechanism:
@@ -160,14 +180,24 @@ class Draft:
         try:
             return self.mechanism.default_state()
         except SimulationError:
-            self.fidelity.add("default-pose", "/", "a default pose near none that fulfils the constraints", "as it is")
+            self.fidelity.add(
+                "default-pose",
+                "/",
+                "a default pose near none that fulfils the constraints",
+                "as it is",
+            )
             return self.mechanism.values({}), self.mechanism.speeds({})
 
     def components(self, kind: type[C]) -> Iterator[tuple[C, str]]:
         """Components of a class that no pass has spoken of yet, with their absolute paths."""
-        spoken_of = self.fidelity.translated.keys() | {record.component for record in self.fidelity.records}
+        spoken_of = self.fidelity.translated.keys() | {
+            record.component for record in self.fidelity.records
+        }
         for component in self.tree.components:
-            if isinstance(component, kind) and (path := self.tree.path_of(component) or "") not in spoken_of:
+            if (
+                isinstance(component, kind)
+                and (path := self.tree.path_of(component) or "") not in spoken_of
+            ):
                 yield component, path
 
     def account(self, path: str, became: str) -> None:
@@ -184,9 +214,8 @@ class Draft:
     def name(self, kind: str, path: str) -> str:
         """A name for a component, unlike any other of this kind: its own, or its path with dots where that is taken.
 
-        Args:
-            kind: MuJoCo's name space: ``geom``, ``site``, ``tendon``, ``actuator``, ``equality`` ...
-            path: absolute path of the component, or any name.
+        Args: kind: MuJoCo's name space: ``geom``, ``site``, ``tendon``, ``actuator``, ``equality``
+            ... path: absolute path of the component, or any name.
         """
         taken = self._names.setdefault(kind, set())
         own = path.rsplit("/", 1)[-1]
@@ -246,18 +275,31 @@ class Draft:
         coefficients = np.zeros(5)
         coefficients[: len(follower.polynomial)] = follower.polynomial
         name = self.name("equality", joint)
-        add(self.section("equality"), "joint", name=name, joint1=joint, joint2=follower.leader, polycoef=coefficients)
+        add(
+            self.section("equality"),
+            "joint",
+            name=name,
+            joint1=joint,
+            joint2=follower.leader,
+            polycoef=coefficients,
+        )
 
-    def speck(self, name: str, element: _Element, frame: Array, inertia: float = SPECK * SPECK) -> _Element:
+    def speck(
+        self, name: str, element: _Element, frame: Array, inertia: float = SPECK * SPECK
+    ) -> _Element:
         """Add a small body, which nothing weighs down, at a frame (4, 4) in an element; `inertia` is in kg·m²."""
-        speck = add(element, "body", name=self.name("body", f"{name}_speck"), gravcomp=1, **pose(frame))
+        speck = add(
+            element, "body", name=self.name("body", f"{name}_speck"), gravcomp=1, **pose(frame)
+        )
         add(speck, "inertial", pos=np.zeros(3), mass=SPECK, diaginertia=np.full(3, inertia))
         return speck
 
     def at_zero(self, station: StationPlacement) -> Array:
         """Where a station is in ground (3,) when all joints stand at zero, as MuJoCo has it before a pose is set."""
         body, location = station
-        link, _ = self.robot.link_of["/ground" if body == GROUND else self.mechanism.bodies[body].path]
+        link, _ = self.robot.link_of[
+            "/ground" if body == GROUND else self.mechanism.bodies[body].path
+        ]
         return self._at_zero[link.name][:3] @ np.append(location, 1.0)
 
     @cached_property
@@ -270,7 +312,8 @@ class Draft:
     def mesh(self, file: str, scale: tuple[float, float, float]) -> str:
         """The asset that is a mesh file at a scale.
 
-        Its inertia is said to be that of its surface: MuJoCo refuses bones whose surface does not close otherwise.
+        Its inertia is said to be that of its surface: MuJoCo refuses bones whose surface does not
+        close otherwise.
         """
         key = (file, scale)
         if key not in self._meshes:
@@ -281,7 +324,9 @@ class Draft:
 
     def links(self) -> Iterator[tuple[Link, _Element]]:
         """Links that are bodies (or ground), with their elements."""
-        for index, path in enumerate(["/ground", *(body.path for body in self.mechanism.bodies)], GROUND):
+        for index, path in enumerate(
+            ["/ground", *(body.path for body in self.mechanism.bodies)], GROUND
+        ):
             yield self.robot.link_of[path][0], self.bodies[index]
 
     def body_name(self, body: int) -> str:

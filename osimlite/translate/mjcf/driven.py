@@ -18,10 +18,17 @@ COMPUTED = "computed by osimlite.mjcf.Driver"
 
 def add_driven(draft: Draft) -> None:
     """Add actuators that push nothing: one for each control, and one that has the auxiliary states."""
-    forces = force_elements(draft.model, draft.mechanism, skip_unsupported=True, folder=draft.folder)
+    forces = force_elements(
+        draft.model, draft.mechanism, skip_unsupported=True, folder=draft.folder
+    )
     for words in forces.skipped:
         path, _, kind = words.partition(" (")
-        draft.fidelity.add("force", path.strip("'"), f"a {kind.rstrip(')')}", f"{LEFT_OUT}: osimlite cannot compute it")
+        draft.fidelity.add(
+            "force",
+            path.strip("'"),
+            f"a {kind.rstrip(')')}",
+            f"{LEFT_OUT}: osimlite cannot compute it",
+        )
     for element in forces.elements:
         draft.account(element.path, COMPUTED)
     for component, path in draft.components(ModelComponent):
@@ -30,7 +37,10 @@ def add_driven(draft: Draft) -> None:
     joint = draft.section("worldbody").find(".//joint")
     if joint is None:
         return
-    states, idle = draft.name("actuator", STATES), {"joint": joint.get("name"), "gainprm": 0, "gear": 0}
+    states, idle = (
+        draft.name("actuator", STATES),
+        {"joint": joint.get("name"), "gainprm": 0, "gear": 0},
+    )
     for path in forces.controls.names:
         add(draft.section("actuator"), "general", name=draft.name("actuator", path), **idle)
     count = sum(len(element.states) for element in forces.elements)

@@ -1,9 +1,9 @@
 """A model in MuJoCo with OpenSim's own laws: MuJoCo moves the bodies, osimlite says what follows and what pushes.
 
-MuJoCo has neither splines nor the forces of OpenSim, but it calls back. A `Driver` writes the exact functions of the
-coordinates into MuJoCo's equalities before every step, gives the generalized forces of all muscles, contacts, limits,
-springs and bushings at every evaluation, wrapped paths and elastic tendons included, and lets MuJoCo integrate their
-states among its own::
+MuJoCo has neither splines nor the forces of OpenSim, but it calls back. A `Driver` writes the exact
+functions of the coordinates into MuJoCo's equalities before every step, gives the generalized
+forces of all muscles, contacts, limits, springs and bushings at every evaluation, wrapped paths and
+elastic tendons included, and lets MuJoCo integrate their states among its own::
 
     driver = osimlite.mjcf.Driver(osimlite.read("gait.osim"))
     driver.data.actuator("soleus_r").ctrl = 0.3
@@ -50,7 +50,11 @@ class _Followed(NamedTuple):
 
     def at(self, data: Any) -> tuple[float, Array, float, float]:
         """Where the function has the joint, its gradient, its rate, and what its curvature adds to the acceleration."""
-        x, rates = (data.qpos[self.addresses], data.qvel[self.leaders]) if self.leaders else (data.time, 1.0)
+        x, rates = (
+            (data.qpos[self.addresses], data.qvel[self.leaders])
+            if self.leaders
+            else (data.time, 1.0)
+        )
         value, *derivatives = self.function.evaluate(np.atleast_1d(x))
         (gradient, hessian), rates = map(np.array, derivatives), np.atleast_1d(rates)
         return value, gradient, float(gradient @ rates), float(rates @ hessian @ rates)
@@ -59,23 +63,19 @@ class _Followed(NamedTuple):
 class Driver:
     """A model that MuJoCo moves by OpenSim's laws.
 
-    MuJoCo's callbacks are one set for the whole process: they are the driver's while it steps, and put back after.
+    MuJoCo's callbacks are one set for the whole process: they are the driver's while it steps, and
+    put back after.
 
-    Args:
-        model: what moves.
-        timestep: of MuJoCo (s).
-        integrator: of MuJoCo.
-        equilibrate: start muscles in equilibrium of fibers and tendon.
-        file: what ``osimlite translate --driver`` wrote of the model, with what you added: a scene, sensors, cameras.
-        folder: where the model's file is, and the files that it names.
-        geometry: more folders to look for mesh files in.
+    Args: model: what moves. timestep: of MuJoCo (s). integrator: of MuJoCo. equilibrate: start
+        muscles in equilibrium of fibers and tendon. file: what ``osimlite translate --driver``
+        wrote of the model, with what you added: a scene, sensors, cameras. folder: where the
+        model's file is, and the files that it names. geometry: more folders to look for mesh files
+        in.
 
-    Attributes:
-        mjcf: the translation, which has the account of what the driver does not compute.
-        model: MuJoCo's ``MjModel``; ``ctrl`` of its actuators are the controls of the model's, added to what the
-            model's controllers make of them.
-        data: MuJoCo's ``MjData``.
-        system: the forces.
+    Attributes: mjcf: the translation, which has the account of what the driver does not compute.
+        model: MuJoCo's ``MjModel``; ``ctrl`` of its actuators are the controls of the model's,
+        added to what the model's controllers make of them. data: MuJoCo's ``MjData``. system: the
+        forces.
 
     Raises:
         MissingDependency: mujoco is not installed.
@@ -103,7 +103,9 @@ class Driver:
             self.model = self._mujoco.MjModel.from_xml_path(str(file))
         self.model.opt.timestep = timestep
         self.model.opt.jacobian = self._mujoco.mjtJacobian.mjJAC_DENSE
-        self.model.opt.integrator = getattr(self._mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+        self.model.opt.integrator = getattr(
+            self._mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}"
+        )
         self.data = self._mujoco.MjData(self.model)
         self._mechanism = mechanism = self.mjcf.robot.mechanism
         self._turns = not all(body.mobilizer.speeds_are_rates for body in mechanism.bodies)
@@ -119,9 +121,13 @@ class Driver:
         self._dofs = np.array([joint.dofadr[0] for joint in joints], dtype=int)
         self._slopes, self._starts = np.array([lead.line for lead in leads]).reshape(-1, 2).T
         led = set(self.mjcf.leads)
-        self._following = {k: each for k, each in coordinate_drivers(self.mjcf.robot).items() if k not in led}
+        self._following = {
+            k: each for k, each in coordinate_drivers(self.mjcf.robot).items() if k not in led
+        }
         self._followed = [self._followed_by(name) for name in self.mjcf.followers]
-        self._free = np.setdiff1d(np.arange(self.model.nv), [followed.dof for followed in self._followed])
+        self._free = np.setdiff1d(
+            np.arange(self.model.nv), [followed.dof for followed in self._followed]
+        )
         self._rates: list[float] = []
         self._failure: BaseException | None = None
         self.reset()
@@ -206,7 +212,9 @@ class Driver:
             state = self.system.state
             if len(self._controls):
                 self.system.numbers[self._controls] = data.ctrl[: len(self._controls)]
-            row = self.system.applied(data.time, state.pack(q.tolist(), u.tolist(), data.act.tolist()))
+            row = self.system.applied(
+                data.time, state.pack(q.tolist(), u.tolist(), data.act.tolist())
+            )
         except Exception as failure:
             # Python's errors do not pass through MuJoCo.
             self._failure = failure
@@ -225,8 +233,9 @@ class Driver:
     def _hold(self, data: Any) -> None:
         """Add the forces of all equalities, with which joints accelerate as those that they follow.
 
-        MuJoCo's own leave a ten-thousandth of the difference. With these forces, and told what the curvature asks for,
-        which MuJoCo leaves out, nothing is left to them but to take back errors of position and speed.
+        MuJoCo's own leave a ten-thousandth of the difference. With these forces, and told what the
+        curvature asks for, which MuJoCo leaves out, nothing is left to them but to take back errors
+        of position and speed.
         """
         if not data.ne:
             return
@@ -244,16 +253,23 @@ class Driver:
         rows = data.efc_J.reshape(-1, self.model.nv)[others]
         applied = data.qfrc_passive - data.qfrc_bias + data.qfrc_applied
         inertia = np.array([self._weighed(data, column) for column in moves.T.copy()]) @ moves
-        known = np.append(moves.T @ (applied - self._weighed(data, wanted)), data.efc_aref[others] - rows @ wanted)
+        known = np.append(
+            moves.T @ (applied - self._weighed(data, wanted)), data.efc_aref[others] - rows @ wanted
+        )
         held = rows @ moves
         matrix = np.block([[inertia, held.T], [held, np.zeros((len(others), len(others)))]])
-        result = np.linalg.lstsq(matrix, known)[0] if len(others) else np.linalg.solve(matrix, known)
+        result = (
+            np.linalg.lstsq(matrix, known)[0] if len(others) else np.linalg.solve(matrix, known)
+        )
         accelerations = moves @ result[: len(self._free)] + wanted
         data.qfrc_passive += self._weighed(data, accelerations) - applied
-        # What `_follow` writes is for the start of a step: within it there are no errors to take back.
+        # What `_follow` writes is for the start of a step: within it there are no errors to take
+        # back.
         for place, item in zip(places, self._followed, strict=True):
             rest = 0.0 if item.fitted else data.efc_aref[place]
-            data.efc_aref[place] = rest + (wanted if len(item.leaders) == 1 else accelerations)[item.dof]
+            data.efc_aref[place] = (
+                rest + (wanted if len(item.leaders) == 1 else accelerations)[item.dof]
+            )
 
     def _weighed(self, data: Any, accelerations: Array) -> Array:
         """The mass matrix times accelerations (nv,)."""
@@ -323,10 +339,14 @@ class Driver:
     def _open_controls(self) -> None:
         """Add MuJoCo's controls to those of the model: numbers, whose places among those of the forces are found."""
         controls = self.system.forces.controls
-        none, one = (controls.driven(dict.fromkeys(controls.names, Constant(value))) for value in (0.0, 1.0))
+        none, one = (
+            controls.driven(dict.fromkeys(controls.names, Constant(value))) for value in (0.0, 1.0)
+        )
         self.system.drive(none)
         place = self.system.structure[MODEL.CONTROLS]
         first = self.system.structure[place + ITEM.NUMBERS] if place else 0
-        self._controls = first + np.flatnonzero(np.array(none.record()[1]) != np.array(one.record()[1]))
+        self._controls = first + np.flatnonzero(
+            np.array(none.record()[1]) != np.array(one.record()[1])
+        )
         names = [self.model.actuator(k).name for k in range(self.model.nu)]
         self._states = names.index(STATES) if STATES in names else -1

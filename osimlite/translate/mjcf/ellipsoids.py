@@ -1,7 +1,8 @@
 """Bodies that slide on an ellipsoid: a mechanism that keeps them there without any function of several coordinates.
 
-The body's origin is p = diag(r) n, where n is its own Z axis. A point ahead of it by h along n is at s = diag(r + h) n.
-A speck on three slides that is connected to that point reads s, and each p is r / (r + h) of its s, a straight line.
+The body's origin is p = diag(r) n, where n is its own Z axis. A point ahead of it by h along n is
+at s = diag(r + h) n. A speck on three slides that is connected to that point reads s, and each p is
+r / (r + h) of its s, a straight line.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from osimlite.translate.mjcf.draft import SPECK, Draft, Follower, add, pose
 def add_ellipsoids(draft: Draft) -> None:
     """Lead the slides of every joint whose body stays on an ellipsoid."""
     joints = draft.robot.joints
-    slides = [place for place, joint in enumerate(joints) if isinstance(joint.function, EllipsoidPoint)]
+    slides = [
+        place for place, joint in enumerate(joints) if isinstance(joint.function, EllipsoidPoint)
+    ]
     for _, group in groupby(slides, key=lambda place: joints[place].source):
         places = list(group)
         _add(draft, [joints[place] for place in places], joints[places[-1] + 1 : places[-1] + 4])
@@ -31,7 +34,10 @@ def _add(draft: Draft, slides: list[RobotJoint], turns: tuple[RobotJoint, ...]) 
         axis = np.eye(3)[joint.function.component]
         if np.array_equal(joint.axis, axis):
             radii[joint.function.component] = joint.function.radius
-    base, end = draft.frames.get(slides[0].parent), draft.frames.get(turns[-1].child) if turns else None
+    base, end = (
+        draft.frames.get(slides[0].parent),
+        draft.frames.get(turns[-1].child) if turns else None,
+    )
     whole = {place for joint in turns for place in joint.coordinates} == set(slides[0].coordinates)
     if len(radii) < len(slides) or base is None or end is None or not whole:
         return

@@ -60,15 +60,12 @@ LOOKS: tuple[Pass, ...] = (add_shapes, add_camera, add_markers, add_frames, add_
 class Mjcf:
     """A model as MJCF.
 
-    Attributes:
-        name: of the files.
-        text: the MJCF.
-        fidelity: what became of every component, exact where there is no record of it.
-        robot: the neutral robot that was written; its joints and links have MuJoCo's names.
-        files: mesh files that the text names, and what the driver needs, by name relative to it.
-        followers: what equality constraints make of joints, by name.
-        start_note: where simulations have to start, if that is not everywhere.
-        leads: the joint that is a straight line of a coordinate, by the coordinate's place in the mechanism.
+    Attributes: name: of the files. text: the MJCF. fidelity: what became of every component, exact
+        where there is no record of it. robot: the neutral robot that was written; its joints and
+        links have MuJoCo's names. files: mesh files that the text names, and what the driver needs,
+        by name relative to it. followers: what equality constraints make of joints, by name.
+        start_note: where simulations have to start, if that is not everywhere. leads: the joint
+        that is a straight line of a coordinate, by the coordinate's place in the mechanism.
     """
 
     name: str
@@ -83,7 +80,10 @@ class Mjcf:
     def joint_values(self, q: Values) -> dict[str, float]:
         """Values (rad, m) of all joints by name at coordinate values `q`, exact where equalities are fitted."""
         values = self.robot.mechanism.values(q)
-        leads = {joint: line.slope * values[place] + line.start for place, (joint, line) in self.leads.items()}
+        leads = {
+            joint: line.slope * values[place] + line.start
+            for place, (joint, line) in self.leads.items()
+        }
         result = leads | self.robot.joint_values(values)
         for joint, follower in self.followers.items():
             if joint not in result:
@@ -100,7 +100,8 @@ class Mjcf:
             OsimliteError: a file cannot be written.
         """
         return write_files(
-            Path(folder), {f"{self.name}.xml": self.text, **self.files, "fidelity.json": self.fidelity.to_json()}
+            Path(folder),
+            {f"{self.name}.xml": self.text, **self.files, "fidelity.json": self.fidelity.to_json()},
         )
 
 
@@ -120,28 +121,25 @@ def to_mjcf(
 ) -> Mjcf:
     """Translate a model to MJCF, without MuJoCo and without OpenSim.
 
-    Bodies keep their names and frames. Joints are named by their coordinates, whose values are theirs (rad, m).
+    Bodies keep their names and frames. Joints are named by their coordinates, whose values are
+    theirs (rad, m).
 
-    Args:
-        model: the model.
-        mujoco: the version to write for, 3 or 4.
-        visuals: whether to say what bodies look like.
-        contact: ``"native"`` writes contact forces as contacts of MuJoCo's own law, ``"none"`` leaves them out.
-        fit: ``"wraps"`` moves and resizes what tendons go around until they do what the paths do, ``"force"`` fits the
-            curves and lengths of muscles to their isometric forces too; ``"none"`` keeps all numbers of the model.
-        spline: ``"quartic"`` fits one quartic to a function that is none, ``"series"`` a quartic of a quartic, which
-            takes a helper joint for each and is about twice as close.
-        driver: write the file that `osimlite.mjcf.Driver` moves, which has no forces: the driver computes them from
-            the model, of which a copy is among the files.
-        folder: where the model's file is; mesh files are looked for there and in its folder ``Geometry``.
-        geometry: more folders to look for mesh files in; those in the environment variable OSIMLITE_GEOMETRY,
-            separated as in PATH, follow them.
+    Args: model: the model. mujoco: the version to write for, 3 or 4. visuals: whether to say what
+        bodies look like. contact: ``"native"`` writes contact forces as contacts of MuJoCo's own
+        law, ``"none"`` leaves them out. fit: ``"wraps"`` moves and resizes what tendons go around
+        until they do what the paths do, ``"force"`` fits the curves and lengths of muscles to their
+        isometric forces too; ``"none"`` keeps all numbers of the model. spline: ``"quartic"`` fits
+        one quartic to a function that is none, ``"series"`` a quartic of a quartic, which takes a
+        helper joint for each and is about twice as close. driver: write the file that
+        `osimlite.mjcf.Driver` moves, which has no forces: the driver computes them from the model,
+        of which a copy is among the files. folder: where the model's file is; mesh files are looked
+        for there and in its folder ``Geometry``. geometry: more folders to look for mesh files in;
+        those in the environment variable OSIMLITE_GEOMETRY, separated as in PATH, follow them.
         name: of the files to write, without ending; that of the model if not given.
 
-    Raises:
-        SettingError: an option has a value that it does not take.
-        ModelError: the model is not a mechanism: something it names is not there, or a body is not connected.
-        UnsupportedError: it uses a joint or constraint that osimlite cannot compute.
+    Raises: SettingError: an option has a value that it does not take. ModelError: the model is not
+        a mechanism: something it names is not there, or a body is not connected. UnsupportedError:
+        it uses a joint or constraint that osimlite cannot compute.
     """
     if mujoco not in (3, 4):
         raise SettingError(f"MJCF is written for MuJoCo 3 or 4, not {mujoco}")
@@ -157,7 +155,14 @@ def to_mjcf(
     mesh_files = MeshFiles(MeshFolders(place, geometry))
     shapes = collect_visuals(model, mechanism, fidelity.add, mesh_files) if visuals else Visuals()
     robot = coordinate_names(build_robot(mechanism, visuals=shapes.by_body))
-    draft = Draft(model, robot, fidelity, Options(mujoco, visuals, contact, fit, spline, driver), place, mesh_files)
+    draft = Draft(
+        model,
+        robot,
+        fidelity,
+        Options(mujoco, visuals, contact, fit, spline, driver),
+        place,
+        mesh_files,
+    )
     _add_settings(draft)
     fidelity.translated["/"] = f"mujoco {mechanism.name}"
     for make in (*MECHANISM, *((add_driven,) if driver else LAWS), *LOOKS):
@@ -184,9 +189,17 @@ def _add_settings(draft: Draft) -> None:
     root = draft.root
     root.set("model", xml_name(draft.mechanism.name))
     root.append(Comment(f" Written by osimlite {__version__} for MuJoCo {draft.options.version}. "))
-    add(root, "compiler", angle="radian", autolimits=True, inertiafromgeom=False, balanceinertia=False)
+    add(
+        root,
+        "compiler",
+        angle="radian",
+        autolimits=True,
+        inertiafromgeom=False,
+        balanceinertia=False,
+    )
     add(root, "option", timestep=STEP, gravity=draft.mechanism.gravity, integrator="implicitfast")
-    # Two steps is the quickest that MuJoCo lets a constraint be; the nearer to 1 the impedance, the less it gives way.
+    # Two steps is the quickest that MuJoCo lets a constraint be; the nearer to 1 the impedance, the
+    # less it gives way.
     add(add(root, "default"), "equality", solref="0.002 1", solimp="0.9999 0.9999 0.001 0.5 2")
     # The sections in the order in which they are best read.
     for tag in ("asset", "worldbody", "contact", "equality", "tendon", "actuator", "keyframe"):

@@ -49,7 +49,9 @@ def _search(piece: Tendon, wrong: Wrong) -> Tendon:
     for _ in range(ROUNDS):
         start = best
         size = sum(7 if isinstance(part, Around) else 3 for part in start if _is_free(part))
-        guess = search(lambda x, t=start: 1e3 * wrong(_moved(t, x)).ravel(), np.zeros(size), max_nfev=40)
+        guess = search(
+            lambda x, t=start: 1e3 * wrong(_moved(t, x)).ravel(), np.zeros(size), max_nfev=40
+        )
         result = _sided(_moved(start, guess.x), wrong)
         error = _error(wrong(result))
         if error < least:
@@ -70,7 +72,10 @@ def _sided(piece: Tendon, wrong: Wrong) -> Tendon:
     directions = np.stack((np.cos(turns), np.sin(turns), 0.0 * turns), axis=1)
     for index, part in enumerate(piece):
         if isinstance(part, Around) and _is_free(part):
-            options = [(*piece[:index], part.sided(way), *piece[index + 1 :]) for way in (None, *directions)]
+            options = [
+                (*piece[:index], part.sided(way), *piece[index + 1 :])
+                for way in (None, *directions)
+            ]
             piece = min((piece, *options), key=lambda option: _error(wrong(option)))
     return piece
 

@@ -32,8 +32,9 @@ MAKERS: Mapping[str, Callable[[Draft, Any, str], str]] = {
     "Ligament": on_paths.ligament,
     "Blankevoort1991Ligament": on_paths.ligament,
 }
-"""By class, but for muscles, what adds a force to a draft and tells what it became; it raises `Unsayable` where that
-cannot be."""
+"""By class, but for muscles, what adds a force to a draft and tells what it became; it raises
+`Unsayable` where that cannot be.
+"""
 
 
 def add_forces(draft: Draft) -> None:

@@ -34,9 +34,18 @@ def point_to_point_actuator(draft: Draft, force: PointToPointActuator, path: str
     """An actuator on a tendon: MuJoCo's positive force lengthens it, too."""
     if force.points_are_global:
         raise Unsayable("its points are given in ground, so that they wander through the bodies")
-    ends = [_point(draft, force, path, "bodyA", force.pointA), _point(draft, force, path, "bodyB", force.pointB)]
+    ends = [
+        _point(draft, force, path, "bodyA", force.pointA),
+        _point(draft, force, path, "bodyB", force.pointB),
+    ]
     name = draft.name("actuator", path)
-    add(draft.section("actuator"), "motor", name=name, tendon=straight(draft, path, ends), gear=force.optimal_force)
+    add(
+        draft.section("actuator"),
+        "motor",
+        name=name,
+        tendon=straight(draft, path, ends),
+        gear=force.optimal_force,
+    )
     return f"actuator {name}"
 
 
@@ -59,7 +68,9 @@ def point_actuator(draft: Draft, force: PointActuator, path: str) -> str:
         raise Unsayable("its point is given in ground, so that it wanders through the body")
     gear = np.append(_unit(force.direction) * force.optimal_force, np.zeros(3))
     site = _point(draft, force, path, "body", force.point)
-    return _push(draft, path, gear, site, draft.site(path, *GROUND_FRAME) if force.force_is_global else None)
+    return _push(
+        draft, path, gear, site, draft.site(path, *GROUND_FRAME) if force.force_is_global else None
+    )
 
 
 def straight(draft: Draft, path: str, sites: list[str], **law: float) -> str:
@@ -96,16 +107,23 @@ def body_actuator(draft: Draft, force: BodyActuator, path: str) -> str:
     site = _point(draft, force, path, "socket_body", force.point)
     axes = draft.site(path, *GROUND_FRAME) if force.spatial_force_is_global else None
     units = np.eye(6)[[3, 4, 5, 0, 1, 2]]
-    made = [_push(draft, f"{path}_{word}", unit, site, axes) for word, unit in zip(SIX, units, strict=True)]
+    made = [
+        _push(draft, f"{path}_{word}", unit, site, axes)
+        for word, unit in zip(SIX, units, strict=True)
+    ]
     return " ".join(made)
 
 
 def bushing(draft: Draft, force: BushingForce, path: str) -> str:
     """A speck on six joints with springs and dampers in the first frame, welded to the second.
 
-    The joints are the six deviations themselves, so that the law is OpenSim's; only the weld gives way a little.
+    The joints are the six deviations themselves, so that the law is OpenSim's; only the weld gives
+    way a little.
     """
-    (one, inner), second = draft.placement(force, "socket_frame1"), draft.placement(force, "socket_frame2")
+    (one, inner), second = (
+        draft.placement(force, "socket_frame1"),
+        draft.placement(force, "socket_frame2"),
+    )
     name = draft.name("bushing", path)
     speck = draft.speck(name, draft.bodies[one], inner)
     state = draft.mechanism.at(draft.default_state[0])
@@ -118,7 +136,15 @@ def bushing(draft: Draft, force: BushingForce, path: str) -> str:
         joint = draft.name("joint", f"{name}_{SIX[k]}")
         draft.starts[joint] = starts[k]
         kind, axis = ("hinge", "slide")[k // 3], np.eye(3)[k % 3]
-        add(speck, "joint", name=joint, type=kind, axis=axis, stiffness=stiffness[k], damping=damping[k])
+        add(
+            speck,
+            "joint",
+            name=joint,
+            type=kind,
+            axis=axis,
+            stiffness=stiffness[k],
+            damping=damping[k],
+        )
     add(speck, "site", name=draft.name("site", f"{name}_speck"))
     weld = draft.name("equality", path)
     ends = {"site1": f"{name}_speck", "site2": draft.site(path, *second)}

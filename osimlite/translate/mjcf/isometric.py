@@ -25,7 +25,8 @@ from osimlite.simulation.system import System
 def isometric_tension(force: Any, lengths: Array, activations: Sequence[float]) -> Array:
     """Tension (A, L), N, of a force along a path at activations (A,) and lengths of the path (L,), m.
 
-    NaN where a muscle has no equilibrium. The force is put between ground and a block on a slide, which stands still.
+    NaN where a muscle has no equilibrium. The force is put between ground and a block on a slide,
+    which stands still.
     """
     model = Model(name="bench", gravity=(0.0, 0.0, 0.0))
     block = model.add(Body(name="block", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
@@ -43,7 +44,10 @@ def isometric_tension(force: Any, lengths: Array, activations: Sequence[float]) 
     system = System(mechanism, force_elements(model, mechanism))
     result = np.full((len(activations), len(lengths)), np.nan)
     for row, activation in zip(result, activations, strict=True):
-        start = [activation if variable.path.endswith("/activation") else 0.1 for variable in system.state.variables]
+        start = [
+            activation if variable.path.endswith("/activation") else 0.1
+            for variable in system.state.variables
+        ]
         for index, length in enumerate(lengths.tolist()):
             with suppress(SimulationError):
                 state = system.equilibrated(activation, [length, 0.0, *start])

@@ -17,7 +17,11 @@ def add_keyframe(draft: Draft) -> None:
     except SimulationError as error:
         done = "as it is: the file can be posed, but what its motions are means nothing"
         draft.fidelity.add(
-            "singular", "/", "a motion without inertia, which OpenSim has no acceleration for", done, error.message
+            "singular",
+            "/",
+            "a motion without inertia, which OpenSim has no acceleration for",
+            done,
+            error.message,
         )
     qdot = draft.mechanism.coordinate_rates(q, u)
     values = draft.robot.joint_values(q)

@@ -1,7 +1,7 @@
 """Moving points: a quartic of the coordinate, of which the three places are quartics again.
 
-MuJoCo's joints follow others by quartics. Two in a row follow a spline several times as closely as one, above all in
-its slope, which is what a moment arm is made of.
+MuJoCo's joints follow others by quartics. Two in a row follow a spline several times as closely as
+one, above all in its slope, which is what a moment arm is made of.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ STARTS = ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, -0.3, 0.0))
 def composition(functions: Sequence[Function], span: tuple[float, float]) -> tuple[Array, Array]:
     """The quartic (5,) of a coordinate, and the quartics (k, 5) of its value that are nearest to k functions on a span.
 
-    All are written from the constant on, the first one within -REACH and REACH. Polynomials of up to degree 4 are
-    written as they are.
+    All are written from the constant on, the first one within -REACH and REACH. Polynomials of up
+    to degree 4 are written as they are.
     """
     exact = [as_polynomial(function) for function in functions]
     known = [item for item in exact if item is not None and item.degree() <= DEGREE]
@@ -43,7 +43,9 @@ def composition(functions: Sequence[Function], span: tuple[float, float]) -> tup
     signs = np.where(values[0] < 0.0, -1.0, 1.0)
     bent, rows = find_nearest((values * signs).tobytes())
     normal = Polynomial((-(low + high) / (high - low), 2.0 / (high - low)))
-    slides = np.array([_padded(Chebyshev(row).convert(kind=Polynomial)) for row in (rows * signs).T])
+    slides = np.array(
+        [_padded(Chebyshev(row).convert(kind=Polynomial)) for row in (rows * signs).T]
+    )
     return REACH * _padded(Polynomial(bent)(normal)), slides / REACH ** np.arange(DEGREE + 1)
 
 
@@ -66,7 +68,10 @@ def find_nearest(data: bytes) -> tuple[Array, Array]:
         return result, (basis @ result - values).ravel()
 
     search = require("scipy.optimize", extra="sim", purpose="fits of moving points").least_squares
-    best = min((search(lambda bends: 1e3 * second(bends)[1], start) for start in STARTS), key=lambda each: each.cost)
+    best = min(
+        (search(lambda bends: 1e3 * second(bends)[1], start) for start in STARTS),
+        key=lambda each: each.cost,
+    )
     return first(best.x), second(best.x)[0]
 
 

@@ -1,11 +1,14 @@
 """Muscles as MuJoCo's: a rigid tendon in series with fibers whose curves are parabolas.
 
-Length range and range say the tendon slack length LT and the optimal fiber length along the tendon L0, as MuJoCo reads
-them: (length - LT) / L0 is its normalized length. These stay the model's own to the last digit unless forces are
-fitted. What MuJoCo has no number for, the ends of the active curve and the height of the passive one, is always the
-best there is for the isometric tension of the muscle in equilibrium with its elastic tendon.
+Length range and range say the tendon slack length LT and the optimal fiber length along the tendon
+L0, as MuJoCo reads
+them: (length - LT) / L0 is its normalized length. These stay the model's own to the last digit
+unless forces are fitted. What MuJoCo has no number for, the ends of the active curve and the height
+of the passive one, is always the best there is for the isometric tension of the muscle in
+equilibrium with its elastic tendon.
 
-Source: MuJoCo's manual (Modeling, Muscles) and the public code of `mju_muscleGainLength` and `mju_muscleBias`.
+Source: MuJoCo's manual (Modeling, Muscles) and the public code of `mju_muscleGainLength` and
+    `mju_muscleBias`.
 """
 
 from __future__ import annotations
@@ -63,7 +66,8 @@ class Curves(NamedTuple):
     lmax: float = 1.6  # that above which there is none
     end: float = 1.6  # the passive force is a line from halfway between 1 and here
     fpmax: float = 1.3  # twice the passive force there, halfway, over `force`
-    shift: float = 0.0  # by so much more than 1 the normalized length is where the passive force begins
+    # by so much more than 1 the normalized length is where the passive force begins
+    shift: float = 0.0
 
     def tension(self, lengths: Array, activation: float) -> Array:
         """Tension (L,) that MuJoCo gives the muscle at lengths of its tendon (L,), m, at rest."""
@@ -75,7 +79,9 @@ class Curves(NamedTuple):
         low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
         short = x <= 1.0
         inner = np.where(short, (1.0 - x) / (1.0 - low), (x - 1.0) / (high - 1.0))
-        outer = np.where(short, (x - self.lmin) / (low - self.lmin), (self.lmax - x) / (self.lmax - high))
+        outer = np.where(
+            short, (x - self.lmin) / (low - self.lmin), (self.lmax - x) / (self.lmax - high)
+        )
         active = np.where((x < low) | (x > high), 0.5 * outer**2, 1.0 - 0.5 * inner**2)
         active[(x < self.lmin) | (x > self.lmax)] = 0.0
         stretch = np.maximum(x - self.shift - 1.0, 0.0) / (0.5 * (1.0 + self.end) - 1.0)
@@ -95,7 +101,19 @@ class Curves(NamedTuple):
         """MuJoCo's numbers of gain and bias of an actuator whose length range is (tendon, tendon + fiber)."""
         fpmax = max(self.fpmax, LEAST_RATE)
         gain = np.array((0.0, 1.0, self.force, SCALE, self.lmin, self.lmax, vmax, fpmax, fvmax))
-        bias = np.array((-self.shift, 1.0 - self.shift, self.force, SCALE, self.lmin, self.end, vmax, fpmax, fvmax))
+        bias = np.array(
+            (
+                -self.shift,
+                1.0 - self.shift,
+                self.force,
+                SCALE,
+                self.lmin,
+                self.end,
+                vmax,
+                fpmax,
+                fvmax,
+            )
+        )
         return tidy(gain), tidy(bias)
 
 
@@ -103,21 +121,33 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
     """A muscle on the tendon of its path."""
     tied = draft.tied(path)
     cos = math.cos(force.pennation_angle_at_optimal)
-    own = Curves(force.tendon_slack_length, force.optimal_fiber_length * cos, force.max_isometric_force * cos)
+    own = Curves(
+        force.tendon_slack_length, force.optimal_fiber_length * cos, force.max_isometric_force * cos
+    )
     if not (own.tendon + own.fiber > own.tendon and own.force > 0.0 and own.tendon >= 0.0):
         raise Unsayable("its lengths or its force are not positive")
     rates = _read_rates(force)
     vmax, fvmax = rates.vmax / cos**2, rates.fvmax
     if not min(vmax, fvmax) > LEAST_RATE:
-        raise Unsayable("its greatest velocity, or what it holds while it lengthens, is not positive")
+        raise Unsayable(
+            "its greatest velocity, or what it holds while it lengthens, is not positive"
+        )
     fits = draft.options.fit == "force"
     try:
-        spread = [np.quantile(lengths, np.linspace(0.0, 1.0, LENGTHS)) for lengths in (tied.lengths, tied.held_out)]
-        tensions, held_out = np.split(isometric_tension(force, np.concatenate(spread), ACTIVATIONS), 2, axis=1)
+        spread = [
+            np.quantile(lengths, np.linspace(0.0, 1.0, LENGTHS))
+            for lengths in (tied.lengths, tied.held_out)
+        ]
+        tensions, held_out = np.split(
+            isometric_tension(force, np.concatenate(spread), ACTIVATIONS), 2, axis=1
+        )
     except OsimliteError as error:
         raise Unsayable(f"its tension cannot be computed: {error.message}") from error
     curves = _fitted(own, spread[0], tensions, free=fits)
-    name, limits = draft.name("actuator", path), (max(force.min_control, 0.0), min(force.max_control, 1.0))
+    name, limits = (
+        draft.name("actuator", path),
+        (max(force.min_control, 0.0), min(force.max_control, 1.0)),
+    )
     rise, fall = rates.rise, rates.fall
     lags = rise > 0.0 and fall > 0.0 and "activation" in states_of(force)
     gain, bias = curves.numbers(vmax, fvmax)
@@ -138,7 +168,9 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
     if lags:
         draft.activations[name] = getattr(force, "default_activation", 0.0)
     draft.account(path, f"actuator {name}")
-    off = ((curves.tensions(spread[1]) - held_out) / force.max_isometric_force)[_counts(held_out, own)]
+    off = ((curves.tensions(spread[1]) - held_out) / force.max_isometric_force)[
+        _counts(held_out, own)
+    ]
     draft.fidelity.add(
         "muscle",
         path,
@@ -169,11 +201,13 @@ class Rates(NamedTuple):
 
 
 RISE_TO_63_PERCENT = 1.052
-"""Time in units of MuJoCo's activation time constant in which full excitation raises the activation from 0 to 1 - 1/e:
-the integral of (0.5 + 1.5 a) / (1 - a)."""
+"""Time in units of MuJoCo's activation time constant in which full excitation raises the activation
+from 0 to 1 - 1/e: the integral of (0.5 + 1.5 a) / (1 - a).
+"""
 FALL_TO_37_PERCENT = 0.715
-"""Time in units of MuJoCo's deactivation time constant in which the activation falls from 1 to 1/e without excitation:
-the integral of 1 / (a (0.5 + 1.5 a))."""
+"""Time in units of MuJoCo's deactivation time constant in which the activation falls from 1 to 1/e
+without excitation: the integral of 1 / (a (0.5 + 1.5 a)).
+"""
 
 
 def _read_rates(force: Muscle) -> Rates:
@@ -207,13 +241,19 @@ def _ends_of_velocity_curve(force: Delp1990Muscle_Deprecated) -> tuple[float, fl
         factors = [curve.evaluate((velocity,))[0] for velocity in velocities]
     except OsimliteError:
         return 0.0, FVMAX
-    idle = [velocity for velocity, factor in zip(velocities, factors, strict=True) if velocity < 0.0 and factor <= 0.0]
+    idle = [
+        velocity
+        for velocity, factor in zip(velocities, factors, strict=True)
+        if velocity < 0.0 and factor <= 0.0
+    ]
     return -max(idle, default=-1.0), max(max(factors), 1.0)
 
 
 def _asked(force: Muscle, name: str, default: float) -> float:
     """What MuJoCo asks of a muscle, from the property that its class names."""
-    named = ChainMap(*(base.__dict__["facts"].mujoco for base in type(force).__mro__ if "facts" in base.__dict__))
+    named = ChainMap(
+        *(base.__dict__["facts"].mujoco for base in type(force).__mro__ if "facts" in base.__dict__)
+    )
     try:
         return float(attrgetter(named[name])(force))
     except AttributeError:
@@ -230,14 +270,19 @@ def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curv
     def curves(x: Sequence[Any]) -> Curves:
         lmin, lmax, end, fpmax, *rest = x
         tendon, fiber, strength, shift = rest or (0.0, 0.0, 0.0, 0.0)
-        moved = own.tendon + tendon * own.fiber, own.fiber * (1.0 + fiber), own.force * (1.0 + strength)
+        moved = (
+            own.tendon + tendon * own.fiber,
+            own.fiber * (1.0 + fiber),
+            own.force * (1.0 + strength),
+        )
         return Curves(*moved, lmin, lmax, end, fpmax, shift)
 
     def off(x: Array) -> Array:
         return ((curves(x.tolist()).tensions(lengths) - tensions) / own.force)[known]
 
     def slopes(x: Array) -> Array:
-        # As least_squares finds them, all at once: by steps forward, or back where that leaves the bounds.
+        # As least_squares finds them, all at once: by steps forward, or back where that leaves the
+        # bounds.
         step = np.where(x >= 0.0, STEP, -STEP) * np.maximum(1.0, np.abs(x))
         step = np.where((x + step < low) | (x + step > high), -step, step)
         moved = curves([*np.vstack((x, x + np.diag(step))).T[:, :, None]]).tensions(lengths)
@@ -249,6 +294,8 @@ def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curv
         start, low, high = [*start, *[0.0] * 4], [*low, *[-FREE] * 4], [*high, *[FREE] * 4]
     # The curves have kinks: the way from one start may end at one.
     starts = start, [0.2, 2.2, *start[2:]]
-    result = [search(off, each, slopes, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for each in starts]
+    result = [
+        search(off, each, slopes, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for each in starts
+    ]
     best = min(result, key=lambda each: each.cost)
     return curves(best.x)

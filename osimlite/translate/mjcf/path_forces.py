@@ -25,11 +25,15 @@ def actuator(draft: Draft, force: PathActuator, path: str) -> str:
 def spring(draft: Draft, force: PathSpring, path: str) -> str:
     """A tension in proportion to the stretch."""
     tied, element = _tendon(draft, path)
-    element.attrib.update({"stiffness": text(force.stiffness), "springlength": text((0.0, force.resting_length))})
+    element.attrib.update(
+        {"stiffness": text(force.stiffness), "springlength": text((0.0, force.resting_length))}
+    )
     draft.account(path, f"tendon {tied.name}")
     if force.dissipation:
         lost = "damping that grows with the stretch"
-        draft.fidelity.add("damping", path, lost, "no damping", f"dissipation {force.dissipation:g} s/m")
+        draft.fidelity.add(
+            "damping", path, lost, "no damping", f"dissipation {force.dissipation:g} s/m"
+        )
     return f"tendon {tied.name}"
 
 

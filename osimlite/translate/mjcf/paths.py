@@ -36,7 +36,8 @@ def add_paths(draft: Draft) -> None:
     owners: dict[str, AbstractGeometryPath] = {
         path: owner.geometry_path
         for owner, path in draft.components(Force)
-        if owner.appliesForce and isinstance(getattr(owner, "geometry_path", None), AbstractGeometryPath)
+        if owner.appliesForce
+        and isinstance(getattr(owner, "geometry_path", None), AbstractGeometryPath)
     }
     if not owners:
         return
@@ -61,10 +62,14 @@ def add_paths(draft: Draft) -> None:
             judge = Router(route, other_truth[path], others, draft.options.version)
             tendon = min(tendon, fitted(router, tendon), key=judge.error)
         name = writer.tendon(path, tendon)
-        draft.tendons[path] = Tied(name, default[path], truth[path].lengths, held_truth[path].lengths)
+        draft.tendons[path] = Tied(
+            name, default[path], truth[path].lengths, held_truth[path].lengths
+        )
         draft.account(own, f"tendon {name}")
         for wrap in given.path_wrap_set.objects:
-            surface = draft.tree.path_of(draft.tree.target(wrap, "wrap_object", wrap.wrap_object)) or ""
+            surface = (
+                draft.tree.path_of(draft.tree.target(wrap, "wrap_object", wrap.wrap_object)) or ""
+            )
             draft.fidelity.translated[surface] = "what tendons go around, if they touch it"
         errors = _errors(draft, tendon, held, held_truth[path])
         if any(error.max > EXACT for error in errors.values()):
@@ -85,7 +90,11 @@ def _errors(draft: Draft, tendon: Tendon, poses: Poses, truth: Truth) -> dict[st
 def _what(route: ThroughPoints, router: Router) -> str:
     """What of a path MuJoCo has no exact words for."""
     kinds = {point.kind for point in route.points}
-    touched = [surface for surface, touch in zip(route.surfaces, router.touches, strict=True) if len(touch.poses)]
+    touched = [
+        surface
+        for surface, touch in zip(route.surfaces, router.touches, strict=True)
+        if len(touch.poses)
+    ]
     result = [
         *(["a point that moves with a coordinate"] if MOVING in kinds else []),
         *(["a point that comes and goes with a coordinate"] if CONDITIONAL in kinds else []),
@@ -113,12 +122,22 @@ class _Writer:
     def tendon(self, path: str, tendon: Tendon) -> str:
         """Write a tendon with all that it needs; returns its name."""
         name = self.draft.name("tendon", path)
-        element = add(self.draft.section("tendon"), "spatial", name=name, width=0.005, rgba=(0.8, 0.1, 0.1, 1.0))
+        element = add(
+            self.draft.section("tendon"),
+            "spatial",
+            name=name,
+            width=0.005,
+            rgba=(0.8, 0.1, 0.1, 1.0),
+        )
         for part in tendon:
             if isinstance(part, Spot):
                 add(element, "site", site=self._site(f"{path}/{part.name or 'between'}", part))
             else:
-                side = None if part.side is None else self._site(f"{path}/{part.name or 'around'}_side", part.side)
+                side = (
+                    None
+                    if part.side is None
+                    else self._site(f"{path}/{part.name or 'around'}_side", part.side)
+                )
                 add(element, "geom", geom=self._geom(path, part), sidesite=side)
         return name
 
@@ -136,7 +155,8 @@ class _Writer:
         name = self.draft.name("body", path)
         where = tidy(spot.place + spot.slides[:, 0])
         carrier = add(self.draft.bodies[spot.body], "body", name=name, pos=where, gravcomp=1)
-        # Equalities of what slides along the axes of ground MuJoCo weighs by its mass, without the armature.
+        # Equalities of what slides along the axes of ground MuJoCo weighs by its mass, without the
+        # armature.
         mass = PULLED if spot.body == GROUND else LEAST_MASS
         add(carrier, "inertial", pos=np.zeros(3), mass=mass, diaginertia=np.full(3, mass))
         for axis, polynomial in _straight(spot.slides * (0.0, 1.0, 1.0, 1.0, 1.0)):
@@ -148,13 +168,34 @@ class _Writer:
         return site
 
     def _geom(self, path: str, around: Around) -> str:
-        key = (around.body, around.kind, around.radius, around.length, *around.frame.ravel().tolist())
+        key = (
+            around.body,
+            around.kind,
+            around.radius,
+            around.length,
+            *around.frame.ravel().tolist(),
+        )
         if key not in self._geoms:
             name = self._geoms[key] = self.draft.name("geom", f"{path}/{around.name or 'around'}")
-            size = [around.radius] if around.kind == "sphere" else [around.radius, 0.5 * around.length]
+            size = (
+                [around.radius] if around.kind == "sphere" else [around.radius, 0.5 * around.length]
+            )
             element = self.draft.bodies[around.body]
-            look: dict[str, Value] = {"contype": 0, "conaffinity": 0, "group": WRAPS, "rgba": (0.0, 1.0, 1.0, 0.3)}
-            add(element, "geom", name=name, type=around.kind, size=size, **pose(around.frame), **look)
+            look: dict[str, Value] = {
+                "contype": 0,
+                "conaffinity": 0,
+                "group": WRAPS,
+                "rgba": (0.0, 1.0, 1.0, 0.3),
+            }
+            add(
+                element,
+                "geom",
+                name=name,
+                type=around.kind,
+                size=size,
+                **pose(around.frame),
+                **look,
+            )
         return self._geoms[key]
 
 

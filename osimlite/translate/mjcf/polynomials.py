@@ -40,7 +40,9 @@ def as_polynomial(function: f.Function) -> Polynomial | None:
             return Polynomial((value,))
         case f.Polynomial(coefficients):
             return Polynomial(coefficients[::-1]).trim()
-        case f.MultivariatePolynomial(coefficients, powers) if all(len(item) == 1 for item in powers):
+        case f.MultivariatePolynomial(coefficients, powers) if all(
+            len(item) == 1 for item in powers
+        ):
             dense = np.zeros(1 + max(power for (power,) in powers))
             for coefficient, (power,) in zip(coefficients, powers, strict=True):
                 dense[power] += coefficient
@@ -59,7 +61,8 @@ def as_polynomial(function: f.Function) -> Polynomial | None:
 def quartic(function: f.Function, span: tuple[float, float], unit: str) -> Fit:
     """The polynomial of degree four that is a function of one argument, or whose greatest error is least on a span.
 
-    Fitted by Lawson's algorithm: least squares, again and again, with weights that grow where the error is large.
+    Fitted by Lawson's algorithm: least squares, again and again, with weights that grow where the
+    error is large.
     """
     exact = as_polynomial(function)
     if exact is not None and exact.degree() <= DEGREE:

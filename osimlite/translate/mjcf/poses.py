@@ -25,11 +25,12 @@ class Poses:
     """P poses of a mechanism of b bodies and n coordinates, of which m move; arrays over bodies end with ground."""
 
     q: Array  # values of the coordinates (P, n)
-    moving: Array  # places (m,) of the coordinates that move by themselves: neither locked nor coupled
+    # places (m,) of the coordinates that move by themselves: neither locked nor coupled
+    moving: Array
     rotations: Array  # of the bodies in ground (b + 1, P, 3, 3)
     origins: Array  # of the bodies in ground (b + 1, P, 3), m
-    # (b + 1, P, 6, m) from the speeds of those coordinates, all that must move with them included, to the angular
-    # velocity and the velocity of the origin of each body
+    # (b + 1, P, 6, m) from the speeds of those coordinates, all that must move with them included,
+    # to the angular velocity and the velocity of the origin of each body
     jacobians: Array
     rates: Array  # of all coordinates (P, n, m) by these speeds
 
@@ -78,7 +79,9 @@ def each_pose(rows: Array, matrices: Array) -> Array:
 def arm_errors(mechanism: Mechanism, arms: Array, truth: Truth) -> dict[int, Error]:
     """How far moment arms (P, m) are off, by the place of the coordinate, where a path or its stand-in has one."""
     result = {}
-    for place, off, wanted in zip(free_coordinates(mechanism), (arms - truth.arms).T, truth.arms.T, strict=True):
+    for place, off, wanted in zip(
+        free_coordinates(mechanism), (arms - truth.arms).T, truth.arms.T, strict=True
+    ):
         if np.abs(off).max() > EXACT or np.abs(wanted).max() > EXACT:
             rotational = mechanism.coordinates[place].motion_type == "rotational"
             result[place] = Error.of(off, "m" if rotational else "1")
@@ -99,7 +102,9 @@ def random_values(mechanism: Mechanism, count: int, seed: int) -> Array:
             low, high = info.default_value - 1.0, info.default_value + 1.0
         values[:, place] = np.random.default_rng((seed, place)).uniform(low, high, count)
     for item in coupled:
-        values[:, item.dependent] = [item.function.evaluate(row[list(item.independent)])[0] for row in values]
+        values[:, item.dependent] = [
+            item.function.evaluate(row[list(item.independent)])[0] for row in values
+        ]
     return values
 
 
@@ -116,7 +121,10 @@ def free_coordinates(mechanism: Mechanism) -> list[int]:
 def random_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mapping[str, Truth]]:
     """Random poses, and what each path does in them."""
     mechanism = paths.mechanism
-    values, moving = random_values(mechanism, count, seed), np.array(free_coordinates(mechanism), dtype=int)
+    values, moving = (
+        random_values(mechanism, count, seed),
+        np.array(free_coordinates(mechanism), dtype=int),
+    )
     states = [mechanism.at(row) for row in values]
     couplings = [paths.coupling_of_free(state) for state in states]
     rates = np.nan_to_num(np.stack([coupling[:, moving] for coupling in couplings]))
@@ -129,9 +137,12 @@ def random_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mappin
         rates,
     )
     lengths = paths.system.lengths(values).T.copy()
-    arms = np.nan_to_num(paths.all_moment_arms(values, couplings)[:, :, moving]).swapaxes(0, 1).copy()
+    arms = (
+        np.nan_to_num(paths.all_moment_arms(values, couplings)[:, :, moving]).swapaxes(0, 1).copy()
+    )
     nodes = [paths.points(row) for row in values]
     truth = {
-        path: Truth(lengths[k], arms[k], [row.get(path, ()) for row in nodes]) for k, path in enumerate(paths.names)
+        path: Truth(lengths[k], arms[k], [row.get(path, ()) for row in nodes])
+        for k, path in enumerate(paths.names)
     }
     return poses, truth

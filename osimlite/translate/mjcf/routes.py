@@ -1,7 +1,8 @@
 """From the paths of a model to tendons: what MuJoCo has exactly, and the nearest that it has to the rest.
 
-What OpenSim decides in each pose (on which side of a surface a path passes, between which points it touches, whether a
-point counts) is decided here once: every way to say it that MuJoCo has is measured in many poses, and the best taken.
+What OpenSim decides in each pose (on which side of a surface a path passes, between which points it
+touches, whether a point counts) is decided here once: every way to say it that MuJoCo has is
+measured in many poses, and the best taken.
 """
 
 from __future__ import annotations
@@ -56,7 +57,12 @@ class Router:
 
     def __init__(self, route: ThroughPoints, truth: Truth, poses: Poses, version: int) -> None:
         columns = np.flatnonzero(np.abs(truth.arms).max(0, initial=0.0) > 1e-9)
-        self.route, self.truth, self.poses, self.version = route, truth, poses.seen_by(columns.tolist()), version
+        self.route, self.truth, self.poses, self.version = (
+            route,
+            truth,
+            poses.seen_by(columns.tolist()),
+            version,
+        )
         self.wanted = np.concatenate((truth.lengths[:, None], truth.arms[:, columns]), axis=1)
         self.touches = [self._touch(number) for number in range(len(route.surfaces))]
 
@@ -78,11 +84,16 @@ class Router:
             for run in [numbers] if comes_and_goes else [[number] for number in numbers]:
                 own = tuple(spot(self.route.points[number]) for number in run)
                 if comes_and_goes:
-                    each = [[(point,), (), *self._switch(number)] for point, number in zip(own, run, strict=True)]
+                    each = [
+                        [(point,), (), *self._switch(number)]
+                        for point, number in zip(own, run, strict=True)
+                    ]
                     ways = [*map(_joined, product(*each)), *self._cylinder(run)]
                     settle[len(slots)] = partial(_choose_of, ways)
                 slots.append(own)
-                if between := [k for k, touch in enumerate(self.touches) if np.isin(touch.after, run).any()]:
+                if between := [
+                    k for k, touch in enumerate(self.touches) if np.isin(touch.after, run).any()
+                ]:
                     settle[len(slots)] = partial(self._around, between)
                     slots.append(())
         for _ in range(2 if len(settle) > 1 else 1):
@@ -91,13 +102,19 @@ class Router:
                 slots[place] = choice(partial(self._least, *parts))
         return _joined(slots)
 
-    def _least(self, before: Tendon, now: Tendon, after: Tendon, options: Sequence[Tendon]) -> Tendon:
+    def _least(
+        self, before: Tendon, now: Tendon, after: Tendon, options: Sequence[Tendon]
+    ) -> Tendon:
         """The option for a part of a tendon with which the whole has the least error."""
         head, tail = before[_last_spot(before) :], after[: len(after) - _last_spot(after[::-1])]
         rest = self.residuals((*before, *now, *after)) - self._own((*head, *now, *tail))
         sound = [option for option in options if _is_tendon((*head, *option, *tail))]
-        lengths, arms = measured_each([(*head, *option, *tail) for option in sound], self.poses, self.version)
-        errors = np.square(rest + np.concatenate((lengths[..., None], arms), axis=-1)).mean(1).sum(-1)
+        lengths, arms = measured_each(
+            [(*head, *option, *tail) for option in sound], self.poses, self.version
+        )
+        errors = (
+            np.square(rest + np.concatenate((lengths[..., None], arms), axis=-1)).mean(1).sum(-1)
+        )
         # Of those that do the same but for rounding the first, on every machine.
         return sound[int(np.argmax(errors <= errors.min() * (1.0 + 1e-9) + 1e-24))]
 
@@ -123,13 +140,18 @@ class Router:
         poses, first, second, before = zip(*result, strict=True) if result else ((), (), (), ())
         at = np.array(poses, dtype=int)
         return Touch(
-            at, self._in_body(body, at, np.array(first)), self._in_body(body, at, np.array(second)), np.array(before)
+            at,
+            self._in_body(body, at, np.array(first)),
+            self._in_body(body, at, np.array(second)),
+            np.array(before),
         )
 
     def _in_body(self, body: int, at: Places, places: Array) -> Array:
         """Places in ground (k, 3) in some of the poses, in the frame of a body."""
         return np.einsum(
-            "pji,pj->pi", self.poses.rotations[body][at], places.reshape(-1, 3) - self.poses.origins[body][at]
+            "pji,pj->pi",
+            self.poses.rotations[body][at],
+            places.reshape(-1, 3) - self.poses.origins[body][at],
         )
 
     # ----------------------------------------------------------------------------------------------- options
@@ -199,8 +221,9 @@ class Router:
     def _switch(self, number: int) -> Iterator[Tendon]:
         """A speck that the path runs through while its side site is inside, which is while the coordinate is in range.
 
-        The side site leaves the middle with the square of the distance of the coordinate from the middle of the range,
-        in a direction in which the speck then is not in the way: to the point before or after.
+        The side site leaves the middle with the square of the distance of the coordinate from the
+        middle of the range, in a direction in which the speck then is not in the way: to the point
+        before or after.
         """
         point, node = spot(self.route.points[number]), self.route.points[number]
         low, high = node.range
@@ -215,8 +238,18 @@ class Router:
             if not toward.any():
                 continue
             direction = toward / np.linalg.norm(toward)
-            side = Spot(point.body, point.place, node.coordinate, np.eye(5)[1], np.outer(direction, parabola))
-            yield (Around(point.body, transform(None, point.place), "sphere", SPECK, side, name=point.name),)
+            side = Spot(
+                point.body,
+                point.place,
+                node.coordinate,
+                np.eye(5)[1],
+                np.outer(direction, parabola),
+            )
+            yield (
+                Around(
+                    point.body, transform(None, point.place), "sphere", SPECK, side, name=point.name
+                ),
+            )
 
     def _cylinder(self, run: Sequence[int]) -> Iterator[Tendon]:
         """Cylinders that points which come and go are on, over whose edge the path bends."""
@@ -224,7 +257,9 @@ class Router:
         for pose, nodes in enumerate(self.truth.nodes):
             at = [k for k, (node, _) in enumerate(nodes) if node in run]
             if at and at[0] > 0 and at[-1] + 1 < len(nodes):
-                before, first, last, after = (nodes[k][1] for k in (at[0] - 1, at[0], at[-1], at[-1] + 1))
+                before, first, last, after = (
+                    nodes[k][1] for k in (at[0] - 1, at[0], at[-1], at[-1] + 1)
+                )
                 ways.append((pose, first - before, after - last))
         points = [spot(self.route.points[number]) for number in run]
         body = points[0].body
@@ -242,14 +277,18 @@ class Router:
         chord = frame[:3, :3].T @ (points[-1].place - points[0].place)
         into = np.array((*(frame[:3, :3].T @ into)[:2], 0.0))
         if len(run) > 1:
-            into = np.array((-chord[1], chord[0], 0.0)) * np.sign(chord[0] * into[1] - chord[1] * into[0])
+            into = np.array((-chord[1], chord[0], 0.0)) * np.sign(
+                chord[0] * into[1] - chord[1] * into[0]
+            )
         into /= np.linalg.norm(into)
         frame[:3, 3] = 0.5 * (points[0].place + points[-1].place)
         half = 0.5 * float(np.hypot(*chord[:2]))
         for radius in RADII:
             if radius > half:
                 placed = frame @ transform(None, np.sqrt(radius**2 - half**2) * into)
-                around = Around(body, placed, "cylinder", radius, length=4.0 * radius, name=points[0].name)
+                around = Around(
+                    body, placed, "cylinder", radius, length=4.0 * radius, name=points[0].name
+                )
                 for turn in np.linspace(-1.0, 1.0, 5):
                     yield (around.sided(rotation_about(np.array((0.0, 0.0, 1.0)), turn) @ -into),)
 
@@ -260,7 +299,9 @@ def spot(point: Node) -> Spot:
     if point.kind != MOVING:
         return Spot(point.body, place, name=point.name)
     drive, slides = composition(point.functions, point.range)
-    return Spot(point.body, place, point.coordinate, drive, point.frame[:3, :3] @ slides, point.name)
+    return Spot(
+        point.body, place, point.coordinate, drive, point.frame[:3, :3] @ slides, point.name
+    )
 
 
 def _choose_of(options: Sequence[Tendon], choose: Choose) -> Tendon:
@@ -270,7 +311,9 @@ def _choose_of(options: Sequence[Tendon], choose: Choose) -> Tendon:
 def _is_tendon(tendon: Tendon) -> bool:
     """Whether there is a site at both ends and between any two surfaces."""
     ends = isinstance(tendon[0], Spot) and isinstance(tendon[-1], Spot)
-    return ends and not any(isinstance(a, Around) and isinstance(b, Around) for a, b in pairwise(tendon))
+    return ends and not any(
+        isinstance(a, Around) and isinstance(b, Around) for a, b in pairwise(tendon)
+    )
 
 
 def _last_spot(tendon: Tendon) -> int:

@@ -36,7 +36,12 @@ def add_shapes(draft: Draft) -> None:
 def add_camera(draft: Draft) -> None:
     """Add a camera that sees the default pose upright: MuJoCo takes z for up, where models of OpenSim have y."""
     state = draft.mechanism.at(draft.default_state[0])
-    spots = np.array([np.zeros(3), *(state.transform(index)[:3, 3] for index in range(len(draft.mechanism.bodies)))])
+    spots = np.array(
+        [
+            np.zeros(3),
+            *(state.transform(index)[:3, 3] for index in range(len(draft.mechanism.bodies))),
+        ]
+    )
     low, high = spots.min(axis=0), spots.max(axis=0)
     fall = draft.mechanism.gravity if draft.mechanism.gravity.any() else np.array((0.0, -1.0, 0.0))
     fall = fall / np.abs(fall).max()

@@ -21,7 +21,9 @@ def stand_ins(surface: Surface, touched: Array) -> Iterator[Around]:
     """
     if min(surface.numbers[4:]) <= 0.0:
         return
-    own = Around(surface.tangent.body, surface.tangent.frame, "sphere", 0.0, name=surface.tangent.name)
+    own = Around(
+        surface.tangent.body, surface.tangent.frame, "sphere", 0.0, name=surface.tangent.name
+    )
     sizes = surface.numbers[4:]
     match surface.law:
         case "wrap_sphere":
@@ -34,15 +36,22 @@ def stand_ins(surface: Surface, touched: Array) -> Iterator[Around]:
             for axis in range(3):
                 across = np.delete(touched, axis, axis=1)
                 turned = own.frame @ transform(z_to(np.eye(3)[axis]))
-                for radius in {*np.delete(sizes, axis).tolist(), float(np.linalg.norm(across, axis=1).mean())}:
-                    yield replace(own, kind="cylinder", frame=turned, radius=radius, length=2.0 * sizes[axis])
+                for radius in {
+                    *np.delete(sizes, axis).tolist(),
+                    float(np.linalg.norm(across, axis=1).mean()),
+                }:
+                    yield replace(
+                        own, kind="cylinder", frame=turned, radius=radius, length=2.0 * sizes[axis]
+                    )
         case "wrap_torus":
             # OpenSim's path bends around the tube where that is nearest.
             tube, ring = sizes
             x, y, _ = touched.mean(0)
             out = np.array((x, y, 0.0)) / np.hypot(x, y)
             turned = transform(z_to(np.cross((0.0, 0.0, 1.0), out)), ring * out)
-            yield replace(own, kind="cylinder", frame=own.frame @ turned, radius=tube, length=2.0 * tube)
+            yield replace(
+                own, kind="cylinder", frame=own.frame @ turned, radius=tube, length=2.0 * tube
+            )
             # Or it runs through a ball in the hole, whose side site is inside.
             yield replace(own, radius=ring - tube, side=Spot(own.body, own.frame[:3, 3]))
 

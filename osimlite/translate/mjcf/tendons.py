@@ -24,7 +24,8 @@ class Spot:
     body: int  # that it is in
     place: Array  # in the body (3,), m
     coordinate: int = -1  # place in the mechanism of that which moves it, or -1
-    # if it moves: polynomial (5,) of the coordinate, constant first, which gives the value of a helper
+    # if it moves: polynomial (5,) of the coordinate, constant first, which gives the value of a
+    # helper
     drive: Array | None = None
     # if it moves: polynomials (3, 5) of the helper that are added to the place, constant first, m
     slides: Array | None = None
@@ -47,7 +48,10 @@ class Around:
         """The same with the side site in a direction (3,), in the frame of the surface, well outside; or without."""
         if direction is None or not direction.any():
             return replace(self, side=None)
-        place = self.frame[:3, :3] @ (direction * (2.0 * self.radius / np.linalg.norm(direction))) + self.frame[:3, 3]
+        place = (
+            self.frame[:3, :3] @ (direction * (2.0 * self.radius / np.linalg.norm(direction)))
+            + self.frame[:3, 3]
+        )
         return replace(self, side=Spot(self.body, place))
 
     def moved(self, frame: Array, radius: float) -> Around:
@@ -55,7 +59,9 @@ class Around:
         if self.side is None:
             return replace(self, frame=frame, radius=radius)
         seen = self.frame[:3, :3].T @ (self.side.place - self.frame[:3, 3])
-        side = replace(self.side, place=frame[:3, :3] @ (seen * (radius / self.radius)) + frame[:3, 3])
+        side = replace(
+            self.side, place=frame[:3, :3] @ (seen * (radius / self.radius)) + frame[:3, 3]
+        )
         return replace(self, frame=frame, radius=radius, side=side)
 
 
@@ -85,7 +91,9 @@ def measured_each(tendons: Sequence[Tendon], poses: Poses, version: int) -> tupl
             kind = around and (around.body, around.kind, side)
             alike.setdefault((first, second, kind), []).append((place, around))
     for (first, second, kind), uses in alike.items():
-        numbers = {around: k for k, around in enumerate(dict.fromkeys(around for _, around in uses))}
+        numbers = {
+            around: k for k, around in enumerate(dict.fromkeys(around for _, around in uses))
+        }
         arounds = () if kind is None else [around for around in numbers if around is not None]
         length, arm = _section(first, arounds, second, poses, version)
         for place, around in uses:
@@ -94,10 +102,13 @@ def measured_each(tendons: Sequence[Tendon], poses: Poses, version: int) -> tupl
     return lengths, arms
 
 
-def _section(first: Spot, arounds: Sequence[Around], second: Spot, poses: Poses, version: int) -> tuple[Array, Array]:
+def _section(
+    first: Spot, arounds: Sequence[Around], second: Spot, poses: Poses, version: int
+) -> tuple[Array, Array]:
     """Lengths (k, P) and moment arms (k, P, m) from site to site: straight, or around each of k surfaces of a kind.
 
-    Surfaces that differ in their side sites only are computed once, in each way that the tendon can go around them.
+    Surfaces that differ in their side sites only are computed once, in each way that the tendon can
+    go around them.
     """
     one, two = (_placed(spot, poses)[None] for spot in (first, second))
     way, back = two - one, one - two
@@ -113,7 +124,9 @@ def _section(first: Spot, arounds: Sequence[Around], second: Spot, poses: Poses,
         radii = np.array([[arounds[place].radius] for place in of_each])
         rotations, middles = frames[:, :3, :3], frames[:, None, :3, 3]
         start, end = ((poses.stations(body, at) - middles) @ rotations for at in (one, two))
-        sides = [_station(around.side, body, poses) for around in arounds if around.side is not None]
+        sides = [
+            _station(around.side, body, poses) for around in arounds if around.side is not None
+        ]
         sites = (np.stack(sides) - middles[owners]) @ rotations[owners] if sides else None
         result = bend(kind, radii, start, end, sites, owners, version)
         # Each way around each surface is one of the k, until they are chosen.
@@ -173,5 +186,7 @@ def _slid(spot: Spot, force: Array, poses: Poses) -> Array:
     assert spot.slides is not None and spot.drive is not None
     value = poses.q[:, spot.coordinate]
     helper, rate = polyval(value, spot.drive), polyval(value, polyder(spot.drive))
-    rates = np.einsum("pij,jp->pi", poses.rotations[spot.body], polyval(helper, polyder(spot.slides.T)) * rate)
+    rates = np.einsum(
+        "pij,jp->pi", poses.rotations[spot.body], polyval(helper, polyder(spot.slides.T)) * rate
+    )
     return np.einsum("kpi,pi->kp", force, rates)[..., None] * poses.rates[:, spot.coordinate]

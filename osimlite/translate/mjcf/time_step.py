@@ -1,8 +1,9 @@
 """What is too quick for the time step, which is fixed in MuJoCo and ends in NaN where OpenSim takes smaller steps.
 
-The springs of a model, linearized about its default pose, swing or decay at rates w (1/s); explicit steps longer than
-2 / w amplify that. MuJoCo takes the damping of joints and tendons implicitly, but that of a bushing acts through a
-weld. Muscles are not linearized: what is stiff in them is the tendon, which is rigid in MuJoCo.
+The springs of a model, linearized about its default pose, swing or decay at rates w (1/s); explicit
+steps longer than 2 / w amplify that. MuJoCo takes the damping of joints and tendons implicitly, but
+that of a bushing acts through a weld. Muscles are not linearized: what is stiff in them is the
+tendon, which is rigid in MuJoCo.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ def choose_step(draft: Draft) -> None:
         rate = _fastest(draft)
     except OsimliteError as error:
         rate, cannot = 0.0, "springs that may be too stiff: how stiff they are cannot be computed"
-        draft.fidelity.add("stiff", "/", cannot, f"steps of {STEP:g} s, be they too long or not", error.message)
+        draft.fidelity.add(
+            "stiff", "/", cannot, f"steps of {STEP:g} s, be they too long or not", error.message
+        )
     if rate * STEP > 2.0:
         step = float(f"{1.0 / rate:.0e}")
         next(draft.root.iter("option")).set("timestep", text(step))
@@ -81,13 +84,19 @@ def _fastest(draft: Draft) -> float:
     builder = ElementBuilder(draft.model, mechanism, draft.folder or Path())
     owners = [force for force in builder.forces() if isinstance(force, SPRINGS)]
     springs = [builder.element(force) for force in owners]
-    bushings = [spring for force, spring in zip(owners, springs, strict=True) if isinstance(force, BushingForce)]
+    bushings = [
+        spring
+        for force, spring in zip(owners, springs, strict=True)
+        if isinstance(force, BushingForce)
+    ]
     zero = np.zeros_like(free)
     stiffness = _slopes(draft, springs, mechanism.rate_matrix(q) @ free, zero)
     damping = _slopes(draft, bushings, zero, free)
     rates = np.linalg.solve(mass, free.T @ np.hstack((stiffness, damping)))
     count = len(mass)
-    return float(np.abs(np.linalg.eigvals(np.vstack((np.eye(count, 2 * count, count), rates)))).max())
+    return float(
+        np.abs(np.linalg.eigvals(np.vstack((np.eye(count, 2 * count, count), rates)))).max()
+    )
 
 
 def _slopes(draft: Draft, elements: Sequence[ForceElement], along: Array, at: Array) -> Array:
@@ -100,7 +109,9 @@ def _slopes(draft: Draft, elements: Sequence[ForceElement], along: Array, at: Ar
 
         def forces(nudge: float, k: int) -> Array:
             row = np.zeros(len(result))
-            y = system.state.pack((q + nudge * along[:, k]).tolist(), (u + nudge * at[:, k]).tolist())
+            y = system.state.pack(
+                (q + nudge * along[:, k]).tolist(), (u + nudge * at[:, k]).tolist()
+            )
             row[places] = system.applied(0.0, y)[len(places) : 2 * len(places)]
             return row
 

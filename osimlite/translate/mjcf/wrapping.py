@@ -1,17 +1,22 @@
 """How MuJoCo bends a tendon around a sphere or a cylinder, in many poses at once.
 
-The tendon stays in a plane: of a sphere that of both ends and the middle, of a cylinder that normal to the axis, and
-heights above that grow in proportion to the length. In the plane it either goes straight or touches a circle, and what
-decides is the side site, whose meaning changed with MuJoCo 4.0:
+The tendon stays in a plane: of a sphere that of both ends and the middle, of a cylinder that normal
+to the axis, and heights above that grow in proportion to the length. In the plane it either goes
+straight or touches a circle, and what decides is the side site, whose meaning changed with MuJoCo
+4.0:
 
-- 4.0: the tendon goes around the middle by the angle from the first end to the side site and on to the second end,
-- 3.x: a tendon that neither cuts the circle nor passes on the other side of the middle than the side site goes
-  straight; any other goes the way around whose tangent points are nearer to the side site.
+- 4.0: the tendon goes around the middle by the angle from the first end to the side site and on to
+  the second end,
+- 3.x: a tendon that neither cuts the circle nor passes on the other side of the middle than the
+  side site goes straight; any other goes the way around whose tangent points are nearer to the side
+  site.
 
-Without a side site both go the shorter way, if the line between the ends cuts the circle. A side site inside of the
-surface makes the tendon go through the surface: by the shortest way that has a point in common with the circle.
+Without a side site both go the shorter way, if the line between the ends cuts the circle. A side
+site inside of the surface makes the tendon go through the surface: by the shortest way that has a
+point in common with the circle.
 
-Source: MuJoCo's XML reference (``spatial/geom``), its changelog for 4.0.0, and the public code of `mju_wrap`.
+Source: MuJoCo's XML reference (``spatial/geom``), its changelog for 4.0.0, and the public code of
+    `mju_wrap`.
 """
 
 from __future__ import annotations
@@ -35,16 +40,23 @@ class Bends(NamedTuple):
     """How a tendon bends around each of S surfaces in P poses, in each of C ways; past others it goes straight on."""
 
     touches: Mask  # whether it touches (C, S, P)
-    # where the tendon leads to from the first end (C, S, P, 3), in the frame of the surface, m: a tangent point, or
-    # the second end
+    # where the tendon leads to from the first end (C, S, P, 3), in the frame of the surface, m: a
+    # tangent point, or the second end
     first: Array
     second: Array  # where it comes to the second end from (C, S, P, 3)
     length: Array  # on the surface (C, S, P), m
-    choice: NDArray[np.intp]  # which way it goes with each of k side sites (k, P); without any, one for each surface
+    # which way it goes with each of k side sites (k, P); without any, one for each surface
+    choice: NDArray[np.intp]
 
 
 def bend(
-    kind: str, radius: Array, first: Array, second: Array, sides: Array | None, owners: NDArray[np.intp], version: int
+    kind: str,
+    radius: Array,
+    first: Array,
+    second: Array,
+    sides: Array | None,
+    owners: NDArray[np.intp],
+    version: int,
 ) -> Bends:
     """How a tendon bends.
 
@@ -61,8 +73,13 @@ def bend(
     p, q = _in(across, first), _in(across, second)
     reach_p, reach_q = _reach(p, radius), _reach(q, radius)
     between = _angle(p, q)
-    signs = np.array((0.0, 1.0, -1.0))[:, None, None] if sides is not None else np.where(between < 0.0, -1.0, 1.0)[None]
-    # Of ends one behind the other, one line passes the other by, and MuJoCo 3 goes all the way around.
+    signs = (
+        np.array((0.0, 1.0, -1.0))[:, None, None]
+        if sides is not None
+        else np.where(between < 0.0, -1.0, 1.0)[None]
+    )
+    # Of ends one behind the other, one line passes the other by, and MuJoCo 3 goes all the way
+    # around.
     least = reach_p + reach_q if version < 4 and sides is not None else -ROUNDING
     winding = np.abs(signs) * (np.mod(signs * between - least, 2.0 * np.pi) + least)
     arc = radius * (winding - reach_p - reach_q)
@@ -85,16 +102,31 @@ def bend(
         lines = np.stack((norm(at_p - p), arc, norm(at_q - q)))
         share = (second - first)[..., 2] / np.maximum(lines.sum(0), TINY)
         heights = first[..., 2] + share * lines[0], first[..., 2] + share * (lines[0] + lines[1])
-        one, two = (np.concatenate((at, z[..., None]), axis=-1) for at, z in zip((at_p, at_q), heights, strict=True))
+        one, two = (
+            np.concatenate((at, z[..., None]), axis=-1)
+            for at, z in zip((at_p, at_q), heights, strict=True)
+        )
         arc = np.hypot(arc, heights[1] - heights[0])
     else:
         one, two = (np.einsum("spij,cspi->cspj", across, at) for at in (at_p, at_q))
     hit = touches[..., None]
-    return Bends(touches, np.where(hit, one, second), np.where(hit, two, first), np.where(touches, arc, 0.0), choice)
+    return Bends(
+        touches,
+        np.where(hit, one, second),
+        np.where(hit, two, first),
+        np.where(touches, arc, 0.0),
+        choice,
+    )
 
 
 def _side(
-    p: Array, q: Array, radius: Array, at_p: Array, at_q: Array, side: Array, owners: NDArray[np.intp]
+    p: Array,
+    q: Array,
+    radius: Array,
+    at_p: Array,
+    at_q: Array,
+    side: Array,
+    owners: NDArray[np.intp],
 ) -> NDArray[np.intp]:
     """Which way a tendon goes in MuJoCo 3 with each of k sides (k, P): 0 is straight."""
     way = q - p
@@ -121,7 +153,9 @@ def _through(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
     for _ in range(50):
         middle = 0.5 * (low + high)
         at = _turned(p, middle * between, radius)
-        slope = sum(_cross(at, at - end) / np.maximum(norm(at - end), TINY) for end in (p, q)) * np.sign(between)
+        slope = sum(
+            _cross(at, at - end) / np.maximum(norm(at - end), TINY) for end in (p, q)
+        ) * np.sign(between)
         low, high = np.where(slope < 0.0, middle, low), np.where(slope < 0.0, high, middle)
     return passes, _turned(p, 0.5 * (low + high) * between, radius)
 

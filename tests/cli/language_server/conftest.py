@@ -22,7 +22,9 @@ def editor(client):
 
 
 @pytest_lsp.fixture(
-    config=pytest_lsp.ClientServerConfig(server_command=[sys.executable, "-m", "osimlite", "lsp", "--stdio"])
+    config=pytest_lsp.ClientServerConfig(
+        server_command=[sys.executable, "-m", "osimlite", "lsp", "--stdio"]
+    )
 )
 async def client(lsp_client: pytest_lsp.LanguageClient) -> AsyncIterator[None]:
     capabilities = pytest_lsp.client_capabilities("visual-studio-code")
@@ -47,7 +49,9 @@ class File:
         for _ in range(nth + 1):
             offset = self.text.index(text, offset + 1)
         offset += within
-        return types.Position(self.text.count("\n", 0, offset), offset - self.text.rfind("\n", 0, offset) - 1)
+        return types.Position(
+            self.text.count("\n", 0, offset), offset - self.text.rfind("\n", 0, offset) - 1
+        )
 
     async def open(self) -> list[types.Diagnostic]:
         item = types.TextDocumentItem(self.uri, "osim", self.version, self.text)

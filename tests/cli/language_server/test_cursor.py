@@ -65,7 +65,11 @@ def test_a_part_is_told_by_the_name_of_its_property() -> None:
 
 
 @settings(max_examples=40)
-@given(st.integers(0, len(TEXT)), st.integers(0, 60), st.sampled_from(["", "<", "</", "&", "-->", '"', "<Body", "é"]))
+@given(
+    st.integers(0, len(TEXT)),
+    st.integers(0, 60),
+    st.sampled_from(["", "<", "</", "&", "-->", '"', "<Body", "é"]),
+)
 def test_no_question_about_a_damaged_text_fails(offset: int, cut: int, put: str) -> None:
     _ask("walker.osim", TEXT[:offset] + put + TEXT[offset + cut :], offset + len(put))
 
@@ -75,7 +79,9 @@ def test_no_question_about_a_damaged_text_fails(offset: int, cut: int, put: str)
     st.sampled_from(["ik.xml", "scale.xml", "id.xml", "loads.xml", "so.xml", "controls.xml", "grf.mot", "walk.trc"]),
     st.floats(0, 1), st.integers(0, 60), st.sampled_from(["", "<", "</", "&", "-->", '"', "<IKMarkerTask", "é", "\t"]),
 )  # fmt: skip
-def test_no_question_about_a_damaged_setup_or_table_fails(name: str, part: float, cut: int, put: str) -> None:
+def test_no_question_about_a_damaged_setup_or_table_fails(
+    name: str, part: float, cut: int, put: str
+) -> None:
     text = (SETUPS / name).read_text()
     offset = int(part * min(len(text), 2000))
     _ask(str(SETUPS / name), text[:offset] + put + text[offset + cut :], offset + len(put))

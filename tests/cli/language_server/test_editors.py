@@ -68,7 +68,9 @@ def edited(tmp_path: Path):
         (tmp_path / name).write_text(text)
     # The program that editors start is the one of this environment.
     (tmp_path / "bin").mkdir()
-    (tmp_path / "bin" / "osimlite").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m osimlite "$@"\n')
+    (tmp_path / "bin" / "osimlite").write_text(
+        f'#!/bin/sh\nexec "{sys.executable}" -m osimlite "$@"\n'
+    )
     (tmp_path / "bin" / "osimlite").chmod(0o755)
 
     def run(editor: str, *words: str) -> tuple[str, str]:
@@ -76,7 +78,9 @@ def edited(tmp_path: Path):
             pytest.skip(f"needs the editor {editor} on the PATH")
         repo = str(Path(__file__).parents[3])
         paths = {"PATH": f"{tmp_path / 'bin'}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": repo}
-        homes = dict.fromkeys(("HOME", "XDG_CONFIG_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"), str(tmp_path))
+        homes = dict.fromkeys(
+            ("HOME", "XDG_CONFIG_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"), str(tmp_path)
+        )
         done = subprocess.run(
             [editor, *words], cwd=tmp_path, env={**os.environ, **paths, **homes}, capture_output=True, text=True,
             timeout=200, stdin=subprocess.DEVNULL,
@@ -89,9 +93,15 @@ def edited(tmp_path: Path):
 def test_neovim(edited, repo, tmp_path):
     (tmp_path / "ask.lua").write_text(NEOVIM)
     settings = str(repo / "editors" / "neovim" / "osimlite.lua")
-    said, text = edited("nvim", "--headless", "-u", settings, "m.osim", "-c", "luafile ask.lua", "-c", "qa!")
+    said, text = edited(
+        "nvim", "--headless", "-u", settings, "m.osim", "-c", "luafile ask.lua", "-c", "qa!"
+    )
     assert "finding OSIM101" in said and "tag xmlTagName" in said, said
-    assert "ik.xml finding OSIM821" in said and "m.mot finding OSIM8" in said and "pom.xml clients 0" in said, said
+    assert (
+        "ik.xml finding OSIM821" in said
+        and "m.mot finding OSIM8" in said
+        and "pom.xml clients 0" in said
+    ), said
     assert "\t\t<gravity>0 -9.8 0</gravity>\n" in text
 
 
@@ -101,5 +111,9 @@ def test_emacs(edited, repo, tmp_path):
     if "no eglot" in said:
         pytest.skip("needs eglot: Emacs 29, or the package eglot")
     assert "OSIM101" in said and "tag (nxml-element-local-name)" in said, said
-    assert "ik.xml is osim-mode" in said and "m.mot is osim-table-mode" in said and "pom.xml is nxml-mode" in said, said
+    assert (
+        "ik.xml is osim-mode" in said
+        and "m.mot is osim-table-mode" in said
+        and "pom.xml is nxml-mode" in said
+    ), said
     assert "\t\t<gravity>0 -9.8 0</gravity>\n" in text

@@ -23,7 +23,9 @@ def folder(fixtures: Path, tmp_path: Path) -> Path:
     for file in (fixtures / "setups").glob("*.*"):
         if file.suffix != ".gz":
             copy(file, tmp_path)
-    (tmp_path / "model.osim").write_bytes(gzip.decompress((fixtures / "setups" / "model.osim.gz").read_bytes()))
+    (tmp_path / "model.osim").write_bytes(
+        gzip.decompress((fixtures / "setups" / "model.osim.gz").read_bytes())
+    )
     return tmp_path
 
 
@@ -37,12 +39,17 @@ def ask(client):
             return await client.text_document_definition_async(asked)
 
         async def hover(self, file, *place) -> str:
-            found = await client.text_document_hover_async(types.HoverParams(file.document, file.place(*place)))
+            found = await client.text_document_hover_async(
+                types.HoverParams(file.document, file.place(*place))
+            )
             return "" if found is None else found.contents.value
 
         async def completion(self, file, *place) -> dict[str, types.CompletionItem]:
             asked = types.CompletionParams(file.document, file.place(*place))
-            return {item.label: item for item in (await client.text_document_completion_async(asked)).items}
+            return {
+                item.label: item
+                for item in (await client.text_document_completion_async(asked)).items
+            }
 
         async def references(self, file, *place) -> list[types.Location]:
             context = types.ReferenceContext(include_declaration=True)
@@ -50,7 +57,9 @@ def ask(client):
             return await client.text_document_references_async(asked)
 
         async def rename(self, file, name, *place) -> dict[str, list[types.TextEdit]]:
-            edit = await client.text_document_rename_async(types.RenameParams(file.document, file.place(*place), name))
+            edit = await client.text_document_rename_async(
+                types.RenameParams(file.document, file.place(*place), name)
+            )
             return edit.changes
 
     return Ask()
@@ -64,7 +73,9 @@ async def test_a_task_names_a_marker_of_the_model(editor, ask, folder: Path) -> 
     found = await ask.definition(ik, *place)
     assert found.uri == model.uri and model.words(found.range) == "R.ASIS"
     assert "<Marker name=" in model.text.splitlines()[found.range.start.line]
-    assert "Marker `/markerset/R.ASIS` of `model.osim`; in `walk.trc`" in await ask.hover(ik, *place)
+    assert "Marker `/markerset/R.ASIS` of `model.osim`; in `walk.trc`" in await ask.hover(
+        ik, *place
+    )
     names = await ask.completion(ik, *place)
     assert {"R.ASIS", "L.ASIS"} <= {*names} and "pelvis" not in names
     assert names["R.ASIS"].detail == "Marker /markerset/R.ASIS, in walk.trc"
@@ -80,7 +91,9 @@ async def test_a_misspelt_marker_is_mended_or_ignored(client, editor, folder: Pa
     ik = editor(folder / "ik.xml")
     await ik.open()
     found = [
-        d for d in await ik.type('IKMarkerTask name="R.ASIS"', 'IKMarkerTask name="R.ASSIS"') if d.code == "OSIM831"
+        d
+        for d in await ik.type('IKMarkerTask name="R.ASIS"', 'IKMarkerTask name="R.ASSIS"')
+        if d.code == "OSIM831"
     ]
     context = types.CodeActionContext(found, only=[types.CodeActionKind.QuickFix])
     asked = types.CodeActionParams(ik.document, found[0].range, context)
@@ -91,7 +104,9 @@ async def test_a_misspelt_marker_is_mended_or_ignored(client, editor, folder: Pa
 
 
 @pytest.mark.asyncio
-async def test_what_an_open_model_says_counts_before_it_is_written(client, editor, folder: Path) -> None:
+async def test_what_an_open_model_says_counts_before_it_is_written(
+    client, editor, folder: Path
+) -> None:
     ik, model = editor(folder / "ik.xml"), editor(folder / "model.osim")
     await ik.open()
     await model.open()
@@ -129,7 +144,9 @@ async def test_a_marker_is_renamed_in_the_model_and_in_setups(editor, ask, folde
     uses = await ask.references(ik, 'IKMarkerTask name="R.ASIS"', 22)
     assert {use.uri for use in uses} == {ik.uri, model.uri, scale.uri}
     await model.open()
-    assert {use.uri for use in await ask.references(model, '<Marker name="R.ASIS"', 16)} == {use.uri for use in uses}
+    assert {use.uri for use in await ask.references(model, '<Marker name="R.ASIS"', 16)} == {
+        use.uri for use in uses
+    }
     changes = await ask.rename(ik, "RASI", 'IKMarkerTask name="R.ASIS"', 22)
     assert '<IKMarkerTask name="RASI">' in ik.after(changes[ik.uri])
     assert '<Marker name="RASI">' in model.after(changes[model.uri])
@@ -149,7 +166,9 @@ async def test_loads_name_bodies_and_columns(editor, ask, folder: Path) -> None:
     assert (await ask.definition(loads, "calcn_r</", 3)).uri.endswith("/model.osim")
     column = await ask.definition(loads, "ground_force_v</", 3)
     data = (folder / "grf.mot").read_text().splitlines()[column.range.start.line]
-    assert column.uri.endswith("/grf.mot") and data[column.range.start.character :].startswith("ground_force_vx")
+    assert column.uri.endswith("/grf.mot") and data[column.range.start.character :].startswith(
+        "ground_force_vx"
+    )
 
 
 @pytest.mark.asyncio
@@ -157,7 +176,9 @@ async def test_files_and_words_that_a_property_takes(editor, ask, folder: Path) 
     inverse = editor(folder / "id.xml")
     await inverse.open()
     files = await ask.completion(inverse, "loads.xml", 2)
-    assert files["loads.xml"].sort_text < files["controls.xml"].sort_text and "coords.mot" not in files
+    assert (
+        files["loads.xml"].sort_text < files["controls.xml"].sort_text and "coords.mot" not in files
+    )
     assert {"MUSCLES", "hamstrings_r"} <= {*await ask.completion(inverse, "Muscles<", 2)}
     assert {"ALL", "hip_r"} <= {*await ask.completion(inverse, "ALL<", 2)}
 
@@ -198,15 +219,24 @@ MOCO = """<OpenSimDocument Version="40600">
 
 @pytest.mark.asyncio
 async def test_states_and_controls_of_moco_are_paths(editor, ask, folder: Path) -> None:
-    text = MOCO.replace('<MocoPhase name="phases"><phases>', "<phases>").replace("</phases></MocoPhase>", "</phases>")
+    text = MOCO.replace('<MocoPhase name="phases"><phases>', "<phases>").replace(
+        "</phases></MocoPhase>", "</phases>"
+    )
     study = editor(folder / "study.omoco", text)
     await study.open()
     states = await ask.completion(study, "/jointset/knee_r", 3)
-    assert "/jointset/knee_r/knee_angle_r/speed" in states and "/forceset/hamstrings_r" not in states
+    assert (
+        "/jointset/knee_r/knee_angle_r/speed" in states and "/forceset/hamstrings_r" not in states
+    )
     controls = await ask.completion(study, "/forceset/hamstrings_r", 3)
-    assert "/forceset/hamstrings_r" in controls and "/jointset/knee_r/knee_angle_r/speed" not in controls
+    assert (
+        "/forceset/hamstrings_r" in controls
+        and "/jointset/knee_r/knee_angle_r/speed" not in controls
+    )
     assert "/forceset/hamstrings_r" in await ask.completion(study, "/forceset/vasti_r", 3)
-    assert "Coordinate `/jointset/knee_r/knee_angle_r` of" in await ask.hover(study, "/jointset/knee_r", 3)
+    assert "Coordinate `/jointset/knee_r/knee_angle_r` of" in await ask.hover(
+        study, "/jointset/knee_r", 3
+    )
     (folder / "study.omoco").write_text(text)
     changes = await ask.rename(study, "knee", "/jointset/knee_r", 3)
     assert "/jointset/knee_r/knee/value" in study.after(changes[study.uri])
@@ -216,11 +246,15 @@ async def test_states_and_controls_of_moco_are_paths(editor, ask, folder: Path) 
 async def test_outline_and_layout_of_a_setup(client, editor, folder: Path) -> None:
     inverse = editor(folder / "id.xml")
     await inverse.open()
-    (tool,) = await client.text_document_document_symbol_async(types.DocumentSymbolParams(inverse.document))
+    (tool,) = await client.text_document_document_symbol_async(
+        types.DocumentSymbolParams(inverse.document)
+    )
     assert (tool.name, tool.detail) == ("walk_subject", "InverseDynamicsTool")
     options = types.FormattingOptions(tab_size=4, insert_spaces=False)
     await inverse.type("\t\t<time_range>0.5 1", "<time_range>0.5   1")
-    edits = await client.text_document_formatting_async(types.DocumentFormattingParams(inverse.document, options))
+    edits = await client.text_document_formatting_async(
+        types.DocumentFormattingParams(inverse.document, options)
+    )
     assert "\t\t<time_range> 0.5 1</time_range>" in inverse.after(edits)
 
 
@@ -248,25 +282,32 @@ async def test_a_table_is_checked_when_it_is_written(client, editor, folder: Pat
 
 
 @pytest.mark.asyncio
-async def test_a_mend_in_a_table_is_where_it_belongs_behind_letters_of_any_script(client, editor, folder: Path) -> None:
+async def test_a_mend_in_a_table_is_where_it_belongs_behind_letters_of_any_script(
+    client, editor, folder: Path
+) -> None:
     text = (folder / "coords.mot").read_text()
     rest = text.partition("\n")[2]
-    motion = editor(folder / "coords.mot", f"Läufer \U0001f3c3\n{rest.replace('inDegrees=yes', 'inDegrees=true')}")
+    motion = editor(
+        folder / "coords.mot",
+        f"Läufer \U0001f3c3\n{rest.replace('inDegrees=yes', 'inDegrees=true')}",
+    )
     (found,) = await motion.open()
     context = types.CodeActionContext([found], only=[types.CodeActionKind.QuickFix])
     asked = types.CodeActionParams(motion.document, found.range, context)
     mend = next(
-        action for action in await client.text_document_code_action_async(asked) if action.title == "Change to 'yes'"
+        action
+        for action in await client.text_document_code_action_async(asked)
+        if action.title == "Change to 'yes'"
     )
     assert motion.after(mend.edit.changes[motion.uri]) == f"Läufer \U0001f3c3\n{rest}"
 
 
 @pytest.mark.asyncio
-async def test_a_class_of_a_plugin_is_offered_where_the_project_has_it(editor, ask, folder: Path) -> None:
+async def test_a_class_of_a_plugin_is_offered_where_the_project_has_it(
+    editor, ask, folder: Path
+) -> None:
     classes = '{"classes": {"DragForce": {"bases": ["Force"], "properties": [{"name": "gain", "type": "double"}]}}}'
-    setup = (
-        '<ForceSet name="f">\n<objects>\n<DragForce name="d">\n<gain>1</gain>\n<\n</DragForce>\n</objects>\n</ForceSet>'
-    )
+    setup = '<ForceSet name="f">\n<objects>\n<DragForce name="d">\n<gain>1</gain>\n<\n</DragForce>\n</objects>\n</ForceSet>'
     text = f'<OpenSimDocument Version="40600">\n{setup}\n</OpenSimDocument>\n'
     ours, others = folder / "ours", folder / "others"
     for place in (ours, others):
@@ -284,7 +325,9 @@ async def test_a_class_of_a_plugin_is_offered_where_the_project_has_it(editor, a
 
 @pytest.mark.asyncio
 async def test_xml_of_others_is_left_alone(client, editor, ask, tmp_path: Path) -> None:
-    pom = editor(tmp_path / "pom.xml", "<project>\n  <Body name='a'><mass>1</mass></Body>\n  <\n</project>")
+    pom = editor(
+        tmp_path / "pom.xml", "<project>\n  <Body name='a'><mass>1</mass></Body>\n  <\n</project>"
+    )
     assert await pom.open() == []
     assert await ask.hover(pom, "mass", 1) == "" and await ask.completion(pom, "<\n", 1) == {}
     assert await ask.definition(pom, "Body", 1) is None

@@ -59,10 +59,18 @@ def editor(fixtures, tmp_path_factory):
         text = (fixtures / "walker" / "DynamicWalkerModel.osim").read_text()
         document = {**FILE, "languageId": "osim", "version": 1, "text": text}
         result.send({"jsonrpc": "2.0", "method": "initialized", "params": {}})
-        result.send({"jsonrpc": "2.0", "method": "textDocument/didOpen", "params": {"textDocument": document}})
+        result.send(
+            {
+                "jsonrpc": "2.0",
+                "method": "textDocument/didOpen",
+                "params": {"textDocument": document},
+            }
+        )
         yield result
         # After all that, it still does its work.
-        assert "result" in result.ask("textDocument/hover", {"textDocument": FILE, "position": START})
+        assert "result" in result.ask(
+            "textDocument/hover", {"textDocument": FILE, "position": START}
+        )
         assert "result" in result.ask("shutdown", None)
         result.send({"jsonrpc": "2.0", "method": "exit"})
         assert result.server.wait(20) == 0
@@ -124,9 +132,13 @@ def test_what_is_no_question_is_answered_too(editor, message, number, code):
     assert (result["id"], result["error"]["code"]) == (number, code)
 
 
-@pytest.mark.parametrize("method", ["textDocument/didChange", "textDocument/didClose", "$/cancelRequest"])
+@pytest.mark.parametrize(
+    "method", ["textDocument/didChange", "textDocument/didClose", "$/cancelRequest"]
+)
 def test_a_notice_that_is_none_changes_nothing(editor, method):
     before = len(editor.remarks)
     editor.send({"jsonrpc": "2.0", "method": method, "params": {}})
     assert "result" in editor.ask("textDocument/hover", _at(0, 0))
-    assert any("are not what the protocol says" in str(remark) for remark in editor.remarks[before:])
+    assert any(
+        "are not what the protocol says" in str(remark) for remark in editor.remarks[before:]
+    )

@@ -18,7 +18,11 @@ def walker(editor, fixtures: Path, tmp_path: Path):
 async def test_a_misspelt_contact_name_is_underlined_and_mended(client, walker) -> None:
     before = await walker.open()
     assert not [found for found in before if found.severity == types.DiagnosticSeverity.Error]
-    found = [d for d in await walker.type("RFootContact Platform", "RFotContact Platform") if d.code == "OSIM301"]
+    found = [
+        d
+        for d in await walker.type("RFootContact Platform", "RFotContact Platform")
+        if d.code == "OSIM301"
+    ]
     assert [walker.words(d.range) for d in found] == ["RFotContact"]
     assert "did you mean 'RFootContact'" in found[0].message
     context = types.CodeActionContext(diagnostics=found, only=[types.CodeActionKind.QuickFix])
@@ -33,10 +37,14 @@ async def test_a_file_that_is_broken_at_the_moment(client, walker) -> None:
     await walker.open()
     found = await walker.type("<mass>1</mass>", "<mass>1</mas")
     assert next(d.code for d in found if d.severity == types.DiagnosticSeverity.Error) == "OSIM001"
-    hover = await client.text_document_hover_async(types.HoverParams(walker.document, walker.place("<mass>", 2)))
+    hover = await client.text_document_hover_async(
+        types.HoverParams(walker.document, walker.place("<mass>", 2))
+    )
     assert "**mass**: one number in kg" in hover.contents.value
     await walker.type("<mass>1</mas", "<mass>1</mass>")
-    assert not [d for d in client.diagnostics[walker.uri] if d.severity == types.DiagnosticSeverity.Error]
+    assert not [
+        d for d in client.diagnostics[walker.uri] if d.severity == types.DiagnosticSeverity.Error
+    ]
 
 
 @pytest.mark.asyncio
@@ -53,7 +61,9 @@ async def test_what_a_word_means(client, walker) -> None:
     velocity = await hover("<transition_velocity>", 4)
     assert "one number in m/s, > 0; by default `0.01`" in velocity
     assert "Slip at which friction is static" in velocity
-    assert "ContactSphere `/contactgeometryset/RFootContact`" in await hover("RFootContact Platform", 4)
+    assert "ContactSphere `/contactgeometryset/RFootContact`" in await hover(
+        "RFootContact Platform", 4
+    )
     assert await hover("<?xml", 2) == ""
 
 
@@ -61,7 +71,9 @@ async def test_what_a_word_means(client, walker) -> None:
 async def test_where_a_name_leads_and_who_uses_it(client, walker) -> None:
     await walker.open()
     here = walker.place("RFootContact Platform", 4)
-    found = await client.text_document_definition_async(types.DefinitionParams(walker.document, here))
+    found = await client.text_document_definition_async(
+        types.DefinitionParams(walker.document, here)
+    )
     assert walker.words(found.range) == "RFootContact"
     assert '<ContactSphere name="' in walker.text.splitlines()[found.range.start.line]
     context = types.ReferenceContext(include_declaration=False)
@@ -75,14 +87,20 @@ async def test_where_a_name_leads_and_who_uses_it(client, walker) -> None:
 async def test_a_name_is_changed_everywhere(client, walker) -> None:
     await walker.open()
     here = walker.place('<ContactSphere name="RFootContact"', 23)
-    shown = await client.text_document_prepare_rename_async(types.PrepareRenameParams(walker.document, here))
+    shown = await client.text_document_prepare_rename_async(
+        types.PrepareRenameParams(walker.document, here)
+    )
     assert (walker.words(shown.range), shown.placeholder) == ("RFootContact", "RFootContact")
-    edit = await client.text_document_rename_async(types.RenameParams(walker.document, here, "heel"))
+    edit = await client.text_document_rename_async(
+        types.RenameParams(walker.document, here, "heel")
+    )
     after = walker.after(edit.changes[walker.uri])
     assert '<ContactSphere name="heel"' in after and "heel Platform" in after
     assert "RFootContact Platform" not in after
     with pytest.raises(Exception, match="its parent has a 'LFootContact' already"):
-        await client.text_document_rename_async(types.RenameParams(walker.document, here, "LFootContact"))
+        await client.text_document_rename_async(
+            types.RenameParams(walker.document, here, "LFootContact")
+        )
 
 
 @pytest.mark.asyncio
@@ -107,17 +125,23 @@ async def test_what_may_be_written_here(client, walker) -> None:
 @pytest.mark.asyncio
 async def test_outline_folds_and_layout(client, walker) -> None:
     await walker.open()
-    (model,) = await client.text_document_document_symbol_async(types.DocumentSymbolParams(walker.document))
+    (model,) = await client.text_document_document_symbol_async(
+        types.DocumentSymbolParams(walker.document)
+    )
     assert model.name == "DynamicWalkerModel"
     sets = {child.name: child for child in model.children}
     assert {"Pelvis", "RightThigh"} <= {body.name for body in sets["bodyset"].children}
-    folds = await client.text_document_folding_range_async(types.FoldingRangeParams(walker.document))
+    folds = await client.text_document_folding_range_async(
+        types.FoldingRangeParams(walker.document)
+    )
     start = walker.place('<ContactSphere name="RFootContact"').line
     fold = next(fold for fold in folds if fold.start_line == start)
     assert walker.text.splitlines()[fold.end_line].strip() == "</ContactSphere>"
     options = types.FormattingOptions(tab_size=4, insert_spaces=False)
     await walker.type("\t\t\t<objects>", "<objects>")
-    edits = await client.text_document_formatting_async(types.DocumentFormattingParams(walker.document, options))
+    edits = await client.text_document_formatting_async(
+        types.DocumentFormattingParams(walker.document, options)
+    )
     assert "\t\t\t<objects>" in walker.after(edits)
 
 
@@ -127,5 +151,9 @@ async def test_layout_of_an_older_format(client, editor, tmp_path: Path) -> None
     old = editor(tmp_path / "old.osim", text)
     await old.open()
     options = types.FormattingOptions(tab_size=4, insert_spaces=False)
-    edits = await client.text_document_formatting_async(types.DocumentFormattingParams(old.document, options))
-    assert "\t\t<gravity>0 -9.810 0</gravity>\n" in old.after(edits) and 'Version="20302"' in old.after(edits)
+    edits = await client.text_document_formatting_async(
+        types.DocumentFormattingParams(old.document, options)
+    )
+    assert "\t\t<gravity>0 -9.810 0</gravity>\n" in old.after(
+        edits
+    ) and 'Version="20302"' in old.after(edits)

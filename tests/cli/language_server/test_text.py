@@ -17,7 +17,9 @@ UNITS = st.sampled_from(list(types.PositionEncodingKind))
 
 
 @given(CONTENT, UNITS, st.data())
-def test_a_place_leads_back_to_its_offset(content: str, unit: types.PositionEncodingKind, data: st.DataObject) -> None:
+def test_a_place_leads_back_to_its_offset(
+    content: str, unit: types.PositionEncodingKind, data: st.DataObject
+) -> None:
     text = Text(content, unit)
     offset = data.draw(st.integers(0, len(content)))
     result = text.offset(text.position(offset))

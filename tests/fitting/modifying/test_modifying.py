@@ -27,15 +27,23 @@ def test_words_are_done_in_their_order() -> None:
     assert osimlite.to_text(model) == before
     reserves = list(changed.components(osimlite.CoordinateActuator))
     assert not list(changed.components(osimlite.Muscle)) and reserves
-    assert {(item.optimal_force, item.min_control, item.max_control) for item in reserves} == {(100.0, -0.5, 0.5)}
+    assert {(item.optimal_force, item.min_control, item.max_control) for item in reserves} == {
+        (100.0, -0.5, 0.5)
+    }
     assert osimlite.validate(changed).ok
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("muscle", "degroote"), "nothing is called 'muscle' that could be replaced; did you mean 'muscles'"),
-        (("muscles", "degrote"), "muscles cannot be replaced with 'degrote'; did you mean 'degroote'"),
+        (
+            ("muscle", "degroote"),
+            "nothing is called 'muscle' that could be replaced; did you mean 'muscles'",
+        ),
+        (
+            ("muscles", "degrote"),
+            "muscles cannot be replaced with 'degrote'; did you mean 'degroote'",
+        ),
         (("joints", "mtp_r"), "say joints=weld:NAME"),
         (("joints", "weld:hipp_r"), "no joint 'hipp_r'"),
         (("reserves", "many"), "reserves takes a number"),
@@ -53,16 +61,22 @@ def test_fitted_paths_are_what_they_are_said_to_be() -> None:
     fitted = {item.path.name: item for item in fit_paths(model, poses=300)}
     changed = modify(model, replace=[("paths", "polynomial")])
     assert all(
-        isinstance(item.geometry_path, osimlite.FunctionBasedPath) for item in changed.components(osimlite.Muscle)
+        isinstance(item.geometry_path, osimlite.FunctionBasedPath)
+        for item in changed.components(osimlite.Muscle)
     )
     old, new = osimlite.paths(model), osimlite.paths(changed)
     rng = np.random.default_rng(3)
     infos = old.mechanism.coordinates
     off = []
     for _ in range(20):
-        q = [info.default_value if info.range[1] > 5 else rng.uniform(*info.range) for info in infos]
+        q = [
+            info.default_value if info.range[1] > 5 else rng.uniform(*info.range) for info in infos
+        ]
         lengths, others = old.lengths(np.array(q)), new.lengths(np.array(q))
-        off += [abs(lengths[name] - others[name]) / max(fitted[name].worst_length, 1e-4) for name in fitted]
+        off += [
+            abs(lengths[name] - others[name]) / max(fitted[name].worst_length, 1e-4)
+            for name in fitted
+        ]
     assert max(off) < 3.0
     osimlite.simulate(changed, to=0.02, engine="compiled")
 
@@ -85,7 +99,9 @@ def test_a_muscle_of_another_kind_is_refused_by_name() -> None:
     model = jumper()
     muscle = next(iter(model.components(osimlite.Muscle)))
     place = model.force_set.objects.index(muscle)
-    other = osimlite.RigidTendonMuscle(name=muscle.name, geometry_path=muscle.geometry_path.copy_deep())
+    other = osimlite.RigidTendonMuscle(
+        name=muscle.name, geometry_path=muscle.geometry_path.copy_deep()
+    )
     model.force_set.objects[place] = other
     with pytest.raises(UnsupportedError, match=rf"'{muscle.name}' is a RigidTendonMuscle"):
         modify(model, muscles="degroote")
@@ -97,10 +113,14 @@ def test_the_model_of_a_study_is_made(tmp_path: Path) -> None:
         name="model", filepath="jumper.osim", operators=[osimlite.ModOpIgnoreTendonCompliance()]
     )
     osimlite.write(osimlite.MocoTrack(name="track", model=processor), tmp_path / "study.omoco")
-    done = run("modify", "study.omoco", "--replace", "strength=2", "-o", "stiff.osim", folder=tmp_path)
+    done = run(
+        "modify", "study.omoco", "--replace", "strength=2", "-o", "stiff.osim", folder=tmp_path
+    )
     assert done.code == 0, done.err
     stiff, own = osimlite.read(tmp_path / "stiff.osim"), processed(processor, tmp_path)
-    for changed, before in zip(stiff.components(osimlite.Muscle), own.components(osimlite.Muscle), strict=True):
+    for changed, before in zip(
+        stiff.components(osimlite.Muscle), own.components(osimlite.Muscle), strict=True
+    ):
         assert changed.ignore_tendon_compliance
         assert changed.max_isometric_force == 2.0 * before.max_isometric_force
     done = run("modify", "jumper.osim", "--replace", "muscles", folder=tmp_path)

@@ -98,7 +98,10 @@ def _change_word(data: bytes, random: Random) -> bytes:
     words = list(_WORD.finditer(data))
     if not words:
         return data
-    old, new = random.choice(words), random.choice((*TOKENS[-6:], b"abc", b"", random.choice(words)[0]))
+    old, new = (
+        random.choice(words),
+        random.choice((*TOKENS[-6:], b"abc", b"", random.choice(words)[0])),
+    )
     return data[: old.start()] + new + data[old.end() :]
 
 

@@ -12,12 +12,15 @@ from osimlite.schema.model import Model
 from osimlite.schema.registry import class_for, tags
 from osimlite.schema.specs import field_specs
 
-CLASSES: list[type[Object]] = [cls for cls in map(class_for, tags()) if cls is not None and cls is not Model]
+CLASSES: list[type[Object]] = [
+    cls for cls in map(class_for, tags()) if cls is not None and cls is not Model
+]
 
 numbers = st.floats(allow_nan=True, allow_infinity=True)
 # What XML can hold; OpenSim trims texts and takes runs of white space for one space.
 texts = st.text(
-    st.characters(exclude_categories=("Cs", "Cc", "Z"), exclude_characters="\ufffe\uffff"), max_size=8
+    st.characters(exclude_categories=("Cs", "Cc", "Z"), exclude_characters="\ufffe\uffff"),
+    max_size=8,
 ) | st.sampled_from(["", "a b", "<&>\"'", "0x10", "1e5", "--"])
 words = st.text(st.sampled_from("abcXYZ019_.:é&<>"), min_size=1, max_size=6)
 names = words.filter(lambda name: "/" not in name)
@@ -48,14 +51,21 @@ def objects(draw: st.DrawFn, accepts: type[Object] = Component, depth: int = 2) 
     cls = draw(st.sampled_from(kinds))
     given: dict[str, Any] = {"name": draw(names)}
     specs = list(field_specs(cls).values())
-    for spec in draw(st.lists(st.sampled_from(specs), unique_by=lambda spec: spec.name, max_size=5)) if specs else []:
+    for spec in (
+        draw(st.lists(st.sampled_from(specs), unique_by=lambda spec: spec.name, max_size=5))
+        if specs
+        else []
+    ):
         kind = spec.kind
         if isinstance(kind, Reference):
             several = st.lists(words, max_size=3).map(tuple)
-            given[spec.name] = draw({"list": several, "optional": st.none() | words}.get(kind.shape, words))
+            given[spec.name] = draw(
+                {"list": several, "optional": st.none() | words}.get(kind.shape, words)
+            )
         elif isinstance(kind, Value):
             value = draw(values(kind))
-            # A file cannot say that a text is absent where it is there by default: an empty element is an empty text.
+            # A file cannot say that a text is absent where it is there by default: an empty element
+            # is an empty text.
             if value is not None or kind.scalar != "string" or spec.default is None:
                 given[spec.name] = value
         elif depth and spec.accepts is not None:
@@ -65,7 +75,8 @@ def objects(draw: st.DrawFn, accepts: type[Object] = Component, depth: int = 2) 
                 given[spec.name] = ObjectList(draw(st.lists(held, max_size=2)))
             else:
                 item = draw(held)
-                # A property with a name gives it to its object; one without takes exactly its own class.
+                # A property with a name gives it to its object; one without takes exactly its own
+                # class.
                 if kind.form == "single":
                     item.name = spec.tag
                 if kind.form != "unnamed" or type(item) is spec.accepts:
@@ -76,7 +87,9 @@ def objects(draw: st.DrawFn, accepts: type[Object] = Component, depth: int = 2) 
 @st.composite
 def models(draw: st.DrawFn) -> Model:
     """A model with a few components of any class."""
-    model = Model(name=draw(names), credits=draw(texts), gravity=draw(st.tuples(numbers, numbers, numbers)))
+    model = Model(
+        name=draw(names), credits=draw(texts), gravity=draw(st.tuples(numbers, numbers, numbers))
+    )
     for component in draw(st.lists(objects(Component), max_size=4)):
         assert isinstance(component, Component)
         model.subcomponents.append(component)

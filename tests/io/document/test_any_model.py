@@ -12,7 +12,9 @@ from osimlite.io.document.data import from_data, to_json
 from osimlite.schema.model import Model
 from tests.io.document.strategies import models
 
-slow = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], max_examples=150)
+slow = settings(
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], max_examples=150
+)
 
 
 @slow

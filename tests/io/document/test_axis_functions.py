@@ -18,7 +18,9 @@ from osimlite.schema.functions import LinearFunction
 def knuckle() -> str:
     """A body that turns about X and Y, by two coordinates."""
     model = Model(name="m")
-    body = model.add(Body(name="a", mass=1.0, mass_center=(0.1, 0.0, 0.0), inertia=(1, 1, 1, 0, 0, 0)))
+    body = model.add(
+        Body(name="a", mass=1.0, mass_center=(0.1, 0.0, 0.0), inertia=(1, 1, 1, 0, 0, 0))
+    )
     joint = CustomJoint(name="j", coordinates=[Coordinate(name="x"), Coordinate(name="y")])
     transform = joint.spatial_transform
     for axis, name in ((transform.rotation1, "x"), (transform.rotation2, "y")):
@@ -30,7 +32,9 @@ def knuckle() -> str:
 def without_function(instead: str, version: str) -> str:
     text = knuckle()
     start = text.index('<TransformAxis name="rotation2">')
-    rest = re.sub(r"<LinearFunction.*?</LinearFunction>", instead, text[start:], count=1, flags=re.S)
+    rest = re.sub(
+        r"<LinearFunction.*?</LinearFunction>", instead, text[start:], count=1, flags=re.S
+    )
     return (text[:start] + rest).replace('Version="40600"', f'Version="{version}"')
 
 
@@ -48,7 +52,9 @@ def test_axes_that_no_one_set_are_printed_where_the_class_has_another():
 
 @pytest.mark.parametrize("version", ["40600", "40000", "30516"])
 @pytest.mark.parametrize("instead", ["<function></function>", "<function />", ""])
-def test_an_empty_function_follows_its_coordinate_and_a_missing_one_does_not(instead: str, version: str):
+def test_an_empty_function_follows_its_coordinate_and_a_missing_one_does_not(
+    instead: str, version: str
+):
     text = without_function(instead, version)
     moved = (np.cos(0.3), 0.0, -np.sin(0.3)) if instead else (1.0, 0.0, 0.0)
     assert first_axis(text, 0.3) == pytest.approx(moved)
@@ -72,4 +78,6 @@ def test_opensim_agrees(instead: str, tmp_path: Path):
         model.getCoordinateSet().get("y").setValue(state, 0.3, False)
         model.realizePosition(state)
         rotation = model.getBodySet().get(0).getTransformInGround(state).R()
-        assert [rotation.get(row, 0) for row in range(3)] == pytest.approx(first_axis(text, 0.3).tolist(), abs=1e-12)
+        assert [rotation.get(row, 0) for row in range(3)] == pytest.approx(
+            first_axis(text, 0.3).tolist(), abs=1e-12
+        )

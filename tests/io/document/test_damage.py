@@ -23,7 +23,11 @@ LARGEST = 120_000
 
 def files() -> list[Path]:
     """Small and old documents of ours, and real files where they are at hand."""
-    ours = [path for name in ("versions", "walker", "documents") for path in (ROOT / "fixtures" / name).glob("*.*")]
+    ours = [
+        path
+        for name in ("versions", "walker", "documents")
+        for path in (ROOT / "fixtures" / name).glob("*.*")
+    ]
     real = [model.path for model in corpus_models()]
     return sorted(path for path in [*ours, *real] if 0 < path.stat().st_size < LARGEST)
 
@@ -37,7 +41,8 @@ def fate(data: bytes) -> str:
         assert refused.message and "\n" not in refused.message, refused.message
         return "refused"
     top = document.top
-    # What has been read can be walked, asked and written, and what is written is read again without a change.
+    # What has been read can be walked, asked and written, and what is written is read again without
+    # a change.
     if isinstance(top, Model):
         tree = top.tree()
         for use in tree.uses():

@@ -110,8 +110,14 @@ def test_unknown_classes_and_elements_stay() -> None:
         ([], "a model is a mapping from properties to values, not a list"),
         ({"gravty": [0, 0, 0]}, "model: a Model has no property 'gravty'; did you mean 'gravity'"),
         ({"gravity": [0, 0]}, "model.gravity: expected 3 numbers, got 2"),
-        ({"body_set": [{"mass": "heavy"}]}, r"model.body_set.objects\[0\].mass: expected a number, got 'heavy'"),
-        ({"body_set": [{"name": 3}]}, r"model.body_set.objects\[0\].name: expected a text, not a number"),
+        (
+            {"body_set": [{"mass": "heavy"}]},
+            r"model.body_set.objects\[0\].mass: expected a number, got 'heavy'",
+        ),
+        (
+            {"body_set": [{"name": 3}]},
+            r"model.body_set.objects\[0\].name: expected a text, not a number",
+        ),
         ({"body_set": [{"class": "PinJoint"}]}, "a PinJoint cannot stand here, only a Body"),
         ({"body_set": [{"class": "Bdy"}]}, "there is no class 'Bdy'; did you mean 'Body'"),
         ({"body_set": 1}, "expected a mapping that describes a BodySet, not a number"),
@@ -127,7 +133,9 @@ def test_what_is_wrong_is_told_with_its_place(data: Any, message: str) -> None:
 def test_data_that_are_no_model_are_told_with_their_file(tmp_path: Path) -> None:
     path = tmp_path / "mistaken.json"
     path.write_text('{"gravty": [0, 0, 0]}')
-    with pytest.raises(ModelError, match=r"mistaken\.json: model: a Model has no property 'gravty'"):
+    with pytest.raises(
+        ModelError, match=r"mistaken\.json: model: a Model has no property 'gravty'"
+    ):
         read_data(path)
 
 
@@ -144,11 +152,16 @@ def test_a_text_that_is_neither(tmp_path: Path) -> None:
         read_data(tmp_path / "nothing.json")
 
 
-def test_aliases_cannot_make_a_short_text_endless(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_aliases_cannot_make_a_short_text_endless(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("yaml")
     monkeypatch.setattr("osimlite.io.document.data.MAX_NUMBERS", 20_000)
     levels = ["&a0 {class: ComponentSet}"]
-    levels += [f"&a{i} {{class: ComponentSet, objects: [{', '.join([f'*a{i - 1}'] * 9)}]}}" for i in range(1, 9)]
+    levels += [
+        f"&a{i} {{class: ComponentSet, objects: [{', '.join([f'*a{i - 1}'] * 9)}]}}"
+        for i in range(1, 9)
+    ]
     bomb = tmp_path / "bomb.yaml"
     bomb.write_text(f"component_set: [{', '.join(levels)}]")
     with pytest.raises(ModelError, match="more values than any model"):

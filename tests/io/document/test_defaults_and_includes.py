@@ -84,7 +84,10 @@ def test_objects_take_what_their_class_has_in_the_block_as_opensim_does() -> Non
     model = osimlite.read_text(BODIES)
     assert [body.mass for body in bodies(model)] == [7.0, 7.0]
     # An Appearance in the file starts from the block; one that its owner made itself does not.
-    assert [geometry.appearance.opacity for geometry in bodies(model)[1].attached_geometry] == [0.25, 1.0]
+    assert [geometry.appearance.opacity for geometry in bodies(model)[1].attached_geometry] == [
+        0.25,
+        1.0,
+    ]
 
 
 def test_the_block_is_printed_back_and_its_values_only_there() -> None:
@@ -138,7 +141,9 @@ def test_numbers_of_elements_are_those_of_the_text() -> None:
     for body in (*bodies(document.model), layout.defaults[0]):
         assert document.source.spans[body.source_index].tag == "Body"
     wrong = read_document(Source(BODIES.replace("<mass>7<", "<mass>x<", 1).encode()))
-    assert [(note.kind, wrong.source.spans[note.number].tag) for note in wrong.notes] == [("unreadable", "mass")]
+    assert [(note.kind, wrong.source.spans[note.number].tag) for note in wrong.notes] == [
+        ("unreadable", "mass")
+    ]
 
 
 @pytest.fixture
@@ -165,7 +170,9 @@ def test_an_object_may_stand_in_a_file_of_its_own(folder: Path) -> None:
     assert document.source.spans[marker(document.model).source_index].tag == "MarkerSet"
 
 
-def test_what_is_unchanged_stays_in_its_file(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_what_is_unchanged_stays_in_its_file(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     model = osimlite.read(folder / "model.osim")
     assert osimlite.to_text(model) == INCLUDING
     elsewhere = tmp_path_factory.mktemp("elsewhere") / "model.osim"
@@ -183,15 +190,21 @@ def test_what_is_changed_is_written_where_it_is_used(folder: Path) -> None:
     assert "file=" not in (folder / "changed.osim").read_text()
 
 
-@pytest.mark.parametrize("content", [None, "no xml", INCLUDING, MARKERS.replace("MarkerSet", "ProbeSet")])
-def test_a_file_that_does_not_hold_it_leaves_the_object_as_it_is(folder: Path, content: str | None) -> None:
+@pytest.mark.parametrize(
+    "content", [None, "no xml", INCLUDING, MARKERS.replace("MarkerSet", "ProbeSet")]
+)
+def test_a_file_that_does_not_hold_it_leaves_the_object_as_it_is(
+    folder: Path, content: str | None
+) -> None:
     if content is None:
         (folder / "markers.xml").unlink()
     else:
         (folder / "markers.xml").write_text(content)
     document = read_document(Source.of_file(folder / "model.osim"))
     assert document.model.marker_set.objects == []
-    assert [(note.kind, note.word, note.value) for note in document.notes] == [("include", "file", "markers.xml")]
+    assert [(note.kind, note.word, note.value) for note in document.notes] == [
+        ("include", "file", "markers.xml")
+    ]
     assert osimlite.to_text(document.model) == INCLUDING.replace(" />\n", ">\n\t\t</MarkerSet>\n")
 
 
@@ -201,29 +214,52 @@ def test_files_that_include_each_other_end(folder: Path) -> None:
     assert marker(osimlite.read(folder / "model.osim")).name == "mk"
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-32", "latin-1"])
+@pytest.mark.parametrize(
+    "encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-32", "latin-1"]
+)
 @pytest.mark.parametrize(
     "attribute",
     ['file="markers.xml"', "file='markers.xml'", 'file = "markers.xml"', 'file\n\t=\r\n"markers.xml"',
      "file=markers.xml", 'file="m&#97;rkers.xml"', 'name="a" file="./markers.xml"'],
 )  # fmt: skip
-def test_an_attribute_in_any_spelling_and_encoding(folder: Path, attribute: str, encoding: str) -> None:
+def test_an_attribute_in_any_spelling_and_encoding(
+    folder: Path, attribute: str, encoding: str
+) -> None:
     text = INCLUDING.replace('file="markers.xml"', attribute)
     mark = "\ufeff" if encoding.endswith("-le") else ""
-    data = (mark + text.replace("UTF-8", encoding.removesuffix("-sig").removesuffix("-le"))).encode(encoding)
+    data = (mark + text.replace("UTF-8", encoding.removesuffix("-sig").removesuffix("-le"))).encode(
+        encoding
+    )
     document = read_document(Source(data, str(folder / "model.osim")))
     assert marker(document.model).name == "mk"
-    assert [(note.word, note.value.removeprefix("./")) for note in document.notes if note.kind == "include"] == [
-        ("file", "markers.xml")
-    ]
+    assert [
+        (note.word, note.value.removeprefix("./"))
+        for note in document.notes
+        if note.kind == "include"
+    ] == [("file", "markers.xml")]
 
 
 def test_what_only_looks_like_an_attribute(folder: Path) -> None:
-    for odd in ('name="file="', "name='file=\"markers.xml\"'", 'File="markers.xml"', 'x:file="markers.xml"'):
+    for odd in (
+        'name="file="',
+        "name='file=\"markers.xml\"'",
+        'File="markers.xml"',
+        'x:file="markers.xml"',
+    ):
         text = INCLUDING.replace('file="markers.xml"', odd)
-        assert read_document(Source(text.encode(), str(folder / "model.osim"))).model.marker_set.objects == []
-    hidden = INCLUDING.replace('<MarkerSet file="markers.xml" />', '<!-- <MarkerSet file="markers.xml" /> -->')
-    assert read_document(Source(hidden.encode(), str(folder / "model.osim"))).model.marker_set.objects == []
+        assert (
+            read_document(
+                Source(text.encode(), str(folder / "model.osim"))
+            ).model.marker_set.objects
+            == []
+        )
+    hidden = INCLUDING.replace(
+        '<MarkerSet file="markers.xml" />', '<!-- <MarkerSet file="markers.xml" /> -->'
+    )
+    assert (
+        read_document(Source(hidden.encode(), str(folder / "model.osim"))).model.marker_set.objects
+        == []
+    )
 
 
 def test_what_another_system_would_include_is_not_included(folder: Path) -> None:

@@ -49,7 +49,9 @@ def test_the_object_is_of_the_class_at_the_top(fixtures: Path) -> None:
     study = osimlite.read_document(fixtures / "documents" / "study.omoco")
     assert isinstance(study, osimlite.MocoStudy)
     assert study.problem.phases.goals[1].reference.operators[0].cutoff_frequency == 6
-    assert isinstance(osimlite.read_document(fixtures / "walker" / "DynamicWalkerModel.osim"), osimlite.Model)
+    assert isinstance(
+        osimlite.read_document(fixtures / "walker" / "DynamicWalkerModel.osim"), osimlite.Model
+    )
 
 
 def test_a_model_inside_a_study() -> None:
@@ -67,9 +69,13 @@ def test_a_tool_made_in_python(tmp_path: Path) -> None:
     body = osimlite.Body(name="foot")
     model = osimlite.Model(name="m")
     model.add(body)
-    loads = osimlite.ExternalLoads(name="plates", objects=[osimlite.ExternalForce(name="r", applied_to_body=body)])
+    loads = osimlite.ExternalLoads(
+        name="plates", objects=[osimlite.ExternalForce(name="r", applied_to_body=body)]
+    )
     osimlite.write(loads, tmp_path / "loads.xml")
-    assert "<applied_to_body>/bodyset/foot</applied_to_body>" in (tmp_path / "loads.xml").read_text()
+    assert (
+        "<applied_to_body>/bodyset/foot</applied_to_body>" in (tmp_path / "loads.xml").read_text()
+    )
     tool = osimlite.ScaleTool(mass=70.0)
     tool.model_scaler.scaling_order = ("measurements",)
     assert osimlite.to_text(tool).count("<ModelScaler>") == 1
@@ -78,7 +84,11 @@ def test_a_tool_made_in_python(tmp_path: Path) -> None:
 def test_an_unknown_tag_is_kept_and_told(fixtures: Path) -> None:
     result = read_document(Source.of_file(fixtures / "documents" / "forward.xml"), of=Object)
     (note,) = result.notes
-    assert (note.kind, note.word, result.source.of_tag(note.number).line) == ("unknown-tag", "use_specified_dt", 6)
+    assert (note.kind, note.word, result.source.of_tag(note.number).line) == (
+        "unknown-tag",
+        "use_specified_dt",
+        6,
+    )
     assert "<use_specified_dt>true</use_specified_dt>" in osimlite.to_text(result.top)
 
 
@@ -116,7 +126,8 @@ def test_a_model_is_wanted(fixtures: Path) -> None:
 def test_members_are_compared_by_name() -> None:
     def tasks(*names: str) -> Object:
         return osimlite.IKTaskSet(
-            name="set", objects=[osimlite.IKMarkerTask(name=name, weight=float(len(name))) for name in names]
+            name="set",
+            objects=[osimlite.IKMarkerTask(name=name, weight=float(len(name))) for name in names],
         )
 
     assert differences(tasks("a", "b"), tasks("b", "a")) == []
@@ -131,5 +142,7 @@ def test_members_are_compared_by_name() -> None:
 
 def test_every_rule_of_a_reference_is_known() -> None:
     used = {spec.kind.rule for tag in tags() for spec in reference_specs(class_for(tag) or Object)}  # type: ignore[attr-defined]
-    named = {cls.name_reference.rule for tag in tags() if (cls := class_for(tag)) and cls.name_reference}
+    named = {
+        cls.name_reference.rule for tag in tags() if (cls := class_for(tag)) and cls.name_reference
+    }
     assert used | named <= RULES.keys()

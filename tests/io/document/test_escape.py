@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 from osimlite.io.document.escape import NO_XML, escape, quoted
 
-texts = st.text(st.sampled_from("ab&<>\"'\n\r\t é")) | st.text().filter(lambda text: not NO_XML.search(text))
+texts = st.text(st.sampled_from("ab&<>\"'\n\r\t é")) | st.text().filter(
+    lambda text: not NO_XML.search(text)
+)
 
 
 @given(texts)

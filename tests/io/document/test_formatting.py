@@ -17,8 +17,12 @@ def laid_out(inner: str, version: int = 30000) -> str:
     text = formatted(Source(DOCUMENT.format(version, inner).encode()))
     assert formatted(Source(text.encode())) == text
     assert f'<OpenSimDocument Version="{version}">\n\t<Model name="m">' in text
-    assert text.startswith('<?xml version="1.0" encoding="UTF-8" ?>\n') and text.endswith("</OpenSimDocument>\n")
-    return text[text.index('name="m">') + 9 : text.rindex("</Model>")].replace("\n\t\t", "\n").strip()
+    assert text.startswith('<?xml version="1.0" encoding="UTF-8" ?>\n') and text.endswith(
+        "</OpenSimDocument>\n"
+    )
+    return (
+        text[text.index('name="m">') + 9 : text.rindex("</Model>")].replace("\n\t\t", "\n").strip()
+    )
 
 
 @pytest.mark.parametrize(
@@ -29,9 +33,15 @@ def laid_out(inner: str, version: int = 30000) -> str:
         ("<!-- a\n b --><x>1</x><!-- c -->", "<!-- a\n b -->\n<x>1</x>\n<!-- c -->"),
         ("<mass><!-- kg --> 7</mass>", "<mass><!-- kg --> 7</mass>"),
         ("<!--The mass of the body (kg)--><mass>7</mass>", "<mass>7</mass>"),
-        ("<credits>a &amp; b &lt;c&gt; é\u00a0 d</credits>", "<credits>a &amp; b &lt;c&gt; é\u00a0 d</credits>"),
+        (
+            "<credits>a &amp; b &lt;c&gt; é\u00a0 d</credits>",
+            "<credits>a &amp; b &lt;c&gt; é\u00a0 d</credits>",
+        ),
         ("<credits><![CDATA[a < b]]></credits>", "<credits>a &lt; b</credits>"),
-        ('<x><y name=\'a"b\'\n file = "c.xml"/></x>', '<x>\n\t<y name=\'a"b\' file="c.xml" />\n</x>'),
+        (
+            '<x><y name=\'a"b\'\n file = "c.xml"/></x>',
+            '<x>\n\t<y name=\'a"b\' file="c.xml" />\n</x>',
+        ),
         ("<H::P a:b='1'>2</H::P>", '<H::P a:b="1">2</H::P>'),
         ("<?pi a?><x>1</x>", "<?pi a?>\n<x>1</x>"),
         ("stray <x>1</x> more <y/> <z/> end", "stray <x>1</x> more <y /> <z /> end"),
@@ -44,7 +54,9 @@ def test_layout_of_an_old_document(inner: str, expected: str) -> None:
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
 def test_a_document_in_any_encoding_becomes_utf_8(encoding: str) -> None:
-    text = f"<?xml version='1.0' encoding='{encoding.removesuffix('-sig')}'?>" + DOCUMENT.format(30000, "<x>é</x>")
+    text = f"<?xml version='1.0' encoding='{encoding.removesuffix('-sig')}'?>" + DOCUMENT.format(
+        30000, "<x>é</x>"
+    )
     assert "<x>é</x>" in formatted(Source(text.encode(encoding)))
 
 
@@ -66,7 +78,8 @@ def test_a_document_of_a_version_to_come() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "<x/>", "<OpenSimDocument><Model/></OpenSimDocument>", DOCUMENT.format(30000, "<x>")]
+    "text",
+    ["", "<x/>", "<OpenSimDocument><Model/></OpenSimDocument>", DOCUMENT.format(30000, "<x>")],
 )
 def test_what_is_no_document_is_refused(text: str) -> None:
     with pytest.raises(DocumentError):

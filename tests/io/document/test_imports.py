@@ -16,14 +16,19 @@ READ = "import sys, osimlite; osimlite.read(sys.argv[1]); print(*sorted(sys.modu
 def loaded(fixtures: Path) -> set[str]:
     walker = fixtures / "walker" / "DynamicWalkerModel.osim"
     done = subprocess.run(
-        [sys.executable, "-c", READ, str(walker)], capture_output=True, text=True, check=True, cwd=fixtures.parent
+        [sys.executable, "-c", READ, str(walker)],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=fixtures.parent,
     )
     return set(done.stdout.split())
 
 
 def test_areas_whose_tags_do_not_occur_stay_out(loaded: set[str]) -> None:
     areas = {name.rpartition(".")[2] for name in loaded if name.startswith("osimlite.schema.")}
-    # The walker has bodies, joints, contact, forces and no muscle, path, probe or controller of its own.
+    # The walker has bodies, joints, contact, forces and no muscle, path, probe or controller of its
+    # own.
     assert not areas & {
         "actuators", "constraint_types", "contact_forces", "controller_types", "custom_joint", "metabolics", "muscles",
         "muscle_curves", "path_actuators", "path_forces", "paths", "prescribed", "probe_types", "reporters", "springs",
@@ -50,21 +55,32 @@ def test_importing_the_package_alone_imports_nothing_of_weight() -> None:
     [
         (("--version",), {"typer", "rich", "pydantic", "lxml", "dataclasses"}),
         (("validate", "walker.osim"), {"typer", "rich", "pydantic", "lxml", "tempfile"}),
-        (("validate", "walker.osim", "--no-cache"), {"typer", "rich", "html", "osimlite.io.document.repair"}),
-        (("validate", "walker.osim", "--no-cache"), {"numpy", "osimlite.mechanics.multibody.mechanism"}),
+        (
+            ("validate", "walker.osim", "--no-cache"),
+            {"typer", "rich", "html", "osimlite.io.document.repair"},
+        ),
+        (
+            ("validate", "walker.osim", "--no-cache"),
+            {"numpy", "osimlite.mechanics.multibody.mechanism"},
+        ),
         (
             ("validate", "walker.osim", "--no-cache"),
             {"osimlite.lint.table", "osimlite.lint.setup", "osimlite.io.tables.headers"},
         ),
         (("info", "walker.osim"), {"typer", "rich", "rapidfuzz", "numba", "llvmlite"}),
         (("info", "walker.osim"), {"numpy", "osimlite.mechanics.multibody.mechanism"}),
-        (("simulate", "walker.osim", "--to", "0.1", "-o", "r"), {"typer", "rich", "numba", "osimlite.lint"}),
+        (
+            ("simulate", "walker.osim", "--to", "0.1", "-o", "r"),
+            {"typer", "rich", "numba", "osimlite.lint"},
+        ),
     ],
 )
 def test_what_a_short_command_leaves_out(
     words: tuple[str, ...], absent: set[str], fixtures: Path, tmp_path: Path
 ) -> None:
-    (tmp_path / "walker.osim").write_bytes((fixtures / "walker" / "DynamicWalkerModel.osim").read_bytes())
+    (tmp_path / "walker.osim").write_bytes(
+        (fixtures / "walker" / "DynamicWalkerModel.osim").read_bytes()
+    )
     code = "import sys, osimlite.cli as c\ntry: c.main(sys.argv[1:])\nfinally: print(*sys.modules, file=sys.stderr)"
     for _ in range(2):
         # The second time, the file is found unchanged.

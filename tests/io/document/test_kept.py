@@ -20,7 +20,10 @@ from osimlite.schema.tools.scale import ScaleTool
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    osimlite.write(Model(name="m", body_set=BodySet(objects=[Body(name="thigh", mass=3.25)])), tmp_path / "model.osim")
+    osimlite.write(
+        Model(name="m", body_set=BodySet(objects=[Body(name="thigh", mass=3.25)])),
+        tmp_path / "model.osim",
+    )
     return tmp_path / "model.osim"
 
 
@@ -56,7 +59,10 @@ def test_another_file_in_its_place_is_read(file: Path, tmp_path: Path) -> None:
     other.write_text(file.read_text().replace("3.25", "4.75"))
     os.utime(other, ns=(before.st_atime_ns, before.st_mtime_ns))
     other.replace(file)
-    assert (os.stat(file).st_mtime_ns, os.stat(file).st_size) == (before.st_mtime_ns, before.st_size)
+    assert (os.stat(file).st_mtime_ns, os.stat(file).st_size) == (
+        before.st_mtime_ns,
+        before.st_size,
+    )
     assert kept.read_anew(file, Model).body_set.objects[0].mass == 4.75
 
 

@@ -124,7 +124,9 @@ def test_a_range_takes_two() -> None:
         ("1 2 abc", "unreadable", ABSENT),
     ],
 )
-def test_of_every_word_of_a_list_the_number_it_begins_with_counts(text: str, trouble: str, value: object) -> None:
+def test_of_every_word_of_a_list_the_number_it_begins_with_counts(
+    text: str, trouble: str, value: object
+) -> None:
     with pytest.raises(Unclean) as caught:
         converter(RANGE)(text)
     assert (caught.value.trouble, caught.value.value) == (trouble, value)
@@ -170,7 +172,11 @@ def test_legacy_lists_of_switches_are_false_but_for_true_in_small_letters() -> N
     assert flags("true false 0") == (True, False, False)
     with pytest.raises(Unclean) as caught:
         flags("true 1 TRUE")
-    assert (caught.value.trouble, caught.value.word, caught.value.value) == ("ignored", "1", (True, False, False))
+    assert (caught.value.trouble, caught.value.word, caught.value.value) == (
+        "ignored",
+        "1",
+        (True, False, False),
+    )
 
 
 @pytest.mark.parametrize("text", ["1x 2", "1 2mm", "1.5kg"])
@@ -188,7 +194,11 @@ def test_both_spellings_of_a_number_read_back_equal(value: float) -> None:
         assert math.copysign(1.0, back) == math.copysign(1.0, value) or math.isnan(value)
 
 
-@given(st.lists(st.floats(allow_nan=False), max_size=6), st.sampled_from(["shortest", "opensim"]), st.booleans())
+@given(
+    st.lists(st.floats(allow_nan=False), max_size=6),
+    st.sampled_from(["shortest", "opensim"]),
+    st.booleans(),
+)
 def test_lists_read_back_equal(values: list[float], numbers: str, legacy: bool) -> None:
     kind = Value("double", "list", legacy=legacy)
     text = formatter(kind, numbers)(tuple(values))
@@ -204,7 +214,13 @@ def test_spelling_of_opensim() -> None:
         "-0",
         "1",
     ]
-    assert [shortest(v) for v in (0.1, 1e-9, 1.0, math.inf, math.nan)] == ["0.1", "1e-09", "1", "Inf", "NaN"]
+    assert [shortest(v) for v in (0.1, 1e-9, 1.0, math.inf, math.nan)] == [
+        "0.1",
+        "1e-09",
+        "1",
+        "Inf",
+        "NaN",
+    ]
 
 
 def test_legacy_lists_print_six_digits_only_where_they_suffice() -> None:

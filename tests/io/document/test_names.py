@@ -47,7 +47,9 @@ def test_namespaces_inside_a_model_are_attributes_that_stay() -> None:
 @pytest.mark.parametrize("tag", ["o:mass", "mass:", "a:b:c", "OpenSim::mass", "xml:mass"])
 def test_a_name_with_a_colon_is_another_name(tag: str) -> None:
     result = read(
-        f"{HEAD} xmlns:o='u'><Model>{REST}".replace("<mass>2</mass>", f"<mass>2</mass><{tag} o:a='1'>3</{tag}>")
+        f"{HEAD} xmlns:o='u'><Model>{REST}".replace(
+            "<mass>2</mass>", f"<mass>2</mass><{tag} o:a='1'>3</{tag}>"
+        )
     )
     assert [(note.kind, note.word) for note in result.notes] == [("unknown-tag", tag)]
     written = osimlite.to_text(result.model)
@@ -56,15 +58,31 @@ def test_a_name_with_a_colon_is_another_name(tag: str) -> None:
 
 
 def test_what_is_no_name_keeps_its_colons() -> None:
-    inside = "<Body name='a:b'><x><![CDATA[<o:p xmlns='q'>]]></x></Body><!-- <o:p xmlns='q'> a:b -->"
-    result = read(f"{HEAD}><Model><BodySet><objects>{inside}</objects></BodySet></Model></OpenSimDocument>")
+    inside = (
+        "<Body name='a:b'><x><![CDATA[<o:p xmlns='q'>]]></x></Body><!-- <o:p xmlns='q'> a:b -->"
+    )
+    result = read(
+        f"{HEAD}><Model><BodySet><objects>{inside}</objects></BodySet></Model></OpenSimDocument>"
+    )
     assert result.model.body_set.objects[0].name == "a:b"
     written = osimlite.to_text(result.model)
     assert "&lt;o:p xmlns='q'&gt;" in written
     assert "<!-- <o:p xmlns='q'> a:b -->" in written
 
 
-PIECES = ["<a", "<a:b", " xmlns='u'", " x:y='1'", ' z="p:q"', ">", "/>", "</a:b>", "</a>", "t:", "\n"]
+PIECES = [
+    "<a",
+    "<a:b",
+    " xmlns='u'",
+    " x:y='1'",
+    ' z="p:q"',
+    ">",
+    "/>",
+    "</a:b>",
+    "</a>",
+    "t:",
+    "\n",
+]
 PIECES += ["<!-- <a:b> -->", "<![CDATA[<a:b>]]>"]
 
 

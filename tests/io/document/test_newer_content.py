@@ -14,7 +14,9 @@ from osimlite.lint import validate
 from tests.cli.command import run
 from tests.lint.verdict_cases import small_model
 
-MODEL_ALONE = small_model().replace('<OpenSimDocument Version="40600">', "").replace("</OpenSimDocument>", "")
+MODEL_ALONE = (
+    small_model().replace('<OpenSimDocument Version="40600">', "").replace("</OpenSimDocument>", "")
+)
 
 
 def test_a_model_without_a_document_is_read_as_it_was_dumped(tmp_path: Path):
@@ -58,4 +60,6 @@ def test_an_old_controller_that_names_an_actuator_twice_is_said_to_be_refused():
         controllers='<PrescribedController name="c"><actuator_list>m m</actuator_list></PrescribedController>',
     ).replace("40600", "40000")
     report = validate(Source(text.encode(), "m.osim"))
-    assert any("names an actuator twice" in finding.message for finding in report.errors), str(report)
+    assert any("names an actuator twice" in finding.message for finding in report.errors), str(
+        report
+    )

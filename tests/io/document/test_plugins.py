@@ -21,7 +21,11 @@ from osimlite.schema.registry import MODULES, class_for, further_classes
 from osimlite.schema.specs import field_specs
 
 REPO = Path(__file__).resolve().parents[3]
-CLASSES = re.findall(r"```json\n(.*?)```", (REPO / "docs" / "plugin-classes.md").read_text(encoding="utf-8"), re.DOTALL)
+CLASSES = re.findall(
+    r"```json\n(.*?)```",
+    (REPO / "docs" / "plugin-classes.md").read_text(encoding="utf-8"),
+    re.DOTALL,
+)
 FORCES = """
 				<BodyDragForce name="drag">
 					<body_name>thigh</body_name>
@@ -47,7 +51,9 @@ def folder(fixtures, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     Path("classes.json").write_text(CLASSES[0])
     text = (fixtures / "lint" / "leg.osim").read_text()
-    text = text.replace("\n\t\t\t</objects>\n\t\t</ForceSet>", FORCES + "\n\t\t\t</objects>\n\t\t</ForceSet>", 1)
+    text = text.replace(
+        "\n\t\t\t</objects>\n\t\t</ForceSet>", FORCES + "\n\t\t\t</objects>\n\t\t</ForceSet>", 1
+    )
     Path("m.osim").write_text(text.replace("\t</Model>", PATCH + "\t</Model>"))
     return tmp_path
 
@@ -57,7 +63,12 @@ def test_without_the_file_they_are_unknown_and_with_it_objects(folder):
     assert str(validate("m.osim", classes="classes.json")) == "nothing found"
     model = osimlite.read("m.osim", classes="classes.json")
     drag = model.force_set.objects[-1]
-    assert (drag.coefficient, drag.exponent, drag.body_name, drag.appliesForce) == (0.7, 2.0, "thigh", True)
+    assert (drag.coefficient, drag.exponent, drag.body_name, drag.appliesForce) == (
+        0.7,
+        2.0,
+        "thigh",
+        True,
+    )
     (patch,) = model.subcomponents
     assert patch.path == "/patch" and patch.normal == (0, 0, 1) and patch.pressure.amplitude == 2
     # What counted for one file counts for no other.
@@ -87,7 +98,9 @@ def test_what_is_wrong_in_them_is_found(folder, old, new, code, suggestion):
     text = Path("m.osim").read_text()
     assert old in text
     Path("m.osim").write_text(text.replace(old, new))
-    assert [(each.code, each.suggestion) for each in validate("m.osim", classes="classes.json")] == [(code, suggestion)]
+    assert [
+        (each.code, each.suggestion) for each in validate("m.osim", classes="classes.json")
+    ] == [(code, suggestion)]
 
 
 def test_settings_and_option_name_files_and_the_cache_knows_them(folder, capsys):
@@ -147,7 +160,10 @@ def test_a_class_may_derive_from_another_and_hold_objects_of_a_third(folder):
 def test_a_default_of_the_base_may_be_another(folder):
     path = declared(
         folder,
-        Ours={"bases": ["Force"], "properties": [{"name": "appliesForce", "type": "bool", "default": "false"}]},
+        Ours={
+            "bases": ["Force"],
+            "properties": [{"name": "appliesForce", "type": "bool", "default": "false"}],
+        },
     )
     cls = classes_in(path)["Ours"]
     assert list(field_specs(cls)) == ["components", "appliesForce"] and cls().appliesForce is False
@@ -161,18 +177,42 @@ PROPERTY = {"name": "gain", "type": "double"}
     [
         ({"bases": ["Forze"]}, 5, "there is no class 'Forze'; did you mean 'Force'?"),
         ({"bases": []}, 3, "'bases' of 'Mine' must list the class that it derives from"),
-        ({"bases": ["Force"], "propertys": []}, 7, "has no 'propertys'; did you mean 'properties'?"),
-        ({"bases": ["Force"], "properties": [{**PROPERTY, "defalt": "1"}]}, 11, "no 'defalt'; did you mean 'default'?"),
-        ({"bases": ["Force"], "properties": [{**PROPERTY, "default": "x"}]}, 11, "must be one number, not 'x'"),
+        (
+            {"bases": ["Force"], "propertys": []},
+            7,
+            "has no 'propertys'; did you mean 'properties'?",
+        ),
+        (
+            {"bases": ["Force"], "properties": [{**PROPERTY, "defalt": "1"}]},
+            11,
+            "no 'defalt'; did you mean 'default'?",
+        ),
+        (
+            {"bases": ["Force"], "properties": [{**PROPERTY, "default": "x"}]},
+            11,
+            "must be one number, not 'x'",
+        ),
         ({"bases": ["Force"], "properties": [{"name": "gain"}]}, 9, "'gain' of 'Mine' has no type"),
-        ({"bases": ["Force"], "properties": [{**PROPERTY, "kind": "lists"}]}, 11, "did you mean 'list'?"),
-        ({"bases": ["Force"], "properties": [{**PROPERTY, "type": "dubble"}]}, 10, "there is no class 'dubble'"),
+        (
+            {"bases": ["Force"], "properties": [{**PROPERTY, "kind": "lists"}]},
+            11,
+            "did you mean 'list'?",
+        ),
+        (
+            {"bases": ["Force"], "properties": [{**PROPERTY, "type": "dubble"}]},
+            10,
+            "there is no class 'dubble'",
+        ),
         (
             {"bases": ["Force"], "properties": [{**PROPERTY, "type": "Function", "object": True}]},
             9,
             "must be an object",
         ),
-        ({"bases": ["Force"], "sockets": [{"tag": "socket_a"}]}, 3, "needs 'tag' and 'connectee_type'"),
+        (
+            {"bases": ["Force"], "sockets": [{"tag": "socket_a"}]},
+            3,
+            "needs 'tag' and 'connectee_type'",
+        ),
         ({"bases": ["Mine"]}, 3, "derive from each other"),
     ],
 )
@@ -180,7 +220,10 @@ def test_a_wrong_declaration_is_told_with_its_line(folder, entry, line, words):
     path = declared(folder, Mine=entry)
     with pytest.raises(OsimliteError) as caught:
         classes_in(path)
-    assert words in str(caught.value) and (caught.value.file, caught.value.line) == (str(path), line)
+    assert words in str(caught.value) and (caught.value.file, caught.value.line) == (
+        str(path),
+        line,
+    )
 
 
 def test_what_is_no_declaration_at_all_is_told(folder, capsys):
@@ -188,8 +231,14 @@ def test_what_is_no_declaration_at_all_is_told(folder, capsys):
         ("{", "mine.json:1: this is no JSON"),
         ("[]", "must be an object of JSON"),
         ('{"classes": {"Body": {"bases": ["Frame"]}}}', "'Body' is a class of OpenSim itself"),
-        ('{"classes": {}, "references": [{"cls": "A", "property": "b", "resolution": "body-names"}]}', "'body-name'?"),
-        ('{"classes": {}, "references": [{"cls": "A", "property": "b", "resolution": "body-name"}]}', "'A.b'"),
+        (
+            '{"classes": {}, "references": [{"cls": "A", "property": "b", "resolution": "body-names"}]}',
+            "'body-name'?",
+        ),
+        (
+            '{"classes": {}, "references": [{"cls": "A", "property": "b", "resolution": "body-name"}]}',
+            "'A.b'",
+        ),
     ]:
         Path("mine.json").write_text(text)
         with pytest.raises(OsimliteError, match=re.escape(words)):
@@ -200,14 +249,20 @@ def test_what_is_no_declaration_at_all_is_told(folder, capsys):
 
 def test_an_output_of_a_plugin_is_one(folder):
     classes = json.loads(CLASSES[0])
-    classes["classes"]["FluidPatch"]["outputs"] = [{"name": "flow", "type": "double", "list": False}]
+    classes["classes"]["FluidPatch"]["outputs"] = [
+        {"name": "flow", "type": "double", "list": False}
+    ]
     Path("classes.json").write_text(json.dumps(classes))
     reporter = '<TableReporter__double_ name="t"> <input_inputs>/patch|{}</input_inputs> </TableReporter__double_>'
     text = Path("m.osim").read_text()
     result = []
     for word in ("flow", "flou"):
-        Path("m.osim").write_text(text.replace("\t\t</components>", reporter.format(word) + "\t\t</components>"))
-        result.append([(each.code, each.suggestion) for each in validate("m.osim", classes="classes.json")])
+        Path("m.osim").write_text(
+            text.replace("\t\t</components>", reporter.format(word) + "\t\t</components>")
+        )
+        result.append(
+            [(each.code, each.suggestion) for each in validate("m.osim", classes="classes.json")]
+        )
     assert result == [[], [("OSIM332", "/patch|flow")]]
 
 
@@ -217,7 +272,12 @@ def test_a_class_may_derive_from_any(folder):
     more = {
         "properties": [
             {"name": "gain", "type": "double"},
-            {"name": "helper", "type": "Function", "object": True, "default": {"class": "Constant"}},
+            {
+                "name": "helper",
+                "type": "Function",
+                "object": True,
+                "default": {"class": "Constant"},
+            },
         ],
         "sockets": [{"tag": "socket_spot", "connectee_type": "Frame"}],
     }
@@ -230,7 +290,9 @@ def test_a_class_may_derive_from_any(folder):
         if cls.is_component:
             file, whole = "m.osim", text.replace("\t\t<components>", f"\t\t<components> {item}")
         codes = validate(Source(whole.encode(), file), config=config).codes
-        assert "OSIM101" in codes and (not cls.is_component or codes.keys() & {"OSIM301", "OSIM103"}), name
+        assert "OSIM101" in codes and (
+            not cls.is_component or codes.keys() & {"OSIM301", "OSIM103"}
+        ), name
 
 
 @pytest.mark.corpus

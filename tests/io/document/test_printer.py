@@ -87,7 +87,9 @@ def test_comments_of_opensim_in_unknown_content_are_dropped_like_all_others() ->
     force = f"<PlugIn name='p'> {generated} <a>{generated}</a> <!--by hand--> <b>1</b> </PlugIn>"
     inside = f"<ForceSet> <objects> {force} </objects> </ForceSet>"
     printed = osimlite.to_text(
-        osimlite.read_text(f'<OpenSimDocument Version="40600"><Model> {inside} </Model></OpenSimDocument>')
+        osimlite.read_text(
+            f'<OpenSimDocument Version="40600"><Model> {inside} </Model></OpenSimDocument>'
+        )
     )
     assert "by hand" in printed and "fibers" not in printed
     assert osimlite.to_text(osimlite.read_text(printed)) == printed
@@ -127,9 +129,9 @@ def test_coordinates_that_a_joint_makes_itself_have_names_of_their_own() -> None
     model = Model(name="m")
     a = model.add(Body(name="a", mass=1.0))
     model.add(PinJoint(name="hinge").between(model.ground, a))
-    assert [c.name for c in osimlite.read_text(osimlite.to_text(model)).components(osimlite.Coordinate)] == [
-        "hinge_coord_0"
-    ]
+    assert [
+        c.name for c in osimlite.read_text(osimlite.to_text(model)).components(osimlite.Coordinate)
+    ] == ["hinge_coord_0"]
 
 
 @pytest.mark.parametrize("odd", ["\0", "\x1b", "\ud800", "\uffff"])

@@ -48,9 +48,15 @@ def test_every_element_keeps_its_number(fixtures: Path) -> None:
     source = Source.of_file(fixtures / "walker" / "DynamicWalkerModel.osim")
     model = read_document(source).model
     for component in model.walk():
-        assert source.spans[component.source_index].tag == component.tag if component.source_index is not None else True
+        assert (
+            source.spans[component.source_index].tag == component.tag
+            if component.source_index is not None
+            else True
+        )
     knee = model.find("/jointset/RightShankToThigh/RKnee_rz")
-    assert source.text[source.spans[knee.source_index].start :].startswith('<Coordinate name="RKnee_rz">')
+    assert source.text[source.spans[knee.source_index].start :].startswith(
+        '<Coordinate name="RKnee_rz">'
+    )
 
 
 def test_properties_in_any_order_and_only_what_is_there() -> None:
@@ -94,12 +100,18 @@ def test_wrong_class_duplicates_attributes() -> None:
         '<ForceSet><objects><Body name="b"/></objects></ForceSet><gravity>0 -1 0</gravity><gravity>0 -2 0</gravity>'
         '<BodySet colour="red"/>'
     )
-    assert kinds(result) == [("wrong-class", "Body"), ("unknown-attribute", "colour"), ("duplicate-tag", "gravity")]
+    assert kinds(result) == [
+        ("wrong-class", "Body"),
+        ("unknown-attribute", "colour"),
+        ("duplicate-tag", "gravity"),
+    ]
     assert result.model.gravity == (0.0, -1.0, 0.0)
 
 
 def test_named_objects_in_all_three_spellings() -> None:
-    short = '<FrameGeometry name="frame_geometry"><display_radius>1</display_radius></FrameGeometry>'
+    short = (
+        '<FrameGeometry name="frame_geometry"><display_radius>1</display_radius></FrameGeometry>'
+    )
     long = "<frame_geometry><FrameGeometry><display_radius>1</display_radius></FrameGeometry></frame_geometry>"
     bare = "<FrameGeometry><display_radius>1</display_radius></FrameGeometry>"
     for spelling in (short, long, bare):
@@ -139,7 +151,11 @@ def test_comments_of_people_stay_where_they_were() -> None:
         ('<OpenSimDocument Version="abc"/>', 1, "abc"),
         ('<OpenSimDocument Version="40600">\n<BodySet/></OpenSimDocument>', 2, "<BodySet>"),
         ('<OpenSimDocument Version="40600"/>', 1, "no <Model>"),
-        ('<OpenSimDocument Version="40600">\n<Model>\n<mass></Model></OpenSimDocument>', 3, "not well-formed"),
+        (
+            '<OpenSimDocument Version="40600">\n<Model>\n<mass></Model></OpenSimDocument>',
+            3,
+            "not well-formed",
+        ),
         ('<!DOCTYPE a [\n<!ENTITY x "y">]>\n<OpenSimDocument Version="40600"/>', 1, "DOCTYPE"),
     ],
 )
@@ -179,7 +195,9 @@ def test_entities_and_files_of_others_are_not_followed(tmp_path: Path) -> None:
     secret = tmp_path / "secret"
     secret.write_text("do not read")
     bomb = '<!DOCTYPE a [<!ENTITY a "x"><!ENTITY b "&a;&a;&a;&a;">]><a>&b;</a>'
-    outside = f'<!DOCTYPE a SYSTEM "{secret}"><OpenSimDocument Version="40600"><Model/></OpenSimDocument>'
+    outside = (
+        f'<!DOCTYPE a SYSTEM "{secret}"><OpenSimDocument Version="40600"><Model/></OpenSimDocument>'
+    )
     with pytest.raises(DocumentError):
         osimlite.read_text(bomb)
     for before in ("", "<!-- <OpenSimDocument> -->", "<?note <OpenSimDocument?>", "\n"):

@@ -58,7 +58,9 @@ def document(text: str | bytes) -> Document:
 )
 def test_read_with_a_note(old: str, new: str, kind: str, line: int) -> None:
     result = document(TEXT.replace(old, new, 1))
-    assert [(note.kind, note.line) for note in result.notes if note.word != "side"] == [(kind, line)]
+    assert [(note.kind, note.line) for note in result.notes if note.word != "side"] == [
+        (kind, line)
+    ]
     assert result.fault is not None
     thigh = result.model["/bodyset/thigh"]
     assert thigh.mass == 8
@@ -69,7 +71,11 @@ def test_read_with_a_note(old: str, new: str, kind: str, line: int) -> None:
     assert mass is not None
     assert source.lines[source.of_tag(mass).line - 1].endswith("<mass>8</mass>")
     # What is written is XML.
-    assert not [note for note in read_document(Source(to_text(result.model).encode())).notes if note.word != "side"]
+    assert not [
+        note
+        for note in read_document(Source(to_text(result.model).encode())).notes
+        if note.word != "side"
+    ]
 
 
 def test_well_formed_text_has_no_fault() -> None:
@@ -78,8 +84,12 @@ def test_well_formed_text_has_no_fault() -> None:
 
 
 def test_everything_at_once() -> None:
-    text = TEXT.replace("Anna", "A & B &copy; C &amp; D").replace("<mass>", "<!-- a -- b -- c --><mass>")
-    result = document("notes:\n" + text.replace('name="thigh"', "name='a' name = \"thigh\"") + "bye")
+    text = TEXT.replace("Anna", "A & B &copy; C &amp; D").replace(
+        "<mass>", "<!-- a -- b -- c --><mass>"
+    )
+    result = document(
+        "notes:\n" + text.replace('name="thigh"', "name='a' name = \"thigh\"") + "bye"
+    )
     kinds = [note.kind for note in result.notes]
     assert kinds == [
         "text-outside-root",
@@ -117,12 +127,15 @@ def test_references_of_xml_are_left_alone(reference: str) -> None:
 
 def test_references_of_html_make_no_markup() -> None:
     assert (
-        document(TEXT.replace("Anna", "&LT;mass&GT; &NewLine; &AMP; &bad; &#;")).model.credits == "<mass> & &bad; &#;"
+        document(TEXT.replace("Anna", "&LT;mass&GT; &NewLine; &AMP; &bad; &#;")).model.credits
+        == "<mass> & &bad; &#;"
     )
 
 
 def test_a_conflict_is_refused_where_it_begins() -> None:
-    text = TEXT.replace("<mass>8</mass>", "<<<<<<< HEAD\n<mass>8</mass>\n=======\n<mass>9</mass>\n>>>>>>> faster")
+    text = TEXT.replace(
+        "<mass>8</mass>", "<<<<<<< HEAD\n<mass>8</mass>\n=======\n<mass>9</mass>\n>>>>>>> faster"
+    )
     with pytest.raises(DocumentError) as caught:
         document(text)
     assert (caught.value.line, caught.value.column) == (8, 1)
@@ -153,7 +166,9 @@ def test_what_may_mean_two_things_is_refused(old: str, new: str, line: int) -> N
 
 
 def test_control_characters_that_are_white_space() -> None:
-    assert document(TEXT.replace("Anna", "Anna\fand\vBert & Co")).model.credits == "Anna and Bert & Co"
+    assert (
+        document(TEXT.replace("Anna", "Anna\fand\vBert & Co")).model.credits == "Anna and Bert & Co"
+    )
 
 
 # Encodings
@@ -166,8 +181,14 @@ def test_control_characters_that_are_white_space() -> None:
         (TEXT.replace("Anna", "Ren\u00e9").encode("utf-16"), "utf-16"),
         (TEXT.replace("Anna", "Ren\u00e9").encode("utf-32"), "utf-32"),
         (TEXT.replace("Anna", "Ren\u00e9").encode("cp1252"), "cp1252"),
-        (TEXT.replace("Anna", "Ren\u00e9").replace("UTF-8", "ISO-8859-1").encode("latin-1"), "iso-8859-1"),
-        (TEXT.replace("Anna", "Ren\u00e9").replace("UTF-8", "windows-1252").encode("cp1252"), "windows-1252"),
+        (
+            TEXT.replace("Anna", "Ren\u00e9").replace("UTF-8", "ISO-8859-1").encode("latin-1"),
+            "iso-8859-1",
+        ),
+        (
+            TEXT.replace("Anna", "Ren\u00e9").replace("UTF-8", "windows-1252").encode("cp1252"),
+            "windows-1252",
+        ),
         (TEXT.replace("Anna", "Ren\u00e9").replace("UTF-8", "UTF-16").encode(), "utf-8"),
         (TEXT.replace("Anna", "Ren\u00e9").replace("UTF-8", "klingon").encode(), "utf-8"),
         (TEXT.replace("Anna", "Ren\u00e9").replace("UTF-8", "punycode").encode(), "utf-8"),
@@ -204,7 +225,9 @@ def test_a_text_that_breaks_off_is_surveyed_as_far_as_it_goes(cut: int) -> None:
 
 def test_what_is_recovered_of_an_old_document_is_upgraded() -> None:
     old = '<OpenSimDocument Version="30000"><Model name="m"><ForceSet><objects><CoordinateActuator name="c">'
-    result = survey(Source((old + "<isDisabled>true</isDisabled></CoordinateActuator></objects>").encode()))
+    result = survey(
+        Source((old + "<isDisabled>true</isDisabled></CoordinateActuator></objects>").encode())
+    )
     assert result.document is not None
     assert result.document.model["/forceset/c"].appliesForce is False
     assert result.document.notes == []
@@ -215,7 +238,22 @@ def test_what_is_recovered_of_an_old_document_is_upgraded() -> None:
 
 @pytest.mark.parametrize(
     "piece",
-    ["<", "<a", "<!--", "<a b='", '<a b="', "<![CDATA[", "</", "<a ", "&", "a", "<?", "<!DOCTYPE", "--", "=\" '"],
+    [
+        "<",
+        "<a",
+        "<!--",
+        "<a b='",
+        '<a b="',
+        "<![CDATA[",
+        "</",
+        "<a ",
+        "&",
+        "a",
+        "<?",
+        "<!DOCTYPE",
+        "--",
+        "=\" '",
+    ],
 )
 def test_time_is_linear_in_the_length(piece: str) -> None:
     text = "<OpenSimDocument Version='40600'><Model>" + piece * (400_000 // len(piece))
@@ -227,7 +265,9 @@ def test_time_is_linear_in_the_length(piece: str) -> None:
 
 
 @pytest.mark.parametrize("instruction", ["<?x >", "<?x y>", "<??>", "<?x <b>"])
-@pytest.mark.parametrize("place", ["<Model", "<gravity", "0 -9", "</gravity>", "</Model>", "</OpenSimDocument>"])
+@pytest.mark.parametrize(
+    "place", ["<Model", "<gravity", "0 -9", "</gravity>", "</Model>", "</OpenSimDocument>"]
+)
 def test_an_instruction_ends_at_its_first_bracket_as_in_opensim(instruction, place):
     text = """<?xml version="1.0"?><OpenSimDocument Version="40600"><Model name="m"><gravity> 0 -9 0</gravity>
 </Model></OpenSimDocument>"""
@@ -238,5 +278,7 @@ def test_an_instruction_ends_at_its_first_bracket_as_in_opensim(instruction, pla
 
 @pytest.mark.parametrize("rest", ["<?", "<?x", "<?x y", "<?x?"])
 def test_an_open_instruction_after_the_root_is_passed_over(rest):
-    text = '<?xml version="1.0"?><OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>'
+    text = (
+        '<?xml version="1.0"?><OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>'
+    )
     assert read_text(text + rest).name == "m"

@@ -58,7 +58,9 @@ def test_numbers_agree_with_lxml(fixtures: Path) -> None:
     source = Source.of_file(fixtures / "walker" / "DynamicWalkerModel.osim")
     root = etree.fromstring(source.text.replace("::", "__").encode())
     elements = list(root.iter(etree.Element))
-    assert [span.tag.replace("::", "__") for span in source.spans] == [element.tag for element in elements]
+    assert [span.tag.replace("::", "__") for span in source.spans] == [
+        element.tag for element in elements
+    ]
     lines: list[object] = [source.of_tag(n).line for n in range(len(elements))]
     assert lines == [element.sourceline for element in elements]
     for span in source.spans:

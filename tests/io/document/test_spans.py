@@ -12,11 +12,42 @@ from osimlite.io.document.reader import parse
 from osimlite.io.document.source import Source
 from osimlite.io.document.spans import PlainSpans, Span, markup, spans_of
 
-PIECES = ["<a>", "</a>", "<a b='>'>", "<a/>", '<b c=">"/>', "<b>", "</b >", "<!-- <a> -->", "<!-- x -->", "<", ">", "/"]
-PIECES += ["<![CDATA[<a>]]>", "<?x <a>?>", '"', "'", "text", " ", "\n", "<a\tb='1'\n>", "<:: >", "<a&b>"]
+PIECES = [
+    "<a>",
+    "</a>",
+    "<a b='>'>",
+    "<a/>",
+    '<b c=">"/>',
+    "<b>",
+    "</b >",
+    "<!-- <a> -->",
+    "<!-- x -->",
+    "<",
+    ">",
+    "/",
+]
+PIECES += [
+    "<![CDATA[<a>]]>",
+    "<?x <a>?>",
+    '"',
+    "'",
+    "text",
+    " ",
+    "\n",
+    "<a\tb='1'\n>",
+    "<:: >",
+    "<a&b>",
+]
 TAG = st.sampled_from(["a", "ab", "a.b", "a-c"])
 ATTRIBUTES = st.sampled_from(["", " x='>'", ' x="/>"', "\n x = '1'", ' x="a" y="/"'])
-HIDING = ["<!-- remark -->", "<!-- </a> -->", "<![CDATA[</ab>]]>", "<?pi </a>?>", "<!-- <a> -->", "<!-- ? [ ! -->"]
+HIDING = [
+    "<!-- remark -->",
+    "<!-- </a> -->",
+    "<![CDATA[</ab>]]>",
+    "<?pi </a>?>",
+    "<!-- <a> -->",
+    "<!-- ? [ ! -->",
+]
 HIDING += ["<!-- <![CDATA[ ]]> </a> -->", "<![CDATA[<!-- --> </a>]]>", "<?pi <!-- --> </a>?>"]
 TEXT = st.sampled_from(["", " ", "1 2", "a > b", "![", "!? [", *HIDING])
 TREE: st.SearchStrategy[str] = st.recursive(
@@ -76,7 +107,9 @@ def test_what_looks_like_an_element_in_a_comment_or_its_like_is_none(text: str) 
     assert [span.tag for span in source.spans if span.tag in "bd"] == []
 
 
-@pytest.mark.parametrize("text", ["<a><a><b/></a ></a>", "<a><b/><a><b/></a\n></a>", "<a><b/><ab></ab></a >"])
+@pytest.mark.parametrize(
+    "text", ["<a><a><b/></a ></a>", "<a><b/><a><b/></a\n></a>", "<a><b/><ab></ab></a >"]
+)
 def test_an_end_may_have_a_blank(text: str) -> None:
     source = Source(text.encode())
     parse(source)

@@ -22,7 +22,14 @@ def test_folders_are_searched_in_order(tmp_path, monkeypatch):
     monkeypatch.setenv("OSIMLITE_GEOMETRY", f"{tmp_path / 'd'}::{tmp_path / 'e'}")
     folders = MeshFolders(tmp_path / "a", [tmp_path / "b", tmp_path / "c"])
     searched = folders.searched
-    assert [path.relative_to(tmp_path).as_posix() for path in searched] == ["a", "a/Geometry", "b", "c", "d", "e"]
+    assert [path.relative_to(tmp_path).as_posix() for path in searched] == [
+        "a",
+        "a/Geometry",
+        "b",
+        "c",
+        "d",
+        "e",
+    ]
     for folder in reversed(searched):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "bone.obj").write_text(f"v {folder.name}")
@@ -42,7 +49,16 @@ def test_a_file_spelled_exactly_anywhere_comes_first(tmp_path):
 def test_names_of_nothing(tmp_path):
     (tmp_path / "a").mkdir()
     folders = MeshFolders(tmp_path, [tmp_path / "none"])
-    for name in ("", ".", "..", "a", "\0", "x" * 5000, "C:\\Geometry\\bone.obj", str(tmp_path / "gone.obj")):
+    for name in (
+        "",
+        ".",
+        "..",
+        "a",
+        "\0",
+        "x" * 5000,
+        "C:\\Geometry\\bone.obj",
+        str(tmp_path / "gone.obj"),
+    ):
         assert folders.find(name) is None
 
 

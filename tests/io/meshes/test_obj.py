@@ -29,7 +29,10 @@ def test_normals_are_kept_where_faces_disagree_on_them():
     for triangle, normal in zip(surface.triangles, ((0, 0, 1), (1, 0, 0)), strict=True):
         assert surface.normals[triangle].tolist() == [list(map(float, normal))] * 3
     corners = surface.points[surface.triangles]
-    assert corners.tolist() == [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 0], [0, 1, 0], [0, 0, 1]]]
+    assert corners.tolist() == [
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
+        [[0, 0, 0], [0, 1, 0], [0, 0, 1]],
+    ]
     assert len(obj_polygons(FOLDED, "x.obj").points) == 4
 
 

@@ -60,7 +60,9 @@ def test_strips_are_cut_into_triangles_that_face_outwards(fixtures):
 
 
 def test_a_compression_that_is_not_known_is_named(fixtures):
-    with pytest.raises(OsimliteError, match=r"lz4\.vtp: it is compressed by vtkLZ4DataCompressor.*save it again"):
+    with pytest.raises(
+        OsimliteError, match=r"lz4\.vtp: it is compressed by vtkLZ4DataCompressor.*save it again"
+    ):
         read_vtp((fixtures / "meshes" / "binary-lz4.vtp").read_bytes(), "lz4.vtp")
 
 
@@ -74,7 +76,10 @@ class Writer:
 
     def block(self, data: bytes) -> list[bytes]:
         """The parts that base64 encodes one by one."""
-        pack = np.dtype(("<" if self.order == "LittleEndian" else ">") + {"UInt32": "u4", "UInt64": "u8"}[self.header])
+        pack = np.dtype(
+            ("<" if self.order == "LittleEndian" else ">")
+            + {"UInt32": "u4", "UInt64": "u8"}[self.header]
+        )
         if not self.compressor:
             return [np.array([len(data)], dtype=pack).tobytes() + data]
         size = 40
@@ -99,12 +104,16 @@ class Writer:
         self.appended += b"".join(parts) if self.form == "raw" else text
         return f'{start} format="appended" offset="{offset}"/>'
 
-    def file(self, pieces: list[tuple[np.ndarray, list[list[int]]]], real: str, whole: str) -> bytes:
+    def file(
+        self, pieces: list[tuple[np.ndarray, list[list[int]]]], real: str, whole: str
+    ) -> bytes:
         text = ""
         for points, polygons in pieces:
             corners = np.array([corner for polygon in polygons for corner in polygon], dtype=int)
             ends = np.cumsum([len(polygon) for polygon in polygons], dtype=int)
-            text += f'<Piece NumberOfPoints="{len(points)}" NumberOfPolys="{len(polygons)}"><Points>'
+            text += (
+                f'<Piece NumberOfPoints="{len(points)}" NumberOfPolys="{len(polygons)}"><Points>'
+            )
             text += self.array("Points", points, real, 3) + "</Points><Verts/><Polys>"
             text += self.array("connectivity", corners, whole) + self.array("offsets", ends, whole)
             text += "</Polys></Piece>"
@@ -113,7 +122,11 @@ class Writer:
         result = f'<?xml version="1.0"?>\n{head}<PolyData>{text}</PolyData>'.encode()
         if self.appended:
             encoding = "raw" if self.form == "raw" else "base64"
-            result += f'<AppendedData encoding="{encoding}">\n  _'.encode() + self.appended + b"\n</AppendedData>"
+            result += (
+                f'<AppendedData encoding="{encoding}">\n  _'.encode()
+                + self.appended
+                + b"\n</AppendedData>"
+            )
         return result + b"</VTKFile>\n"
 
 
@@ -136,7 +149,10 @@ def test_every_encoding_says_the_same(form, compressor, header, order, real, who
     )
     surface = read_vtp(content, "cube.vtp")
     assert surface.points.shape == (8 * pieces, 3) and surface.triangles.shape == (12 * pieces, 3)
-    assert np.array_equal(surface.points, np.concatenate([CUBE + np.array((2.0 * k, 0.0, 0.0)) for k in range(pieces)]))
+    assert np.array_equal(
+        surface.points,
+        np.concatenate([CUBE + np.array((2.0 * k, 0.0, 0.0)) for k in range(pieces)]),
+    )
     assert volume(surface) == pytest.approx(pieces) and area(surface) == pytest.approx(6.0 * pieces)
     assert surface.normals is None
 
@@ -152,7 +168,11 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(fixtures, data):
     try:
         surface = read_vtp(bytes(content), "damaged.vtp")
     except OsimliteError as error:
-        assert str(error).startswith("damaged.vtp: ") and "save it again" in str(error) and "\n" not in str(error)
+        assert (
+            str(error).startswith("damaged.vtp: ")
+            and "save it again" in str(error)
+            and "\n" not in str(error)
+        )
     else:
         assert np.isfinite(surface.points).all()
         assert 0 <= surface.triangles.min() <= surface.triangles.max() < len(surface.points)
@@ -166,8 +186,18 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(fixtures, data):
         (b'<VTKFile type="PolyData"><PolyData/></VTKFile>', "no polygons"),
         (b'<VTKFile type="PolyData"><AppendedData encoding="raw">_xx', "ends in the middle"),
         (b'<VTKFile type="PolyData"><PolyData><Piece/></PolyData></VTKFile>', "without points"),
-        (Writer("ascii", "", "UInt32", "LittleEndian").file([(CUBE[:4], SIDES)], "Float32", "Int32"), "not there"),
-        (Writer("ascii", "", "UInt32", "LittleEndian").file([(CUBE + np.inf, SIDES)], "Float32", "Int32"), "finite"),
+        (
+            Writer("ascii", "", "UInt32", "LittleEndian").file(
+                [(CUBE[:4], SIDES)], "Float32", "Int32"
+            ),
+            "not there",
+        ),
+        (
+            Writer("ascii", "", "UInt32", "LittleEndian").file(
+                [(CUBE + np.inf, SIDES)], "Float32", "Int32"
+            ),
+            "finite",
+        ),
     ],
 )
 def test_what_is_wrong_is_said(content, said):
@@ -201,4 +231,9 @@ def test_a_mirrored_surface_still_faces_outwards(fixtures):
         assert volume(mirrored) == pytest.approx(volume(surface))
         assert mirrored.normals is not None
         a, b, c = (mirrored.points[mirrored.triangles[:, k]] for k in range(3))
-        assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), mirrored.normals[mirrored.triangles[:, 0]]) > 0.0).all()
+        assert (
+            np.einsum(
+                "ij,ij->i", np.cross(b - a, c - a), mirrored.normals[mirrored.triangles[:, 0]]
+            )
+            > 0.0
+        ).all()

@@ -10,7 +10,9 @@ from osimlite.io.tables.storage import StoTable
 
 RNG = np.random.default_rng(7)
 PLAIN = RNG.normal(0.0, 100.0, (300, 7))
-ODD = np.array([[0.0, -0.0, -1e-9, 1e-320, 0.99999999499999, 9998.999999999, np.nextafter(9999.0, 0.0)]])
+ODD = np.array(
+    [[0.0, -0.0, -1e-9, 1e-320, 0.99999999499999, 9998.999999999, np.nextafter(9999.0, 0.0)]]
+)
 TABLES = {
     "plain": PLAIN,
     "of all sizes": PLAIN * 10.0 ** RNG.uniform(-13.0, 4.9, PLAIN.shape),
@@ -32,10 +34,14 @@ TABLES = {
 @pytest.mark.parametrize("name", TABLES)
 def test_every_number_is_as_its_format_writes_it(name: str, precision: int) -> None:
     rows = TABLES[name]
-    table = StoTable("a table", np.arange(len(rows)) / 60.0, tuple("abcdefg"[: rows.shape[1]]), rows)
+    table = StoTable(
+        "a table", np.arange(len(rows)) / 60.0, tuple("abcdefg"[: rows.shape[1]]), rows
+    )
     text = "".join(printed(table, precision=precision))
     line = "\t".join([f"%{8 + precision}.{precision}f"] * (1 + rows.shape[1])) + "\n"
-    expected = "".join(line % (time, *row) for time, row in zip(table.times.tolist(), rows.tolist(), strict=True))
+    expected = "".join(
+        line % (time, *row) for time, row in zip(table.times.tolist(), rows.tolist(), strict=True)
+    )
     assert text.partition("endheader\n")[2].partition("\n")[2] == expected
 
 

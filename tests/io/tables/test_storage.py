@@ -16,7 +16,9 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 def test_layout():
     """Line for line what OpenSim 4.6 writes, but for its own version."""
-    assert sto_text("Walker", [0.0, 0.5], ["/a/value", "/a/speed"], [[1.0, -0.0], [1e-21, 2.5]]).splitlines() == [
+    assert sto_text(
+        "Walker", [0.0, 0.5], ["/a/value", "/a/speed"], [[1.0, -0.0], [1e-21, 2.5]]
+    ).splitlines() == [
         "Walker",
         "inDegrees=no",
         "nColumns=3",
@@ -122,10 +124,18 @@ def test_what_older_programs_wrote(tmp_path):
     # Files of SIMM are in degrees; the number of columns tells that both tabs and spaces part them.
     assert (table.name, table.columns, table.in_degrees) == ("walk", ("hip", "knee"), True)
     assert np.isnan(table.rows[0, 0]) and table.rows[1, 0] == -np.inf and np.isnan(table.rows[1, 1])
-    for said, degrees in (("inDegrees=no", False), ("Angles are in degrees.", True), ("Angles are in radians.", False)):
+    for said, degrees in (
+        ("inDegrees=no", False),
+        ("Angles are in degrees.", True),
+        ("Angles are in radians.", False),
+    ):
         (tmp_path / "old.sto").write_text(f"t\n{said}\nendheader\na\ttime\ta\n1\t0\t2\n")
         table = read_sto(tmp_path / "old.sto")
-        assert (table.in_degrees, table.columns, table.times.tolist()) == (degrees, ("a", "a"), [0.0])
+        assert (table.in_degrees, table.columns, table.times.tolist()) == (
+            degrees,
+            ("a", "a"),
+            [0.0],
+        )
         assert table.rows.tolist() == [[1.0, 2.0]]
 
 
@@ -153,6 +163,9 @@ def test_rows_one_by_one(tmp_path):
         rows_ = iter(table)
         assert next(rows_) == (0.0, [0.0])
         assert next(rows_) == (0.1, [1.0])
-    with pytest.raises(DocumentError, match="'damaged' is no number") as caught, stream_table(path) as table:
+    with (
+        pytest.raises(DocumentError, match="'damaged' is no number") as caught,
+        stream_table(path) as table,
+    ):
         assert sum(1 for _ in table) == 1000
     assert caught.value.line == 1009

@@ -15,8 +15,12 @@ import pytest
 
 from osimlite.mechanics.codegen.cplusplus import HEADER, header_text
 
-COMPILER = os.environ.get("CXX") or next(filter(None, map(shutil.which, ("clang++", "g++", "c++"))), None)
-needs_compiler = pytest.mark.skipif(COMPILER is None, reason="needs a C++ compiler on the PATH, or in CXX")
+COMPILER = os.environ.get("CXX") or next(
+    filter(None, map(shutil.which, ("clang++", "g++", "c++"))), None
+)
+needs_compiler = pytest.mark.skipif(
+    COMPILER is None, reason="needs a C++ compiler on the PATH, or in CXX"
+)
 
 # A function that only tests use may have variables that nothing reads.
 WARNINGS = "-Wall -Wextra -Wpedantic -Werror -Wno-unused -Wno-unused-parameter"
@@ -39,7 +43,9 @@ def compile_text(folder, text, *flags, compiler=COMPILER, name="kernels"):
     source, library = folder / f"{name}.cpp", folder / f"{name}.so"
     source.write_text(text)
     command = [*shlex.split(compiler), *FLAGS.split(), *WARNINGS.split(), *(flags or ["-O1"])]
-    result = subprocess.run([*command, source.name, "-o", library.name], cwd=folder, capture_output=True, text=True)
+    result = subprocess.run(
+        [*command, source.name, "-o", library.name], cwd=folder, capture_output=True, text=True
+    )
     assert result.returncode == 0, result.stderr[:5000]
     return ctypes.CDLL(str(library))
 
@@ -70,5 +76,7 @@ def are_same_bits(one, two):
     if isinstance(one, list):
         return len(one) == len(two) and all(map(are_same_bits, one, two))
     if isinstance(one, float) and isinstance(two, float):
-        return struct.pack("d", one) == struct.pack("d", two) or (math.isnan(one) and math.isnan(two))
+        return struct.pack("d", one) == struct.pack("d", two) or (
+            math.isnan(one) and math.isnan(two)
+        )
     return one == two

@@ -1,7 +1,8 @@
 """Motions and derivatives of models by the kernels of one library, as digests of their bits.
 
-Run as a program: the path of a shared library with all kernels, the number of motions, and the number of models whose
-derivatives are computed; with `-` for the path, the kernels that osimlite takes anyway.
+Run as a program: the path of a shared library with all kernels, the number of motions, and the
+number of models whose derivatives are computed; with `-` for the path, the kernels that osimlite
+takes anyway.
 """
 
 from __future__ import annotations
@@ -30,11 +31,20 @@ DURATION = 0.1
 def list_models() -> dict[str, Any]:
     """Return functions that make models, by name: built-in ones, fixtures, and those of the shared folder."""
     files = [ROOT / "fixtures/kinematics/mixed_joint_tree.osim"]
-    shared = next((folder for folder in (ROOT.parent / "shared", ROOT.parents[1] / "shared") if folder.is_dir()), None)
+    shared = next(
+        (
+            folder
+            for folder in (ROOT.parent / "shared", ROOT.parents[1] / "shared")
+            if folder.is_dir()
+        ),
+        None,
+    )
     if shared is not None:
         files += sorted(shared.glob("corpus/models/*/*.osim"))
     made = {"walker": furthest_walker, "jumper": jumper}
-    return made | {file.parent.name + "/" + file.stem: lambda file=file: osimlite.read(file) for file in files}
+    return made | {
+        file.parent.name + "/" + file.stem: lambda file=file: osimlite.read(file) for file in files
+    }
 
 
 def load_kernels(path: str) -> None:
@@ -42,12 +52,16 @@ def load_kernels(path: str) -> None:
     library = ctypes.CDLL(path)
     names = json.loads(Path(path).with_suffix(".json").read_text(encoding="utf-8"))
     for name, symbol in names.items():
-        machine_code._addresses[name] = ctypes.cast(getattr(library, symbol), ctypes.c_void_p).value or 0
+        machine_code._addresses[name] = (
+            ctypes.cast(getattr(library, symbol), ctypes.c_void_p).value or 0
+        )
 
 
 def describe(*arrays: Any) -> str:
     """Return a digest of numbers; every NaN is the same."""
-    parts = [np.where(np.isnan(array), np.nan, array).tobytes() for array in map(np.asarray, arrays)]
+    parts = [
+        np.where(np.isnan(array), np.nan, array).tobytes() for array in map(np.asarray, arrays)
+    ]
     return hashlib.sha256(b"".join(parts)).hexdigest()[:16]
 
 
@@ -86,4 +100,6 @@ if __name__ == "__main__":
     if sys.argv[1] != "-":
         load_kernels(sys.argv[1])
     motions, models = map(int, sys.argv[2:])
-    print(json.dumps({"motions": collect(run, motions), "tangents": collect(differentiate, models)}))
+    print(
+        json.dumps({"motions": collect(run, motions), "tangents": collect(differentiate, models)})
+    )

@@ -36,12 +36,19 @@ def call_javascript(text, calls):
     Returns:
         For each call, what it returns and the three vectors after it.
     """
-    given = [[name, list(map(_write, ints)), list(map(_write, floats)), count] for name, ints, floats, count in calls]
+    given = [
+        [name, list(map(_write, ints)), list(map(_write, floats)), count]
+        for name, ints, floats, count in calls
+    ]
     program = PROGRAM % (text, json.dumps(given), SIZE)
     result = subprocess.run([NODE, "-"], input=program, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr[-3000:]
     return [
-        [int(float(value)), [int(float(x)) for x in ints], *([float(x) for x in row] for row in rows)]
+        [
+            int(float(value)),
+            [int(float(x)) for x in ints],
+            *([float(x) for x in row] for row in rows),
+        ]
         for value, ints, *rows in json.loads(result.stdout, parse_constant=float)
     ]
 

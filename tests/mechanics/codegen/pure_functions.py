@@ -1,6 +1,7 @@
 """The functions of numbers among the kernels and laws, each as a kernel that takes its arguments from vectors.
 
-Run as a program, it calls the functions of a library many times, for builds that end at undefined behaviour.
+Run as a program, it calls the functions of a library many times, for builds that end at undefined
+behaviour.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ def all_kernels(directions: int) -> dict[str, tuple[Callable[..., Any], int]]:
 
 def is_of_numbers(kind: Type | None) -> bool:
     """Return whether a type is a number or a tuple of such types."""
-    return is_plain_number(kind) or (isinstance(kind, Tuple) and all(map(is_of_numbers, kind.parts)))
+    return is_plain_number(kind) or (
+        isinstance(kind, Tuple) and all(map(is_of_numbers, kind.parts))
+    )
 
 
 def wrap_functions() -> dict[Callable[..., Any], Callable[..., int]]:
@@ -43,12 +46,18 @@ def wrap_functions() -> dict[Callable[..., Any], Callable[..., int]]:
     library = make_library(all_kernels(0))
     wrapped: dict[Callable[..., Any], Callable[..., int]] = {}
     for part in library.specialisations:
-        if not part.effects and all(map(is_of_numbers, part.arguments)) and is_of_numbers(part.result):
+        if (
+            not part.effects
+            and all(map(is_of_numbers, part.arguments))
+            and is_of_numbers(part.result)
+        ):
             wrapped[part.function] = _wrap(part.function, part.name, part.arguments, part.result)
     return wrapped
 
 
-def _wrap(function: Callable[..., Any], name: str, kinds: tuple[Type, ...], result: Any) -> Callable[..., int]:
+def _wrap(
+    function: Callable[..., Any], name: str, kinds: tuple[Type, ...], result: Any
+) -> Callable[..., int]:
     scope = {"function": function, "Ints": Ints, "Floats": Floats, "__name__": "osimlite.pure"}
     counters = iter(range(SIZE)), iter(range(SIZE))
     given = ", ".join(_argument(kind, counters, scope) for kind in kinds)
@@ -105,7 +114,9 @@ def make_arguments(symbol: str, seed: int, hard: float) -> tuple[array[int], arr
     return array("q", integers), array("d", floats)
 
 
-def call_compiled(library: ctypes.CDLL, symbol: str, ints: array[int], floats: array[float]) -> list[float]:
+def call_compiled(
+    library: ctypes.CDLL, symbol: str, ints: array[int], floats: array[float]
+) -> list[float]:
     """Return the results of a wrapped function in a library."""
     kernel = getattr(library, symbol)
     kernel.restype, kernel.argtypes = ctypes.c_int64, [*[ctypes.c_void_p] * 3, ctypes.c_int64]

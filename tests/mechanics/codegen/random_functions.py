@@ -1,7 +1,8 @@
 """Random functions in the restricted Python of kernels, from a seed.
 
-They are made of all constructs but those whose results differ between the languages by intent: powers of floats, which
-compiled code computes as products, and the sign of an integer zero, which JavaScript has.
+They are made of all constructs but those whose results differ between the languages by intent:
+powers of floats, which compiled code computes as products, and the sign of an integer zero, which
+JavaScript has.
 """
 
 from __future__ import annotations
@@ -89,7 +90,9 @@ class Writer:
             if self.vectors:
                 leaves += [f"{self.pick(*self.vectors)}[{self.index(0)} % 4]" for _ in range(2)]
             leaves += [f"{name}[{self.rng.randint(-2, 1)}]" for name in self.variables("pair")]
-            leaves += [f"{name}{self.pick('.size', '.arm[1]', '[0]')}" for name in self.variables("record")]
+            leaves += [
+                f"{name}{self.pick('.size', '.arm[1]', '[0]')}" for name in self.variables("record")
+            ]
             return self.pick(*leaves)
         a, b = self.number(depth - 1), self.number(depth - 1)
         choices = [
@@ -115,7 +118,9 @@ class Writer:
             return f"at({self.pick(*self.vectors)}, {self.index(0)} % 3)"
         if kind == "function":
             return self.pick("add_two", "take_two")
-        return {"float": self.number, "int": self.index, "bool": self.truth, "pair": self.pair}[kind](max(depth, 0))
+        return {"float": self.number, "int": self.index, "bool": self.truth, "pair": self.pair}[
+            kind
+        ](max(depth, 0))
 
     @staticmethod
     def small(text: str) -> str:
@@ -125,8 +130,14 @@ class Writer:
     def index(self, depth: int = DEPTH) -> str:
         """Return an expression of an integer."""
         if depth <= 0 or self.chance(0.2):
-            leaves = [str(self.rng.randint(-5, 9)), *self.variables("int") * 2, f"s[{self.rng.randint(0, 3)}]"]
-            return f"({self.pick(*leaves, *[f'{name}.number' for name in self.variables('record')])})"
+            leaves = [
+                str(self.rng.randint(-5, 9)),
+                *self.variables("int") * 2,
+                f"s[{self.rng.randint(0, 3)}]",
+            ]
+            return (
+                f"({self.pick(*leaves, *[f'{name}.number' for name in self.variables('record')])})"
+            )
         a, b = self.index(depth - 1), self.index(depth - 1)
         return self.pick(
             f"({a} + {b})", f"({a} - {b})", f"({a} * {self.rng.randint(-3, 3)})", f"({a} // {self.pick(2, 3, -4)})",
@@ -139,7 +150,9 @@ class Writer:
     def truth(self, depth: int = DEPTH) -> str:
         """Return an expression of a truth value."""
         if depth <= 0 or self.chance(0.2):
-            return f"({self.number(0)} {self.pick('<', '<=', '>', '>=', '==', '!=')} {self.number(0)})"
+            return (
+                f"({self.number(0)} {self.pick('<', '<=', '>', '>=', '==', '!=')} {self.number(0)})"
+            )
         a, b = self.truth(depth - 1), self.truth(depth - 1)
         number, index = self.number(depth - 1), self.index(depth - 1)
         return self.pick(
@@ -229,12 +242,16 @@ class Writer:
             self.scope |= {a: "float", b: "int", c: "float", d: "float"}
             return
         name = self.target("record")
-        self.write(f"{name} = Record({self.small(self.number(2))}, {self.index(1)} % 9, {self.pair(1)})")
+        self.write(
+            f"{name} = Record({self.small(self.number(2))}, {self.index(1)} % 9, {self.pair(1)})"
+        )
         self.scope[name] = "record"
 
     def write_if(self, depth: int) -> None:
         """Add a branch."""
-        with self.block(f"if {self.pick(self.truth(), self.truth(), self.index(1), self.number(1))}:"):
+        with self.block(
+            f"if {self.pick(self.truth(), self.truth(), self.index(1), self.number(1))}:"
+        ):
             self.statements(self.rng.randint(1, 3), depth - 1)
         if self.chance(0.3):
             with self.block(f"elif {self.truth()}:"):
@@ -294,7 +311,9 @@ class Writer:
         self.statements(self.rng.randint(0, 3), 1)
         if self.chance(0.5):
             with self.block(f"if {self.truth(1)}:"):
-                self.write(f"return {self.small(self.number(1)) if result == 'float' else self.pair(1)}")
+                self.write(
+                    f"return {self.small(self.number(1)) if result == 'float' else self.pair(1)}"
+                )
         self.write(f"return {self.small(self.number(2)) if result == 'float' else self.pair(2)}")
         # Integers of the kernel's own vector are not known here.
         self.lines[start:] = [line.replace("s[", "CODES[") for line in self.lines[start:]]
@@ -303,12 +322,19 @@ class Writer:
     def kernel(self) -> str:
         """Return the name of the kernel, after which the text is complete."""
         prefix = f"random_{self.seed}"
-        self.lines += ["def add_two(a, b):", "    return a + b", "def take_two(a, b):", "    return a - 2 * b"]
+        self.lines += [
+            "def add_two(a, b):",
+            "    return a + b",
+            "def take_two(a, b):",
+            "    return a - 2 * b",
+        ]
         self.helper(f"{prefix}_pure", ["float", "int"], "float")
         self.helper(f"{prefix}_pair", ["float", "float", "pair"], "pair")
         self.helper(f"{prefix}_writes", ["vector", "float", "int"], "float")
         self.helper(f"{prefix}_calls", ["float", "function", "bool"], "float")
-        self.lines.append(f"def {prefix}(s: 'Ints', x: 'Floats', out: 'Floats', count: 'int') -> 'int':")
+        self.lines.append(
+            f"def {prefix}(s: 'Ints', x: 'Floats', out: 'Floats', count: 'int') -> 'int':"
+        )
         self.scope, self.vectors, self.may_write = {"count": "int"}, ["x", "out"], True
         self.statements(self.rng.randint(5, 9), 2)
         for k, name in enumerate(self.variables("float")[:8]):
@@ -337,9 +363,15 @@ def make_inputs(seed: int, count: int) -> list[tuple[tuple[int, ...], tuple[floa
     rng = random.Random(-seed)
 
     def number() -> float:
-        return rng.choice((rng.gauss(0.0, 1.0), rng.uniform(-9.0, 9.0), float(rng.randint(-2, 2)), 0.0, -0.0))
+        return rng.choice(
+            (rng.gauss(0.0, 1.0), rng.uniform(-9.0, 9.0), float(rng.randint(-2, 2)), 0.0, -0.0)
+        )
 
     return [
-        (tuple(rng.randint(-4, 9) for _ in range(4)), tuple(number() for _ in range(8)), rng.randint(0, 6))
+        (
+            tuple(rng.randint(-4, 9) for _ in range(4)),
+            tuple(number() for _ in range(8)),
+            rng.randint(0, 6),
+        )
         for _ in range(count)
     ]

@@ -31,7 +31,9 @@ def library(tmp_path_factory):
 
 
 @needs_compiler
-@pytest.mark.parametrize("function", (*constructs.EXACT, constructs.use_bits), ids=lambda function: function.__name__)
+@pytest.mark.parametrize(
+    "function", (*constructs.EXACT, constructs.use_bits), ids=lambda function: function.__name__
+)
 def test_each_construct(library, function):
     for given in constructs.INPUTS:
         expected = call_python(function, *given)
@@ -69,7 +71,14 @@ def test_floats_beyond_integers_saturate(tmp_path):
 def test_powers_by_floats_beyond_integers(tmp_path):
     library = compile_text(tmp_path, write_library({"power": (power, 0)}))
     library.power.restype, library.power.argtypes = ctypes.c_double, [ctypes.c_double] * 2
-    for a, b in ((-0.5, 1e300), (-1.0, 1e19), (-2.0, 3.0), (-2.0, 2.5), (-3.0, -2.0), (2.0, math.inf)):
+    for a, b in (
+        (-0.5, 1e300),
+        (-1.0, 1e19),
+        (-2.0, 3.0),
+        (-2.0, 2.5),
+        (-3.0, -2.0),
+        (2.0, math.inf),
+    ):
         assert are_same_bits(library.power(a, b), power(a, b)), (a, b)
 
 
@@ -84,7 +93,12 @@ def divide(s: Ints, x: Floats, out: Floats, count: int) -> int:
 def test_division_by_zero_ends_nothing(tmp_path):
     library = compile_text(tmp_path, write_library({"divide": (divide, 0)}))
     value, _, _, out = call_library(library, "divide", [5, 0, 0, 0], [1.0, -1.0, 0.0, 0.0], 0)
-    assert value == 0 and out[:2] == [math.inf, -math.inf] and math.isnan(out[2]) and out[3] == math.inf
+    assert (
+        value == 0
+        and out[:2] == [math.inf, -math.inf]
+        and math.isnan(out[2])
+        and out[3] == math.inf
+    )
 
 
 # ------------------------------------------------------------------------------------------------------ text

@@ -30,13 +30,21 @@ CHANGES = [(0.0, 1.0, -0.5), (2.0, -0.0, 0.25)]
 def write_function(function, which):
     """Return a kernel that applies a function to numbers of x, of which some carry no derivatives."""
     given = [f"x[{k}]" if carries else f"plain(x[{k}])" for k, carries in enumerate(which)]
-    text = SIGNS.get(function, f"{function.__name__}({', '.join(['{}'] * len(which))})").format(*given)
+    text = SIGNS.get(function, f"{function.__name__}({', '.join(['{}'] * len(which))})").format(
+        *given
+    )
     name = f"rule_{function.__name__}_{''.join('dp'[not carries] for carries in which)}"
     source = f"def {name}(s: 'Ints', x: 'Floats', out: 'Floats', count: 'int') -> 'int':\n"
     source += f"    out[0] = {text}\n    return count\n"
     file = f"<{name}>"
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-    scope = {**vars(math), "plain": plain, "Floats": Floats, "Ints": Ints, "__name__": "osimlite.rules"}
+    scope = {
+        **vars(math),
+        "plain": plain,
+        "Floats": Floats,
+        "Ints": Ints,
+        "__name__": "osimlite.rules",
+    }
     exec(compile(source, file, "exec"), scope)
     return scope[name]
 
@@ -55,13 +63,17 @@ def compiled(tmp_path_factory):
     """All rules for all numbers of arguments that carry derivatives."""
     kernels = [write_function(*case) for case in CASES]
     text = write_library({kernel.__name__: (kernel, DIRECTIONS) for kernel in kernels})
-    return compile_text(tmp_path_factory.mktemp("rules"), text), {kernel.__name__: kernel for kernel in kernels}
+    return compile_text(tmp_path_factory.mktemp("rules"), text), {
+        kernel.__name__: kernel for kernel in kernels
+    }
 
 
 def evaluate(library, name, numbers):
     """Return the value of a kernel for numbers and their derivatives, and its derivatives."""
     size = 1 + DIRECTIONS
-    x = (ctypes.c_double * (size * len(numbers)))(*itertools.chain.from_iterable((v, *c) for v, c in numbers))
+    x = (ctypes.c_double * (size * len(numbers)))(
+        *itertools.chain.from_iterable((v, *c) for v, c in numbers)
+    )
     out = (ctypes.c_double * size)()
     kernel = getattr(library, name)
     kernel.restype, kernel.argtypes = ctypes.c_int64, [*[ctypes.c_void_p] * 3, ctypes.c_int64]
@@ -84,7 +96,10 @@ def test_each_rule_is_that_of_python(compiled, case):
     tried = 0
     for values in itertools.product(VALUES, repeat=len(which)):
         numbers = list(zip(values, CHANGES[: len(which)], strict=True))
-        given = [Carrying(v, [*c]) if carries else v for (v, c), carries in zip(numbers, which, strict=True)]
+        given = [
+            Carrying(v, [*c]) if carries else v
+            for (v, c), carries in zip(numbers, which, strict=True)
+        ]
         try:
             expected = IN_PLACE[function](*given)
         except (ValueError, ZeroDivisionError, OverflowError):
@@ -94,10 +109,13 @@ def test_each_rule_is_that_of_python(compiled, case):
         result = evaluate(library, name, numbers)
         assert are_same_bits(result[0], expected.value), (values, result, expected.value)
         if function is operator.truediv:
-            # Machine code divides the sum of both terms, and Python each term, which may be too large then.
+            # Machine code divides the sum of both terms, and Python each term, which may be too
+            # large then.
             if not all(map(math.isfinite, expected.slopes)):
                 continue
-            assert result[1:] == pytest.approx(expected.slopes, rel=4e-16, abs=0.0, nan_ok=True), values
+            assert result[1:] == pytest.approx(expected.slopes, rel=4e-16, abs=0.0, nan_ok=True), (
+                values
+            )
         else:
             assert are_same_bits(result[1:], expected.slopes), (values, result, expected.slopes)
         tried += 1
@@ -140,16 +158,28 @@ def test_corners_are_those_of_python(tmp_path):
     for a, b in itertools.product((0.0, -0.0, 1.0, -0.75, 2.5), (0.5, -0.5, 1.0)):
         for changes in (CHANGES, [(0.0,) * 3, (1.0, 0.0, 0.0)]):
             numbers = list(zip((a, b), changes, strict=True))
-            x = (ctypes.c_double * (2 * size))(*itertools.chain.from_iterable((v, *c) for v, c in numbers))
+            x = (ctypes.c_double * (2 * size))(
+                *itertools.chain.from_iterable((v, *c) for v, c in numbers)
+            )
             out = (ctypes.c_double * (count * size))()
             expected = [0.0] * count
             wanted = in_python([0], [Carrying(v, [*c]) for v, c in numbers], expected, 3)
             assert kernel(None, x, out, 3) == wanted
             for k, number in enumerate(expected):
-                row = [number.value, *number.slopes] if isinstance(number, Carrying) else [float(number), 0.0, 0.0, 0.0]
-                assert out[k * size : (k + 1) * size] == pytest.approx(row, rel=1e-15, abs=1e-16), (k, a, b)
+                row = (
+                    [number.value, *number.slopes]
+                    if isinstance(number, Carrying)
+                    else [float(number), 0.0, 0.0, 0.0]
+                )
+                assert out[k * size : (k + 1) * size] == pytest.approx(row, rel=1e-15, abs=1e-16), (
+                    k,
+                    a,
+                    b,
+                )
 
 
 def test_every_rule_has_a_test():
     assert {function for function, _ in CASES} == {*SLOPES, *ARITHMETIC}
-    assert all(len(inspect.signature(rules[0]).parameters) == len(rules) + 1 for rules in RULES.values())
+    assert all(
+        len(inspect.signature(rules[0]).parameters) == len(rules) + 1 for rules in RULES.values()
+    )

@@ -47,7 +47,11 @@ def text(wrapped):
 
 def has_powers(function):
     """Return whether a function, or one that it calls, takes powers: Python rounds those by integers once."""
-    return any(isinstance(node, ast.Pow) for part in collect_functions(function) for node in ast.walk(find_tree(part)))
+    return any(
+        isinstance(node, ast.Pow)
+        for part in collect_functions(function)
+        for node in ast.walk(find_tree(part))
+    )
 
 
 @needs_compiler
@@ -57,7 +61,9 @@ def test_functions_of_numbers_are_those_of_python(wrapped, text, tmp_path):
     for function, kernel in wrapped.items():
         may_differ = has_powers(function)
         for number in range(CALLS):
-            ints, floats = pure_functions.make_arguments(kernel.__name__, number, 0.3 * (number % 2))
+            ints, floats = pure_functions.make_arguments(
+                kernel.__name__, number, 0.3 * (number % 2)
+            )
             out = array("d", [0.0] * pure_functions.SIZE)
             try:
                 kernel(memoryview(ints), memoryview(floats), memoryview(out), 0)
@@ -68,8 +74,12 @@ def test_functions_of_numbers_are_those_of_python(wrapped, text, tmp_path):
             if not are_same_bits(result, out.tolist()):
                 different += 1
                 assert may_differ, (function.__qualname__, number)
-                assert result == pytest.approx(out.tolist(), rel=1e-10, abs=1e-290, nan_ok=True), function.__qualname__
-    assert len(wrapped) > 150 and compared > 0.5 * CALLS * len(wrapped) and different < 0.01 * compared
+                assert result == pytest.approx(out.tolist(), rel=1e-10, abs=1e-290, nan_ok=True), (
+                    function.__qualname__
+                )
+    assert (
+        len(wrapped) > 150 and compared > 0.5 * CALLS * len(wrapped) and different < 0.01 * compared
+    )
 
 
 @pytest.mark.skipif(len(compilers()) < 1, reason="needs g++ or clang++ on the PATH")
@@ -83,7 +93,9 @@ def test_every_build_of_functions_gives_the_same_bits(wrapped, text, tmp_path):
     for kernel in wrapped.values():
         for number in range(CALLS // 4):
             given = pure_functions.make_arguments(kernel.__name__, number, 0.3 * (number % 2))
-            first, *others = (pure_functions.call_compiled(build, kernel.__name__, *given) for build in builds)
+            first, *others = (
+                pure_functions.call_compiled(build, kernel.__name__, *given) for build in builds
+            )
             assert all(are_same_bits(first, other) for other in others), (kernel.__name__, number)
 
 
@@ -101,7 +113,10 @@ def environment(compiler, name):
     ).stdout.strip()
     if not os.path.isabs(path):
         pytest.skip(f"needs {library} of {compiler}")
-    options = {"ASAN_OPTIONS": "detect_leaks=0:detect_stack_use_after_return=1", "UBSAN_OPTIONS": "print_stacktrace=1"}
+    options = {
+        "ASAN_OPTIONS": "detect_leaks=0:detect_stack_use_after_return=1",
+        "UBSAN_OPTIONS": "print_stacktrace=1",
+    }
     return {**os.environ, **options, "LD_PRELOAD": path, "PYTHONPATH": str(ROOT)}
 
 
@@ -120,7 +135,11 @@ def test_functions_have_no_undefined_behaviour(wrapped, text, tmp_path, name):
     compile_text(tmp_path, text, "-O1", "-g", *flags, *STRICT, compiler="g++")
     symbols = [kernel.__name__ for kernel in wrapped.values()]
     calls = run_module(
-        pure_functions.__name__, tmp_path / "kernels.so", CALLS // 4, *symbols, env=environment("g++", name)
+        pure_functions.__name__,
+        tmp_path / "kernels.so",
+        CALLS // 4,
+        *symbols,
+        env=environment("g++", name),
     )
     assert int(calls) == CALLS // 4 * len(wrapped)
 

@@ -83,7 +83,9 @@ def test_functions_give_the_same(page):
     result = page.evaluate(f"{json.dumps(cases)}.map(([a, b]) => ({code}).loops(a, b))")
     assert result == [loops(count, start) for count, start in cases]
     code = write_javascript([], [pointers])
-    result = page.evaluate(f"[1, 2, 4].map((k) => ({code}).pointers(new Float64Array([0, 1, 2, 3, 4, 5]), k))")
+    result = page.evaluate(
+        f"[1, 2, 4].map((k) => ({code}).pointers(new Float64Array([0, 1, 2, 3, 4, 5]), k))"
+    )
     assert result == [pointers(np.arange(6.0), k) for k in (1, 2, 4)]
 
 
@@ -108,9 +110,13 @@ def shares(a: int) -> int:
     return max(a, 1, key=abs)
 
 
-@pytest.mark.parametrize("function", (opens, asks, masks, shares), ids=lambda function: function.__name__)
+@pytest.mark.parametrize(
+    "function", (opens, asks, masks, shares), ids=lambda function: function.__name__
+)
 def test_what_is_not_known_is_an_error(function):
-    with pytest.raises(TranslationError, match=f"'test_javascript_{function.__name__}'.* JavaScript") as caught:
+    with pytest.raises(
+        TranslationError, match=f"'test_javascript_{function.__name__}'.* JavaScript"
+    ) as caught:
         write_javascript([], [function])
     assert caught.value.file == __file__
 

@@ -40,7 +40,11 @@ def cases():
 
 def test_functions_differ(cases):
     """Functions depend on what they are given, and store results."""
-    varied = [results for results in cases.values() if len({repr(result) for _, result in results}) > INPUTS // 2]
+    varied = [
+        results
+        for results in cases.values()
+        if len({repr(result) for _, result in results}) > INPUTS // 2
+    ]
     assert len(varied) > 0.8 * len(cases)
 
 
@@ -56,11 +60,15 @@ def test_cplusplus_gives_the_same_bits(cases, tmp_path):
 
 @needs_node
 def test_javascript_gives_the_same_numbers(cases):
-    calls = [(function.__name__, *given) for function, results in cases.items() for given, _ in results]
+    calls = [
+        (function.__name__, *given) for function, results in cases.items() for given, _ in results
+    ]
     results = iter(call_javascript(write_javascript([], [*cases]), calls))
     for function, rows in cases.items():
         for given, expected in rows:
-            assert are_same_bits(ignore_sign_of_zero(next(results)), ignore_sign_of_zero(expected)), (
+            assert are_same_bits(
+                ignore_sign_of_zero(next(results)), ignore_sign_of_zero(expected)
+            ), (
                 function.__name__,
                 given,
             )

@@ -52,17 +52,27 @@ def test_an_edited_function_concerns_those_that_call_it(changed):
     # `project` solves by the addresses of these laws.
     paths = {"cable_path", "geodesic_path"}
     searches = {"fit_frames", "assemble_poses"}
-    assert result == {*paths, *searches, "factorise_law", "minimum_norm_law", "constrained_dynamics"}
+    assert result == {
+        *paths,
+        *searches,
+        "factorise_law",
+        "minimum_norm_law",
+        "constrained_dynamics",
+    }
 
 
 def test_a_changed_number_concerns_those_that_use_it(changed):
-    assert changed(constrained_dynamics, "SAFE_MASS", 2.0 * constrained_dynamics.SAFE_MASS) == {"constrained_dynamics"}
+    assert changed(constrained_dynamics, "SAFE_MASS", 2.0 * constrained_dynamics.SAFE_MASS) == {
+        "constrained_dynamics"
+    }
 
 
 def test_words_and_layout_concern_nobody(changed):
     reflect = least_squares.reflect
     document = reflect.__doc__
-    moved = edited(reflect, f'"""{document}"""', '"""Other words."""\n    # A comment, and an empty line.\n')
+    moved = edited(
+        reflect, f'"""{document}"""', '"""Other words."""\n    # A comment, and an empty line.\n'
+    )
     assert not changed(least_squares, "reflect", moved)
 
 

@@ -7,7 +7,9 @@ from math import inf
 
 from osimlite.mechanics.laws.hunt_crossley import contact_energy, contact_force
 
-Contact = tuple[float, float, float, float, float, float, float, float, float, float, float, float, float]
+Contact = tuple[
+    float, float, float, float, float, float, float, float, float, float, float, float, float
+]
 """d, R, k, c, us, ud, uv, and the numbers of n and v: the arguments of `contact_force` but for vt."""
 
 
@@ -16,14 +18,12 @@ def contact_forces(
 ) -> tuple[list[tuple[float, float, float]], float]:
     """All contacts of one HuntCrossleyForce: the force on surface 2 of each, and their potential energy.
 
-    Each contact is on its own, unless Simbody's defect is asked for: there the first contact that separates
-    too fast to push ends the work on this HuntCrossleyForce, and the contacts after it lose their force and
-    their energy.
+    Each contact is on its own, unless Simbody's defect is asked for: there the first contact that
+    separates too fast to push ends the work on this HuntCrossleyForce, and the contacts after it
+    lose their force and their energy.
 
-    Args:
-        contacts: one tuple per contact, in the order of `simbody_pair_order` (the order matters to the defect
-            only).
-        vt: transition velocity of the HuntCrossleyForce, m/s.
+    Args: contacts: one tuple per contact, in the order of `simbody_pair_order` (the order matters
+        to the defect only). vt: transition velocity of the HuntCrossleyForce, m/s.
         simbody_early_return: reproduce the defect, to compare with OpenSim.
 
     Returns:
@@ -43,21 +43,22 @@ def contact_forces(
     return forces, energy
 
 
-def simbody_pair_order(centres: Sequence[tuple[float, float, float]], radii: Sequence[float]) -> list[tuple[int, int]]:
+def simbody_pair_order(
+    centres: Sequence[tuple[float, float, float]], radii: Sequence[float]
+) -> list[tuple[int, int]]:
     """Pairs of surfaces of one HuntCrossleyForce that may touch, in the order in which Simbody works on them.
 
-    Simbody sweeps along the axis of ground on which the centres lie farthest apart (largest sum of distances
-    from their mean), starting from the surface that begins first, and drops pairs whose bounding spheres are
-    apart. Pairs on the same body are among them: their force has no effect, but OpenSim counts their energy.
+    Simbody sweeps along the axis of ground on which the centres lie farthest apart (largest sum of
+    distances from their mean), starting from the surface that begins first, and drops pairs whose
+    bounding spheres are apart. Pairs on the same body are among them: their force has no effect,
+    but OpenSim counts their energy.
 
-    Args:
-        centres: centre of each surface in ground, m, in the order in which the file lists them; of a half
-            space the origin of its frame.
-        radii: radius of each sphere, m; `inf` marks a half space.
+    Args: centres: centre of each surface in ground, m, in the order in which the file lists them;
+        of a half space the origin of its frame. radii: radius of each sphere, m; `inf` marks a half
+        space.
 
-    Returns:
-        Pairs (surface 1, surface 2) of indices; a half space is always surface 1. Two half spaces make no
-        pair.
+    Returns: Pairs (surface 1, surface 2) of indices; a half space is always surface 1. Two half
+        spaces make no pair.
     """
     n = len(centres)
     spread = []

@@ -13,15 +13,22 @@ from osimlite.base.load import module_name
 from osimlite.mechanics.laws import muscle_curves
 from osimlite.mechanics.laws.bezier import LAST, curve_integral, curve_value
 
-MORE = {"force_velocity_inverse": lambda *numbers: muscle_curves.force_velocity(*numbers, inverse=True)}
+MORE = {
+    "force_velocity_inverse": lambda *numbers: muscle_curves.force_velocity(*numbers, inverse=True)
+}
 
 
 def curves(fixtures):
-    for result in json.loads(gzip.decompress((fixtures / "muscles" / "curves.json.gz").read_bytes())):
+    for result in json.loads(
+        gzip.decompress((fixtures / "muscles" / "curves.json.gz").read_bytes())
+    ):
         if result["curve"].endswith("Curve"):
             name = module_name(result["curve"].removesuffix("Curve"))
             make = MORE.get(name) or getattr(muscle_curves, name)
-            yield result, make(*[value for key, value in result["params"].items() if key != "fitted"])
+            yield (
+                result,
+                make(*[value for key, value in result["params"].items() if key != "fitted"]),
+            )
 
 
 def test_values_slopes_and_integrals(fixtures):
@@ -33,7 +40,8 @@ def test_values_slopes_and_integrals(fixtures):
             if result["dy"]:
                 assert slope == pytest.approx(result["dy"][index], rel=1e-11, abs=1e-11)
             if result["integral"]:
-                # OpenSim's is a spline, worst beside the ends; that of compression counts from the other end.
+                # OpenSim's is a spline, worst beside the ends; that of compression counts from the
+                # other end.
                 own = curve_integral(numbers, x)
                 own = whole - own if "Compressive" in result["curve"] else own
                 assert own == pytest.approx(result["integral"][index], abs=2e-5)
@@ -45,9 +53,20 @@ share = st.floats(0.0, 1.0)
 @given(share, share, share, share, share)
 def test_the_inverse_is_one(near, more, isometric, one, other):
     """For any curve, and as exactly as its steepness lets it be."""
-    numbers = (0.1 + 0.4 * near, 0.11 + 0.8 * more, 1.5 + 8.0 * isometric, 0.05, 0.2, 1.5, one, other)
+    numbers = (
+        0.1 + 0.4 * near,
+        0.11 + 0.8 * more,
+        1.5 + 8.0 * isometric,
+        0.05,
+        0.2,
+        1.5,
+        one,
+        other,
+    )
     numbers = (0.5 * numbers[1], *numbers[1:])
-    there, back = (muscle_curves.force_velocity(*numbers, inverse=inverse) for inverse in (False, True))
+    there, back = (
+        muscle_curves.force_velocity(*numbers, inverse=inverse) for inverse in (False, True)
+    )
     for k in range(-13, 14):
         factor, slope = curve_value(there, 0.1 * k)
         velocity, inverse_slope = curve_value(back, factor)
@@ -68,14 +87,35 @@ def test_the_integral_has_the_curve_as_its_slope(low, curviness, x):
     ("make", "words"),
     [
         (lambda: muscle_curves.active_force_length(0.5, 0.4, 1.8, 0.8, 0.0), "do not rise"),
-        (lambda: muscle_curves.active_force_length(0.4, 0.7, 1.8, 4.0, 0.0), "shallow_ascending_slope"),
-        (lambda: muscle_curves.force_velocity(0.0, 0.2, 5.0, 0.0, 0.5, 1.4, 0.6, 0.9), "eccentric_slope_near_vmax"),
-        (lambda: muscle_curves.force_velocity(0.0, 0.2, 5.0, 0.0, 0.1, 1.4, 0.6, 1.1), "curviness is not from 0 to 1"),
-        (lambda: muscle_curves.fiber_force_length(0.0, 0.6, 0.2, 1.0, 0.5), "stiffness_at_one_norm_force"),
-        (lambda: muscle_curves.fiber_force_length(0.0, 0.6, 0.2), "stiffness_at_low_force and what follows"),
+        (
+            lambda: muscle_curves.active_force_length(0.4, 0.7, 1.8, 4.0, 0.0),
+            "shallow_ascending_slope",
+        ),
+        (
+            lambda: muscle_curves.force_velocity(0.0, 0.2, 5.0, 0.0, 0.5, 1.4, 0.6, 0.9),
+            "eccentric_slope_near_vmax",
+        ),
+        (
+            lambda: muscle_curves.force_velocity(0.0, 0.2, 5.0, 0.0, 0.1, 1.4, 0.6, 1.1),
+            "curviness is not from 0 to 1",
+        ),
+        (
+            lambda: muscle_curves.fiber_force_length(0.0, 0.6, 0.2, 1.0, 0.5),
+            "stiffness_at_one_norm_force",
+        ),
+        (
+            lambda: muscle_curves.fiber_force_length(0.0, 0.6, 0.2),
+            "stiffness_at_low_force and what follows",
+        ),
         (lambda: muscle_curves.tendon_force_length(0.05, 40.0, 1.0, 0.5), "norm_force_at_toe_end"),
-        (lambda: muscle_curves.fiber_compressive_force_length(0.5, -1.0, 0.5), "stiffness_at_zero_length"),
-        (lambda: muscle_curves.fiber_compressive_force_cos_pennation(95.0), "engagement_angle_in_degrees"),
+        (
+            lambda: muscle_curves.fiber_compressive_force_length(0.5, -1.0, 0.5),
+            "stiffness_at_zero_length",
+        ),
+        (
+            lambda: muscle_curves.fiber_compressive_force_cos_pennation(95.0),
+            "engagement_angle_in_degrees",
+        ),
     ],
 )
 def test_what_makes_no_curve(make, words):

@@ -46,13 +46,17 @@ def test_angles_where_two_axes_are_one(b, a, c):
 def test_rates_and_moment(a, b, c, rates):
     """Rates against a difference of rotations; moment and rates are of one power."""
     h = 1e-6
-    before, after = (rotation(*(np.array((a, b, c)) + sign * h * np.array(rates))) for sign in (-1.0, 1.0))
+    before, after = (
+        rotation(*(np.array((a, b, c)) + sign * h * np.array(rates))) for sign in (-1.0, 1.0)
+    )
     spin = rotation(a, b, c).T @ (after - before) / (2.0 * h)
     w = spin[2, 1], spin[0, 2], spin[1, 0]
     result = xyz_rates(b, c, *w)
     assert result == pytest.approx(rates, abs=1e-6 / cos(b))
     loads = 1.0, -2.0, 0.5
-    assert np.dot(xyz_moment(b, c, *loads), w) == pytest.approx(np.dot(loads, result), abs=1e-9 / cos(b))
+    assert np.dot(xyz_moment(b, c, *loads), w) == pytest.approx(
+        np.dot(loads, result), abs=1e-9 / cos(b)
+    )
 
 
 def test_load():

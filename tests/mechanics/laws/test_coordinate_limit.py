@@ -17,14 +17,22 @@ from osimlite.mechanics.laws.coordinate_limit import (
     limit_force,
 )
 
-PROPERTIES = "upper_stiffness", "upper_limit", "lower_stiffness", "lower_limit", "damping", "transition"
+PROPERTIES = (
+    "upper_stiffness",
+    "upper_limit",
+    "lower_stiffness",
+    "lower_limit",
+    "damping",
+    "transition",
+)
 
 
 def test_every_row_of_opensims_table(fixtures):
     """Force to 1e-9 of the sum of the magnitudes of its terms (springs, damper), energy to 1e-9 of itself.
 
-    That sum is the force itself where the terms do not cancel; in four rows they cancel to rounding. OpenSim
-    forms one step as a difference, which costs digits next to the limit (1.6e-10); the rest agrees to 1e-12.
+    That sum is the force itself where the terms do not cancel; in four rows they cancel to
+    rounding. OpenSim forms one step as a difference, which costs digits next to the limit
+    (1.6e-10); the rest agrees to 1e-12.
     """
     with gzip.open(fixtures / "forces" / "coordinate_limit_table.csv.gz", "rt") as text:
         rows = list(csv.DictReader(line for line in text if not line.startswith("#")))
@@ -74,9 +82,13 @@ def test_nothing_between_the_limits(law, q, u):
 def test_spring_is_minus_the_slope_of_the_energy(law, q):
     Ku, qu, Kl, ql, _, t = law
     h = 1e-5
-    slope = (limit_energy(q + h, Ku, qu, Kl, ql, t) - limit_energy(q - h, Ku, qu, Kl, ql, t)) / (2 * h)
+    slope = (limit_energy(q + h, Ku, qu, Kl, ql, t) - limit_energy(q - h, Ku, qu, Kl, ql, t)) / (
+        2 * h
+    )
     # The third derivative of the energy is at most of the order K / t within the zone.
-    assert limit_force(q, 0.0, *law) == pytest.approx(-slope, rel=1e-6, abs=10 * (Ku + Kl) * h * h / t + 1e-6)
+    assert limit_force(q, 0.0, *law) == pytest.approx(
+        -slope, rel=1e-6, abs=10 * (Ku + Kl) * h * h / t + 1e-6
+    )
 
 
 @given(laws(), angle, speed)
@@ -86,8 +98,12 @@ def test_damper_takes_power_and_is_the_rest_of_the_force(law, q, u):
     x = min(max(q - qu, ql - q, 0.0) / t, 1.0)
     share = 10.0 * x**3 - 15.0 * x**4 + 6.0 * x**5
     spring = limit_force(q, 0.0, *law)
-    assert spring - limit_force(q, u, *law) == pytest.approx(share * D * u, rel=1e-9, abs=1e-9 * (1.0 + abs(spring)))
-    assert limit_dissipation(q, u, qu, ql, D, t) == pytest.approx(share * D * u * u, rel=1e-9, abs=1e-12)
+    assert spring - limit_force(q, u, *law) == pytest.approx(
+        share * D * u, rel=1e-9, abs=1e-9 * (1.0 + abs(spring))
+    )
+    assert limit_dissipation(q, u, qu, ql, D, t) == pytest.approx(
+        share * D * u * u, rel=1e-9, abs=1e-12
+    )
 
 
 @given(laws(), angle, speed)
@@ -128,7 +144,9 @@ def test_only_rotational_coordinates_are_converted():
     plain = 10.0, 2.0, 20.0, -3.0, 0.7, 0.1
     assert limit_constants(*plain, False) == (10.0, 2.0, 20.0, -3.0, 0.7, 0.1)
     w = math.pi / 180
-    assert limit_constants(*plain, True) == pytest.approx((10 / w, 2 * w, 20 / w, -3 * w, 0.7 / w, 0.1 * w))
+    assert limit_constants(*plain, True) == pytest.approx(
+        (10 / w, 2 * w, 20 / w, -3 * w, 0.7 / w, 0.1 * w)
+    )
 
 
 @pytest.mark.parametrize("q", [1.5, -1.5])

@@ -61,8 +61,15 @@ TRIPLE = st.tuples(NUMBER, NUMBER, NUMBER)
 @given(TRIPLE, TRIPLE, TRIPLE, TRIPLE, TRIPLE)
 def test_torque_and_motion_about_any_point(middle, end, about, velocity, spin):
     (rx, ry, rz), (wx, wy, wz) = [b - a for a, b in zip(about, end, strict=True)], spin
-    there = [v + x for v, x in zip(velocity, (wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx), strict=True)]
+    there = [
+        v + x
+        for v, x in zip(
+            velocity, (wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx), strict=True
+        )
+    ]
     (fx, fy, fz), torque, energy = spring_load(*MATERIAL, middle, end, about, velocity, spin)
     same, none, stored = spring_load(*MATERIAL, middle, end, end, tuple(there), spin)
     assert (fx, fy, fz, energy) == pytest.approx((*same, stored)) and none == ZERO
-    assert torque == pytest.approx([ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx], abs=1e-12)
+    assert torque == pytest.approx(
+        [ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx], abs=1e-12
+    )

@@ -17,7 +17,9 @@ ANY = st.floats(allow_nan=True, allow_infinity=True)
 @given(ANY, ANY)
 def test_nothing_raises_and_all_are_as_in_c(a, b):
     with np.errstate(all="ignore"):
-        assert formulas.divide(a, b) == pytest.approx(np.float64(a) / np.float64(b), nan_ok=True, rel=1e-15)
+        assert formulas.divide(a, b) == pytest.approx(
+            np.float64(a) / np.float64(b), nan_ok=True, rel=1e-15
+        )
     for name in ("smaller", "larger", "power"):
         getattr(formulas, name)(a, b)
 
@@ -55,7 +57,12 @@ REFERENCES = {
 
 
 @pytest.mark.parametrize("name", REFERENCES)
-@given(st.one_of(st.floats(-709, 709), st.sampled_from([0.0, -0.0, math.inf, -math.inf, math.nan, 1e300, 711.0])))
+@given(
+    st.one_of(
+        st.floats(-709, 709),
+        st.sampled_from([0.0, -0.0, math.inf, -math.inf, math.nan, 1e300, 711.0]),
+    )
+)
 def test_functions(name, x):
     with np.errstate(all="ignore"):
         expected = float(REFERENCES[name](np.float64(x)))

@@ -129,7 +129,9 @@ def test_two_spheres_as_simbody_does_it(measured, separating, positions):
     contacts, order = plane_contacts([float(x) for x in positions], separating, "AB")
     forces, energy = contact_forces(contacts, 0.2, simbody_early_return=True)
     for name, force in zip(order, forces, strict=True):
-        expected = [case["values"][case["labels"].index(f"f.{name}.force.{axis}")] for axis in "XYZ"]
+        expected = [
+            case["values"][case["labels"].index(f"f.{name}.force.{axis}")] for axis in "XYZ"
+        ]
         assert force == pytest.approx(expected, rel=1e-9, abs=1e-9)
     assert energy == pytest.approx(case["PE"], rel=1e-9)
 
@@ -392,12 +394,14 @@ def test_the_law_knows_no_frame(contact, vt, angle):
     assert turned == pytest.approx(expected, rel=1e-9, abs=1e-9 * elastic)
 
 
-@given(st.tuples(*[number] * 3), unit_vectors(), st.tuples(*[number] * 3), radius, st.floats(0.0, 1.0))
+@given(
+    st.tuples(*[number] * 3), unit_vectors(), st.tuples(*[number] * 3), radius, st.floats(0.0, 1.0)
+)
 def test_point_of_application_divides_the_overlap(o, n, c, r, a):
     d, P = half_space_sphere(o, n, c, r, a)
     if d > 0.0:
-        # a of the depth lies on the half space's side of the point, the rest between the point and the
-        # sphere's pole.
+        # a of the depth lies on the half space's side of the point, the rest between the point and
+        # the sphere's pole.
         assert dot([p - q for p, q in zip(P, o, strict=True)], n) == pytest.approx(-a * d, abs=1e-9)
         pole = [x - r * y for x, y in zip(c, n, strict=True)]
         assert math.dist(P, pole) == pytest.approx((1 - a) * d, abs=1e-9)
@@ -424,8 +428,12 @@ def test_derivatives_are_those_of_the_force(d, approach, slip, turn):
     )
     there = force(0.0, 0.0)
     scale = max(1.0, there[1])
-    assert by_depth == pytest.approx((force(d * h, 0.0) - force(-d * h, 0.0))[1] / (2.0 * d * h), abs=1e-5 * scale / d)
-    assert by_speed == pytest.approx((force(0.0, h) - force(0.0, -h))[1] / (2.0 * h), abs=1e-3 * scale)
+    assert by_depth == pytest.approx(
+        (force(d * h, 0.0) - force(-d * h, 0.0))[1] / (2.0 * d * h), abs=1e-5 * scale / d
+    )
+    assert by_speed == pytest.approx(
+        (force(0.0, h) - force(0.0, -h))[1] / (2.0 * h), abs=1e-3 * scale
+    )
     assert across * slip == pytest.approx(math.hypot(there[0], there[2]), rel=1e-9)
 
 

@@ -27,14 +27,22 @@ def is_of_forces(value):
 
 def globals_of(function):
     """What a function names that is not built in."""
-    names = {item.argval for item in dis.get_instructions(function) if item.opname == "LOAD_GLOBAL"} - BUILT_IN
+    names = {
+        item.argval for item in dis.get_instructions(function) if item.opname == "LOAD_GLOBAL"
+    } - BUILT_IN
     return {name: function.__globals__[name] for name in names if name in function.__globals__}
 
 
 def laws():
     """The functions of the package that kernels and kinds of forces call; the rest prepares numbers or reports."""
-    modules = [import_module(f"{kernels.__name__}.{item.name}") for item in iter_modules(kernels.__path__)]
-    pending = [function for module in modules for _, function in inspect.getmembers(module, inspect.isfunction)]
+    modules = [
+        import_module(f"{kernels.__name__}.{item.name}") for item in iter_modules(kernels.__path__)
+    ]
+    pending = [
+        function
+        for module in modules
+        for _, function in inspect.getmembers(module, inspect.isfunction)
+    ]
     for kind in (kind for kind in kinds() if isinstance(kind, Kind)):
         own = kind.law, kind.equilibrium, *kind.geometry.calls
         pending += [law for law in own if law is not None]
@@ -62,14 +70,22 @@ def test_all_laws_are_here():
 def test_stands_alone(law):
     """A function that closes over nothing, and that calls none but laws and those of `math`, can be compiled."""
     for name, value in globals_of(law).items():
-        assert is_of_forces(value) or vars(math).get(name) is value or isinstance(value, float | int | tuple), name
+        assert (
+            is_of_forces(value)
+            or vars(math).get(name) is value
+            or isinstance(value, float | int | tuple)
+        ), name
     assert not law.__code__.co_freevars and not law.__code__.co_cellvars
 
 
 @of_each(LAWS, lambda law: f"{law.__module__}.{law.__name__}")
 def test_takes_and_gives_scalars(law):
     """And triples, tables of numbers, and named tuples of scalars or of tables."""
-    named = {name: value for name, value in law.__globals__.items() if inspect.isclass(value) and is_of_forces(value)}
+    named = {
+        name: value
+        for name, value in law.__globals__.items()
+        if inspect.isclass(value) and is_of_forces(value)
+    }
     for value in named.values():
         assert set(get_type_hints(value).values()) in ({float}, {bool, float}, {Sequence[float]})
     known = {*SCALARS, *TRIPLES, *named}

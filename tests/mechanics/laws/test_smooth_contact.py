@@ -37,7 +37,9 @@ def test_sharp_limit_is_hunt_crossley(d, R, v):
 
 
 def test_apart_there_is_nearly_nothing():
-    assert 0.0 < smooth_hertz(-0.01, 0.1, 1e5, 1e-5, 300.0) < smooth_hertz(0.0, 0.1, 1e5, 1e-5, 300.0)
+    assert (
+        0.0 < smooth_hertz(-0.01, 0.1, 1e5, 1e-5, 300.0) < smooth_hertz(0.0, 0.1, 1e5, 1e-5, 300.0)
+    )
     force = smooth_contact_force(100.0, 0.5, 0.8, 0.4, 0.1, 0.2, *SHARP, UP, (0.0, -5.0, 0.0))
     assert force == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
 
@@ -58,10 +60,23 @@ def test_derivatives_are_those_of_the_force(d, approach, slip, turn, c):
         return np.array(smooth_contact_force(hertz, c, *friction, cf, bv, UP, v))
 
     v = slip * math.cos(turn), approach, slip * math.sin(turn)
-    by_depth, by_speed, across, growth = smooth_contact_derivatives(d, R, E, cf, bd, c, *friction, bv, UP, v)
+    by_depth, by_speed, across, growth = smooth_contact_derivatives(
+        d, R, E, cf, bd, c, *friction, bv, UP, v
+    )
     there, scale = force(0.0, 0.0), abs(force(0.0, 0.0)[1]) + 1e-3
-    assert by_depth == pytest.approx((force(h, 0.0) - force(-h, 0.0))[1] / (2.0 * h), abs=1e-3 * scale)
-    assert by_speed == pytest.approx((force(0.0, h) - force(0.0, -h))[1] / (2.0 * h), abs=1e-5 * scale)
-    assert across * slip == pytest.approx(math.copysign(math.hypot(there[0], there[2]), across), rel=1e-9, abs=1e-12)
+    assert by_depth == pytest.approx(
+        (force(h, 0.0) - force(-h, 0.0))[1] / (2.0 * h), abs=1e-3 * scale
+    )
+    assert by_speed == pytest.approx(
+        (force(0.0, h) - force(0.0, -h))[1] / (2.0 * h), abs=1e-5 * scale
+    )
+    assert across * slip == pytest.approx(
+        math.copysign(math.hypot(there[0], there[2]), across), rel=1e-9, abs=1e-12
+    )
     assert growth * there[1] == pytest.approx(by_depth, rel=1e-9, abs=1e-12)
-    assert smooth_contact_derivatives(-1.0, R, E, cf, bd, c, *friction, bv, UP, v) == (0.0, 0.0, 0.0, 0.0)
+    assert smooth_contact_derivatives(-1.0, R, E, cf, bd, c, *friction, bv, UP, v) == (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )

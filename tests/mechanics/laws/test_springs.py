@@ -27,7 +27,9 @@ def slope(f, x, h=1e-5):
 def test_elastic_forces_are_slopes_of_the_energies(length, l0):
     k, e1 = 7.0, 0.3
     tension = blankevoort_tension(length, 0.0, l0, k, e1, 5.0)
-    assert tension == pytest.approx(slope(lambda x: blankevoort_energy(x, l0, k, e1), length), abs=2e-3)
+    assert tension == pytest.approx(
+        slope(lambda x: blankevoort_energy(x, l0, k, e1), length), abs=2e-3
+    )
     tension = path_spring_tension(length, 0.0, l0, k, 5.0)
     assert tension == pytest.approx(slope(lambda x: path_spring_energy(x, l0, k), length), abs=2e-3)
     tension = point_spring_tension(length, k, l0)
@@ -43,7 +45,9 @@ def test_damping_of_a_ligament():
         length = 2.0 * (1.0 + strain)
         still = blankevoort_tension(length, 0.0, *constants)
         assert blankevoort_tension(length, -0.5, *constants) == still
-        assert blankevoort_tension(length, 0.5, *constants) - still == pytest.approx(8.0 * 0.25 * part, abs=1e-12)
+        assert blankevoort_tension(length, 0.5, *constants) - still == pytest.approx(
+            8.0 * 0.25 * part, abs=1e-12
+        )
 
 
 def test_values_worked_out_by_hand():
@@ -59,4 +63,6 @@ def test_values_worked_out_by_hand():
 def test_pneumatic_muscle():
     # It does not pull at the length B / sqrt(3).
     assert mckibben_tension(0.1 + 0.6 / 3**0.5, 1e5, 1.5, 0.6, 0.1) == pytest.approx(0.0, abs=1e-9)
-    assert mckibben_tension(0.5, 1e5, 1.5, 0.6, 0.1) == pytest.approx(1e5 * 0.12 / (9.0 * 3.141592653589793))
+    assert mckibben_tension(0.5, 1e5, 1.5, 0.6, 0.1) == pytest.approx(
+        1e5 * 0.12 / (9.0 * 3.141592653589793)
+    )

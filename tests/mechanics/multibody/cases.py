@@ -51,7 +51,9 @@ def function(spec: dict[str, Any]) -> f.Function:
 
 
 def _component(spec: dict[str, Any]) -> schema.Function:
-    fields = {name: tuple(value) if isinstance(value, list) else value for name, value in spec.items()}
+    fields = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in spec.items()
+    }
     kind = getattr(schema, str(fields.pop("type")))
     if "function" in fields:
         fields["function"] = _component(spec["function"])
@@ -113,8 +115,13 @@ def mechanism_of(case: dict[str, Any], *, turned_round: bool = False) -> Mechani
 def alone(mobilizer: Mobilizer) -> Mechanism:
     """Ground and one body that a joint carries."""
     names = [f"q{k}" for k in mobilizer.coordinates]
-    infos = tuple(CoordinateInfo(name, f"{mobilizer.joint}/{name}", mobilizer.joint, "coupled") for name in names)
-    return Mechanism("alone", (MobileBody("C", "/bodyset/C", -1, MassProperties(1.0), mobilizer),), infos)
+    infos = tuple(
+        CoordinateInfo(name, f"{mobilizer.joint}/{name}", mobilizer.joint, "coupled")
+        for name in names
+    )
+    return Mechanism(
+        "alone", (MobileBody("C", "/bodyset/C", -1, MassProperties(1.0), mobilizer),), infos
+    )
 
 
 @cache

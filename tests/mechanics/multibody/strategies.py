@@ -34,7 +34,13 @@ from osimlite.mechanics.multibody.spatial import Array, offset
 KINDS = ("point", "distance", "line", "weld", "rolling", "coupler", "prescribed")
 """Of constraints."""
 
-JOINT_TYPES = (*MOTIONS, "EllipsoidJoint", "ScapulothoracicJoint", "ConstantCurvatureJoint", "CustomJoint")
+JOINT_TYPES = (
+    *MOTIONS,
+    "EllipsoidJoint",
+    "ScapulothoracicJoint",
+    "ConstantCurvatureJoint",
+    "CustomJoint",
+)
 
 
 class Case(NamedTuple):
@@ -79,19 +85,35 @@ def coordinates_of(motions: tuple[Motion, ...]) -> int:
 
 
 def _body(
-    index: int, parent: int, joint_type: str, turned_round: bool, first: int, rng: np.random.Generator
+    index: int,
+    parent: int,
+    joint_type: str,
+    turned_round: bool,
+    first: int,
+    rng: np.random.Generator,
 ) -> tuple[MobileBody, list[CoordinateInfo]]:
     motions = motions_of(joint_type, rng)
     count = coordinates_of(motions)
     path = f"/jointset/j{index}"
     frames = [offset(rng.uniform(-0.4, 0.4, 3), rng.uniform(-1.0, 1.0, 3)) for _ in range(2)]
     mobilizer = Mobilizer(
-        path, joint_type, motions, tuple(range(first, first + count)), frames[0], frames[1], turned_round
+        path,
+        joint_type,
+        motions,
+        tuple(range(first, first + count)),
+        frames[0],
+        frames[1],
+        turned_round,
     )
     half = rng.uniform(-0.3, 0.3, (3, 3))
-    properties = MassProperties(rng.uniform(0.5, 3.0), rng.uniform(-0.2, 0.2, 3), half @ half.T + 0.1 * np.eye(3))
+    properties = MassProperties(
+        rng.uniform(0.5, 3.0), rng.uniform(-0.2, 0.2, 3), half @ half.T + 0.1 * np.eye(3)
+    )
     types = motion_types(motions, count)
-    infos = [CoordinateInfo(f"q{first + k}", f"{path}/q{first + k}", path, types[k]) for k in range(count)]
+    infos = [
+        CoordinateInfo(f"q{first + k}", f"{path}/q{first + k}", path, types[k])
+        for k in range(count)
+    ]
     return MobileBody(f"B{index}", f"/bodyset/B{index}", parent, properties, mobilizer), infos
 
 
@@ -110,7 +132,9 @@ def cases(draw: st.DrawFn, *, max_bodies: int = 5) -> Case:
         coordinates += infos
     mechanism = Mechanism("random", tuple(bodies), tuple(coordinates), np.array((0.3, -9.5, 0.7)))
     n = len(coordinates)
-    return Case(mechanism, rng.uniform(-1.2, 1.2, n), rng.uniform(-2.0, 2.0, n), rng.uniform(-3.0, 3.0, n))
+    return Case(
+        mechanism, rng.uniform(-1.2, 1.2, n), rng.uniform(-2.0, 2.0, n), rng.uniform(-3.0, 3.0, n)
+    )
 
 
 def constraint_of(kind: str, mechanism: Mechanism, rng: np.random.Generator) -> Constraint:
@@ -125,13 +149,17 @@ def constraint_of(kind: str, mechanism: Mechanism, rng: np.random.Generator) -> 
         case "line":
             return b.PointOnLineConstraint(first, rng.normal(size=3), second)
         case "weld":
-            inner, outer = (offset(rng.uniform(-0.3, 0.3, 3), rng.uniform(-1.0, 1.0, 3)) for _ in range(2))
+            inner, outer = (
+                offset(rng.uniform(-0.3, 0.3, 3), rng.uniform(-1.0, 1.0, 3)) for _ in range(2)
+            )
             return b.WeldConstraint(FramePlacement(one, inner), FramePlacement(two, outer))
         case "rolling":
             return b.RollingConstraint(one, two, rng.normal(size=3), 0.3)
         case "coupler":
             places = rng.permutation(len(mechanism.coordinates))[:2].tolist()
             return Coupler(
-                places[0], tuple(places[1:]), f.Polynomial((0.3, -0.2, 0.1)) if places[1:] else f.Constant(0.2)
+                places[0],
+                tuple(places[1:]),
+                f.Polynomial((0.3, -0.2, 0.1)) if places[1:] else f.Constant(0.2),
             )
     return Prescribed(int(rng.integers(len(mechanism.coordinates))), f.Sine(0.4, 3.0, 0.2, 0.1))

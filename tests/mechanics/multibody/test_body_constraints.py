@@ -18,8 +18,8 @@ from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_
 def test_equations_are_the_derivatives_of_the_errors(case: Case, kind, seed):
     """Along any motion: the errors change at G u - b, and what binds speeds changes at G udot - b.
 
-    Where points are to meet, both as the first body sees it, but for what it does to the rate of the errors; and what
-    speeds change at, as the body sees it that carries both.
+    Where points are to meet, both as the first body sees it, but for what it does to the rate of
+    the errors; and what speeds change at, as the body sees it that carries both.
     """
     assume(len(case.q))
     mechanism, q, u, udot = case
@@ -28,7 +28,9 @@ def test_equations_are_the_derivatives_of_the_errors(case: Case, kind, seed):
     qddot = mechanism.rate_matrix(q) @ udot + mechanism.rate_bias(q, u)
 
     def at(time):
-        return mechanism.at(q + qdot * time + qddot * time * time / 2.0, u + udot * time, 0.7 + time)
+        return mechanism.at(
+            q + qdot * time + qddot * time * time / 2.0, u + udot * time, 0.7 + time
+        )
 
     def slips(time):
         state = at(time)
@@ -37,14 +39,18 @@ def test_equations_are_the_derivatives_of_the_errors(case: Case, kind, seed):
 
     step, state = 1e-4, at(0.0)
     changes, drifts = (
-        (8.0 * (function(step) - function(-step)) - (function(2 * step) - function(-2 * step))) / (12.0 * step)
+        (8.0 * (function(step) - function(-step)) - (function(2 * step) - function(-2 * step)))
+        / (12.0 * step)
         for function in (lambda time: constraint.position_errors(at(time)), slips)
     )
     scale = 1.0 + np.abs(drifts).max()
     if kind in ("point", "weld"):
         body = constraint.bodies[0]
         changes[-3:] -= np.cross(state.velocities[body][:3], constraint.position_errors(state)[-3:])
-        turning = state.velocities[body][:3] - 2.0 * state.velocities[carrier(mechanism, constraint.bodies)][:3]
+        turning = (
+            state.velocities[body][:3]
+            - 2.0 * state.velocities[carrier(mechanism, constraint.bodies)][:3]
+        )
         drifts[-3:] += np.cross(turning, slips(0.0)[-3:])
     assert slips(0.0)[: len(changes)] == pytest.approx(changes, abs=1e-6 * scale)
     rows, wanted = constraint.acceleration_equations(state)
@@ -52,7 +58,11 @@ def test_equations_are_the_derivatives_of_the_errors(case: Case, kind, seed):
 
 
 @settings(max_examples=50)
-@given(cases(), st.sampled_from(["point", "distance", "line", "coupler", "prescribed"]), st.integers(0, 2**32 - 1))
+@given(
+    cases(),
+    st.sampled_from(["point", "distance", "line", "coupler", "prescribed"]),
+    st.integers(0, 2**32 - 1),
+)
 def test_assembled_states_fulfil_the_constraints_or_are_refused(case: Case, kind, seed):
     assume(len(case.q))
     constraint = constraint_of(kind, case.mechanism, np.random.default_rng(seed))
@@ -68,9 +78,13 @@ def test_assembled_states_fulfil_the_constraints_or_are_refused(case: Case, kind
     assert np.abs(constraint.position_errors(state)).max() < 1e-10
     rows, wanted = constraint.velocity_equations(state)
     free = solutions(rows, wanted)[1]
-    # What is kept up costs nothing beyond it: the change of speeds and the forces missing lie in the rows.
-    # A change of a speed above 1 counts relative to it.
+    # What is kept up costs nothing beyond it: the change of speeds and the forces missing lie in
+    # the rows. A change of a speed above 1 counts relative to it.
     change = (u - case.u) / np.maximum(np.abs(case.u), 1.0) ** 2
-    assert free.T @ change == pytest.approx(np.zeros(free.shape[1]), abs=1e-9 * (1.0 + np.abs(u).max()))
+    assert free.T @ change == pytest.approx(
+        np.zeros(free.shape[1]), abs=1e-9 * (1.0 + np.abs(u).max())
+    )
     missing = mechanism.inverse_dynamics(q, u, udot) - case.udot
-    assert free.T @ missing == pytest.approx(np.zeros(free.shape[1]), abs=1e-7 * (1.0 + np.abs(missing).max()))
+    assert free.T @ missing == pytest.approx(
+        np.zeros(free.shape[1]), abs=1e-7 * (1.0 + np.abs(missing).max())
+    )

@@ -90,7 +90,11 @@ def test_the_walker_in_contact_is_opensims(walker, case):
     for force, body in CONTACT_BODIES.items():
         loads[body] += records[force][:6]
     wrenches = {body: Wrench(load[:3], load[3:]) for body, load in loads.items()}
-    torques = {name.replace("LimitTorque", "_rz"): record[0] for name, record in records.items() if "Limit" in name}
+    torques = {
+        name.replace("LimitTorque", "_rz"): record[0]
+        for name, record in records.items()
+        if "Limit" in name
+    }
     result = walker.acceleration(case["q"], case["u_with_locked_platform"], torques, wrenches)
     _close(result, case["udot_locked_all_forces"], 1e-11)
     assert result[0] == pytest.approx(0.0, abs=1e-30)
@@ -98,19 +102,29 @@ def test_the_walker_in_contact_is_opensims(walker, case):
 
 def test_some_of_the_walkers_cases_are_in_contact():
     touching = [case["force_records_all_forces"] for case in WALKER["cases"]]
-    assert sum(np.any(record["RFootForce"]) or np.any(record["LFootForce"]) for record in touching) == 4
+    assert (
+        sum(np.any(record["RFootForce"]) or np.any(record["LFootForce"]) for record in touching)
+        == 4
+    )
 
 
 def test_the_walker_stands_where_opensim_puts_it(walker):
     q, u = walker.default_state()
-    assert q == pytest.approx(np.array((*np.radians((-10, 0)), 0, 0.835, *np.radians((30, -10, -30, -30)))))
+    assert q == pytest.approx(
+        np.array((*np.radians((-10, 0)), 0, 0.835, *np.radians((30, -10, -30, -30))))
+    )
     assert not u.any()
 
 
 # ---------------------------------------------------------------------------------------- frames and reversal
 def _body(model: Model, name: str) -> Body:
     return model.add(
-        Body(name=name, mass=1.5, mass_center=(0.1, -0.2, 0.05), inertia=(0.3, 0.35, 0.4, 0.02, -0.01, 0.03))
+        Body(
+            name=name,
+            mass=1.5,
+            mass_center=(0.1, -0.2, 0.05),
+            inertia=(0.3, 0.35, 0.4, 0.02, -0.01, 0.03),
+        )
     )
 
 
@@ -123,7 +137,9 @@ def _named(joint: Joint) -> Joint:
 def test_frames_on_frames_end_at_the_body():
     model = Model(name="m")
     body = _body(model, "b")
-    inner = PhysicalOffsetFrame(name="inner", socket_parent=body, translation=(0.1, 0.2, 0.3), orientation=(0.1, 0, 0))
+    inner = PhysicalOffsetFrame(
+        name="inner", socket_parent=body, translation=(0.1, 0.2, 0.3), orientation=(0.1, 0, 0)
+    )
     outer = PhysicalOffsetFrame(
         name="outer", socket_parent=inner, translation=(0.0, 0.5, 0.0), orientation=(0, 0.2, 0.3)
     )
@@ -151,20 +167,34 @@ def test_a_joint_whose_child_is_ground_is_reversed(kind):
         body = _body(model, "b")
         parent, child = (body, model.ground) if turned_round else (model.ground, body)
         joint = _named(kind(name="j"))
-        model.add(joint.between(parent, child, at=(0.1, 0.2, 0.3), turned=(0.4, 0.5, 0.6), child_at=(-0.3, 0.1, 0.0)))
+        model.add(
+            joint.between(
+                parent, child, at=(0.1, 0.2, 0.3), turned=(0.4, 0.5, 0.6), child_at=(-0.3, 0.1, 0.0)
+            )
+        )
         return build_mechanism(model)
 
     forward, backward = chain(False), chain(True)
-    assert [mechanism.bodies[0].mobilizer.reversed for mechanism in (forward, backward)] == [False, True]
+    assert [mechanism.bodies[0].mobilizer.reversed for mechanism in (forward, backward)] == [
+        False,
+        True,
+    ]
     assert forward.coordinate_names == backward.coordinate_names
     q = np.linspace(0.2, 0.9, len(forward.coordinates))
-    assert backward.body_transforms(q)["b"] == pytest.approx(inverse(forward.body_transforms(q)["b"]), abs=1e-15)
+    assert backward.body_transforms(q)["b"] == pytest.approx(
+        inverse(forward.body_transforms(q)["b"]), abs=1e-15
+    )
 
 
 def test_bodies_come_breadth_first_and_coordinates_in_the_order_of_joints():
     model = Model(name="m")
     bodies = {name: _body(model, name) for name in "abcd"}
-    for name, parent, child in (("j4", "c", "d"), ("j3", "b", "c"), ("j1", None, "a"), ("j2", None, "b")):
+    for name, parent, child in (
+        ("j4", "c", "d"),
+        ("j3", "b", "c"),
+        ("j1", None, "a"),
+        ("j2", None, "b"),
+    ):
         carrier = model.ground if parent is None else bodies[parent]
         model.add(_named(PinJoint(name=name)).between(carrier, bodies[child]))
     mechanism = build_mechanism(model)
@@ -201,7 +231,9 @@ def test_a_body_without_mass_has_no_inertia():
     alone = Model(name="m")
     alone.add(_named(PinJoint(name="j")).between(alone.ground, _body(alone, "heavy")))
     q = [0.3]
-    assert build_mechanism(model).mass_matrix(q) == pytest.approx(build_mechanism(alone).mass_matrix(q))
+    assert build_mechanism(model).mass_matrix(q) == pytest.approx(
+        build_mechanism(alone).mass_matrix(q)
+    )
 
 
 def test_bodies_without_a_way_to_ground_float():
@@ -214,12 +246,23 @@ def test_bodies_without_a_way_to_ground_float():
     assert [info.path for info in mechanism.coordinates] == [
         "/jointset/j/j_0",
         "/jointset/k/k_0",
-        *(f"/jointset/free_{body}/free_{body}_coord_{index}" for body in "ab" for index in range(6)),
+        *(
+            f"/jointset/free_{body}/free_{body}_coord_{index}"
+            for body in "ab"
+            for index in range(6)
+        ),
     ]
-    carriers = {body.name: mechanism.bodies[body.parent].name if body.parent >= 0 else "" for body in mechanism.bodies}
+    carriers = {
+        body.name: mechanism.bodies[body.parent].name if body.parent >= 0 else ""
+        for body in mechanism.bodies
+    }
     assert carriers == {"a": "", "b": "", "c": "b", "d": ""}
-    q = {f"free_b_coord_{index}": value for index, value in enumerate((0.1, 0.2, 0.3, 1.0, 2.0, 3.0))}
-    assert mechanism.body_transforms(q)["b"] == pytest.approx(offset((1.0, 2.0, 3.0), (0.1, 0.2, 0.3)), abs=1e-15)
+    q = {
+        f"free_b_coord_{index}": value for index, value in enumerate((0.1, 0.2, 0.3, 1.0, 2.0, 3.0))
+    }
+    assert mechanism.body_transforms(q)["b"] == pytest.approx(
+        offset((1.0, 2.0, 3.0), (0.1, 0.2, 0.3)), abs=1e-15
+    )
 
 
 def test_a_frame_is_laid_through_stations():
@@ -255,14 +298,18 @@ def test_a_chain_of_frames_may_be_of_any_length(through_stations):
         if through_stations:
             points = [
                 Station(name=f"{name}{number}", location=place, socket_parent_frame=base)
-                for name, place in zip("abco", [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 0.01)], strict=True)
+                for name, place in zip(
+                    "abco", [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 0.01)], strict=True
+                )
             ]
             names = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point")
             sockets: Any = dict(zip(names, points, strict=True))
             base = StationDefinedFrame(name=f"f{number}", ab_x_ac_axis="+z", **sockets)
             model.component_set.objects += points
         else:
-            base = PhysicalOffsetFrame(name=f"f{number}", socket_parent=base, translation=(0, 0, 0.01))
+            base = PhysicalOffsetFrame(
+                name=f"f{number}", socket_parent=base, translation=(0, 0, 0.01)
+            )
         model.component_set.objects.append(base)
     path, matrix = Placements(Tree(model)).frame(base)
     assert path == "/bodyset/rod"
@@ -297,7 +344,9 @@ def _extra_coordinate(model: Model, body: Body, joint: Joint) -> None:
 
 
 def _prescribed(model: Model, body: Body, joint: Joint) -> None:
-    joint.coordinates[0].prescribed_function = ExpressionBasedFunction(expression="t", variables=("t",))
+    joint.coordinates[0].prescribed_function = ExpressionBasedFunction(
+        expression="t", variables=("t",)
+    )
     joint.coordinates[0].prescribed = True
 
 
@@ -311,7 +360,9 @@ def _unknown_constraint(model: Model, body: Body, joint: Joint) -> None:
     model.constraint_set.objects = objects
 
 
-def _stations(model: Model, body: Body, *points: tuple[float, float, float], last: Body | Ground | None = None) -> None:
+def _stations(
+    model: Model, body: Body, *points: tuple[float, float, float], last: Body | Ground | None = None
+) -> None:
     frame = StationDefinedFrame(name="laid")
     for word, point in zip(("point_a", "point_b", "point_c", "origin_point"), points, strict=True):
         carrier = last if last is not None and word == "origin_point" else body
@@ -345,10 +396,22 @@ def _no_inertia(model: Model, body: Body, joint: Joint) -> None:
 @pytest.mark.parametrize(
     ("spoil", "kind", "words"),
     [
-        (_loop, UnsupportedError, "'/jointset/again' closes a loop through '/ground' and '/bodyset/rod'.*remove"),
-        (_loop_to_ground, UnsupportedError, "'/jointset/again' closes a loop through '/bodyset/rod' and '/ground'"),
+        (
+            _loop,
+            UnsupportedError,
+            "'/jointset/again' closes a loop through '/ground' and '/bodyset/rod'.*remove",
+        ),
+        (
+            _loop_to_ground,
+            UnsupportedError,
+            "'/jointset/again' closes a loop through '/bodyset/rod' and '/ground'",
+        ),
         (_to_itself, ModelError, "'/jointset/hinge' connects '/bodyset/rod' to itself"),
-        (_dangling, ModelError, "'/jointset/hinge'.*socket_child_frame.*'/bodyset/rodd'.*did you mean"),
+        (
+            _dangling,
+            ModelError,
+            "'/jointset/hinge'.*socket_child_frame.*'/bodyset/rodd'.*did you mean",
+        ),
         (_circle, ModelError, "'/bodyset/rod/first' is fixed to itself"),
         (_extra_coordinate, ModelError, "PinJoint '/jointset/hinge' has 2 coordinates and needs 1"),
         (
@@ -357,9 +420,17 @@ def _no_inertia(model: Model, body: Body, joint: Joint) -> None:
             "of '/jointset/hinge/hinge_0' is a ExpressionBasedFunction",
         ),
         (_unknown_joint, UnsupportedError, "'/jointset/odd' is a ScrewJoint.*PinJoint"),
-        (_unknown_constraint, UnsupportedError, "'/constraintset/odd' \\(GearConstraint\\) cannot be computed"),
+        (
+            _unknown_constraint,
+            UnsupportedError,
+            "'/constraintset/odd' \\(GearConstraint\\) cannot be computed",
+        ),
         (_stations_on_a_line, ModelError, "point_c of the frame '/laid' lie on a line; move one"),
-        (_stations_on_two_bodies, ModelError, "stations of the frame '/laid' are fixed to /bodyset/rod and /ground"),
+        (
+            _stations_on_two_bodies,
+            ModelError,
+            "stations of the frame '/laid' are fixed to /bodyset/rod and /ground",
+        ),
         (_no_mass, ModelError, "'/bodyset/rod' has mass nan"),
         (_negative_mass, ModelError, "'/bodyset/rod' has mass -2"),
         (_no_inertia, ModelError, "'/bodyset/rod' has a mass centre or inertia that is not finite"),

@@ -37,7 +37,8 @@ def test_a_locked_coordinate_does_not_accelerate(case: Case, data):
     qddot = mechanism.rate_matrix(q) @ udot + mechanism.rate_bias(q, u)
     scale = 1.0 + np.abs(udot).max()
     assert np.abs(qddot[sorted(places)]).max() < 1e-9 * scale
-    # What holds the coordinates does no work: the forces missing from the equation of motion lie along the locks.
+    # What holds the coordinates does no work: the forces missing from the equation of motion lie
+    # along the locks.
     missing = mechanism.inverse_dynamics(q, u, udot) - case.udot
     multipliers = np.linalg.lstsq(rows.T, missing, rcond=None)[0]
     assert np.abs(rows.T @ multipliers - missing).max() < 1e-8 * (1.0 + np.abs(missing).max())
@@ -51,6 +52,9 @@ def test_default_speeds_obey_the_locks(case: Case, data):
     mechanism = _locked(case.mechanism, places)
     q, u = mechanism.default_state()
     wanted = np.array([info.default_speed for info in mechanism.coordinates])
-    assert np.abs(mechanism.coordinate_rates(q, u)[sorted(places)]).max(initial=0.0) < 1e-12 * wanted.max()
+    assert (
+        np.abs(mechanism.coordinate_rates(q, u)[sorted(places)]).max(initial=0.0)
+        < 1e-12 * wanted.max()
+    )
     if not places:
         assert u == pytest.approx(wanted)

@@ -26,7 +26,9 @@ def _mechanism_and_truth(corpus_model):
 
 def test_real_models_stand_as_in_opensim(corpus_model):
     mechanism, truth = _mechanism_and_truth(corpus_model)
-    assert [info.path for info in mechanism.coordinates] == [item["path"] for item in truth["coordinates"]]
+    assert [info.path for info in mechanism.coordinates] == [
+        item["path"] for item in truth["coordinates"]
+    ]
     assert [_TYPES.index(info.motion_type) for info in mechanism.coordinates] == [
         item["motion"] for item in truth["coordinates"]
     ]

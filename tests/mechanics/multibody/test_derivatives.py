@@ -33,9 +33,15 @@ def _knee(*, opensim_derivatives: bool) -> Mechanism:
     motions = custom(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
     properties = MassProperties(2.0, np.array((0.1, -0.3, 0.05)), np.diag((0.03, 0.02, 0.04)))
     body = MobileBody(
-        "shank", "/bodyset/shank", -1, properties, Mobilizer("/jointset/k", "CustomJoint", motions, (0, 1))
+        "shank",
+        "/bodyset/shank",
+        -1,
+        properties,
+        Mobilizer("/jointset/k", "CustomJoint", motions, (0, 1)),
     )
-    coordinates = tuple(CoordinateInfo(name, f"/jointset/k/{name}", "/jointset/k", "coupled") for name in "ab")
+    coordinates = tuple(
+        CoordinateInfo(name, f"/jointset/k/{name}", "/jointset/k", "coupled") for name in "ab"
+    )
     return Mechanism("knee", (body,), coordinates)
 
 
@@ -78,7 +84,10 @@ def test_the_two_agree_on_everything_but_accelerations():
     assert np.abs(theirs.acceleration(q, u) - ours.acceleration(q, u)).max() > 0.01
     assert theirs.bodies[0].mobilizer.elementary()[1:-1] != ()
     # Three joints that only accelerate stand for the difference.
-    assert len(theirs.bodies[0].mobilizer.elementary()) == len(ours.bodies[0].mobilizer.elementary()) + 3
+    assert (
+        len(theirs.bodies[0].mobilizer.elementary())
+        == len(ours.bodies[0].mobilizer.elementary()) + 3
+    )
 
 
 def test_where_each_coordinate_has_its_rotation_the_two_agree():

@@ -36,7 +36,11 @@ def test_the_mixed_tree_moves_as_in_opensim(case):
     udot = np.array([case["udot"][name] for name in names])
     tree_order = [mechanism.coordinate_index(name) for name in MIXED["tree_order"]]
     _close(mechanism.acceleration(q, u), udot, 1e-12)
-    _close(mechanism.mass_matrix(q)[np.ix_(tree_order, tree_order)], case["mass_matrix_tree_order"], 1e-12)
+    _close(
+        mechanism.mass_matrix(q)[np.ix_(tree_order, tree_order)],
+        case["mass_matrix_tree_order"],
+        1e-12,
+    )
     _close(mechanism.coordinate_rates(q, u), [case["qdot"][name] for name in names], 1e-12)
     _close(mechanism.center_of_mass(q), case["com"], 1e-12)
     _close(mechanism.center_of_mass_velocity(q, u), case["com_velocity"], 1e-12)
@@ -69,7 +73,9 @@ def test_the_mass_matrix_is_that_of_the_kinetic_energy(case: Case):
     assert (matrix == matrix.T).all()
     if len(q):
         assert np.linalg.eigvalsh(matrix).min() > 0.0
-    assert mechanism.kinetic_energy(q, u) == pytest.approx(0.5 * u @ matrix @ u, rel=1e-12, abs=1e-14)
+    assert mechanism.kinetic_energy(q, u) == pytest.approx(
+        0.5 * u @ matrix @ u, rel=1e-12, abs=1e-14
+    )
 
 
 @given(cases())
@@ -78,7 +84,8 @@ def test_inverse_dynamics_undoes_acceleration(case: Case):
     matrix = mechanism.mass_matrix(q)
     needed = mechanism.inverse_dynamics(q, u, udot)
     _close(needed, matrix @ udot + mechanism.bias(q, u) - mechanism.gravity_forces(q), 1e-12)
-    # Compared as forces: where a random joint moves next to no mass the accelerations themselves say little.
+    # Compared as forces: where a random joint moves next to no mass the accelerations themselves
+    # say little.
     result = mechanism.acceleration(q, u, generalized_forces=needed)
     _close(matrix @ result, matrix @ udot, 1e-11 * (1.0 + np.abs(result).max(initial=0.0)))
 
@@ -107,7 +114,9 @@ def test_velocity_forces_take_no_power_but_that_of_the_changing_mass_matrix(case
     mechanism, q, u, _ = case
     rates, step = mechanism.rate_matrix(q), 1e-5
     qdot, qddot = rates @ u, mechanism.rate_bias(q, u)
-    high, low = (mechanism.kinetic_energy(q + t * qdot + 0.5 * t * t * qddot, u) for t in (step, -step))
+    high, low = (
+        mechanism.kinetic_energy(q + t * qdot + 0.5 * t * t * qddot, u) for t in (step, -step)
+    )
     assert u @ mechanism.bias(q, u) == pytest.approx((high - low) / (2 * step), rel=1e-6, abs=1e-5)
 
 
@@ -116,7 +125,10 @@ def test_accelerations_of_the_bodies_are_derivatives_of_their_velocities(case: C
     mechanism, q, u, udot = case
     rates, step = mechanism.rate_matrix(q), 1e-5
     qdot, qddot = rates @ u, rates @ udot + mechanism.rate_bias(q, u)
-    high, low = (mechanism.at(q + t * qdot + 0.5 * t * t * qddot, u + t * udot).velocities for t in (step, -step))
+    high, low = (
+        mechanism.at(q + t * qdot + 0.5 * t * t * qddot, u + t * udot).velocities
+        for t in (step, -step)
+    )
     result = mechanism.at(q, u).accelerations(udot)
     scale = 1.0 + np.abs(result).max()
     assert np.abs(result - (high - low) / (2 * step)).max() < 1e-5 * scale
@@ -186,7 +198,9 @@ def test_the_coordinate_named_is_the_one_that_moves_nothing():
     chain = Mechanism("chain", (arm.bodies[0], tip), (arm.coordinates[0], spin))
     with pytest.raises(SimulationError, match="'spin' moves no mass"):
         chain.acceleration([0.1, 0.2], [0.0, 0.0])
-    locked = dataclasses.replace(chain, coordinates=(arm.coordinates[0], dataclasses.replace(spin, locked=True)))
+    locked = dataclasses.replace(
+        chain, coordinates=(arm.coordinates[0], dataclasses.replace(spin, locked=True))
+    )
     alone = arm.acceleration([0.1], [0.5])
     assert locked.acceleration([0.1, 0.2], [0.5, 0.0]) == pytest.approx([alone[0], 0.0], rel=1e-14)
 
@@ -200,8 +214,14 @@ def test_a_number_that_is_not_finite_is_refused(bad):
                 pendulum.acceleration(*arguments)
     tree = mixed_tree()
     first = tree.turning[0].coordinates[0]
-    infos = [dataclasses.replace(info, locked=place == first) for place, info in enumerate(tree.coordinates)]
+    infos = [
+        dataclasses.replace(info, locked=place == first)
+        for place, info in enumerate(tree.coordinates)
+    ]
     locked = dataclasses.replace(tree, coordinates=tuple(infos))
-    for q, u in (({tree.coordinate_names[first]: bad}, {}), ({}, {tree.coordinate_names[first]: bad})):
+    for q, u in (
+        ({tree.coordinate_names[first]: bad}, {}),
+        ({}, {tree.coordinate_names[first]: bad}),
+    ):
         with pytest.raises(SimulationError, match="not finite"):
             locked.acceleration(q, u)

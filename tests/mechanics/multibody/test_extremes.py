@@ -94,7 +94,8 @@ def changed(text: str, draw: random.Random) -> Iterator[tuple[str, str]]:
 @pytest.mark.parametrize("file", MODELS)
 def test_nothing_fails_of_what_a_property_holds(file: str) -> None:
     edits = changed(
-        (ROOT / "fixtures" / file).read_text(), random.Random(f"{file} {os.environ.get('OSIMLITE_SEED', '1')}")
+        (ROOT / "fixtures" / file).read_text(),
+        random.Random(f"{file} {os.environ.get('OSIMLITE_SEED', '1')}"),
     )
     for _ in range(WANTED // len(MODELS)):
         what, text = next(edits)
@@ -108,7 +109,9 @@ def test_nothing_fails_of_what_a_property_holds(file: str) -> None:
             raise AssertionError(what) from error
 
 
-@pytest.mark.parametrize("coefficients", [(1e-320, 1.0, 0.0), (1e308, 1e308, 0.0), (-1e308, 5.0, 1.0, 1e-320)])
+@pytest.mark.parametrize(
+    "coefficients", [(1e-320, 1.0, 0.0), (1e308, 1e308, 0.0), (-1e308, 5.0, 1.0, 1e-320)]
+)
 def test_polynomials_of_joints(coefficients: tuple[float, ...]) -> None:
     model = one_body(CustomJoint)
     joint = model.joint_set.objects[0]
@@ -125,9 +128,13 @@ def test_splines_far_outside(value: float) -> None:
     joint = model.joint_set.objects[0]
     assert isinstance(joint, CustomJoint)
     joint.SpatialTransform.rotation1.coordinates = ("q0",)
-    joint.SpatialTransform.rotation1.function = Spline(x=(0.0, 1.0, 2.0, 3.0), y=(0.0, value, 2.0, 3.0))
+    joint.SpatialTransform.rotation1.function = Spline(
+        x=(0.0, 1.0, 2.0, 3.0), y=(0.0, value, 2.0, 3.0)
+    )
     used(model)
-    joint.SpatialTransform.rotation1.function = Spline(x=(0.0, 1.0, 2.0, 3.0), y=(0.0, 1.0, 0.0, 3.0))
+    joint.SpatialTransform.rotation1.function = Spline(
+        x=(0.0, 1.0, 2.0, 3.0), y=(0.0, 1.0, 0.0, 3.0)
+    )
     joint.coordinates[0].default_value = value
     used(model)
     if not np.isfinite(value):
@@ -146,7 +153,9 @@ def test_the_most_extreme_number_is_named() -> None:
     model = one_body(PinJoint)
     assert extreme(model) == ""
     model.body_set.objects[0].mass = 1e30
-    model.joint_set.objects[0].coordinates[0].prescribed_function = LinearFunction(coefficients=(1e-300, 0.0))
+    model.joint_set.objects[0].coordinates[0].prescribed_function = LinearFunction(
+        coefficients=(1e-300, 0.0)
+    )
     assert extreme(model) == "prescribed_function of '/jointset/j/q0', 1e-300,"
     model.body_set.objects[0].mass = np.nan
     assert extreme(model) == "mass of '/bodyset/b', nan,"
@@ -155,8 +164,14 @@ def test_the_most_extreme_number_is_named() -> None:
     def fails(of: Model, fault: Exception) -> None:
         raise fault
 
-    for fault in (np.linalg.LinAlgError("no"), OverflowError("no"), ValueError("math domain error")):
-        with pytest.raises(ModelError, match="mass of '/bodyset/b', nan, is too large or too small to compute with"):
+    for fault in (
+        np.linalg.LinAlgError("no"),
+        OverflowError("no"),
+        ValueError("math domain error"),
+    ):
+        with pytest.raises(
+            ModelError, match="mass of '/bodyset/b', nan, is too large or too small to compute with"
+        ):
             fails(model, fault)
     with pytest.raises(ValueError, match=r"^another$"):
         fails(model, ValueError("another"))
@@ -164,7 +179,14 @@ def test_the_most_extreme_number_is_named() -> None:
 
 @pytest.mark.parametrize(
     ("ab", "across", "axes"),
-    [("+x", "+y", "xy"), ("", "", "xy"), ("none", "Y", "xy"), ("zyx", "", "zx"), ("y", "q", "yz"), ("+", "-", "xy")],
+    [
+        ("+x", "+y", "xy"),
+        ("", "", "xy"),
+        ("none", "Y", "xy"),
+        ("zyx", "", "zx"),
+        ("y", "q", "yz"),
+        ("+", "-", "xy"),
+    ],
 )
 def test_words_for_axes_are_read_by_their_first_letter(ab: str, across: str, axes: str) -> None:
     model = Model(name="m")
@@ -173,7 +195,9 @@ def test_words_for_axes_are_read_by_their_first_letter(ab: str, across: str, axe
         model.add(osimlite.Station(name=name, socket_parent_frame="/ground", location=place))
     frame = StationDefinedFrame(name="f", ab_axis=ab, ab_x_ac_axis=across)
     for name in ("point_a", "point_b", "point_c", "origin_point"):
-        setattr(frame, f"socket_{name}", f"/componentset/{name[-1] if name != 'origin_point' else 'd'}")
+        setattr(
+            frame, f"socket_{name}", f"/componentset/{name[-1] if name != 'origin_point' else 'd'}"
+        )
     model.add(frame)
     rotation = osimlite.mechanism(model).frames["/componentset/f"].transform[:3, :3]
     # From a to b is along x of ground, across all three points along z.

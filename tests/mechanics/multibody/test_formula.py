@@ -47,7 +47,9 @@ def test_values(text, expected):
 
 def test_definitions_that_double_are_written_once():
     names = [f"x{number}" for number in range(60)]
-    text = names[0] + "".join(f"; {a} = {b}*0.5 + {b}*0.5" for a, b in zip(names, [*names[1:], "q"], strict=True))
+    text = names[0] + "".join(
+        f"; {a} = {b}*0.5 + {b}*0.5" for a, b in zip(names, [*names[1:], "q"], strict=True)
+    )
     assert value(text) == pytest.approx(0.7)
 
 
@@ -111,7 +113,16 @@ LONG = 20_000
         ("q+(" * LONG + "q" + ")" * LONG, (LONG + 1) * 0.7),
         (";".join(["a0", *(f"a{k}=a{k + 1}+1" for k in range(LONG)), f"a{LONG}=q"]), LONG + 0.7),
     ],
-    ids=["sum", "difference", "power", "parentheses", "signs", "calls", "nested sums", "definitions"],
+    ids=[
+        "sum",
+        "difference",
+        "power",
+        "parentheses",
+        "signs",
+        "calls",
+        "nested sums",
+        "definitions",
+    ],
 )
 def test_no_length_and_no_depth_is_too_much(text, expected):
     result = value(text)
@@ -163,11 +174,15 @@ def test_every_function_is_a_law():
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_derivatives_of_functions(name):
     inner = "0.3*q-0.1*u*q"
-    text = f"{name}({inner})" if name not in ("min", "max") else f"{name}({inner},u)*{name}(q,{inner})"
+    text = (
+        f"{name}({inner})" if name not in ("min", "max") else f"{name}({inner},u)*{name}(q,{inner})"
+    )
     assert_derivatives(text)
 
 
-@pytest.mark.parametrize("text", ["q", "u", "3", "q-q*u", "-q/u", "q^3+(q+1)^(u*q)", "a*q;a=q*u", "2^(q*u)"])
+@pytest.mark.parametrize(
+    "text", ["q", "u", "3", "q-q*u", "-q/u", "q^3+(q+1)^(u*q)", "a*q;a=q*u", "2^(q*u)"]
+)
 def test_derivatives(text):
     assert_derivatives(text)
 

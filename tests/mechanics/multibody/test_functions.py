@@ -96,16 +96,23 @@ def test_a_sine_is_a_sine():
     assert wave.evaluate(np.array((0.1,)))[0] == pytest.approx(2.0 * math.sin(0.8) + 1.0, abs=1e-15)
 
 
-def _slopes(function: f.Function, at: np.ndarray, step: float = 1e-5) -> tuple[np.ndarray, np.ndarray]:
+def _slopes(
+    function: f.Function, at: np.ndarray, step: float = 1e-5
+) -> tuple[np.ndarray, np.ndarray]:
     """Gradient and Hessian by central differences."""
-    pairs = [[function.evaluate(at + sign * step * np.eye(len(at))[k]) for sign in (1.0, -1.0)] for k in range(len(at))]
+    pairs = [
+        [function.evaluate(at + sign * step * np.eye(len(at))[k]) for sign in (1.0, -1.0)]
+        for k in range(len(at))
+    ]
     gradient = np.array([(high[0] - low[0]) / (2.0 * step) for high, low in pairs])
     hessian = np.array([np.subtract(high[1], low[1]) / (2.0 * step) for high, low in pairs])
     return gradient, hessian
 
 
 @given(st.integers(1, 3), st.integers(0, 3), st.integers(0, 2**32 - 1))
-def test_a_polynomial_of_several_variables_has_the_derivatives_of_its_values(dimension, order, seed):
+def test_a_polynomial_of_several_variables_has_the_derivatives_of_its_values(
+    dimension, order, seed
+):
     rng = np.random.default_rng(seed)
     polynomial = f.MultivariatePolynomial.complete(
         rng.uniform(-1.0, 1.0, math.comb(dimension + order, order)).tolist(), dimension, order
@@ -124,7 +131,9 @@ def test_the_monomials_come_in_opensims_order():
     assert value == 1.0 + 30.0 + 900.0 + 2e3 + 6e4 + 4e5
     assert gradient == [1e3 + 3e4 + 4e5, 10.0 + 600.0 + 2e4]
     assert hessian == [[2e5, 1e4], [1e4, 200.0]]
-    theirs = f.MultivariatePolynomial(polynomial.coefficients, polynomial.powers, opensim_derivatives=True)
+    theirs = f.MultivariatePolynomial(
+        polynomial.coefficients, polynomial.powers, opensim_derivatives=True
+    )
     assert theirs.evaluate(np.array((2.0, 3.0)))[2] == [[gradient[0]] * 2, [gradient[1]] * 2]
 
 
@@ -144,5 +153,7 @@ def test_a_weighted_sum():
 
 
 def test_a_function_that_is_not_there_is_named():
-    with pytest.raises(ModelError, match=r"the function of '/constraintset/c' is missing; give one"):
+    with pytest.raises(
+        ModelError, match=r"the function of '/constraintset/c' is missing; give one"
+    ):
         numeric(None, 1, "the function of '/constraintset/c'")

@@ -32,7 +32,10 @@ def same_mechanics(mechanism: Mechanism, q, u) -> Moved:
         same(getattr(ours, name), getattr(theirs, name), name)
     for constraint in mechanism.constraints:
         for name, mine, its in zip(
-            ("errors", "rows", "rates", "drifts"), ours.equations(constraint), bond(constraint, theirs), strict=True
+            ("errors", "rows", "rates", "drifts"),
+            ours.equations(constraint),
+            bond(constraint, theirs),
+            strict=True,
         ):
             same(mine, its, f"{name} of {constraint.name}")
     bodies = MassCentres.of(theirs)
@@ -51,7 +54,9 @@ def test_random_trees(case: Case, kinds: list[str], seed: int):
     pushed = rng.normal(size=len(case.u))
     udot = acceleration(state, pushed)
     scale = max(1.0, np.abs(udot).max(initial=0.0))
-    assert mechanism.acceleration(case.q, case.u, pushed, time=0.3) == pytest.approx(udot, abs=1e-8 * scale)
+    assert mechanism.acceleration(case.q, case.u, pushed, time=0.3) == pytest.approx(
+        udot, abs=1e-8 * scale
+    )
     needed = MassCentres.of(state).mass_matrix() @ case.udot + mechanism.bias(case.q, case.u)
     missing = needed - mechanism.gravity_forces(case.q)
     same(mechanism.inverse_dynamics(case.q, case.u, case.udot), missing, "inverse dynamics")
@@ -62,10 +67,14 @@ def test_models(corpus, opensim_derivatives):
     tried = 0
     for model in corpus:
         try:
-            mechanism = build_mechanism(osimlite.read(model.path), opensim_derivatives=opensim_derivatives)
+            mechanism = build_mechanism(
+                osimlite.read(model.path), opensim_derivatives=opensim_derivatives
+            )
         except OsimliteError:
             continue
         rng, count = np.random.default_rng(tried), len(mechanism.coordinates)
-        same_mechanics(mechanism, mechanism.values({}) + rng.normal(0.0, 0.2, count), rng.normal(size=count))
+        same_mechanics(
+            mechanism, mechanism.values({}) + rng.normal(0.0, 0.2, count), rng.normal(size=count)
+        )
         tried += 1
     assert tried > 40

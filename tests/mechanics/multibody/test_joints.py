@@ -40,8 +40,13 @@ def test_kinematics_are_opensims(pair):
     mechanism = mechanism_of(case)
     q, u, qdot = _state(case)
     state = mechanism.at(q, u)
-    expected = (*case["omega_child_in_parent_expr_parent"], *case["vel_child_origin_in_parent_expr_parent"])
-    assert state.transform(0) == pytest.approx(np.array(case["T_child_body_in_parent_body"]), abs=1e-12)
+    expected = (
+        *case["omega_child_in_parent_expr_parent"],
+        *case["vel_child_origin_in_parent_expr_parent"],
+    )
+    assert state.transform(0) == pytest.approx(
+        np.array(case["T_child_body_in_parent_body"]), abs=1e-12
+    )
     assert state.velocities[0] == pytest.approx(np.array(expected), abs=1e-12)
     assert mechanism.coordinate_rates(q, u) == pytest.approx(qdot, abs=1e-12)
     assert mechanism.speeds_from_rates(q, qdot) == pytest.approx(u, abs=1e-12)
@@ -58,7 +63,9 @@ def test_a_reversed_joint_is_the_inverse(pair):
     assert backward.transform(0) == pytest.approx(inverse(forward.transform(0)), abs=1e-13)
     w, v = np.split(forward.velocities[0], 2)
     back, p = forward.rotations[0].T, forward.origins[0]
-    assert backward.velocities[0] == pytest.approx(np.concatenate((-back @ w, -back @ (v - np.cross(w, p)))), abs=1e-12)
+    assert backward.velocities[0] == pytest.approx(
+        np.concatenate((-back @ w, -back @ (v - np.cross(w, p)))), abs=1e-12
+    )
 
 
 @given(st.sampled_from(JOINT_TYPES), st.integers(0, 2**32 - 1), st.booleans())
@@ -66,7 +73,10 @@ def test_a_joint_is_a_chain_of_one_axis_motions(joint_type, seed, turned_round):
     rng = np.random.default_rng(seed)
     motions = motions_of(joint_type, rng)
     count = coordinates_of(motions)
-    frames = [transform(rotation_about(np.eye(3)[k], rng.uniform(-2, 2)), rng.normal(size=3)) for k in (0, 1)]
+    frames = [
+        transform(rotation_about(np.eye(3)[k], rng.uniform(-2, 2)), rng.normal(size=3))
+        for k in (0, 1)
+    ]
     mobilizer = Mobilizer("/j", joint_type, motions, tuple(range(count)), *frames, turned_round)
     q = rng.uniform(-1.2, 1.2, count)
     product = np.eye(4)
@@ -90,7 +100,11 @@ def test_the_joints_of_urdf_chains_name_their_coordinate():
         ("rotate", [0.0, 0.0, 1.0], 0),
     ]
     coupled = motions_of("EllipsoidJoint", np.random.default_rng(0))
-    kinds = [(part.kind, part.coordinate) for part in coupled[0].elementary() if isinstance(part, AxisMotion)]
+    kinds = [
+        (part.kind, part.coordinate)
+        for part in coupled[0].elementary()
+        if isinstance(part, AxisMotion)
+    ]
     assert kinds == [("translate", None)] * 3 + [("rotate", 0), ("rotate", 1), ("rotate", 2)]
 
 
@@ -102,7 +116,9 @@ def test_motions_agree_with_what_the_schema_declares(joint_type):
 
 @pytest.mark.parametrize("joint_type", MOTIONS)
 def test_a_joint_has_as_many_coordinates_as_in_opensim(joint_type):
-    assert coordinates_of(MOTIONS[joint_type]) == len(load("joint_defaults.json")[joint_type]["coordinates"])
+    assert coordinates_of(MOTIONS[joint_type]) == len(
+        load("joint_defaults.json")[joint_type]["coordinates"]
+    )
 
 
 def test_a_coordinate_without_a_plain_axis_is_coupled():
@@ -146,7 +162,9 @@ def test_bias_and_rate_bias_are_derivatives(joint_type, seed, turned_round):
     qdot, qddot = rates @ u, mobilizer.rate_bias(q, u)
     later, earlier = (q + side * step * qdot + 0.5 * step**2 * qddot for side in (1.0, -1.0))
     high, low = mechanism.at(later, u), mechanism.at(earlier, u)
-    assert middle.biases[0] == pytest.approx((high.velocities[0] - low.velocities[0]) / (2 * step), abs=2e-7)
+    assert middle.biases[0] == pytest.approx(
+        (high.velocities[0] - low.velocities[0]) / (2 * step), abs=2e-7
+    )
     velocity = (high.origins[0] - low.origins[0]) / (2 * step)
     assert middle.velocities[0, 3:] == pytest.approx(velocity, abs=2e-7)
     difference = (mobilizer.rate_matrix(later) - mobilizer.rate_matrix(earlier)) @ u / (2 * step)
@@ -166,6 +184,10 @@ def test_a_rod_that_bends_evenly_is_an_arc():
     arm = place - np.array((center[0], 0.0, center[1]))
     assert np.linalg.norm(arm) == pytest.approx(radius, rel=1e-12)
     assert arm @ along == pytest.approx(0.0, abs=1e-12)
-    assert np.arctan2(place[1], radius - np.linalg.norm(place[[0, 2]])) == pytest.approx(bend, rel=1e-12)
+    assert np.arctan2(place[1], radius - np.linalg.norm(place[[0, 2]])) == pytest.approx(
+        bend, rel=1e-12
+    )
     straight = rod.at(np.array((-0.1, -0.2, 0.3))).transform(0)
-    assert straight == pytest.approx(np.eye(4) + np.outer((0, 1, 0, 0), (0, 0, 0, length)), abs=1e-15)
+    assert straight == pytest.approx(
+        np.eye(4) + np.outer((0, 1, 0, 0), (0, 0, 0, length)), abs=1e-15
+    )

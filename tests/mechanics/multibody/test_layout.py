@@ -8,7 +8,13 @@ from osimlite.mechanics.kernels.layout import CONSTRAINED, ITEM, MODEL, OPERATIO
 
 
 def test_a_record_is_in_the_order_of_its_declaration():
-    assert RESPONSE.record(SENSE=-1, STATES=2, FIRST_STATE=7, ITEM=40, KERNEL=0) == [0, 40, 7, 2, -1]
+    assert RESPONSE.record(SENSE=-1, STATES=2, FIRST_STATE=7, ITEM=40, KERNEL=0) == [
+        0,
+        40,
+        7,
+        2,
+        -1,
+    ]
     assert ITEM.record(FIRST_CONTACT=4, RECORD=3, NUMBERS=2, LAW=1) == [1, 2, 3, 4]
 
 
@@ -19,9 +25,15 @@ def test_fields_beside_the_offsets_are_none():
 
 @pytest.mark.parametrize("wrong", [{"LAW": 1}, {"LAW": 1, "NUMBERS": 2, "RECORD": 3, "CONTACT": 4}])
 def test_a_missing_or_another_field_is_refused(wrong):
-    with pytest.raises(TypeError, match=r"ITEM has the fields LAW, NUMBERS, RECORD, FIRST_CONTACT; got LAW"):
+    with pytest.raises(
+        TypeError, match=r"ITEM has the fields LAW, NUMBERS, RECORD, FIRST_CONTACT; got LAW"
+    ):
         ITEM.record(**wrong)
 
 
 def test_offsets_follow_the_declaration():
-    assert (MODEL.LINKS, MODEL.RUN_AT + 1, CONSTRAINED.MINIMUM_NORM + 1) == (0, MODEL.LAWS, CONSTRAINED.SIZE)
+    assert (MODEL.LINKS, MODEL.RUN_AT + 1, CONSTRAINED.MINIMUM_NORM + 1) == (
+        0,
+        MODEL.LAWS,
+        CONSTRAINED.SIZE,
+    )

@@ -42,7 +42,9 @@ MEASURED = [
         (8.028064, 0.0, -0.156307, 0.026269, 1.0, 3.0, 6.0),
     ),
     (
-        StepFunction(transition_start_time=1.0, transition_end_time=0.0, start_value=1.0, end_value=2.0),
+        StepFunction(
+            transition_start_time=1.0, transition_end_time=0.0, start_value=1.0, end_value=2.0
+        ),
         (2.0, 2.0, 1.83692, 1.5, 1.0, 1.0, 1.0),
     ),
     (LinearFunction(coefficients=(1.0, 5.0, 7.0)), (4.0, 5.0, 5.3, 5.5, 6.0, 7.0, 10.0)),

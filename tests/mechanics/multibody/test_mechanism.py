@@ -28,7 +28,9 @@ def test_values_come_as_arrays_or_by_name():
 
 def test_names_left_out_take_their_default():
     tree = mixed_tree()
-    changed = [dataclasses.replace(info, default_value=0.2, default_speed=0.4) for info in tree.coordinates]
+    changed = [
+        dataclasses.replace(info, default_value=0.2, default_speed=0.4) for info in tree.coordinates
+    ]
     tree = Mechanism(tree.name, tree.bodies, tuple(changed))
     assert tree.values({"c1": 1.0})[:9] == pytest.approx([0.2] * 9)
     assert tree.speeds({})[0] == 0.4
@@ -53,18 +55,35 @@ def test_two_coordinates_with_one_name_are_told_apart_by_their_paths():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda tree: tree.body_transforms({"bb2": 0.0}), "has no coordinate 'bb2'; did you mean 'b2'"),
-        (lambda tree: tree.mass_matrix([1.0, 2.0]), "one value for each of its 24 coordinates.*got 2"),
+        (
+            lambda tree: tree.body_transforms({"bb2": 0.0}),
+            "has no coordinate 'bb2'; did you mean 'b2'",
+        ),
+        (
+            lambda tree: tree.mass_matrix([1.0, 2.0]),
+            "one value for each of its 24 coordinates.*got 2",
+        ),
         (lambda tree: tree.mass_matrix(0.0), "got a single one"),
         (lambda tree: tree.bias(np.zeros(24), np.zeros((24, 1))), "one speed.*got 24 × 1"),
         (
             lambda tree: tree.frame_transform("/bodyset/w", {}),
             "no body or frame '/bodyset/w'; did you mean '/bodyset/W",
         ),
-        (lambda tree: tree.acceleration({}, {}, body_wrenches={"Q": Wrench((0, 0, 0), (0, 0, 0))}), "frame 'Q'"),
+        (
+            lambda tree: tree.acceleration(
+                {}, {}, body_wrenches={"Q": Wrench((0, 0, 0), (0, 0, 0))}
+            ),
+            "frame 'Q'",
+        ),
         (lambda tree: tree.jacobian("W", {}, (0.0, 1.0)), "a station has 3 numbers; got 2"),
-        (lambda tree: tree.station_position("W", 0.0, {}), "a station has 3 numbers; got a single one"),
-        (lambda tree: tree.generalized_forces({}, {"W": ((1, 2), (0, 0, 0))}), "a force has 3 numbers; got 2"),
+        (
+            lambda tree: tree.station_position("W", 0.0, {}),
+            "a station has 3 numbers; got a single one",
+        ),
+        (
+            lambda tree: tree.generalized_forces({}, {"W": ((1, 2), (0, 0, 0))}),
+            "a force has 3 numbers; got 2",
+        ),
         (
             lambda tree: tree.generalized_forces({}, {"W": ((0, 0, 0), [[1, 2, 3]])}),
             "a torque has 3 numbers; got 1 × 3",
@@ -78,7 +97,9 @@ def test_what_is_not_there_is_named(call, words):
 
 def test_bodies_must_follow_their_carriers():
     tree = mixed_tree()
-    with pytest.raises(ModelError, match=f"'{tree.bodies[-1].name}' stands before the body that carries it"):
+    with pytest.raises(
+        ModelError, match=f"'{tree.bodies[-1].name}' stands before the body that carries it"
+    ):
         Mechanism("wrong", tree.bodies[::-1], tree.coordinates)
     with pytest.raises(ModelError, match="do not share out its coordinates"):
         Mechanism("wrong", tree.bodies, tree.coordinates[:-1])
@@ -111,9 +132,13 @@ def test_stations_follow_their_frames(case: Case):
     assert position == pytest.approx(frame[:3, :3] @ station + frame[:3, 3], abs=1e-13)
     velocity = mechanism.station_velocity(name, station, q, u)
     w = mechanism.body_velocities(q, u)[mechanism.bodies[-1].name][:3]
-    assert mechanism.jacobian(name, q, station) @ u == pytest.approx(np.concatenate((w, velocity)), abs=1e-11)
+    assert mechanism.jacobian(name, q, station) @ u == pytest.approx(
+        np.concatenate((w, velocity)), abs=1e-11
+    )
     rates, step = mechanism.rate_matrix(q) @ u, 1e-6
-    ahead, behind = (mechanism.station_position(name, station, q + t * rates) for t in (step, -step))
+    ahead, behind = (
+        mechanism.station_position(name, station, q + t * rates) for t in (step, -step)
+    )
     assert velocity == pytest.approx((ahead - behind) / (2 * step), abs=1e-6)
 
 
@@ -122,9 +147,13 @@ def test_ground_stands_still():
     q, u = tree.values({}), np.ones(24)
     assert tree.frame_transform("ground", q) == pytest.approx(np.eye(4))
     assert tree.frame_transform("/ground/corner", q) == pytest.approx(placed.transform)
-    assert tree.station_velocity("/ground/corner", (1.0, 2.0, 3.0), q, u) == pytest.approx(np.zeros(3))
+    assert tree.station_velocity("/ground/corner", (1.0, 2.0, 3.0), q, u) == pytest.approx(
+        np.zeros(3)
+    )
     assert not tree.jacobian("ground", q).any()
-    assert not tree.generalized_forces(q, {"ground": Wrench((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))}).any()
+    assert not tree.generalized_forces(
+        q, {"ground": Wrench((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))}
+    ).any()
 
 
 @given(cases())
@@ -132,7 +161,10 @@ def test_a_wrench_at_a_frame_is_that_of_its_body_moved(case: Case):
     mechanism, _ = _with_frame(case.mechanism)
     q, name = case.q, mechanism.bodies[-1].name
     force, torque = np.array((3.0, -4.0, 5.0)), np.array((0.5, 0.2, -0.3))
-    arm = mechanism.frame_transform("/bodyset/last/frame", q)[:3, 3] - mechanism.body_transforms(q)[name][:3, 3]
+    arm = (
+        mechanism.frame_transform("/bodyset/last/frame", q)[:3, 3]
+        - mechanism.body_transforms(q)[name][:3, 3]
+    )
     at_frame = mechanism.generalized_forces(q, {"/bodyset/last/frame": Wrench(force, torque)})
     at_body = mechanism.generalized_forces(q, {name: Wrench(force, torque + np.cross(arm, force))})
     assert at_frame == pytest.approx(at_body, abs=1e-11)
@@ -141,7 +173,9 @@ def test_a_wrench_at_a_frame_is_that_of_its_body_moved(case: Case):
 @given(cases())
 def test_rates_and_speeds_convert_both_ways(case: Case):
     mechanism, q, u, _ = case
-    assert mechanism.speeds_from_rates(q, mechanism.coordinate_rates(q, u)) == pytest.approx(u, abs=1e-10)
+    assert mechanism.speeds_from_rates(q, mechanism.coordinate_rates(q, u)) == pytest.approx(
+        u, abs=1e-10
+    )
 
 
 def test_a_mechanism_is_the_same_in_another_process():

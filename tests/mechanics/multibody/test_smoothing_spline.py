@@ -10,7 +10,8 @@ from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
 X = (0.0, 0.3, 0.5, 1.1, 1.2, 1.9, 2.4, 2.5, 3.1, 3.3)
 Y = (0.1, 0.5, 0.4, 1.2, 1.0, 0.3, -0.4, -0.5, -0.2, 0.3)
 
-# Value, first and second derivative in OpenSim 4.6 at 0.0, 0.77 and 3.3; keys: half order, error variance.
+# Value, first and second derivative in OpenSim 4.6 at 0.0, 0.77 and 3.3; keys: half order, error
+# variance.
 OPENSIM = {
     (1, 0.0): (
         (0.1, 1.333333333333, 0),
@@ -88,15 +89,17 @@ def test_it_goes_through_the_points_and_is_natural(half_order, count, seed):
     assert [_at(spline, knot)[0] for knot in x] == pytest.approx(y, abs=1e-8)
     # Beyond the ends it is a polynomial of degree half_order - 1.
     ends = [_at(spline, x[0] - 0.1 * k)[0] for k in range(1, half_order + 2)]
-    assert np.diff(ends, half_order) == pytest.approx(np.zeros(1), abs=1e-7 * (1.0 + np.abs(ends).max()))
+    assert np.diff(ends, half_order) == pytest.approx(
+        np.zeros(1), abs=1e-7 * (1.0 + np.abs(ends).max())
+    )
 
 
 @pytest.mark.parametrize("case", OPENSIM, ids=str)
 def test_it_is_opensims(case):
     half_order, error_variance = case
     spline = smoothing_spline(X, Y, half_order, error_variance)
-    # The search for the smoothing ends a little apart from OpenSim's. Degree 7 through unequal points costs digits:
-    # 1.1e-11 beside sixty digits on one processor, less than 1e-11 on others.
+    # The search for the smoothing ends a little apart from OpenSim's. Degree 7 through unequal
+    # points costs digits: 1.1e-11 beside sixty digits on one processor, less than 1e-11 on others.
     exact = 1e-11 if half_order < 4 else 1e-10
     tolerance = exact if error_variance == 0.0 else 2e-5
     for x, expected in zip((0.0, 0.77, 3.3), OPENSIM[case], strict=True):
@@ -124,8 +127,12 @@ def test_rates_taken_in_blocks_are_those_of_the_whole_spline(count):
         whole = smoothing_spline(x, y[:, column], 3, 0.0)
         for row in {0, 1, count // 2, min(191, count - 1), min(192, count - 1), count - 1}:
             _, slope, bend = _at(whole, x[row])
-            assert first[row, column] == pytest.approx(slope, rel=1e-8, abs=1e-8 * np.abs(first).max())
-            assert second[row, column] == pytest.approx(bend, rel=1e-8, abs=1e-8 * np.abs(second).max())
+            assert first[row, column] == pytest.approx(
+                slope, rel=1e-8, abs=1e-8 * np.abs(first).max()
+            )
+            assert second[row, column] == pytest.approx(
+                bend, rel=1e-8, abs=1e-8 * np.abs(second).max()
+            )
 
 
 @pytest.mark.parametrize("place", [0, 30, 60])

@@ -44,7 +44,10 @@ HEAD = "controls\nversion=1\nnRows=2\nnColumns=3\ninDegrees=no\nendheader\ntime\
     [
         ("0\t1\t2\n0.1\tnan\t2\n", "controls.sto:9:5: 'motor' is nan; give a number"),
         ("0\t1\t2\n0.1\t1\tinf\n", "controls.sto:9:7: 'other' is inf; give a number"),
-        ("0.5\t1\t2\n0.1\t1\t2\n", "controls.sto:9: the time goes back from 0.5 to 0.1 s; sort the rows"),
+        (
+            "0.5\t1\t2\n0.1\t1\t2\n",
+            "controls.sto:9: the time goes back from 0.5 to 0.1 s; sort the rows",
+        ),
         ("0\t1\n", "controls.sto:8:4: the row has 2 numbers and needs 3"),
         ("0\t1\tx\n", "controls.sto:8:5: 'x' is no number"),
         ("", "controls.sto:7: the table has no rows; give it some"),
@@ -101,7 +104,9 @@ def test_a_control_set_that_is_not_named_does_nothing(model, tmp_path):
 def synergies(inputs, weights) -> SynergyController:
     vectors = [SynergyVector(name="v", synergy_weights=weights)]
     name = ("/forceset/motor",)
-    return SynergyController(name="brain", socket_actuators=name, input_controls=inputs, synergy_vectors=vectors)
+    return SynergyController(
+        name="brain", socket_actuators=name, input_controls=inputs, synergy_vectors=vectors
+    )
 
 
 @pytest.mark.parametrize(
@@ -128,7 +133,10 @@ def synergies(inputs, weights) -> SynergyController:
 )
 def test_faults_of_synergies(model, inputs, weights, message, tmp_path):
     write_sto(tmp_path / "table.sto", "table", [0.0, 1.0], ["a"], [[1.0], [2.0]])
-    model.subcomponents += [SignalGenerator(name="wave"), TableSource__double_(name="table", filename="table.sto")]
+    model.subcomponents += [
+        SignalGenerator(name="wave"),
+        TableSource__double_(name="table", filename="table.sto"),
+    ]
     model.add(synergies(inputs, weights))
     assert told(model, tmp_path).message == message
 
@@ -137,13 +145,18 @@ def test_a_synergy_of_what_is_no_function_of_time(model, tmp_path):
     model.add(synergies(("/jointset/j0/q0|value",), (1.0,)))
     error = told(model, tmp_path)
     assert isinstance(error, UnsupportedError)
-    assert "driven by '/controllerset/brain', whose input '/jointset/j0/q0|value' is no function of time" in str(error)
+    assert (
+        "driven by '/controllerset/brain', whose input '/jointset/j0/q0|value' is no function of time"
+        in str(error)
+    )
 
 
 def test_controllers_of_the_examples(model, tmp_path):
     brain = ToyReflexController(name="brain", socket_actuators=("/forceset/motor",))
     model.add(brain)
-    message = "'/controllerset/brain' drives '/forceset/motor', which is no muscle; name muscles only"
+    message = (
+        "'/controllerset/brain' drives '/forceset/motor', which is no muscle; name muscles only"
+    )
     assert told(model, tmp_path).message == message
     brain.enabled = False
     model.add(ToyPropMyoController(name="myo", socket_actuator="/forceset/motor"))
@@ -154,10 +167,14 @@ def test_controllers_of_the_examples(model, tmp_path):
 def test_an_actuator_of_a_class_that_nobody_knows(tmp_path):
     model = arm()
     model.add(CoordinateActuator(name="motor", coordinate="q0"))
-    brain = PrescribedController(name="brain", socket_actuators=("/forceset/motor", "/forceset/piston"))
+    brain = PrescribedController(
+        name="brain", socket_actuators=("/forceset/motor", "/forceset/piston")
+    )
     brain.ControlFunctions.objects += [Constant(value=1.0), Constant(value=2.0)]
     model.add(brain)
-    text = osimlite.to_text(model).replace("<CoordinateActuator", '<Piston name="piston"/><CoordinateActuator', 1)
+    text = osimlite.to_text(model).replace(
+        "<CoordinateActuator", '<Piston name="piston"/><CoordinateActuator', 1
+    )
     (tmp_path / "model.osim").write_text(text)
     read = osimlite.read(tmp_path / "model.osim")
     assert "'/forceset/piston' (Piston)" in told(read, tmp_path).message

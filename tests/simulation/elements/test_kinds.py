@@ -30,7 +30,9 @@ def test_the_kernel_follows_from_the_declaration(kind):
     assert kind.law is None or " law(" in source
     # What the geometry applies is given by the law.
     applied = set(re.findall(r"\w+", " ".join(kind.geometry.after)))
-    assert applied & {"force", "torque", "tension", "fx", "fy", "fz"} <= set(kind.outputs) | applied & {"room"}
+    assert applied & {"force", "torque", "tension", "fx", "fy", "fz"} <= set(
+        kind.outputs
+    ) | applied & {"room"}
     for state in kind.states:
         assert state.rate in kind.outputs
         assert f"= {state.rate}\n" in source
@@ -70,7 +72,9 @@ def test_a_law_takes_what_the_kernel_gives():
     for kind in DECLARED:
         if kind.law is not None:
             calls = [
-                node for node in ast.walk(ast.parse(inspect.getsource(kind.text.kernel))) if isinstance(node, ast.Call)
+                node
+                for node in ast.walk(ast.parse(inspect.getsource(kind.text.kernel)))
+                if isinstance(node, ast.Call)
             ]
             (given,) = (len(call.args) for call in calls if call.func.id == "law")
             assert given == len(inspect.signature(kind.law).parameters), kind.name

@@ -24,7 +24,11 @@ from osimlite.simulation.system import System
 from tests.simulation.checked import Checked
 from tests.simulation.elements.muscle_rows import CONFIGURATIONS, FOLDER, hung, muscle, table
 
-CASES = [name for name, settings in CONFIGURATIONS.items() if (FOLDER / f"{settings['cls']}.csv.gz").exists()]
+CASES = [
+    name
+    for name, settings in CONFIGURATIONS.items()
+    if (FOLDER / f"{settings['cls']}.csv.gz").exists()
+]
 RECORDED = {
     "tension": "Actuation",
     "activation": "Activation",
@@ -43,9 +47,7 @@ DIGITS = {"Millard2012EquilibriumMuscle": 2e-11, "Millard2012AccelerationMuscle"
 """How exactly the numbers of a muscle are known, where it is not 2e-12."""
 
 
-NOWHERE = (
-    r"no equilibrium was found of '/forceset/mu', whose path of 0\.\d+ m is 0\.\d+ m (long|short)er than its tendon"
-)
+NOWHERE = r"no equilibrium was found of '/forceset/mu', whose path of 0\.\d+ m is 0\.\d+ m (long|short)er than its tendon"
 
 
 def system(model, code=None):
@@ -70,7 +72,10 @@ def test_derivatives_forces_and_energy(case, code):
     for number, row in enumerate(rows):
         y = [float(row[name]) for name in ("path_length", "path_speed", *states(ready))]
         if row["error"]:
-            with pytest.raises(SimulationError, match="no solution of the equations of '/forceset/mu', whose path of"):
+            with pytest.raises(
+                SimulationError,
+                match="no solution of the equations of '/forceset/mu', whose path of",
+            ):
                 ready.applied(float(number), y)
             continue
         _, force, *rates = ready.applied(float(number), y)
@@ -81,24 +86,37 @@ def test_derivatives_forces_and_energy(case, code):
         for name, value in ours.items():
             expected = float(row[name])
             # What is a difference of forces has the digits of these.
-            scale = 1e-3 * digits * known["max_isometric_force"] if "Force" in name or name == "Actuation" else 0.0
+            scale = (
+                1e-3 * digits * known["max_isometric_force"]
+                if "Force" in name or name == "Actuation"
+                else 0.0
+            )
             if is_searched:
                 # OpenSim's search for the velocity leaves 1e-10 of the strength.
                 scale += 2e-10 * (known["max_isometric_force"] if scale else 100.0)
             # Exponentials of large numbers have fewer.
             close = digits if abs(expected) < 1e6 else 1e-10
-            assert value == pytest.approx(expected, rel=close, abs=1e-14 + scale, nan_ok=True), (number, name)
+            assert value == pytest.approx(expected, rel=close, abs=1e-14 + scale, nan_ok=True), (
+                number,
+                name,
+            )
         assert force == pytest.approx(-known["tension"], rel=1e-15)
         if is_searched and known["fiber_velocity"] != 0.0:
             # Here it leaves rounding.
-            borne = (known["active_fiber_force"] + known["passive_fiber_force"]) * known["cos_pennation"]
-            assert borne == pytest.approx(known["tension"], abs=1e-13 * known["max_isometric_force"])
+            borne = (known["active_fiber_force"] + known["passive_fiber_force"]) * known[
+                "cos_pennation"
+            ]
+            assert borne == pytest.approx(
+                known["tension"], abs=1e-13 * known["max_isometric_force"]
+            )
         assert ready.force_records(float(number), y) == [known["tension"]]
         parts = [row[f"{part}PotentialEnergy"] for part in ("Fiber", "Tendon")]
         stored = 0.0 if "n/a" in parts else sum(map(float, parts))
         # OpenSim's integrals of Millard's curves are splines.
         close = 1e-4 if "millard" in case else 1e-8
-        assert ready.energies(float(number), y)[2] == pytest.approx(stored, rel=close, abs=0.001 * close)
+        assert ready.energies(float(number), y)[2] == pytest.approx(
+            stored, rel=close, abs=0.001 * close
+        )
 
 
 @pytest.mark.parametrize("code", [None, Checked("Python")], ids=["compiled", "Python"])
@@ -107,15 +125,22 @@ def test_equilibrium(case, code):
     rows = table("equilibrium", case)[:: 1 if code is None else 8]
     ready = system(hung(muscle(case), [float(row["activation"]) for row in rows]), code)
     for number, row in enumerate(rows):
-        start = [float(row["activation"]) if name == "activation" else 0.1 for name in states(ready)]
+        start = [
+            float(row["activation"]) if name == "activation" else 0.1 for name in states(ready)
+        ]
         y = [float(row["path_length"]), float(row["path_speed"]), *start]
         if row["error"]:
             with pytest.raises(SimulationError, match=NOWHERE):
                 ready.equilibrated(float(number), y)
             continue
         result = ready.equilibrated(float(number), y)
-        expected = [float(row.get(f"eq_{name}") or value) for name, value in zip(states(ready), start, strict=True)]
-        assert result[:2] == y[:2] and result[2:] == pytest.approx(expected, rel=1e-12, abs=1e-14), number
+        expected = [
+            float(row.get(f"eq_{name}") or value)
+            for name, value in zip(states(ready), start, strict=True)
+        ]
+        assert result[:2] == y[:2] and result[2:] == pytest.approx(
+            expected, rel=1e-12, abs=1e-14
+        ), number
 
 
 def test_a_motion_may_start_in_equilibrium():
@@ -128,14 +153,25 @@ def test_a_motion_may_start_in_equilibrium():
         engine, rest = simulation.engine, simulation.initial_state(resting, {}, equilibrate=True)
         assert rest[-1] == fiber and abs(engine.derivative(0.0, rest)[-1]) < 1e-6
         # What is given stays, and without the option nothing is found.
-        assert simulation.run(0.01, initial={"x": 0.3, path: 0.05}, equilibrate=True).auxiliary[path][0] == 0.05
+        assert (
+            simulation.run(0.01, initial={"x": 0.3, path: 0.05}, equilibrate=True).auxiliary[path][
+                0
+            ]
+            == 0.05
+        )
         assert simulation.run(0.01, initial={"x": 0.3}).auxiliary[path][0] == 0.1
 
 
 def test_numbers_of_another_model_of_the_structure():
-    ready, other = (system(hung(muscle("thelen_default", tendon_slack_length=x))) for x in (0.27, 0.28))
+    ready, other = (
+        system(hung(muscle("thelen_default", tendon_slack_length=x))) for x in (0.27, 0.28)
+    )
     y = [0.325, 0.1, 0.3, 0.1]
-    assert ready.equilibrated(0.0, y, other.numbers) == other.equilibrated(0.0, y) != ready.equilibrated(0.0, y)
+    assert (
+        ready.equilibrated(0.0, y, other.numbers)
+        == other.equilibrated(0.0, y)
+        != ready.equilibrated(0.0, y)
+    )
 
 
 @pytest.mark.parametrize(
@@ -150,7 +186,12 @@ def test_numbers_of_another_model_of_the_structure():
         ("thelen_default", "max_isometric_force", math.nan, "is not a finite number"),
         ("millard_damped", "maximum_pennation_angle", math.inf, "is not a finite number"),
         ("rigidtendon", "pennation_angle_at_optimal", math.inf, "is not a finite number"),
-        ("thelen_default", "ignore_tendon_compliance", True, "is true, which a Thelen2003Muscle cannot do"),
+        (
+            "thelen_default",
+            "ignore_tendon_compliance",
+            True,
+            "is true, which a Thelen2003Muscle cannot do",
+        ),
         ("thelen_default", "fv_linear_extrap_threshold", 0.7, "is not above 1 / Flen"),
         ("thelen_default", "min_control", 0.0, "is below its minimum_activation, 0.01"),
         ("thelen_default", "maximum_pennation_angle", 2.0, "is not from 0 to pi/2"),
@@ -194,13 +235,18 @@ def test_what_makes_a_muscle_impossible(case, name, value, words):
 
 
 def test_no_muscle_is_in_equilibrium_where_there_is_none():
-    ready = system(hung(PathActuator(name="mu", geometry_path=muscle("thelen_default").geometry_path)))
+    ready = system(
+        hung(PathActuator(name="mu", geometry_path=muscle("thelen_default").geometry_path))
+    )
     assert ready.equilibrated(0.0, [0.3, 0.0]) == [0.3, 0.0]
 
 
 @pytest.mark.parametrize(
     ("code", "words"),
-    [(None, "no equilibrium was found of"), (Checked("Python"), "cannot be computed: math range error")],
+    [
+        (None, "no equilibrium was found of"),
+        (Checked("Python"), "cannot be computed: math range error"),
+    ],
 )
 def test_an_equilibrium_beyond_all_numbers_is_none(code, words):
     ready = system(hung(muscle("thelen_default", optimal_fiber_length=1e-160)), code)
@@ -218,14 +264,18 @@ def test_activation_times_of_the_first_muscle_count_for_all():
     mechanism = build_mechanism(model)
 
     def rates(engine):
-        return dict(zip(engine.state.paths, engine.derivative(0.0, engine.state.default())[2:], strict=True))
+        return dict(
+            zip(engine.state.paths, engine.derivative(0.0, engine.state.default())[2:], strict=True)
+        )
 
     def made(**more):
         return CompiledEngine(mechanism, force_elements(model, mechanism, **more))
 
     before, path = made(), "/forceset/other/activation"
     assert (
-        rates(made(own_activation_times=True))[path] != rates(before)[path] == rates(before)["/forceset/mu/activation"]
+        rates(made(own_activation_times=True))[path]
+        != rates(before)[path]
+        == rates(before)["/forceset/mu/activation"]
     )
     renewal = before.renewal(model, Path())
     first.deactivation_time_constant = 0.02

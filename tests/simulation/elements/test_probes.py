@@ -35,17 +35,24 @@ from tests.simulation.test_force_elements import arm
 @pytest.fixture
 def model() -> Model:
     made = arm()
-    made.add(CoordinateActuator(name="motor", coordinate="q0"), BodyActuator(name="push", socket_body="/bodyset/b2"))
+    made.add(
+        CoordinateActuator(name="motor", coordinate="q0"),
+        BodyActuator(name="push", socket_body="/bodyset/b2"),
+    )
     return made
 
 
 def muscular(**more) -> Model:
     """A block on a muscle with a probe of all muscles, each by name."""
-    muscle = Thelen2003Muscle(name="mu", optimal_fiber_length=0.1, tendon_slack_length=0.2, geometry_path=line())
+    muscle = Thelen2003Muscle(
+        name="mu", optimal_fiber_length=0.1, tendon_slack_length=0.2, geometry_path=line()
+    )
     muscle.default_activation, muscle.default_fiber_length = 0.4, 0.1
     made = hung(muscle, (0.4, 0.4))
     made.find("/jointset/slide/x").default_value = 0.31
-    probe = Umberger2010MuscleMetabolicsProbe(name="used", report_total_metabolics_only=False, **more)
+    probe = Umberger2010MuscleMetabolicsProbe(
+        name="used", report_total_metabolics_only=False, **more
+    )
     parameter = Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter(name="mu")
     probe.metabolic_muscle_parameter_set.objects.append(parameter)
     made.add(probe)
@@ -102,8 +109,16 @@ def test_what_is_left_out(model, probe, message):
     [
         ("name", "nu", "of the muscle 'nu', which the model does not have"),
         ("density", -1.0, "of the muscle 'mu', whose density is not positive"),
-        ("use_provided_muscle_mass", True, "of the muscle 'mu', whose provided_muscle_mass is not positive"),
-        ("ratio_slow_twitch_fibers", 1.5, "of the muscle 'mu', whose ratio_slow_twitch_fibers is not 0 to 1"),
+        (
+            "use_provided_muscle_mass",
+            True,
+            "of the muscle 'mu', whose provided_muscle_mass is not positive",
+        ),
+        (
+            "ratio_slow_twitch_fibers",
+            1.5,
+            "of the muscle 'mu', whose ratio_slow_twitch_fibers is not 0 to 1",
+        ),
     ],
 )
 def test_metabolic_probes_that_opensim_switches_off(name, value, words):
@@ -150,7 +165,10 @@ def test_kernels_as_python(operation):
     model = muscular(probe_operation=operation)
     model.add(ActuatorPowerProbe(name="power", actuator_names=("all",), exponent=2.0))
     mechanism = build_mechanism(model)
-    systems = [System(mechanism, force_elements(model, mechanism), code=code) for code in (COMPILED, PYTHON)]
+    systems = [
+        System(mechanism, force_elements(model, mechanism), code=code)
+        for code in (COMPILED, PYTHON)
+    ]
     state = systems[0].state.default()
     first, second = (system.probe_results(0.3, state) for system in systems)
     assert [len(row) for row in first] == [3, 1]

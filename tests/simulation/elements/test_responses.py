@@ -29,18 +29,25 @@ STATES = 2
 def jets_of(kind: Any, given: tuple[Any, ...]) -> tuple[list[Any], list[int]]:
     """What a law was given, with jets for what its response is by, and the columns of these."""
     changed, count = kind.text.changed_outputs, len(kind.text.changed_outputs)
-    names = [*kind.text.input_names, "excitation", *(state.name for state in kind.states if state.given)]
+    names = [
+        *kind.text.input_names,
+        "excitation",
+        *(state.name for state in kind.states if state.given),
+    ]
     flat = [getattr(given[0], name) for name in names] if kind.together else [*given]
     none = np.zeros(count)
     for direction, place in enumerate(changed.values()):
         flat[place] = Jet(float(flat[place]), np.eye(count)[direction], 0.0, none)
     # Registers of formulas take jets.
     rest = [
-        part.astype(object) if isinstance(part, np.ndarray) else part for part in given[1 if kind.together else 0 :]
+        part.astype(object) if isinstance(part, np.ndarray) else part
+        for part in given[1 if kind.together else 0 :]
     ]
     if kind.together:
         return [given[0]._replace(**dict(zip(names, flat, strict=True))), *rest], [*changed]
-    return [flat[k] if isinstance(flat[k], Jet) else part for k, part in enumerate(rest)], [*changed]
+    return [flat[k] if isinstance(flat[k], Jet) else part for k, part in enumerate(rest)], [
+        *changed
+    ]
 
 
 @pytest.mark.parametrize("case", [*FORCE_NAMES, *CONFIGURATIONS])
@@ -80,13 +87,21 @@ def test_they_are_derivatives_of_the_law(case, monkeypatch):
             carried, columns = jets_of(kind, own)
             with _carried([kind.law]):
                 results = kind.law(*carried)
-            results = dict(zip(kind.outputs, results if isinstance(results, tuple) else (results,), strict=True))
-            for row, output in zip(slopes, (kind.geometry.along[0], *(s.rate for s in kind.states)), strict=False):
+            results = dict(
+                zip(
+                    kind.outputs, results if isinstance(results, tuple) else (results,), strict=True
+                )
+            )
+            for row, output in zip(
+                slopes, (kind.geometry.along[0], *(s.rate for s in kind.states)), strict=False
+            ):
                 result = results[output]
                 wanted = np.zeros(WIDTH)
                 if isinstance(result, Jet):
                     wanted[columns] = result.g
-                assert row == pytest.approx(wanted, rel=1e-9, abs=1e-9 * (1.0 + np.abs(wanted).max())), output
+                assert row == pytest.approx(
+                    wanted, rel=1e-9, abs=1e-9 * (1.0 + np.abs(wanted).max())
+                ), output
 
 
 def _noted(given: dict[str, Any], kind: Any, *own: Any) -> Any:
@@ -98,9 +113,19 @@ def responses(system: System, y: np.ndarray) -> dict[str, np.ndarray]:
     """The derivatives of each force, by the name of what finds them."""
     s, result = system.program.ints, {}
     for place, name in system.program.responses.items():
-        kernel = system.program.code.bound(name, s, system.numbers, system.work_vector, y, np.zeros(len(y)))
+        kernel = system.program.code.bound(
+            name, s, system.numbers, system.work_vector, y, np.zeros(len(y))
+        )
         if isinstance(system.program.code, Checked):
-            kernel = partial(pointers.call, int(s[place]), s, system.numbers, system.work_vector, y, np.zeros(len(y)))
+            kernel = partial(
+                pointers.call,
+                int(s[place]),
+                s,
+                system.numbers,
+                system.work_vector,
+                y,
+                np.zeros(len(y)),
+            )
         assert kernel(int(s[place + layout.RESPONSE.ITEM])) == OUTCOME.OK
         result[name] = np.array(system.work_vector[WORK.SCRATCH : WORK.SCRATCH + INVERSE])
     return result

@@ -149,6 +149,10 @@ def test_a_second_process_compiles_nothing(tmp_path):
     kept = {**os.environ, "OSIMLITE_KERNELS": "compiler", compiled_laws.FOLDER: str(tmp_path)}
     for compiler in ({}, {"CXX": "no-such-compiler"}):
         done = subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, env={**kept, **compiler}, check=False
+            [sys.executable, "-c", program],
+            capture_output=True,
+            text=True,
+            env={**kept, **compiler},
+            check=False,
         )
         assert done.stdout.split() == ["True", "False"], done.stderr

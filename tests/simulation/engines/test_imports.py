@@ -40,7 +40,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     arm.find("/jointset/slide/x").default_value = 0.33
     osimlite.write(arm, folder / "arm.osim")
     rows = "".join(f"0.{k} 0\n" for k in range(9))
-    (folder / "walker.mot").write_text(f"m\nversion=1\nnRows=9\nnColumns=2\nendheader\ntime Pelvis_tx\n{rows}")
+    (folder / "walker.mot").write_text(
+        f"m\nversion=1\nnRows=9\nnColumns=2\nendheader\ntime Pelvis_tx\n{rows}"
+    )
     (folder / "setup.xml").write_text(SETUP)
     return folder
 

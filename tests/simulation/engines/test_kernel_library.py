@@ -14,12 +14,17 @@ from osimlite.simulation.engines import kernel_library
 from osimlite.simulation.engines.kernel_library import KernelLibrary, load_library
 
 LIBRARY = load_library()
-needs_library = pytest.mark.skipif(LIBRARY is None, reason="osimlite was installed without a library of kernels")
+needs_library = pytest.mark.skipif(
+    LIBRARY is None, reason="osimlite was installed without a library of kernels"
+)
 
 
 @needs_library
 def test_every_law_is_in_the_library():
-    assert {*LIBRARY.table["laws"]} >= {*library_laws(), *library_laws(DIRECTIONS)} or LIBRARY.changed_files
+    assert {*LIBRARY.table["laws"]} >= {
+        *library_laws(),
+        *library_laws(DIRECTIONS),
+    } or LIBRARY.changed_files
 
 
 @needs_library

@@ -28,7 +28,9 @@ print(walk.summary["versions"]["engine"], walk.values[-1].tobytes().hex(), sep="
 def run_by(source):
     """Run the walk by one source of machine code; what ran it, and where the walker is at the end."""
     environment = {**os.environ, "OSIMLITE_KERNELS": source}
-    done = subprocess.run([sys.executable, "-c", WALK], capture_output=True, text=True, env=environment, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", WALK], capture_output=True, text=True, env=environment, check=False
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.split("\n")[:2]
 
@@ -40,12 +42,16 @@ def test_a_motion_is_the_same_to_the_last_bit_by_every_source(source):
     if source == "numba" and absent("numba"):
         pytest.skip("needs numba (extra 'jit')")
     python, library, other = run_by("python"), run_by(""), run_by(source)
-    assert python[0].startswith("Python") and other[0].startswith({"compiler": "C++", "numba": "numba"}[source])
+    assert python[0].startswith("Python") and other[0].startswith(
+        {"compiler": "C++", "numba": "numba"}[source]
+    )
     assert python[1] == library[1] == other[1]
 
 
 @pytest.mark.skipif(not has_machine_code(), reason="there is no machine code to compare with")
-@pytest.mark.parametrize("make", [dynamic_walker, lambda: hung(muscle("thelen_default"))], ids=["walker", "muscle"])
+@pytest.mark.parametrize(
+    "make", [dynamic_walker, lambda: hung(muscle("thelen_default"))], ids=["walker", "muscle"]
+)
 def test_derivatives_in_python_are_those_of_machine_code(make, monkeypatch):
     def linearize():
         model = osimlite.tangents(make())
@@ -54,4 +60,6 @@ def test_derivatives_in_python_are_those_of_machine_code(make, monkeypatch):
     machine = linearize()
     monkeypatch.setattr(tangents, "_code", lambda: linking.PythonTangents(tangents.DIRECTIONS))
     for one, other in zip(machine, linearize(), strict=True):
-        np.testing.assert_allclose(other, one, rtol=1e-12, atol=1e-12 * np.abs(one).max(initial=1.0))
+        np.testing.assert_allclose(
+            other, one, rtol=1e-12, atol=1e-12 * np.abs(one).max(initial=1.0)
+        )

@@ -92,11 +92,15 @@ def test_numba_compiles_what_the_compiler_refuses(sources):
 
 
 def test_without_any_source_the_law_is_named(sources):
-    with pytest.raises(CompilationError, match=r"'merson' is in no library.*neither a C\+\+ compiler nor numba"):
+    with pytest.raises(
+        CompilationError, match=r"'merson' is in no library.*neither a C\+\+ compiler nor numba"
+    ):
         machine_code.make_ready(["merson"])
 
 
-@pytest.mark.parametrize(("only", "address"), [("library", 100), ("compiler", 200), ("numba", 300), ("python", None)])
+@pytest.mark.parametrize(
+    ("only", "address"), [("library", 100), ("compiler", 200), ("numba", 300), ("python", None)]
+)
 def test_one_source_can_be_asked_for(sources, only, address):
     for add in (add_library, add_compiler, add_numba):
         add(sources)
@@ -126,7 +130,10 @@ def test_an_unknown_source_is_refused(sources):
 @pytest.mark.parametrize(
     ("adds", "words"),
     [
-        ((add_library, add_compiler), ["compiled library", "target baseline", "clang version 14", "g++ 12"]),
+        (
+            (add_library, add_compiler),
+            ["compiled library", "target baseline", "clang version 14", "g++ 12"],
+        ),
         ((add_library,), ["compiled library", "with an edited kernel", "thousand times slower"]),
         ((add_compiler,), ["without a library", "each kernel is compiled at first use by g++ 12"]),
         ((add_numba,), ["without a library", "no C++ compiler", "by numba, without derivatives"]),
@@ -144,14 +151,20 @@ def test_what_runs_is_explained(sources, adds, words):
 def test_a_library_of_older_sources_is_reported(sources):
     add_library(sources)
     sources.setattr(Library, "changed_files", ["kernels/dynamics.py"])
-    assert any("1 of its source files" in line and "pip install -e ." in line for line in machine_code.explain_source())
+    assert any(
+        "1 of its source files" in line and "pip install -e ." in line
+        for line in machine_code.explain_source()
+    )
 
 
 def test_python_takes_over_with_one_warning(sources, caplog):
     for _ in range(2):
         assert linking.best() is linking.PYTHON
     (message,) = caplog.messages
-    assert "run as Python, some thousand times slower" in message and "numba is not installed" in message
+    assert (
+        "run as Python, some thousand times slower" in message
+        and "numba is not installed" in message
+    )
 
 
 def test_one_edited_law_without_compiler_has_all_run_as_python(sources, caplog):

@@ -23,26 +23,41 @@ class Bullet:
 
         self.pb, self.client = pybullet, client
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE
-        self.body = pybullet.loadURDF(str(path), useFixedBase=True, flags=flags, physicsClientId=client)
-        infos = [pybullet.getJointInfo(self.body, k, client) for k in range(pybullet.getNumJoints(self.body, client))]
+        self.body = pybullet.loadURDF(
+            str(path), useFixedBase=True, flags=flags, physicsClientId=client
+        )
+        infos = [
+            pybullet.getJointInfo(self.body, k, client)
+            for k in range(pybullet.getNumJoints(self.body, client))
+        ]
         self.joints = {info[1].decode(): info for info in infos}
         self.links = {info[12].decode(): info[0] for info in infos}
         for k in range(len(infos)):
             pybullet.changeDynamics(
-                self.body, k, linearDamping=0, angularDamping=0, jointDamping=0, physicsClientId=client
+                self.body,
+                k,
+                linearDamping=0,
+                angularDamping=0,
+                jointDamping=0,
+                physicsClientId=client,
             )
             if infos[k][2] != pybullet.JOINT_FIXED:
-                pybullet.setJointMotorControl2(self.body, k, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
+                pybullet.setJointMotorControl2(
+                    self.body, k, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client
+                )
 
     def set(self, values: dict[str, float], rates: dict[str, float] | None = None) -> None:
         for name, value in values.items():
             rate = (rates or {}).get(name, 0.0)
-            self.pb.resetJointState(self.body, self.joints[name][0], value, rate, physicsClientId=self.client)
+            self.pb.resetJointState(
+                self.body, self.joints[name][0], value, rate, physicsClientId=self.client
+            )
 
     def inertial_frame(self, link: str) -> Array:
         """Mass centre and principal axes of a link in the root (4, 4).
 
-        Bullet keeps these in double precision; the link frames that it reports passed through single precision.
+        Bullet keeps these in double precision; the link frames that it reports passed through
+        single precision.
         """
         state = self.pb.getLinkState(
             self.body, self.links[link], computeForwardKinematics=1, physicsClientId=self.client
@@ -55,9 +70,12 @@ class Bullet:
         by_place = {info[3]: name for name, info in self.joints.items()}
         inside = [by_place[place] for place in moving]
         values = [
-            self.pb.getJointState(self.body, self.joints[name][0], physicsClientId=self.client)[0] for name in inside
+            self.pb.getJointState(self.body, self.joints[name][0], physicsClientId=self.client)[0]
+            for name in inside
         ]
-        matrix = np.array(self.pb.calculateMassMatrix(self.body, values, physicsClientId=self.client))
+        matrix = np.array(
+            self.pb.calculateMassMatrix(self.body, values, physicsClientId=self.client)
+        )
         order = [inside.index(name) for name in names]
         return matrix[np.ix_(order, order)]
 
@@ -105,7 +123,9 @@ def mujoco_poses(text: str, values: dict[str, float]) -> tuple[dict[str, Array],
     """Pose of every link that moves in the root (4, 4), and the sum of their masses, by MuJoCo."""
     mujoco = pytest.importorskip("mujoco")
     # MuJoCo makes one body of links that do not move relative to each other, unless told otherwise.
-    model = mujoco.MjModel.from_xml_string(text.replace("<compiler ", '<compiler fusestatic="false" '))
+    model = mujoco.MjModel.from_xml_string(
+        text.replace("<compiler ", '<compiler fusestatic="false" ')
+    )
     data = mujoco.MjData(model)
     for name, value in values.items():
         data.qpos[model.joint(name).qposadr[0]] = value

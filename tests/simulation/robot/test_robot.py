@@ -69,7 +69,10 @@ def test_links_stand_where_the_bodies_stand(case: Case):
 
 @given(cases())
 def test_links_carry_the_masses_of_the_bodies(case: Case):
-    for robot in (build_robot(case.mechanism), merge_fixed(build_robot(case.mechanism, body_frames=False))):
+    for robot in (
+        build_robot(case.mechanism),
+        merge_fixed(build_robot(case.mechanism, body_frames=False)),
+    ):
         links, bodies = _momenta(robot, case)
         assert np.abs(links - bodies).max() <= 1e-9 * np.abs(bodies).max()
 
@@ -77,7 +80,11 @@ def test_links_carry_the_masses_of_the_bodies(case: Case):
 def _momenta(robot: Robot, case: Case):
     """Mass, first and second moments about ground's origin: of the links, and of the bodies."""
     placed, bodies = robot.link_transforms(case.q), case.mechanism.body_transforms(case.q)
-    links = [(placed[link.name], link.mass, link.center, link.inertia) for link in robot.links if link.name != WORLD]
+    links = [
+        (placed[link.name], link.mass, link.center, link.inertia)
+        for link in robot.links
+        if link.name != WORLD
+    ]
     # What is welded to ground has no mass in the merged robot.
     parts = [
         (bodies[body.name], p.mass, p.center, p.inertia)
@@ -92,14 +99,24 @@ def _sum(parts):
     total = np.zeros(13)
     for matrix, mass, center, inertia in parts:
         turn, arm = matrix[:3, :3], matrix[:3, :3] @ center + matrix[:3, 3]
-        total += np.concatenate(([mass], mass * arm, (turn @ inertia @ turn.T - mass * skew(arm) @ skew(arm)).ravel()))
+        total += np.concatenate(
+            ([mass], mass * arm, (turn @ inertia @ turn.T - mass * skew(arm) @ skew(arm)).ravel())
+        )
     return total
 
 
 def test_a_chain_is_named_after_its_coordinates():
     robot = build_robot(walker())
     names = [joint.name for joint in robot.moving]
-    assert names == ["Pelvis_tx", "Pelvis_ty", "Pelvis_rz", "RHip_rz", "LHip_rz", "RKnee_rz", "LKnee_rz"]
+    assert names == [
+        "Pelvis_tx",
+        "Pelvis_ty",
+        "Pelvis_rz",
+        "RHip_rz",
+        "LHip_rz",
+        "RKnee_rz",
+        "LKnee_rz",
+    ]
     for index, joint in robot.joint_of.items():
         assert joint.name == robot.mechanism.coordinates[index].name
 
@@ -135,7 +152,11 @@ def test_links_between_joints_are_massless_and_no_leaf_is_made_massless():
 
 
 def test_planar_joint_translates_in_the_parent_before_it_turns():
-    chain = [joint for joint in build_robot(walker()).joints if joint.source == "/jointset/PelvisToPlatform"]
+    chain = [
+        joint
+        for joint in build_robot(walker()).joints
+        if joint.source == "/jointset/PelvisToPlatform"
+    ]
     assert [(joint.kind, joint.axis.tolist()) for joint in chain] == [
         ("prismatic", [1.0, 0.0, 0.0]),
         ("prismatic", [0.0, 1.0, 0.0]),
@@ -182,14 +203,18 @@ def test_what_is_constant_in_a_function_goes_into_the_origin():
 
 
 def test_ranges_become_limits_on_demand():
-    axes = [TransformAxis((0,), (1.0, 0.0, 0.0), Linear(1.0)), TransformAxis((0,), (0.0, 1.0, 0.0), Linear(-0.5))]
+    axes = [
+        TransformAxis((0,), (1.0, 0.0, 0.0), Linear(1.0)),
+        TransformAxis((0,), (0.0, 1.0, 0.0), Linear(-0.5)),
+    ]
     robot = build_robot(one_body(custom(axes, ()), 1))
     assert [joint.limits for joint in robot.moving] == [None, None]
     assert [joint.limits for joint in range_limits(robot).moving] == [(-1.0, 2.0), (-1.0, 0.5)]
 
 
 @pytest.mark.parametrize(
-    ("name", "fit"), [("hip r", "hip_r"), ("7th", "_7th"), ("ü/a", "__a"), ("a.b-c", "a.b-c"), ("", "_")]
+    ("name", "fit"),
+    [("hip r", "hip_r"), ("7th", "_7th"), ("ü/a", "__a"), ("a.b-c", "a.b-c"), ("", "_")],
 )
 def test_names_are_made_legal(name, fit):
     assert legal(name) == fit

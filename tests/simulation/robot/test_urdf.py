@@ -154,7 +154,10 @@ def _after_one_step(robot: Robot, q, u) -> float:
         bullet.pb.stepSimulation(physicsClientId=bullet.client)
         wanted = u + step * mechanism.acceleration(q, u)
         return max(
-            abs(bullet.pb.getJointState(bullet.body, bullet.joints[joint.name][0], bullet.client)[1] - wanted[index])
+            abs(
+                bullet.pb.getJointState(bullet.body, bullet.joints[joint.name][0], bullet.client)[1]
+                - wanted[index]
+            )
             for index, joint in robot.joint_of.items()
         )
 
@@ -162,19 +165,28 @@ def _after_one_step(robot: Robot, q, u) -> float:
 def test_sliding_joints_have_limits():
     """Bullet refuses a prismatic joint without <limit>."""
     text = urdf_text(build_robot(walker()))
-    sliding = [j for j in ElementTree.fromstring(text).iterfind("joint") if j.get("type") == "prismatic"]
+    sliding = [
+        j for j in ElementTree.fromstring(text).iterfind("joint") if j.get("type") == "prismatic"
+    ]
     assert len(sliding) == 2
     for joint in sliding:
         limit = joint.find("limit")
         assert limit is not None
-        assert (float(limit.get("lower", "")), float(limit.get("upper", ""))) == (-UNLIMITED, UNLIMITED)
+        assert (float(limit.get("lower", "")), float(limit.get("upper", ""))) == (
+            -UNLIMITED,
+            UNLIMITED,
+        )
     with in_bullet(text) as bullet:
         assert bullet.joints["Pelvis_tx"][2] == bullet.pb.JOINT_PRISMATIC
 
 
 def test_only_joints_of_one_axis_are_used():
     """Bullet's planar and floating joints cannot be set."""
-    kinds = [kind for robot in robots() for kind in re.findall(r'<joint .*type="(\w+)"', urdf_text(robot))]
+    kinds = [
+        kind
+        for robot in robots()
+        for kind in re.findall(r'<joint .*type="(\w+)"', urdf_text(robot))
+    ]
     assert len(kinds) == sum(len(robot.joints) for robot in robots())
     assert set(kinds) == {"fixed", "continuous", "prismatic"}
 
@@ -234,14 +246,22 @@ def test_a_joint_that_follows_another_says_so():
 
 
 def test_numbers_are_the_shortest_that_read_back():
-    for value, text in ((0.1, "0.1"), (1.0, "1"), (-0.0, "0"), (1e-7, "1e-07"), (1 / 3, "0.3333333333333333")):
+    for value, text in (
+        (0.1, "0.1"),
+        (1.0, "1"),
+        (-0.0, "0"),
+        (1e-7, "1e-07"),
+        (1 / 3, "0.3333333333333333"),
+    ):
         assert number(value) == text and float(text) == value
 
 
 def test_names_need_no_escape_but_files_do():
     robot = build_robot(walker())
     visual = Visual(MeshFile('meshes/a "b" <c> & d.obj'), np.eye(4))
-    robot = dataclasses.replace(robot, links=(dataclasses.replace(robot.links[0], visuals=(visual,)), *robot.links[1:]))
+    robot = dataclasses.replace(
+        robot, links=(dataclasses.replace(robot.links[0], visuals=(visual,)), *robot.links[1:])
+    )
     root = ElementTree.fromstring(urdf_text(robot))
     mesh = root.find("link/visual/geometry/mesh")
     assert mesh is not None and mesh.get("filename") == 'meshes/a "b" <c> & d.obj'

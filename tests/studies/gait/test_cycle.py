@@ -47,7 +47,9 @@ def test_the_steady_walker_walks_in_a_stable_cycle(steady):
     (walk,) = walk_many(steady.engine, steady.start[None], 20.0, accuracy=1e-8)
     first, *_, last = walk.steps
     x = steady.names.index("Pelvis_tx")
-    assert cycle.speed == pytest.approx((last.state[x] - first.state[x]) / (last.time - first.time), rel=1e-4)
+    assert cycle.speed == pytest.approx(
+        (last.state[x] - first.state[x]) / (last.time - first.time), rel=1e-4
+    )
     assert cycle.largest == pytest.approx(0.5659, abs=2e-3) and cycle.largest < 0.6
     assert len(cycle.multipliers) == 11 and cycle.neutral == 3
     # Along the motion itself the section has no extent.
@@ -58,14 +60,18 @@ def test_a_walker_comes_back_as_the_derivative_says(steady):
     """Near the cycle the map is its derivative, whose eigenvalues are the multipliers."""
     step_map, cycle = steady.step_map, steady.cycle
     slope = step_matrix(step_map, cycle.state)
-    assert np.sort(np.abs(np.linalg.eigvals(slope))) == pytest.approx(np.sort(np.abs(cycle.multipliers)))
+    assert np.sort(np.abs(np.linalg.eigvals(slope))) == pytest.approx(
+        np.sort(np.abs(cycle.multipliers))
+    )
     away = np.random.default_rng(1).normal(0.0, 3e-6, 11)
     y, expected = (cycle.state + step_map.basis @ away)[None], away
     for _ in range(8):
         y, expected = step_map(y).states, slope @ expected
         result = step_map.reduce(y[0]) - step_map.reduce(cycle.state)
         # The push grows a hundredfold before it dies away, and may pass near zero on the way.
-        assert np.linalg.norm(result - expected) < 0.01 * np.linalg.norm(expected) + 0.1 * np.linalg.norm(away)
+        assert np.linalg.norm(result - expected) < 0.01 * np.linalg.norm(
+            expected
+        ) + 0.1 * np.linalg.norm(away)
 
 
 def test_neutral_directions_are_the_slope_and_the_turn_of_the_pelvis(steady):
@@ -75,7 +81,11 @@ def test_neutral_directions_are_the_slope_and_the_turn_of_the_pelvis(steady):
     tilt = np.pi / 2 - 1.57
     along[[place("Pelvis_tx"), place("Pelvis_ty")]] = np.cos(tilt), np.sin(tilt)
     for row, first in ((turned, 0), (spun, n)):
-        row[[first + place("Pelvis_rz"), first + place("RHip_rz"), first + place("LHip_rz")]] = 1.0, -1.0, -1.0
+        row[[first + place("Pelvis_rz"), first + place("RHip_rz"), first + place("LHip_rz")]] = (
+            1.0,
+            -1.0,
+            -1.0,
+        )
     neutral = steady.step_map.neutral
     for direction in (along, turned, spun):
         inside = neutral @ (neutral.T @ direction)
@@ -115,20 +125,30 @@ def test_perturbed_starts_stand_as_deep_as_before(steady):
     starts = perturbed(steady.step_map, steady.start, 0.05, 8, 3)
     assert np.array_equal(starts, perturbed(steady.step_map, steady.start, 0.05, 8, 3))
     place = steady.engine.contacts.index("RFootForce")
-    before, after = (along_slope(steady.engine, np.atleast_2d(rows))[1][:, place] for rows in (steady.start, starts))
+    before, after = (
+        along_slope(steady.engine, np.atleast_2d(rows))[1][:, place]
+        for rows in (steady.start, starts)
+    )
     assert after == pytest.approx(np.full(8, before[0]), abs=1e-9)
     assert len(walks_from(steady.step_map, steady.cycle, starts, 3)) == 8
 
 
 def test_a_basin_has_the_cycle_in_its_middle(steady):
-    basin = find_basin(steady.step_map, steady.cycle, "RHip_rz/speed", "LHip_rz", reach=0.02, grid=3, wanted=5)
+    basin = find_basin(
+        steady.step_map, steady.cycle, "RHip_rz/speed", "LHip_rz", reach=0.02, grid=3, wanted=5
+    )
     assert basin.steps.shape == (3, 3) and basin.steps[1, 1] == 5
     assert basin.x.label == "speed of RHip_rz (rad/s)" and basin.y.label == "LHip_rz (rad)"
     assert basin.center == pytest.approx((basin.x.values[1], basin.y.values[1]))
     with pytest.raises(OsimliteError, match="locked"):
         find_basin(steady.step_map, steady.cycle, "platform_rz", grid=3)
-    other = find_basin(steady.step_map, steady.cycle, y="RHip_rz/speed", reach=0.02, grid=2, wanted=2)
-    assert (other.x.label, other.y.label) == ("speed of LHip_rz (rad/s)", "speed of RHip_rz (rad/s)")
+    other = find_basin(
+        steady.step_map, steady.cycle, y="RHip_rz/speed", reach=0.02, grid=2, wanted=2
+    )
+    assert (other.x.label, other.y.label) == (
+        "speed of LHip_rz (rad/s)",
+        "speed of RHip_rz (rad/s)",
+    )
 
 
 def test_the_human_walker_walks_from_two_digits():
@@ -144,7 +164,10 @@ def test_the_human_walker_walks_from_two_digits():
 
 def test_the_steady_walker_differs_in_two_properties():
     """Besides its start, the way that is ready for it, and its name."""
-    theirs, ours = ({part.path: part for part in model.components()} for model in (dynamic_walker(), steady_walker()))
+    theirs, ours = (
+        {part.path: part for part in model.components()}
+        for model in (dynamic_walker(), steady_walker())
+    )
     assert theirs.keys() == ours.keys()
     start = {"default_value", "default_speed_value", "range", "half_lengths", "name"}
     changed = set()
@@ -160,7 +183,10 @@ def test_the_steady_walker_differs_in_two_properties():
 
 
 def test_who_makes_no_step_has_no_map():
-    with Simulation(dynamic_walker(), "compiled") as simulation, pytest.raises(OsimliteError, match="makes no step"):
+    with (
+        Simulation(dynamic_walker(), "compiled") as simulation,
+        pytest.raises(OsimliteError, match="makes no step"),
+    ):
         StepMap(simulation.engine, simulation.initial_state({}, {}))
 
 
@@ -176,7 +202,11 @@ def test_the_command(tmp_path, monkeypatch):
     assert facts["cycle"]["step_length_m"] == pytest.approx(0.624382, abs=1e-6)
     assert len((tmp_path / "basin.csv").read_text().splitlines()) == 5
     (tmp_path / "basin.png").write_bytes(b"of an earlier walk")
-    done = CliRunner().invoke(app(["gait"]), ["gait", "steady-walker", "--to", "5", "-o", str(tmp_path)])
+    done = CliRunner().invoke(
+        app(["gait"]), ["gait", "steady-walker", "--to", "5", "-o", str(tmp_path)]
+    )
     assert done.exit_code == 0 and [each.name for each in tmp_path.iterdir()] == ["gait.json"]
     done = CliRunner().invoke(app(["gait"]), ["gait", "dynamic-walker"])
-    assert done.exit_code == 1 and "0 steps, 1 scuff" in done.output and "makes no step" in done.output
+    assert (
+        done.exit_code == 1 and "0 steps, 1 scuff" in done.output and "makes no step" in done.output
+    )

@@ -35,7 +35,10 @@ NEAR = {
     INERTIA: (0.085, 0.1),
     AHEAD: (0.065, 0.085),
     **{name: (STEADY_START[name][0] - 0.1, STEADY_START[name][0] + 0.1) for name in JOINTS},
-    **{f"{name}/speed": (STEADY_START[name][1] - 0.4, STEADY_START[name][1] + 0.4) for name in JOINTS},
+    **{
+        f"{name}/speed": (STEADY_START[name][1] - 0.4, STEADY_START[name][1] + 0.4)
+        for name in JOINTS
+    },
 }
 FEW = {"samples": 256, "tries": 3, "enough": 1, "budget": 4}
 
@@ -44,7 +47,9 @@ FEW = {"samples": 256, "tries": 3, "enough": 1, "budget": 4}
 def found(tmp_path_factory):
     folder = tmp_path_factory.mktemp("found")
     stages = []
-    gait = find_gait(plan(dynamic_walker(), NEAR), folder, **FEW, stage=lambda *words: stages.append(words))
+    gait = find_gait(
+        plan(dynamic_walker(), NEAR), folder, **FEW, stage=lambda *words: stages.append(words)
+    )
     return gait, folder, stages
 
 
@@ -53,20 +58,35 @@ def test_a_walker_is_found_that_never_stops(found):
     gait, folder, stages = found
     assert gait.found.cycle.residual < 1e-9 and gait.found.cycle.largest < 1.0
     assert gait.walk.walks and len(gait.walk.steps) > 50 and not gait.walk.scuffs
-    assert sorted({title for title, _, _ in stages}) == ["closing cycles", "making it stable", "random walkers"]
+    assert sorted({title for title, _, _ in stages}) == [
+        "closing cycles",
+        "making it stable",
+        "random walkers",
+    ]
     with Simulation(read(folder / "best.osim"), "compiled") as simulation:
         cycle = find_cycle(StepMap(simulation.engine, simulation.initial_state({}, {})))
     assert cycle.largest == pytest.approx(gait.found.cycle.largest, abs=1e-2)
-    assert (cycle.length, cycle.period) == pytest.approx((gait.found.cycle.length, gait.found.cycle.period), rel=1e-7)
+    assert (cycle.length, cycle.period) == pytest.approx(
+        (gait.found.cycle.length, gait.found.cycle.period), rel=1e-7
+    )
 
 
 @pytest.mark.full
 def test_only_the_numbers_that_may_change_do_and_have_few_digits(found):
     gait, folder, _ = found
     before, after = dynamic_walker(), read(folder / "best.osim")
-    assert {name: float(f"{number:.3g}") for name, number in gait.found.numbers.items()} == gait.found.numbers
+    assert {
+        name: float(f"{number:.3g}") for name, number in gait.found.numbers.items()
+    } == gait.found.numbers
     for body in ("LeftShank", "RightShank"):
-        assert after[f"/bodyset/{body}"].inertia == (1.0, 1.0, gait.found.numbers[INERTIA], 0.0, 0.0, 0.0)
+        assert after[f"/bodyset/{body}"].inertia == (
+            1.0,
+            1.0,
+            gait.found.numbers[INERTIA],
+            0.0,
+            0.0,
+            0.0,
+        )
         before[f"/bodyset/{body}"].inertia = after[f"/bodyset/{body}"].inertia
     for side in "LR":
         sphere = f"/contactgeometryset/{side}FootContact"
@@ -85,7 +105,9 @@ def test_the_files_tell_what_was_found_and_how(found):
     assert summary["numbers"] == gait.found.numbers and summary["settings"]["seed"] == 0
     assert summary["largest_multiplier"] == gait.found.cycle.largest
     heads, *rows = (folder / "cycles.csv").read_text().splitlines()
-    assert heads.split(",")[:3] == [INERTIA, AHEAD, "largest_multiplier"] and len(rows) == gait.cycles
+    assert (
+        heads.split(",")[:3] == [INERTIA, AHEAD, "largest_multiplier"] and len(rows) == gait.cycles
+    )
 
 
 @pytest.mark.full
@@ -127,7 +149,9 @@ def test_settings_are_checked_before_the_search(said, choice, tmp_path):
 
 def test_what_cannot_be_searched_leaves_no_folder(tmp_path):
     model = dynamic_walker()
-    model.add(PointConstraint(name="held", socket_body_1="/ground", socket_body_2="/bodyset/Pelvis"))
+    model.add(
+        PointConstraint(name="held", socket_body_1="/ground", socket_body_2="/bodyset/Pelvis")
+    )
     with pytest.raises(UnsupportedError, match="some of which /constraintset/held takes away"):
         find_gait(plan(model, NEAR), tmp_path / "new", **FEW)
     (tmp_path / "file").write_text("mine")
@@ -153,22 +177,30 @@ def test_more_of_them_walk_where_a_cycle_costs_less():
 def test_rounded_numbers_have_no_noise_in_the_last_bit():
     search = CycleSearch(plan(dynamic_walker(), NEAR | {INERTIA: (0.02, 1.0, "log")}))
     for inertia in (0.0894, 0.0673, 0.112, 0.33):
-        numbers = search.numbers(search.rounded(search.fractions({INERTIA: inertia, AHEAD: 0.0694}), 3))
+        numbers = search.numbers(
+            search.rounded(search.fractions({INERTIA: inertia, AHEAD: 0.0694}), 3)
+        )
         assert numbers == {INERTIA: inertia, AHEAD: 0.0694}
 
 
 def test_random_walkers_do_not_depend_on_the_numbers_that_are_searched():
     """Not by a rounding either: a search from the walker that it found before finds it again."""
-    ranges = {"slope": (2.0, 3.5), "foot_radius": (0.1, 0.2)} | {name: (-0.3, 0.3) for name in JOINTS}
+    ranges = {"slope": (2.0, 3.5), "foot_radius": (0.1, 0.2)} | {
+        name: (-0.3, 0.3) for name in JOINTS
+    }
     found = []
     for slope, radius in ((2.7, 0.1), (3.1, 0.17)):
         given = {"slope": slope, "foot_radius": radius}
-        made = plan(lambda numbers, given=given: human_walker(**(given | numbers)), ranges, parameters=given)
+        made = plan(
+            lambda numbers, given=given: human_walker(**(given | numbers)), ranges, parameters=given
+        )
         found.append(CycleSearch(made).candidates(512, 0))
     assert len(found[0]) > 3
     assert [each.miss for each in found[0]] == [each.miss for each in found[1]]
     for one, other in zip(*found, strict=True):
-        assert np.array_equal(one.state, other.state) and np.array_equal(one.fractions, other.fractions)
+        assert np.array_equal(one.state, other.state) and np.array_equal(
+            one.fractions, other.fractions
+        )
 
 
 class Valley:
@@ -229,7 +261,15 @@ def test_walkers_that_only_fall_are_told_of(tmp_path):
 
 def test_the_command_writes_a_walker(tmp_path):
     words = [f"--vary={name}={low!r}:{high!r}" for name, (low, high) in NEAR.items()]
-    options = ["--samples=256", "--tries=3", "--enough=1", "--budget=0", "--start-digits=4", "-o", str(tmp_path)]
+    options = [
+        "--samples=256",
+        "--tries=3",
+        "--enough=1",
+        "--budget=0",
+        "--start-digits=4",
+        "-o",
+        str(tmp_path),
+    ]
     done = CliRunner().invoke(app(["find-gait"]), ["find-gait", "dynamic-walker", *words, *options])
     assert "largest multiplier" in done.output and done.exit_code in (0, 1)
     start = json.loads((tmp_path / "summary.json").read_text())["start"]

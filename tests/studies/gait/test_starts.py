@@ -54,7 +54,11 @@ def test_a_planted_foot_touches_and_rests(walker, states, slope):
     before, after = (walker.contact_places(moved, numbers, which) for moved in (placed, later))
     moved = (after - before)[:, feet, 6:]
     assert np.linalg.norm(moved[rows, depths.argmax(axis=1)], axis=1).max() < 20 * dt**2
-    others = [k for k in range(2 * n) if k not in places_of(walker, "Pelvis_ty") and k - n not in range(1, 3)]
+    others = [
+        k
+        for k in range(2 * n)
+        if k not in places_of(walker, "Pelvis_ty") and k - n not in range(1, 3)
+    ]
     assert (placed[:, others] == states[:, others]).all()
 
 

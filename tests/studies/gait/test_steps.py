@@ -26,11 +26,15 @@ def engine():
 
 def start_of(engine) -> np.ndarray:
     infos = engine.mechanism.coordinates
-    return np.array(engine.state.pack([i.default_value for i in infos], [i.default_speed for i in infos]))
+    return np.array(
+        engine.state.pack([i.default_value for i in infos], [i.default_speed for i in infos])
+    )
 
 
 def test_feet_are_found_by_structure(engine):
-    assert find_footing(engine) == FootContacts(FEET, ("RHipForce", "LHipForce", "RKneeForce", "LKneeForce"))
+    assert find_footing(engine) == FootContacts(
+        FEET, ("RHipForce", "LHipForce", "RKneeForce", "LKneeForce")
+    )
 
 
 def test_names_decide_nothing_where_the_structure_does():
@@ -59,7 +63,10 @@ def test_a_model_without_legs_says_so():
     model = dynamic_walker()
     for force in list(model.components(HuntCrossleyForce)):
         force.appliesForce = force.name in ("RHipForce", "LHipForce")
-    with Simulation(model, "compiled") as simulation, pytest.raises(OsimliteError, match=r"of 1 leg .*--foot"):
+    with (
+        Simulation(model, "compiled") as simulation,
+        pytest.raises(OsimliteError, match=r"of 1 leg .*--foot"),
+    ):
         find_footing(simulation.engine)
 
 
@@ -82,7 +89,9 @@ def test_places_along_the_slope(engine):
     angle = np.pi / 2 - 1.57  # the exercise's plane is that much off the platform
     assert along[1] - along[0] == pytest.approx(np.full(6, 0.25 * np.cos(angle)), abs=1e-12)
     assert depth[1] - depth[0] == pytest.approx(np.full(6, 0.25 * np.sin(angle)), abs=1e-12)
-    plane = next(g for g in dynamic_walker().components(ContactGeometry) if g.name == "PlatformContact")
+    plane = next(
+        g for g in dynamic_walker().components(ContactGeometry) if g.name == "PlatformContact"
+    )
     ty = one[engine.order.index(engine.mechanism.coordinate_index("Pelvis_ty"))]
     hip = 0.05 - (ty - plane.location[1]) * np.cos(angle)
     assert depth[0, :2] == pytest.approx([hip, hip], abs=1e-12)
@@ -92,7 +101,12 @@ def follow(events, along, touching=(False, False)) -> Walk:
     contacts = ["RFootForce", "LFootForce", "RHipForce"]
     states = np.arange(len(events), dtype=float)[:, None]
     return steps.follow(
-        FootContacts(FEET, ("RHipForce",)), contacts, events, states, np.array(along), np.array((*touching, False))
+        FootContacts(FEET, ("RHipForce",)),
+        contacts,
+        events,
+        states,
+        np.array(along),
+        np.array((*touching, False)),
     )
 
 
@@ -114,7 +128,11 @@ def test_what_is_a_step():
             (1.5, "fall: RHipForce", True),
             (1.6, left, True),
         ],
-        [[0.0, 0.0, 0]] + [[0.0, 0.3, 0]] * 4 + [[0.34, 0.3, 0]] * 2 + [[0.7, 0.3, 0]] * 3 + [[0.9, 0.3, 0]] * 3,
+        [[0.0, 0.0, 0]]
+        + [[0.0, 0.3, 0]] * 4
+        + [[0.34, 0.3, 0]] * 2
+        + [[0.7, 0.3, 0]] * 3
+        + [[0.9, 0.3, 0]] * 3,
         touching=(True, True),
     )
     assert [(s.time, s.foot) for s in walk.steps] == [(0.5, 1), (1.2, 0)]
@@ -127,7 +145,13 @@ def test_what_is_a_step():
 
 
 def test_a_heel_and_a_toe_are_one_foot():
-    events = [(0.1, "heel", True), (0.2, "toe", True), (0.5, "heel", False), (0.6, "toe", False), (0.9, "heel", True)]
+    events = [
+        (0.1, "heel", True),
+        (0.2, "toe", True),
+        (0.5, "heel", False),
+        (0.6, "toe", False),
+        (0.9, "heel", True),
+    ]
     footing = FootContacts((("heel", "toe"), ("other",)), ())
     walk = steps.follow(
         footing,

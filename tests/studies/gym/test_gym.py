@@ -30,7 +30,11 @@ def test_gymnasium_finds_nothing_wrong(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "count", "integrator"),
-    [("Arm-v0", 64, "merson"), ("Walk2D-v0", 6, "merson"), *(("Arm-v0", 5, name) for name in INTEGRATORS)],
+    [
+        ("Arm-v0", 64, "merson"),
+        ("Walk2D-v0", 6, "merson"),
+        *(("Arm-v0", 5, name) for name in INTEGRATORS),
+    ],
 )
 def test_copies_are_single_environments_bit_for_bit(name: str, count: int, integrator: str) -> None:
     """Through episodes that end and begin anew, beside another environment of the same model."""
@@ -85,7 +89,11 @@ def test_copies_begin_anew_after_their_episodes() -> None:
         if number == 200:
             assert late.all()
         elif number == 201:
-            assert not late.any() and (rewards == 0.0).all() and np.abs(observations[:, 0] - 0.5).max() < 0.11
+            assert (
+                not late.any()
+                and (rewards == 0.0).all()
+                and np.abs(observations[:, 0] - 0.5).max() < 0.11
+            )
         else:
             assert not late.any() and (rewards != 0.0).all()
     many.close()
@@ -103,12 +111,18 @@ def test_any_model_has_a_task(tmp_path) -> None:
         hidden=("pelvis_tx",),
         seconds=0.05,
     ).unwrapped
-    assert "pelvis_tx" not in env.labels and "soleus_r/activation" in env.labels and len(env.controls) == 16
+    assert (
+        "pelvis_tx" not in env.labels
+        and "soleus_r/activation" in env.labels
+        and len(env.controls) == 16
+    )
     env.reset(seed=1)
     ends = [env.step(np.full(16, 0.02, dtype=np.float32))[3] for _ in range(5)]
     assert ends == [False] * 4 + [True]
     with pytest.raises(OsimliteError, match="no actuators"):
-        gymnasium.make("osimlite/Model-v0", model=furthest_walker(), reward=lambda before, after: 0.0)
+        gymnasium.make(
+            "osimlite/Model-v0", model=furthest_walker(), reward=lambda before, after: 0.0
+        )
     with pytest.raises(gymnasium.error.Error, match="give a task"):
         gymnasium.make("osimlite/Model-v0")
 
@@ -128,10 +142,14 @@ def test_what_an_environment_does_not_know_is_refused(choices, words) -> None:
 
 
 def test_a_task_can_be_another_in_parts() -> None:
-    env = gymnasium.make("osimlite/Arm-v0", seconds=0.02, reward=lambda before, after: np.full(1, 7.0)).unwrapped
+    env = gymnasium.make(
+        "osimlite/Arm-v0", seconds=0.02, reward=lambda before, after: np.full(1, 7.0)
+    ).unwrapped
     env.reset(seed=0)
     action = np.zeros(env.action_space.shape)
     assert env.step(action)[1] == 7.0 and env.step(action)[3]
-    with pytest.raises(gymnasium.error.InvalidAction, match=r"actions have the shape \(1, 2\), not \(1, 3\)"):
+    with pytest.raises(
+        gymnasium.error.InvalidAction, match=r"actions have the shape \(1, 2\), not \(1, 3\)"
+    ):
         env.step(np.zeros(3))
     env.close()

@@ -19,10 +19,24 @@ from osimlite.studies.reflexes.scenario import Scenario
 REFLEXES = {
     "dual_sided": 0,
     "DofReflex": [
-        {"target": "flexor", "source": "elbow", "P0": 1.2, "KP": "~2<0,20>", "KV": 0.3, "delay": 0.013, "C0": 0.1},
+        {
+            "target": "flexor",
+            "source": "elbow",
+            "P0": 1.2,
+            "KP": "~2<0,20>",
+            "KV": 0.3,
+            "delay": 0.013,
+            "C0": 0.1,
+        },
         {"target": "extensor", "source": "elbow", "P0": 1.2, "KP": -1, "allow_neg_P": 0},
     ],
-    "MuscleReflex": {"target": "extensor", "source": "flexor", "KF": 0.2, "KV": 0.01, "delay": 0.005},
+    "MuscleReflex": {
+        "target": "extensor",
+        "source": "flexor",
+        "KF": 0.2,
+        "KV": 0.01,
+        "delay": 0.005,
+    },
 }
 SOUGHT: dict[str, Any] = {
     "dual_sided": 0,
@@ -45,7 +59,9 @@ def model():
 
 
 def same(one, other) -> bool:
-    return np.array_equal(one.times, other.times) and np.array_equal(one.states.rows, other.states.rows)
+    return np.array_equal(one.times, other.times) and np.array_equal(
+        one.states.rows, other.states.rows
+    )
 
 
 def test_controls_are_sums_of_what_was_felt(model) -> None:
@@ -56,7 +72,9 @@ def test_controls_are_sums_of_what_was_felt(model) -> None:
     # What it felt is what was there.
     assert told["elbow.value"] == pytest.approx(moved.values[:, -1], abs=1e-15)
     strength = model.tree().by_path["/forceset/flexor"].max_isometric_force
-    assert told["forceset/flexor.force"] == pytest.approx(moved.forces["flexor"] / strength, abs=1e-12)
+    assert told["forceset/flexor.force"] == pytest.approx(
+        moved.forces["flexor"] / strength, abs=1e-12
+    )
 
     def before(column: str, delay: float):
         return np.interp(told.times - delay, told.times, told[column])
@@ -107,7 +125,9 @@ def test_runs_go_on_bit_for_bit(model, integrator, tmp_path) -> None:
     whole = simulate(model, 0.4, controller=feedback, integrator=integrator)
     first = simulate(model, 0.1, controller=feedback, integrator=integrator)
     first.write(tmp_path / "first")
-    second = simulate(model, 0.3, controller=feedback, integrator=integrator, resume=tmp_path / "first")
+    second = simulate(
+        model, 0.3, controller=feedback, integrator=integrator, resume=tmp_path / "first"
+    )
     third = simulate(model, 0.4, controller=feedback, integrator=integrator, resume=second)
     assert third.times[0] == 0.3 and third.times[-1] == 0.4
     rows = slice(30, None)
@@ -126,7 +146,11 @@ def test_a_human_goes_on_in_the_midst_of_a_walk(tmp_path) -> None:
     scenario = Scenario(file)
     start = scenario.walk(scenario.best(), duration=0.005).states
     initial = {path: float(start[path][0]) for path in start.columns}
-    choices = {"controller": osimlite.Feedback(file), "integrator": "euler2", "report_interval": 0.05}
+    choices = {
+        "controller": osimlite.Feedback(file),
+        "integrator": "euler2",
+        "report_interval": 0.05,
+    }
     whole = simulate(scenario.model, 2.0, initial=initial, **choices)
     assert np.ptp(whole.states["/jointset/ground_pelvis/pelvis_tx/value"]) > 1.5
     assert {0.0, 1.0, 2.0, 3.0} <= {*whole.controller["leg_l.state"]}
@@ -137,7 +161,9 @@ def test_a_human_goes_on_in_the_midst_of_a_walk(tmp_path) -> None:
     events = [each for each in whole.summary["contact_events"] if each["time_s"] > 0.75]
     begun = [each for each in second.summary["contact_events"] if each["time_s"] > 0.75]
     assert [each["contact"] for each in begun] == [each["contact"] for each in events]
-    assert [each["time_s"] for each in begun] == pytest.approx([each["time_s"] for each in events], abs=1e-8)
+    assert [each["time_s"] for each in begun] == pytest.approx(
+        [each["time_s"] for each in events], abs=1e-8
+    )
 
 
 def test_an_interrupted_run_goes_on(model) -> None:
@@ -152,13 +178,20 @@ def test_an_interrupted_run_goes_on(model) -> None:
     first: Any = stopped.value.trajectory
     second = simulate(model, 0.5, controller=feedback, resume=first)
     whole = simulate(model, 0.5, controller=feedback)
-    assert 0.1 < second.times[0] < 0.5 and second.values[-1] == pytest.approx(whole.values[-1], abs=1e-6)
+    assert 0.1 < second.times[0] < 0.5 and second.values[-1] == pytest.approx(
+        whole.values[-1], abs=1e-6
+    )
 
 
 def test_motors_are_driven_beside_what_else_drives(model) -> None:
     reflex = {"target": "motor", "source": "elbow", "P0": 1.2, "KP": 5, "KV": 1, "delay": 0.005}
-    given = {"ReflexController": {"dual_sided": 0, "DofReflex": reflex}, "fixed_control_step_size": 0.002}
-    moved = simulate(model, 0.5, controller=osimlite.Feedback(given), controls={"flexor": 0.1, "motor": 0.3})
+    given = {
+        "ReflexController": {"dual_sided": 0, "DofReflex": reflex},
+        "fixed_control_step_size": 0.002,
+    }
+    moved = simulate(
+        model, 0.5, controller=osimlite.Feedback(given), controls={"flexor": 0.1, "motor": 0.3}
+    )
     told = moved.controller["/forceset/motor"]
     assert told[0] == 0.5 and told.min() < 0.49 and len(told) == 251
     # What the motor pushes is what it is driven by, also between the control steps.
@@ -186,12 +219,21 @@ def test_what_has_no_meaning_is_refused(model, tmp_path) -> None:
     first.write(tmp_path / "first")
     (tmp_path / "first" / "controller.sto").unlink()
     for words, choices in (
-        ("goes on from 0.1 s on, and not to 0.05", {"to": 0.05, "resume": first, "controller": feedback}),
+        (
+            "goes on from 0.1 s on, and not to 0.05",
+            {"to": 0.05, "resume": first, "controller": feedback},
+        ),
         ("had a controller; give it", {"resume": first}),
         ("so had no controller", {"resume": plain, "controller": feedback}),
         (r"has left no controller\.sto", {"resume": tmp_path / "first", "controller": feedback}),
-        ("say no other start", {"resume": first, "controller": feedback, "initial": {"elbow": 1.0}}),
-        (r"controller is an osimlite\.Feedback, such as osimlite\.Feedback\('a.yaml'\)", {"controller": "a.yaml"}),
+        (
+            "say no other start",
+            {"resume": first, "controller": feedback, "initial": {"elbow": 1.0}},
+        ),
+        (
+            r"controller is an osimlite\.Feedback, such as osimlite\.Feedback\('a.yaml'\)",
+            {"controller": "a.yaml"},
+        ),
         ("leave out the fixed step", {"controller": feedback, "fixed_step": 0.001}),
         ("not functions of Python", {"controller": feedback, "controls": {"motor": lambda t: t}}),
     ):
@@ -213,31 +255,72 @@ def test_what_has_no_meaning_is_refused(model, tmp_path) -> None:
     ],
 )
 @pytest.mark.parametrize("is_file", [True, False])
-def test_a_run_goes_on_by_the_gains_that_it_began_with(model, changed, words, is_file, tmp_path) -> None:
+def test_a_run_goes_on_by_the_gains_that_it_began_with(
+    model, changed, words, is_file, tmp_path
+) -> None:
     first = simulate(model, 0.1, controller=osimlite.Feedback({"ReflexController": SOUGHT}))
     first.write(tmp_path)
     before = tmp_path if is_file else first
     other = {**SOUGHT, "DofReflex": {**SOUGHT["DofReflex"], **changed}}
     with pytest.raises(OsimliteError, match=words):
-        simulate(model, 0.2, controller=osimlite.Feedback({"ReflexController": other}), resume=before)
+        simulate(
+            model, 0.2, controller=osimlite.Feedback({"ReflexController": other}), resume=before
+        )
 
 
 @pytest.mark.parametrize(
     ("given", "words"),
     [
         ({"DofReflex": {}}, "a controller is needed"),
-        ({"ReflexController": [REFLEXES] * 2}, "'ReflexController' stands beside 'ReflexController'; join them"),
-        ({"ReflexController": REFLEXES, "CompositeController": {}}, "'CompositeController' stands beside 'Reflex"),
-        ({"ReflexController": REFLEXES, "fixed_control_step_size": 0}, "'fixed_control_step_size' is 0.0001 s or"),
-        ({"ReflexController": REFLEXES, "fixed_control_step_size": 1e-9}, "0.0001 s or more, not 1e-09 s"),
-        ({"ReflexController": {"DofReflex": {"target": "motor", "source": "elbow", "delay": 11}}}, "more than 10 s"),
-        ({"ReflexController": REFLEXES, "measure": 1}, "'measure' of a file of a controller is not done here"),
-        ({"CompositeController": {"NoiseControler": {}}}, "'NoiseControler'.*did you mean 'NoiseController'"),
+        (
+            {"ReflexController": [REFLEXES] * 2},
+            "'ReflexController' stands beside 'ReflexController'; join them",
+        ),
+        (
+            {"ReflexController": REFLEXES, "CompositeController": {}},
+            "'CompositeController' stands beside 'Reflex",
+        ),
+        (
+            {"ReflexController": REFLEXES, "fixed_control_step_size": 0},
+            "'fixed_control_step_size' is 0.0001 s or",
+        ),
+        (
+            {"ReflexController": REFLEXES, "fixed_control_step_size": 1e-9},
+            "0.0001 s or more, not 1e-09 s",
+        ),
+        (
+            {
+                "ReflexController": {
+                    "DofReflex": {"target": "motor", "source": "elbow", "delay": 11}
+                }
+            },
+            "more than 10 s",
+        ),
+        (
+            {"ReflexController": REFLEXES, "measure": 1},
+            "'measure' of a file of a controller is not done here",
+        ),
+        (
+            {"CompositeController": {"NoiseControler": {}}},
+            "'NoiseControler'.*did you mean 'NoiseController'",
+        ),
         ({"CompositeController": {"NoiseController": [{}, {}]}}, "a NoiseController already"),
-        ({"CompositeController": {"NoiseController": {"base_noice": 1}}}, "'base_noice' of a NoiseController"),
-        ({"CompositeController": {"NoiseController": {"base_noise": -1}}}, "'base_noise' must not be negative"),
-        ({"CompositeController": {"NoiseController": {"random_seed": 1.5}}}, "'random_seed'.*whole.*not 1.5"),
-        ({"CompositeController": {"NoiseController": {"random_seed": 1e20}}}, "'random_seed'.*whole.*not 1e.20"),
+        (
+            {"CompositeController": {"NoiseController": {"base_noice": 1}}},
+            "'base_noice' of a NoiseController",
+        ),
+        (
+            {"CompositeController": {"NoiseController": {"base_noise": -1}}},
+            "'base_noise' must not be negative",
+        ),
+        (
+            {"CompositeController": {"NoiseController": {"random_seed": 1.5}}},
+            "'random_seed'.*whole.*not 1.5",
+        ),
+        (
+            {"CompositeController": {"NoiseController": {"random_seed": 1e20}}},
+            "'random_seed'.*whole.*not 1e.20",
+        ),
     ],
 )
 def test_what_is_not_done_is_refused(model, given, words) -> None:
@@ -247,7 +330,9 @@ def test_what_is_not_done_is_refused(model, given, words) -> None:
 
 def test_values_of_nothing_are_refused(model) -> None:
     feedback = osimlite.Feedback({"ReflexController": REFLEXES}, {"flexor.KP": 1.0})
-    with pytest.raises(OsimliteError, match=r"no parameter 'flexor\.KP'.*did you mean 'flexor-elbow\.KP'"):
+    with pytest.raises(
+        OsimliteError, match=r"no parameter 'flexor\.KP'.*did you mean 'flexor-elbow\.KP'"
+    ):
         simulate(model, 0.01, controller=feedback)
 
 
@@ -288,11 +373,17 @@ def test_noise_is_as_large_as_it_is_asked_for(model) -> None:
     )
     value, drawn = calm["/forceset/flexor"][0], normal(123, 0, 0, 0)
     assert 0.1 < value < 0.9
-    assert rough["/forceset/flexor"][0] == pytest.approx(value + (0.004 + 0.02 * value) * drawn, abs=1e-12)
-    felt = simulate(model, 0.05, controller=noisy(sensor_noise=0.01, proportional_sensor_noise=0.1)).controller
+    assert rough["/forceset/flexor"][0] == pytest.approx(
+        value + (0.004 + 0.02 * value) * drawn, abs=1e-12
+    )
+    felt = simulate(
+        model, 0.05, controller=noisy(sensor_noise=0.01, proportional_sensor_noise=0.1)
+    ).controller
     first, place = calm.rows[0], calm.columns.index("elbow.value")
     width = 0.01 + 0.1 * abs(first[place])
-    assert felt.rows[0, place] == pytest.approx(first[place] + width * normal(123, 1, 0, place), abs=1e-12)
+    assert felt.rows[0, place] == pytest.approx(
+        first[place] + width * normal(123, 1, 0, place), abs=1e-12
+    )
 
 
 def test_what_no_reflex_drives_has_noise_too(model) -> None:
@@ -300,13 +391,18 @@ def test_what_no_reflex_drives_has_noise_too(model) -> None:
     one = {"dual_sided": 0, "DofReflex": {"target": "flexor", "source": "elbow", "KP": 1}}
     for noise, drives in (({"base_noise": 5.0}, True), ({"proportional_noise": 5.0}, False)):
         both = {"CompositeController": {"ReflexController": one, "NoiseController": noise}}
-        extensor = simulate(model, 0.2, controller=osimlite.Feedback(both)).controller["/forceset/extensor"]
+        extensor = simulate(model, 0.2, controller=osimlite.Feedback(both)).controller[
+            "/forceset/extensor"
+        ]
         assert extensor.max() == float(drives)
 
 
 def test_seeds_are_exact(model) -> None:
     """Also of a run that goes on."""
-    runs = [simulate(model, 0.2, controller=noisy(base_noise=0.05, random_seed=seed)) for seed in (1, 1, 2)]
+    runs = [
+        simulate(model, 0.2, controller=noisy(base_noise=0.05, random_seed=seed))
+        for seed in (1, 1, 2)
+    ]
     assert same(runs[0], runs[1]) and not same(runs[0], runs[2])
     first = simulate(model, 0.1, controller=noisy(base_noise=0.05, random_seed=1))
     second = simulate(model, 0.2, controller=noisy(base_noise=0.05, random_seed=1), resume=first)
@@ -316,7 +412,10 @@ def test_seeds_are_exact(model) -> None:
 def test_noisy_walks_alone_are_those_among_many(tmp_path) -> None:
     file = write_scenario(tmp_path)
     text, end = file.read_text(), "CompositeMeasure"
-    inner, measures = text[text.index("GaitStateController") : text.index(end)], text[text.index(end) :]
+    inner, measures = (
+        text[text.index("GaitStateController") : text.index(end)],
+        text[text.index(end) :],
+    )
     noise = "NoiseController { base_noise = 0.005 proportional_noise = 0.05 random_seed = 5 }"
     head = text[: text.index("GaitStateController")]
     file.write_text(f"{head} CompositeController {{ {inner} {noise} }} {measures}")
@@ -324,7 +423,10 @@ def test_noisy_walks_alone_are_those_among_many(tmp_path) -> None:
     best, name = scenario.best(), "S00011.vasti.KF"
     with pytest.warns(UserWarning, match="numbers depend on the compiler of SCONE"):
         together = scenario.walk(best | {name: best[name] * np.array([1.0, 1.01])}, 2, duration=1.0)
-        alone = [scenario.walk(best | {name: best[name] * factor}, duration=1.0) for factor in (1.0, 1.01)]
+        alone = [
+            scenario.walk(best | {name: best[name] * factor}, duration=1.0)
+            for factor in (1.0, 1.01)
+        ]
     assert together.results.tolist() == [walked.results[0] for walked in alone]
     calm = Scenario(write_scenario(tmp_path / "calm"))
     assert calm.walk(best, duration=1.0).results[0] != together.results[0]
@@ -369,7 +471,16 @@ def test_sweeps_go_by_a_file(model, tmp_path) -> None:
     (tmp_path / "hold.yaml").write_text(
         'ReflexController:\n  dual_sided: 0\n  DofReflex: {target: motor, source: elbow, P0: 1.2, KP: "~1<0,9>"}\n'
     )
-    words = ["sweep", tmp_path / "arm.osim", "--vary", "elbow=0.4:1.4:3", "--to", "0.1", "--measure", "elbow/value"]
+    words = [
+        "sweep",
+        tmp_path / "arm.osim",
+        "--vary",
+        "elbow=0.4:1.4:3",
+        "--to",
+        "0.1",
+        "--measure",
+        "elbow/value",
+    ]
     words += ["--controller", tmp_path / "hold.yaml", "-o", tmp_path / "r.parquet"]
     assert command(*words).code == 0
     (tmp_path / "stiff.par").write_text("motor-elbow.KP 5 5 1\n")
@@ -403,7 +514,12 @@ def test_gains_of_many_runs_are_those_of_single_ones_bit_for_bit(model) -> None:
         "motor-elbow.delay": (0.0, 0.05), "motor-elbow.KP": (0.0, 9.0), "motor-elbow.KV": (0.0, 1.0),
     }  # fmt: skip
     some = plan(model, {"elbow": "0.7", "motor-elbow.KP": "2"}, **choices)
-    assert [item.name for item in some.variables] == ["elbow", "motor-elbow.KP", "motor-elbow.delay", "motor-elbow.KV"]
+    assert [item.name for item in some.variables] == [
+        "elbow",
+        "motor-elbow.KP",
+        "motor-elbow.delay",
+        "motor-elbow.KV",
+    ]
     rows = np.array([[0.0, 5.0, 0.1], [0.05, 0.0, 0.0], [0.013, 2.0, 0.9]])
     together = Runner(made).run(rows)
     names = [item.name for item in made.variables]
@@ -429,7 +545,11 @@ def test_a_search_for_gains(model, tmp_path) -> None:
     from tests.cli.command import run as command
 
     osimlite.write(model, tmp_path / "arm.osim")
-    text = json.dumps({"ReflexController": SOUGHT}).replace('"~0.005<0,0.05>"', "0.005").replace("1.2", "0.5")
+    text = (
+        json.dumps({"ReflexController": SOUGHT})
+        .replace('"~0.005<0,0.05>"', "0.005")
+        .replace("1.2", "0.5")
+    )
     (tmp_path / "hold.yaml").write_text(text)
     given = ["--controller", tmp_path / "hold.yaml", "--to", "0.3"]
     words = ["optimize", tmp_path / "arm.osim", *given, "--objective", "max(elbow)-min(elbow)"]
@@ -437,7 +557,9 @@ def test_a_search_for_gains(model, tmp_path) -> None:
     result = command(*words, "--budget", "40", "--method", "nelder-mead", "-o", out)
     assert result.code == 0 and "best.par" in result.out
     summary = json.loads((out / "summary.json").read_text())
-    begun = simulate(model, 0.3, controller=osimlite.Feedback(tmp_path / "hold.yaml"), engine="compiled")
+    begun = simulate(
+        model, 0.3, controller=osimlite.Feedback(tmp_path / "hold.yaml"), engine="compiled"
+    )
     best = osimlite.Feedback(tmp_path / "hold.yaml", out / "best.par")
     found = simulate(osimlite.read(out / "best.osim"), 0.3, controller=best, engine="compiled")
     assert np.ptp(found.values[:, -1]) == pytest.approx(summary["value"], abs=1e-12)
@@ -445,7 +567,10 @@ def test_a_search_for_gains(model, tmp_path) -> None:
     assert "PrescribedController" not in (out / "best.osim").read_text()
     for more, told in (
         (["--method", "gradient"], "has no derivatives"),
-        (["--vary", "motor-elbow.KQ=0:1"], "number 'motor-elbow.KQ' to vary; did you mean 'motor-elbow.KP'"),
+        (
+            ["--vary", "motor-elbow.KQ=0:1"],
+            "number 'motor-elbow.KQ' to vary; did you mean 'motor-elbow.KP'",
+        ),
         (["--vary", "motor-elbow.KP=0:1deg"], "whose unit only that knows"),
     ):
         refused = command(*words, *more, "-o", tmp_path / "other")
@@ -453,6 +578,8 @@ def test_a_search_for_gains(model, tmp_path) -> None:
     (tmp_path / "hold.yaml").write_text(text.replace("~1<0,9>", "~1"))
     refused = command(*words, "-o", tmp_path / "other")
     assert refused.code != 0 and "'motor-elbow.KP' has no bounds" in refused.err.replace("\n", " ")
-    (tmp_path / "hold.yaml").write_text(text.replace("~", "").replace("<0,9>", "").replace("<0,1>", ""))
+    (tmp_path / "hold.yaml").write_text(
+        text.replace("~", "").replace("<0,9>", "").replace("<0,1>", "")
+    )
     refused = command(*words, "-o", tmp_path / "other")
     assert refused.code != 0 and "say what to vary" in refused.err

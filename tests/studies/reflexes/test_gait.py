@@ -25,7 +25,9 @@ def test_strides_are_counted() -> None:
     found = strides_of(TIMES, 1.5 * TIMES, loads)
     assert found is not None and (found.number, found.touches) == (16, 20)
     assert (found.time, found.length, found.peak) == pytest.approx((1.0, 1.5, 1.2), abs=1e-12)
-    assert found.stance == pytest.approx((0.6, 0.6), abs=1e-12) and found.both == pytest.approx(0.2, abs=0.01)
+    assert found.stance == pytest.approx((0.6, 0.6), abs=1e-12) and found.both == pytest.approx(
+        0.2, abs=0.01
+    )
     assert found.humps == pytest.approx((1.2, 0.6, 1.0), abs=1e-12)
     assert strides_of(TIMES[:250], TIMES[:250], loads[:250]) is None
 
@@ -58,6 +60,11 @@ def test_our_human_s_gait(tmp_path) -> None:
     assert gait.speed == pytest.approx(walked.report["speed"][0], rel=0.05)
     assert all(0.5 < part < 0.65 for part in gait.strides.stance) and 0.05 < gait.strides.both < 0.2
     told = gait.told()
-    assert list(told) == ["way", "heights", "strides", "stance", "ground"] and "weights" in told["ground"]
+    assert (
+        list(told) == ["way", "heights", "strides", "stance", "ground"]
+        and "weights" in told["ground"]
+    )
     # What muscles take, by two measures, is told once.
-    assert walked.report["transport"] == pytest.approx(walked.report["power"] / gait.speed, rel=0.05)
+    assert walked.report["transport"] == pytest.approx(
+        walked.report["power"] / gait.speed, rel=0.05
+    )

@@ -65,18 +65,24 @@ def scenario(folder, *changes: tuple[str, str]) -> Scenario:
     return Scenario(folder / "jump.scone")
 
 
-def judged(walked, given: Scenario, prepare: float, least: float, at_peak: bool) -> tuple[float, int]:
+def judged(
+    walked, given: Scenario, prepare: float, least: float, at_peak: bool
+) -> tuple[float, int]:
     """SCONE's measure of a jump, and the control step it ends after, from the motion."""
     walkers, table = given.walkers(1), walked.states
     states = np.empty_like(table.rows)
     states[:, [walkers.places[path] for path in table.columns]] = table.rows
-    centre = centers_of_mass(walkers.engine, list(zip(table.times.tolist(), states.tolist(), strict=True)))
+    centre = centers_of_mass(
+        walkers.engine, list(zip(table.times.tolist(), states.tolist(), strict=True))
+    )
     height, rise = centre[:, 1], centre[:, 4]
     load, last = walked.loads.rows.sum(axis=1), len(height) - 1
     sunk = np.flatnonzero(height < least * height[0])
     end = int(sunk[0]) if len(sunk) else last
     steps = np.arange(len(height))
-    took_off = np.flatnonzero((steps * STEP >= prepare - 1e-9) & ((rise > 0.0) | (load <= 0.0)) & (steps > 0))
+    took_off = np.flatnonzero(
+        (steps * STEP >= prepare - 1e-9) & ((rise > 0.0) | (load <= 0.0)) & (steps > 0)
+    )
     if not len(took_off) or took_off[0] >= end:
         return 100.0 * (height[0] + (height[end] - height[0]) / (STEP * end)), end
     first = took_off[0]
@@ -128,10 +134,19 @@ def test_signs_weights_and_sums(folder) -> None:
     both = "EffortMeasure { weight = -0.1 measure_type = SquaredMuscleActivation } }"
     for first, sign in (("", -1.0), ("minimize = 1", 1.0)):
         measure = f"CompositeMeasure {{ {first} JumpMeasure {{"
-        summed = scenario(folder, ("JumpMeasure {", measure), ("prepare_time = 0.2 }", f"prepare_time = 0.2 }} {both}"))
+        summed = scenario(
+            folder,
+            ("JumpMeasure {", measure),
+            ("prepare_time = 0.2 }", f"prepare_time = 0.2 }} {both}"),
+        )
         found = summed.walk(PUSHES)
-        assert found.terms["JumpMeasure"][0] == high and found.terms["SquaredMuscleActivation"][0] < 0.0
-        assert found.results[0] == pytest.approx(sign * sum(term[0] for term in found.terms.values()), rel=1e-12)
+        assert (
+            found.terms["JumpMeasure"][0] == high
+            and found.terms["SquaredMuscleActivation"][0] < 0.0
+        )
+        assert found.results[0] == pytest.approx(
+            sign * sum(term[0] for term in found.terms.values()), rel=1e-12
+        )
 
 
 def test_candidates_jump_as_they_do_alone(folder) -> None:
@@ -160,16 +175,24 @@ def test_kernels_as_python_jump_likewise(folder, monkeypatch) -> None:
     """Where a place outside an array is an error."""
     from tests.simulation.checked import Checked
 
-    compiled, plain = (scenario(folder, ("prepare_time = 0.2", "prepare_time = 0")) for _ in range(2))
+    compiled, plain = (
+        scenario(folder, ("prepare_time = 0.2", "prepare_time = 0")) for _ in range(2)
+    )
     with monkeypatch.context() as patched:
         patched.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
         walked = plain.walk(PUSHES, duration=2 * STEP)
-    assert walked.results == pytest.approx(compiled.walk(PUSHES, duration=2 * STEP).results, rel=1e-12)
+    assert walked.results == pytest.approx(
+        compiled.walk(PUSHES, duration=2 * STEP).results, rel=1e-12
+    )
 
 
 # --------------------------------------------------------------------------------------------------- functions of time
 def points(extra: str = "") -> dict[str, Any]:
-    made = {"control_points": 3, "control_point_y": "~0.3<0,1>", "control_point_dt": "~0.07<0.001,1>"}
+    made = {
+        "control_points": 3,
+        "control_point_y": "~0.3<0,1>",
+        "control_point_dt": "~0.07<0.001,1>",
+    }
     return made | ({extra: 1} if extra else {})
 
 
@@ -200,17 +223,25 @@ def test_actuators_are_driven_by_functions_of_time(form) -> None:
     feedback = osimlite.Feedback(given, {f"flexor.{name}": value for name, value in values.items()})
     model, simulate = arm().model(), cast("Any", osimlite.simulate)
     told = simulate(model, 0.3, controller=feedback).controller
-    assert told["/forceset/flexor"] == pytest.approx(np.clip(expected(told.times), 0.0, 1.0), abs=1e-12)
+    assert told["/forceset/flexor"] == pytest.approx(
+        np.clip(expected(told.times), 0.0, 1.0), abs=1e-12
+    )
     assert (told["/forceset/extensor"] == 0.0).all() and len(told.times) == 61
     # A run that goes on knows the time.
-    again = simulate(model, 0.3, controller=feedback, resume=simulate(model, 0.1, controller=feedback))
-    assert np.array_equal(again.controller["/forceset/flexor"][-41:], told["/forceset/flexor"][-41:])
+    again = simulate(
+        model, 0.3, controller=feedback, resume=simulate(model, 0.1, controller=feedback)
+    )
+    assert np.array_equal(
+        again.controller["/forceset/flexor"][-41:], told["/forceset/flexor"][-41:]
+    )
 
 
 @pytest.mark.filterwarnings("ignore:noise is as large")
 def test_functions_go_with_reflexes_and_noise(folder) -> None:
     """What one says alone is added to what the others say, and each side can have its own."""
-    constant = "PieceWiseConstant { control_points = 2 control_point_y = 0.3 control_point_dt = 0.03 }"
+    constant = (
+        "PieceWiseConstant { control_points = 2 control_point_y = 0.3 control_point_dt = 0.03 }"
+    )
     plain = f"CompositeController {{ FeedForwardController {{ symmetric = 0 {constant} }}"
     reflex = "ReflexController { MuscleReflex { target = vasti C0 = 0.2 } }"
     noise = "NoiseController { base_noise = 0.01 random_seed = 3 }"
@@ -231,21 +262,61 @@ def test_functions_go_with_reflexes_and_noise(folder) -> None:
     ("old", "new", "words"),
     [
         ("PieceWiseConstant", "SineWave", "'SineWave' of a FeedForwardController is not done here"),
-        ("PieceWiseConstant {", "Polynomial { degree = 1 coefficient0 = 0 } PieceWiseConstant {", "needs one function"),
-        ("PieceWiseConstant {", "Polynomial { degree = 1 coefficient0 = 0 } #", "'coefficient1' is missing"),
-        ("control_points = 2", "control_points = 0", "'control_points' must be a whole number from 1 to 99, not 0"),
+        (
+            "PieceWiseConstant {",
+            "Polynomial { degree = 1 coefficient0 = 0 } PieceWiseConstant {",
+            "needs one function",
+        ),
+        (
+            "PieceWiseConstant {",
+            "Polynomial { degree = 1 coefficient0 = 0 } #",
+            "'coefficient1' is missing",
+        ),
+        (
+            "control_points = 2",
+            "control_points = 0",
+            "'control_points' must be a whole number from 1 to 99, not 0",
+        ),
         ("control_points = 2", "control_points = 2.5", "a whole number from 1 to 99, not 2.5"),
-        ("PieceWiseConstant {", "Polynomial { degree = -1 } #", "'degree' must be a whole number from 0 to 99, not -1"),
+        (
+            "PieceWiseConstant {",
+            "Polynomial { degree = -1 } #",
+            "'degree' must be a whole number from 0 to 99, not -1",
+        ),
         ("control_points = 2", "", "'control_points' is missing"),
         ("control_point_y = 0.3~0.1<0,1>", "", "'control_point_y' is missing"),
-        ("control_point_dt = 0.2~0.05<0.001,1>", "", "several control points need 'control_point_dt'"),
+        (
+            "control_point_dt = 0.2~0.05<0.001,1>",
+            "",
+            "several control points need 'control_point_dt'",
+        ),
         ("0.2~0.05<0.001,1>", "0", "'control_point_dt' must be positive"),
-        ("control_points = 2", "control_points = 2 flat = 1", "'flat' of a PieceWiseConstant is not done here"),
+        (
+            "control_points = 2",
+            "control_points = 2 flat = 1",
+            "'flat' of a PieceWiseConstant is not done here",
+        ),
         ("symmetric = 1", "include = psoas", "no actuator is in 'psoas' and not in ''"),
-        ("symmetric = 1", "start_time = 1", "'start_time' of a FeedForwardController is not done here"),
-        ("prepare_time", "recover_time = 1 prepare_time", "'recover_time' of a JumpMeasure is not done here"),
-        ("prepare_time", "target_body = torso prepare_time", "'target_body' of a JumpMeasure is not done here"),
-        ("prepare_time", "prepare", "'prepare' of a JumpMeasure is not done here.*did you mean 'prepare_time'"),
+        (
+            "symmetric = 1",
+            "start_time = 1",
+            "'start_time' of a FeedForwardController is not done here",
+        ),
+        (
+            "prepare_time",
+            "recover_time = 1 prepare_time",
+            "'recover_time' of a JumpMeasure is not done here",
+        ),
+        (
+            "prepare_time",
+            "target_body = torso prepare_time",
+            "'target_body' of a JumpMeasure is not done here",
+        ),
+        (
+            "prepare_time",
+            "prepare",
+            "'prepare' of a JumpMeasure is not done here.*did you mean 'prepare_time'",
+        ),
     ],
 )
 def test_what_is_not_done_is_refused_by_name(folder, old, new, words) -> None:

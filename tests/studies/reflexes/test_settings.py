@@ -12,7 +12,9 @@ from osimlite.studies.reflexes.settings import read_settings, settings_of
 
 def test_trees_includes_and_constants(tmp_path) -> None:
     (tmp_path / "parts").mkdir()
-    (tmp_path / "parts" / "other.scone").write_text("c = $far  # what is included knows the constants\n")
+    (tmp_path / "parts" / "other.scone").write_text(
+        "c = $far  # what is included knows the constants\n"
+    )
     text = '$far = 0.5 # a comment\na = "two words" b { x = 1 y = [ 1 2 ] }\n<< parts/other.scone >>\nb = q { z = 2 }'
     (tmp_path / "it.scone").write_text(text)
     top = read_settings(tmp_path / "it.scone")
@@ -33,10 +35,17 @@ def test_yaml_and_data_are_the_same_trees(tmp_path) -> None:
     text = 'a: two words\nb:\n  - {x: "~2<0,20>", y: [1, 2]}\n  - {z: true}\ninclude: other.yaml\n'
     (tmp_path / "it.yaml").write_text(text)
     top = read_settings(tmp_path / "it.yaml")
-    assert [(name, node.line) for name, node in top.parts] == [("a", 1), ("b", 3), ("b", 4), ("c", 1)]
+    assert [(name, node.line) for name, node in top.parts] == [
+        ("a", 1),
+        ("b", 3),
+        ("b", 4),
+        ("c", 1),
+    ]
     first, second = (node for _, node in top.all_of("b"))
     assert first.text("x") == "~2<0,20>" and first.text("y") == "1 2" and second.flag("z", False)
-    data = settings_of({"a": "two words", "b": [{"x": "~2<0,20>", "y": [1, 2]}, {"z": True}], "c": 3})
+    data = settings_of(
+        {"a": "two words", "b": [{"x": "~2<0,20>", "y": [1, 2]}, {"z": True}], "c": 3}
+    )
 
     def plain(node):
         return node.value.lower(), [(name, plain(part)) for name, part in node.parts]
@@ -47,7 +56,11 @@ def test_yaml_and_data_are_the_same_trees(tmp_path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("a: [1", "it.yaml:1:6: not YAML"), ("- 1", "keys with values are wanted"), ("a: [{b: 1}, [2]]", "keys with")],
+    [
+        ("a: [1", "it.yaml:1:6: not YAML"),
+        ("- 1", "keys with values are wanted"),
+        ("a: [{b: 1}, [2]]", "keys with"),
+    ],
 )
 def test_damage_of_yaml_is_told(text, words, tmp_path) -> None:
     pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
@@ -89,10 +102,13 @@ def test_parameters(text, mean, std, low, high, tmp_path) -> None:
     top, own = read_settings(tmp_path / "it.scone"), Parameters({"S1.a": np.array([0.1, 20.0])}, 2)
     found = own.of(top, "a", 0.0, "S1.a")
     assert found.tolist() == [min(max(value, low), high) for value in (0.1, 20.0)]
-    assert own.found["S1.a"] == pytest.approx(("S1.a", mean, std, low, high)[1:], abs=1e-12) or own.found["S1.a"][
-        1:
-    ] == (pytest.approx((mean, std, low, high)))
-    assert own.of(top, "b", 0.0).tolist() == [2.0, 2.0] and own.of(top, "c", 7.0).tolist() == [7.0, 7.0]
+    assert own.found["S1.a"] == pytest.approx(
+        ("S1.a", mean, std, low, high)[1:], abs=1e-12
+    ) or own.found["S1.a"][1:] == (pytest.approx((mean, std, low, high)))
+    assert own.of(top, "b", 0.0).tolist() == [2.0, 2.0] and own.of(top, "c", 7.0).tolist() == [
+        7.0,
+        7.0,
+    ]
 
 
 def test_files_of_parameters(tmp_path) -> None:

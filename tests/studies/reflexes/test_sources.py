@@ -26,24 +26,56 @@ def held(model: Any, given: dict[str, Any], values: dict[str, float] | None = No
     [
         ("BodyPointReflex", {"direction": None, "KP": 1}, "'direction' is missing"),
         ("BodyPointReflex", {"direction": [0, 0, 0], "KP": 1}, "'direction' is 0 0 0"),
-        ("BodyPointReflex", {"direction": [1, 0], "KP": 1}, r"'direction' must be three numbers, as \[ 0 0 1 \], not"),
+        (
+            "BodyPointReflex",
+            {"direction": [1, 0], "KP": 1},
+            r"'direction' must be three numbers, as \[ 0 0 1 \], not",
+        ),
         ("BodyPointReflex", {"KA": 1}, "'KA' of reflexes is not done here"),
-        ("BodyPointReflex", {"source": "forarm"}, "the model has no 'forarm'.*did you mean 'forearm'"),
-        ("BodyPointReflex", {"allow_neg_P": 0}, "'allow_neg_P' of a BodyPointReflex is not done here"),
+        (
+            "BodyPointReflex",
+            {"source": "forarm"},
+            "the model has no 'forarm'.*did you mean 'forearm'",
+        ),
+        (
+            "BodyPointReflex",
+            {"allow_neg_P": 0},
+            "'allow_neg_P' of a BodyPointReflex is not done here",
+        ),
         ("BodyOrientationReflex", {"axis": [1, 1, 0]}, "angles are about .* there is only KV"),
         ("BodyOrientationReflex", {"axis": [0, 0, 0]}, "'axis' has no direction"),
-        ("BodyOrientationReflex", {"use_rotation_vector": 1}, "'use_rotation_vector' of reflexes is not done here"),
+        (
+            "BodyOrientationReflex",
+            {"use_rotation_vector": 1},
+            "'use_rotation_vector' of reflexes is not done here",
+        ),
         ("BodyOrientationReflex", {"source": None}, "'source' is missing"),
-        ("BodyPostureMuscleReflex", {}, "'BodyPostureMuscleReflex' of a ReflexController is not done here"),
+        (
+            "BodyPostureMuscleReflex",
+            {},
+            "'BodyPostureMuscleReflex' of a ReflexController is not done here",
+        ),
         ("MuscleReflex", {"source": "flexor", "KP": 1}, "'KP' of a MuscleReflex is not done here"),
-        ("MuscleReflex", {"source": "flexor", "dof": "elbow"}, "'dof' of a MuscleReflex is not done here"),
+        (
+            "MuscleReflex",
+            {"source": "flexor", "dof": "elbow"},
+            "'dof' of a MuscleReflex is not done here",
+        ),
     ],
 )
 def test_what_has_no_meaning_is_refused(kind, changed, words) -> None:
-    given = {**(POINT if kind == "BodyPointReflex" else TURN if "Body" in kind else {"target": "flexor"}), **changed}
+    given = {
+        **(
+            POINT if kind == "BodyPointReflex" else TURN if "Body" in kind else {"target": "flexor"}
+        ),
+        **changed,
+    }
     reflex = {key: value for key, value in given.items() if value is not None}
     with pytest.raises(OsimliteError, match=words):
-        held(arm(), {"dual_sided": 0, "DofReflex": {"target": "flexor", "source": "elbow"}, kind: reflex})
+        held(
+            arm(),
+            {"dual_sided": 0, "DofReflex": {"target": "flexor", "source": "elbow"}, kind: reflex},
+        )
 
 
 def test_a_gain_that_is_looked_for_is_felt_even_where_it_is_none() -> None:

@@ -56,7 +56,9 @@ def test_our_human_walks(ours) -> None:
     # Each foot carries the body in turn, and both do for a while.
     assert (loads.max(axis=0) > 0.9).all() and (loads.min(axis=0) == 0.0).all()
     assert 0.02 < np.mean((loads > 0.05).all(axis=1)) < 0.4
-    assert walked.results[0] == pytest.approx(sum(terms[0] for terms in walked.terms.values()), abs=0.5)
+    assert walked.results[0] == pytest.approx(
+        sum(terms[0] for terms in walked.terms.values()), abs=0.5
+    )
 
 
 def test_candidates_are_single_walks_bit_for_bit(ours) -> None:
@@ -96,12 +98,18 @@ def test_a_file_of_states_is_a_start(tmp_path) -> None:
     first = Scenario(file)
     states = first.walk(first.best(), duration=0.05).states
     write_sto(tmp_path / "start.sto", "states", states.times, states.columns, states.rows)
-    text = file.read_text().replace("human-walks.zml", "start.sto").replace("initial_load = 0.5", "initial_load = 0")
+    text = (
+        file.read_text()
+        .replace("human-walks.zml", "start.sto")
+        .replace("initial_load = 0.5", "initial_load = 0")
+    )
     file.write_text(text.replace("initial_state_offset = 0~0.05<-1,1>", ""))
     again = Scenario(file)
     start = again.walk(again.best(), duration=0.01).states
     values = [label for label in states.columns if label.endswith("/value")]
-    assert [start[label][0] for label in values] == pytest.approx([states[label][0] for label in values], abs=1e-9)
+    assert [start[label][0] for label in values] == pytest.approx(
+        [states[label][0] for label in values], abs=1e-9
+    )
 
 
 def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
@@ -117,12 +125,17 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
     assert len(seen) == 8 and seen[-1].best < 0.5 * before
     assert scenario.walk(found).results[0] == pytest.approx(seen[-1].best, rel=1e-6)
     assert set(read_par(tmp_path / "out" / "best.par")) == set(found)
-    assert {name: best for name, (best, _, _) in read_par(tmp_path / "out" / "best.par").items()} == found
+    assert {
+        name: best for name, (best, _, _) in read_par(tmp_path / "out" / "best.par").items()
+    } == found
     with pytest.raises(OsimliteError, match=r"best\.par' is there already: go on with it"):
         search(Scenario(arm), tmp_path / "out", generations=1, population=8)
     text = (tmp_path / "out" / "best.par").read_text()
     (tmp_path / "out" / "best.par").write_text(text.replace("elbow.KP", "elbow.KQ"))
-    with pytest.raises(OsimliteError, match=r"has no parameter 'flexor-elbow\.K[PQ]': they are of different searches"):
+    with pytest.raises(
+        OsimliteError,
+        match=r"has no parameter 'flexor-elbow\.K[PQ]': they are of different searches",
+    ):
         search(Scenario(arm), tmp_path / "out", generations=1, population=8, resume=True)
     (tmp_path / "out" / "best.par").write_text(text)
     # The best so far is one of the candidates, and a mean beyond the bounds is none.
@@ -135,7 +148,9 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
 
 def test_values_of_nothing_are_refused(arm) -> None:
     scenario = Scenario(arm)
-    with pytest.raises(OsimliteError, match=r"no parameter 'flexor-elbow\.KQ'.*did you mean 'flexor-elbow\.KP'"):
+    with pytest.raises(
+        OsimliteError, match=r"no parameter 'flexor-elbow\.KQ'.*did you mean 'flexor-elbow\.KP'"
+    ):
         scenario.walk({"flexor-elbow.KQ": 1.0}, duration=0.01)
     with pytest.raises(OsimliteError, match=r"'flexor-elbow\.KP' has 3 values for 2 candidates"):
         scenario.walk({"flexor-elbow.KP": np.ones(3)}, 2, duration=0.01)
@@ -164,10 +179,15 @@ def test_yaml_and_data_of_python_say_the_same_as_a_scenario(arm, tmp_path) -> No
     yaml = pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
     wanted = Scenario(arm).walk({}, duration=0.2)
     model = osimlite.read(tmp_path / "arm.osim")
-    text = yaml.safe_dump(HOLDS).replace("initial_load: 0", "{initial_load: 0, model_file: arm.osim}")
+    text = yaml.safe_dump(HOLDS).replace(
+        "initial_load: 0", "{initial_load: 0, model_file: arm.osim}"
+    )
     (tmp_path / "arm.yaml").write_text(text)
     for scenario in (Scenario(HOLDS, model), Scenario(tmp_path / "arm.yaml")):
-        assert [each.name for each in scenario.parameters()] == ["flexor-elbow.KP", "flexor-elbow.C0"]
+        assert [each.name for each in scenario.parameters()] == [
+            "flexor-elbow.KP",
+            "flexor-elbow.C0",
+        ]
         walked = scenario.walk({}, duration=0.2)
         assert np.array_equal(walked.states.rows, wanted.states.rows)
 
@@ -179,23 +199,39 @@ def test_yaml_and_data_of_python_say_the_same_as_a_scenario(arm, tmp_path) -> No
         ("KV = 0.3", "KX = 0.3", "'KX' of a DofReflex is not done here"),
         ("ModelOpenSim4", "ModelHyfydy", "only ModelOpenSim4"),
         ("ReflexController", "MirrorController", "this has MirrorController"),
-        ("dual_sided = 0", "dual_sided = 0 NoiseController { base_noise = 0.1 }", "'NoiseController' of a Reflex"),
+        (
+            "dual_sided = 0",
+            "dual_sided = 0 NoiseController { base_noise = 0.1 }",
+            "'NoiseController' of a Reflex",
+        ),
         ("dof = elbow", "dof = knee", "no coordinate 'knee'"),
         ("DofMeasure", "BodyMeasure", "a measure is needed"),
         ("max_duration = 1", "max_duration = long", "must be a number, not 'long'"),
         ("~2<0,20>", "~x", "must be a number or a parameter"),
-        ("SimulationObjective", "lamda = 4 SimulationObjective", "'lamda' of a CmaOptimizer is not.*mean 'lambda'"),
+        (
+            "SimulationObjective",
+            "lamda = 4 SimulationObjective",
+            "'lamda' of a CmaOptimizer is not.*mean 'lambda'",
+        ),
         ("P0 = 1.2", "P0 = 1.2 P0 = 2", "'P0' stands here again"),
         ("dual_sided = 0", "dual_sided = perhaps", "'dual_sided' must be 0 or 1, not 'perhaps'"),
         ("delay = 0.01", "delay = -0.01", "a delay of -0.01 s"),
         ("min = 65 max = 72", "min = 72 max = 65", "from 72 to 65 there is no value"),
         ("max_duration = 1", "max_duration = 0", "max_duration is to be positive"),
-        ("max_duration = 1", "max_duration = 0.001", "0.001 s is shorter than a control step of 0.005 s"),
+        (
+            "max_duration = 1",
+            "max_duration = 0.001",
+            "0.001 s is shorter than a control step of 0.005 s",
+        ),
         ("initial_load = 0", "fixed_control_step_size = 1e-9", "is 0.0001 s or more, not 1e-09 s"),
         ("~2<0,20>", "~30<0,20>", "'flexor-elbow.KP' begins at 30, which is not from 0 to 20"),
         ("~2<0,20>", "~2<20,0>", "begins at 2, which is not from 20 to 0"),
         ("source = elbow P0 = 1.2 KP = ~2", "P0 = 1.2 KP = ~2", "'source' is missing"),
-        ("dual_sided = 0", "dual_sided = 0 symetric = 1", "'symetric' of a ReflexController is not done here"),
+        (
+            "dual_sided = 0",
+            "dual_sided = 0 symetric = 1",
+            "'symetric' of a ReflexController is not done here",
+        ),
     ],
 )
 def test_what_is_not_done_is_refused_by_name(arm, old, new, words) -> None:
@@ -220,7 +256,9 @@ def test_the_scenario_says_how_to_search_and_step(arm) -> None:
     text = arm.read_text().replace(
         "SimulationObjective", "lambda = 6 random_seed = 3 min_progress = 1 SimulationObjective"
     )
-    arm.write_text(text.replace("initial_load = 0", "initial_load = 0 max_integration_step_size = 0.0001"))
+    arm.write_text(
+        text.replace("initial_load = 0", "initial_load = 0 max_integration_step_size = 0.0001")
+    )
     scenario = Scenario(arm)
     assert (scenario.population, scenario.seed) == (6, 3)
     scenario.walk({}, duration=0.005)
@@ -232,7 +270,9 @@ def test_implicit_steps_do_not_shrink_where_feet_touch(ours) -> None:
     text = (ours.folder / "human-walks.scone").read_text()
     method = "ModelOpenSim4 {\n integration_method = Rosenbrock integration_accuracy = 0.01"
     (ours.folder / "implicit.scone").write_text(text.replace("ModelOpenSim4 {", method))
-    walked, wanted = (Scenario(ours.folder / f"{name}.scone") for name in ("implicit", "human-walks"))
+    walked, wanted = (
+        Scenario(ours.folder / f"{name}.scone") for name in ("implicit", "human-walks")
+    )
     steps = []
     for scenario in (walked, wanted):
         result = scenario.walk(scenario.best(), duration=0.5)
@@ -244,9 +284,13 @@ def test_implicit_steps_do_not_shrink_where_feet_touch(ours) -> None:
 def bumpy(model, height, seed):
     """A model whose floor has bumps, some three a metre, of up to a height (m)."""
     model, rng = model.copy_deep(), np.random.default_rng(seed)
-    tops = [(0.5 + 0.3 * k + rng.uniform(-0.1, 0.1), height * rng.uniform(0.3, 1.0)) for k in range(45)]
+    tops = [
+        (0.5 + 0.3 * k + rng.uniform(-0.1, 0.1), height * rng.uniform(0.3, 1.0)) for k in range(45)
+    ]
     bumps = [
-        osimlite.ContactSphere(name=f"bump{k}", socket_frame="/ground", radius=0.5, location=(x, y - 0.5, 0.0))
+        osimlite.ContactSphere(
+            name=f"bump{k}", socket_frame="/ground", radius=0.5, location=(x, y - 0.5, 0.0)
+        )
         for k, (x, y) in enumerate(tops)
     ]
     model.add(*bumps)
@@ -265,9 +309,13 @@ def test_our_human_walks_over_uneven_ground(ours, seed) -> None:
 
 def test_gaits_need_legs(arm) -> None:
     arm.write_text(
-        arm.read_text().replace("DofMeasure { dof = elbow", "GaitMeasure { name = gait #").replace("#", "#\n}#")
+        arm.read_text()
+        .replace("DofMeasure { dof = elbow", "GaitMeasure { name = gait #")
+        .replace("#", "#\n}#")
     )
-    with pytest.raises(OsimliteError, match="the model has no legs, which are bodies 'femur_l' and 'femur_r'"):
+    with pytest.raises(
+        OsimliteError, match="the model has no legs, which are bodies 'femur_l' and 'femur_r'"
+    ):
         Scenario(arm).walk({})
 
 
@@ -281,7 +329,9 @@ def test_scone_s_human_walks_twenty_seconds() -> None:
         pytest.skip("needs the sources of scone-core, which are not beside this repository")
     scenario, count, rng = Scenario(file), 16, np.random.default_rng(0)
     # Contact makes of rounding another walk: some of these fall, on whatever processor.
-    values = {name: best * (1.0 + 1e-7 * rng.normal(size=count)) for name, best in scenario.best().items()}
+    values = {
+        name: best * (1.0 + 1e-7 * rng.normal(size=count)) for name, best in scenario.best().items()
+    }
     walked = scenario.walk(values, count)
     whole = walked.times == 20.0
     assert whole.sum() >= count // 3 and (walked.terms["Gait"][whole] == 0.0).all()

@@ -43,7 +43,11 @@ class Cluster:
         self.folder, self.processes = folder, []
         (folder / "patience.py").write_text(PATIENCE)
         paths = (str(folder), *filter(None, [os.environ.get("PYTHONPATH")]))
-        self.environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "SECONDS_A_RUN": "0.03"}
+        self.environment = {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join(paths),
+            "SECONDS_A_RUN": "0.03",
+        }
         self.file = folder / "scheduler.json"
         self.start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show")
         self.address = wait_for(self.told_address, "the scheduler's file")
@@ -115,7 +119,9 @@ def command(cluster, folder, *words):
 
 @pytest.mark.skipif(os.name == "nt", reason="sends signals")
 @pytest.mark.full
-def test_workers_and_coordinator_are_killed_and_nothing_is_lost(cluster, tmp_path, walker, monkeypatch):
+def test_workers_and_coordinator_are_killed_and_nothing_is_lost(
+    cluster, tmp_path, walker, monkeypatch
+):
     monkeypatch.syspath_prepend(str(cluster.folder))
     osimlite.write(walker, tmp_path / "walker.osim")
     vary = {"RHip_rz": "0.3:0.7", "/bodyset/Pelvis/mass": "1:2:log"}
@@ -159,7 +165,9 @@ def test_a_cluster_that_is_not_there_is_told(walker, tmp_path, monkeypatch):
     monkeypatch.setattr("osimlite.base.pools.PATIENCE", 1)
     made = plan(walker, {"RHip_rz": (0.3, 0.7)})
     chosen = samples(made.variables, "random", 10)
-    with pytest.raises(OsimliteError, match=r"no Dask scheduler at 'tcp://127.0.0.1:1'.*dask scheduler"):
+    with pytest.raises(
+        OsimliteError, match=r"no Dask scheduler at 'tcp://127.0.0.1:1'.*dask scheduler"
+    ):
         sweep(made, chosen, tmp_path / "r.parquet", cluster="tcp://127.0.0.1:1")
     for address, words in (
         ("scheduler", "'scheduler' is no address .*missing port.*tcp://127.0.0.1:8786"),
@@ -177,7 +185,14 @@ def test_a_search_finds_the_same_there(cluster, tmp_path):
     vary = {"m*/control@0:0.03:3": (0.0, 1.0), "mu/max_isometric_force@scale": (0.5, 2.0)}
     made = plan(pulled(), vary, to=0.03, equilibrate=True)
     for name, where in (("there", {"cluster": cluster.address}), ("here", {})):
-        optimize(made, Objective("max(x) + integral(mu/control^2)"), tmp_path / name, budget=24, popsize=8, **where)
+        optimize(
+            made,
+            Objective("max(x) + integral(mu/control^2)"),
+            tmp_path / name,
+            budget=24,
+            popsize=8,
+            **where,
+        )
     for name in (HISTORY, BEST, SUMMARY):
         assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
 
@@ -204,25 +219,32 @@ def test_workers_that_cannot_do_the_task_are_told(cluster, walker, tmp_path, mon
             sweep(made, chosen, tmp_path / "r.parquet", cluster=cluster.address)
     monkeypatch.setattr("osimlite.__version__", "0.0.1")
     made = plan(walker, {"RHip_rz": (0.3, 0.7)}, to=0.1)
-    with pytest.raises(OsimliteError, match=r"a worker has osimlite .*, and the sweep was begun by 0\.0\.1"):
+    with pytest.raises(
+        OsimliteError, match=r"a worker has osimlite .*, and the sweep was begun by 0\.0\.1"
+    ):
         sweep(made, chosen, tmp_path / "r.parquet", cluster=cluster.address)
     assert not list(tmp_path.glob("*.parquet*"))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="sends signals")
 @pytest.mark.full
-def test_a_scheduler_that_goes_is_told_and_nothing_is_lost(tmp_path_factory, walker, tmp_path, monkeypatch):
+def test_a_scheduler_that_goes_is_told_and_nothing_is_lost(
+    tmp_path_factory, walker, tmp_path, monkeypatch
+):
     lost = Cluster(tmp_path_factory.mktemp("lost"))
     try:
         monkeypatch.syspath_prepend(str(lost.folder))
-        made = plan(walker, {"RHip_rz": (0.3, 0.7)}, measures=("distance", "patience:ended"), to=0.3)
+        made = plan(
+            walker, {"RHip_rz": (0.3, 0.7)}, measures=("distance", "patience:ended"), to=0.3
+        )
         chosen = samples(made.variables, "random", 900)
 
         def end(done, of):
             if done > 40:
                 lost.processes[0].kill()
 
-        # Workers start slowly on a busy machine; only the wait for a scheduler that has gone is to be short.
+        # Workers start slowly on a busy machine; only the wait for a scheduler that has gone is to
+        # be short.
         with distributed.Client(lost.address, set_as_default=False) as client:
             client.wait_for_workers(1, timeout=120)
         monkeypatch.setattr("osimlite.base.pools.PATIENCE", 5)

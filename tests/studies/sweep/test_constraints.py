@@ -24,13 +24,20 @@ def test_the_rest_follows_from_what_is_set():
     rows = np.array([(0.8, -0.5), (-0.3, -0.25), (0.1, 3.0)])
     result = Runner(made).run(rows)
     assert result.status == ["done", "done", "failed"]
-    assert "no pose of 'pins' near the given one fulfils /constraintset/loop" in str(result.reasons[2])
+    assert "no pose of 'pins' near the given one fulfils /constraintset/loop" in str(
+        result.reasons[2]
+    )
     other = Runner(replace(made, engine="bullet")).run(rows)
     assert other.status == result.status
     for name in result.measures:
         assert result.measures[name] == pytest.approx(other.measures[name], abs=1e-8, nan_ok=True)
     for number, (speed, value) in enumerate(rows[:2].tolist()):
         alone = simulate(
-            four_bars(), 0.4, "compiled", accuracy=1e-6, initial={"p1": value}, initial_speeds={"p0": speed}
+            four_bars(),
+            0.4,
+            "compiled",
+            accuracy=1e-6,
+            initial={"p1": value},
+            initial_speeds={"p0": speed},
         )
         assert result.measures["p0/value"][number] == pytest.approx(alone.values[-1, 0], abs=1e-12)

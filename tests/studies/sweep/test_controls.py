@@ -30,7 +30,9 @@ ENDS = ("x/value", "x/speed", "/forceset/mu/activation")
 
 def pulled():
     """A block that a muscle, which is taut, and a motor pull."""
-    model = hung(muscle("thelen_default", default_activation=0.3, default_fiber_length=0.064), [0.3, 0.3])
+    model = hung(
+        muscle("thelen_default", default_activation=0.3, default_fiber_length=0.064), [0.3, 0.3]
+    )
     model.tree().by_path["/jointset/slide/x"].default_value = 0.34
     model.add(CoordinateActuator(name="motor", coordinate="x", optimal_force=100.0))
     return model
@@ -71,11 +73,17 @@ def test_nodes_make_a_curve(interpolation):
 
 def test_nodes_hold_their_values_outside():
     (result,) = runs(pulled(), {"mu/control@0.02,0.01": (0.0, 1.0)}, (0.1, 0.9))
-    assert result == pytest.approx(ends(pulled(), mu=((0.0, 0.01, 0.02, 0.03), (0.9, 0.9, 0.1, 0.1))), rel=1e-9)
+    assert result == pytest.approx(
+        ends(pulled(), mu=((0.0, 0.01, 0.02, 0.03), (0.9, 0.9, 0.1, 0.1))), rel=1e-9
+    )
 
 
 def test_switches_may_pass_each_other():
-    vary = {"motor/control@switch1": (0.0, TO), "motor/control@switch2": (0.0, TO), "motor/control": (-1.0, 1.0)}
+    vary = {
+        "motor/control@switch1": (0.0, TO),
+        "motor/control@switch2": (0.0, TO),
+        "motor/control": (-1.0, 1.0),
+    }
     result = runs(pulled(), vary, (0.01, 0.02, 0.5), (0.02, 0.01, 0.5), (0.01, 0.01, 0.5))
     on = PiecewiseConstantFunction(x=(0.0, 0.01, 0.02), y=(0.5, 1.5, 0.5))
     assert result[0] == result[1] == pytest.approx(ends(pulled(), motor=on), rel=1e-9)
@@ -100,7 +108,11 @@ def hung_with_motor(excitation):
 
 
 def test_several_names_are_one_variable():
-    for name in ("m*/control@0:0.03:2", "mu,motor/control@0,0.03", "/forceset/m?,/forceset/motor/control@0:0.03:2"):
+    for name in (
+        "m*/control@0:0.03:2",
+        "mu,motor/control@0,0.03",
+        "/forceset/m?,/forceset/motor/control@0:0.03:2",
+    ):
         (result,) = runs(pulled(), {name: (0.0, 1.0)}, (0.5, 0.3))
         both = {name: ((0.0, 0.03), (0.5, 0.3)) for name in ("mu", "motor")}
         assert result == pytest.approx(ends(pulled(), **both), rel=1e-9)
@@ -109,7 +121,11 @@ def test_several_names_are_one_variable():
 def test_muscles_and_reflexes_have_numbers_too():
     model = pulled()
     model.add(ToyReflexController(name="reflex", gain=0.0, socket_actuators=("/forceset/mu",)))
-    vary = {"mu/max_isometric_force@scale": (0.5, 2.0), "reflex/gain": (0.0, 5.0), "x/speed": (0.0, 1.0)}
+    vary = {
+        "mu/max_isometric_force@scale": (0.5, 2.0),
+        "reflex/gain": (0.0, 5.0),
+        "x/speed": (0.0, 1.0),
+    }
     result = runs(model, vary, (1.5, 3.0, 0.5), (1.0, 0.0, 0.5))
     for (scale, gain, speed), ours in zip([(1.5, 3.0, 0.5), (1.0, 0.0, 0.5)], result, strict=True):
         own = pulled()
@@ -126,7 +142,12 @@ def test_files_of_other_controllers_are_read_once(tmp_path):
     model = pulled()
     model.add(PrescribedController(name="file", controls_file="given.sto"))
     made = plan(
-        model, {"motor/control@0:0.03:2": (0.0, 1.0)}, measures=ENDS, to=TO, accuracy=1e-7, folder=str(tmp_path)
+        model,
+        {"motor/control@0:0.03:2": (0.0, 1.0)},
+        measures=ENDS,
+        to=TO,
+        accuracy=1e-7,
+        folder=str(tmp_path),
     )
     runner = Runner(made)
     runner.run(np.array([[0.1, 0.2]]))
@@ -138,7 +159,11 @@ def test_files_of_other_controllers_are_read_once(tmp_path):
 
 
 def test_the_model_that_is_written_does_the_same(tmp_path):
-    vary = {"m*/control@0:0.03:3": (0.0, 1.0), "motor/control@switch1": (0.0, TO), "mu/control@scale": (0.5, 2.0)}
+    vary = {
+        "m*/control@0:0.03:3": (0.0, 1.0),
+        "motor/control@switch1": (0.0, TO),
+        "mu/control@scale": (0.5, 2.0),
+    }
     row, given = (0.2, 0.9, 0.4, 0.01, 1.7), {"motor": 0.1}
     (result,) = runs(pulled(), vary, row, controls=given)
     variants = Variants(plan(pulled(), vary, to=TO, controls=given))
@@ -151,10 +176,16 @@ def test_the_model_that_is_written_does_the_same(tmp_path):
 
 
 def test_the_results_are_the_same_for_any_number_of_workers(tmp_path):
-    vary = {"m*/control@0:0.03:3": (0.0, 1.0), "motor/control@switch1": (0.0, TO), "mu/max_isometric_force": (100, 500)}
+    vary = {
+        "m*/control@0:0.03:3": (0.0, 1.0),
+        "motor/control@switch1": (0.0, TO),
+        "mu/max_isometric_force": (100, 500),
+    }
     made = plan(pulled(), vary, measures=(*ENDS, "max(mu)", "mean(x/speed)"), to=TO)
     chosen = samples(made.variables, "sobol", 40)
-    one, three = (sweep(made, chosen, tmp_path / f"{n}.parquet", workers=n).path.read_bytes() for n in (1, 3))
+    one, three = (
+        sweep(made, chosen, tmp_path / f"{n}.parquet", workers=n).path.read_bytes() for n in (1, 3)
+    )
     assert one == three
 
 
@@ -167,9 +198,15 @@ def test_names():
     mu, motor = "/forceset/mu", "/forceset/motor"
     assert targets("mu/control") == [Control((mu,))]
     assert targets("/forceset/*/control@0.5") == [Control((mu, motor), "node", 0.5)]
-    assert targets("mu/control@0:0.5:2") == [Control((mu,), "node", 0.0), Control((mu,), "node", 0.5)]
+    assert targets("mu/control@0:0.5:2") == [
+        Control((mu,), "node", 0.0),
+        Control((mu,), "node", 0.5),
+    ]
     assert targets("mu/control@switch2") == [Control((mu,), "switch", 2.0)]
-    assert targets("{m*}/control@1") == [Control((mu,), "node", 1.0), Control((motor,), "node", 1.0)]
+    assert targets("{m*}/control@1") == [
+        Control((mu,), "node", 1.0),
+        Control((motor,), "node", 1.0),
+    ]
     assert targets("/forceset/m{?}/control") == [Control((mu,))]
     assert [len(target.places) for target in targets("{*}/max_control@scale")] == [1, 1]
     assert targets("mu/control@scale") == [Control((mu,), "scale")]
@@ -197,11 +234,17 @@ def test_names_that_mean_nothing(name, words):
 def test_what_cannot_be_is_said():
     with pytest.raises(SettingError, match="the same number"):
         plan(pulled(), {"mu/control@0.1": (0.0, 1.0), "m*/control@0.1": (0.0, 1.0)})
-    with pytest.raises(SettingError, match="there is no interpolation 'cubed'; did you mean 'cubic'"):
+    with pytest.raises(
+        SettingError, match="there is no interpolation 'cubed'; did you mean 'cubic'"
+    ):
         plan(pulled(), {"mu/control@0.1": (0.0, 1.0)}, interpolation="cubed")
-    with pytest.raises(SettingError, match=r"needs 4 nodes or more, .* '/forceset/mu' are at 0, 0.1, 0.2, 0.3 s"):
+    with pytest.raises(
+        SettingError, match=r"needs 4 nodes or more, .* '/forceset/mu' are at 0, 0.1, 0.2, 0.3 s"
+    ):
         plan(pulled(), {"mu/control@0:0.3:4": (0.0, 1.0)}, interpolation="cubic", to=0.5)
-    with pytest.raises(SettingError, match="'/forceset/motor', so that there is nothing to scale; give one with"):
+    with pytest.raises(
+        SettingError, match="'/forceset/motor', so that there is nothing to scale; give one with"
+    ):
         Variants(plan(pulled(), {"motor/control@scale": (0.0, 1.0)}))
     with pytest.raises(SettingError, match="no actuator 'moter' to control; did you mean 'motor'"):
         plan(pulled(), {"x": (0.0, 1.0)}, controls={"moter": 1.0})
@@ -213,7 +256,9 @@ def test_what_is_chosen_for_a_simulation_is_of_each_run(choice):
     model = pulled()
     egg = WrapEllipsoid(name="egg", dimensions=(0.05, 0.08, 0.06), translation=(0.15, 0.05, 0.01))
     model.ground.wrap_object_set.objects.append(egg)
-    model.tree().by_path["/forceset/mu"].geometry_path.path_wrap_set.objects.append(PathWrap(wrap_object="egg"))
+    model.tree().by_path["/forceset/mu"].geometry_path.path_wrap_set.objects.append(
+        PathWrap(wrap_object="egg")
+    )
     vary = {"mu/control@0:0.03:2": (0.0, 1.0), "mu/max_isometric_force": (300.0, 600.0)}
     (result,) = runs(model, vary, (0.2, 0.6, 500.0), **choice)
     model.tree().by_path["/forceset/mu"].max_isometric_force = 500.0

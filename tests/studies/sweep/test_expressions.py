@@ -14,7 +14,9 @@ from tests.studies.sweep.test_controls import pulled
 
 
 def measured(model, *measures, vary=None, row=(0.345,), **choices):
-    block = Runner(plan(model, vary or {"x": (0.0, 1.0)}, measures=measures, **choices)).run(np.array([row]))
+    block = Runner(plan(model, vary or {"x": (0.0, 1.0)}, measures=measures, **choices)).run(
+        np.array([row])
+    )
     assert block.status == ["done"], block.reasons
     return [float(block.measures[name][0]) for name in measures]
 
@@ -22,7 +24,11 @@ def measured(model, *measures, vary=None, row=(0.345,), **choices):
 def test_they_are_of_the_columns_of_a_simulation():
     model = pulled()
     model.add(ActuatorPowerProbe(name="power", actuator_names=("mu",)))
-    model.add(ActuatorPowerProbe(name="work", actuator_names=("all",), probe_operation="integrate", gain=2.0))
+    model.add(
+        ActuatorPowerProbe(
+            name="work", actuator_names=("all",), probe_operation="integrate", gain=2.0
+        )
+    )
     names = {
         "x": lambda run: run.values[:, 0],
         "/jointset/slide/x/value": lambda run: run.values[:, 0],
@@ -35,21 +41,38 @@ def test_they_are_of_the_columns_of_a_simulation():
         "mu/control": lambda run: np.full(len(run.times), 0.3),
         "time": lambda run: run.times,
     }
-    result = measured(model, *(f"{what}({name})" for name in names for what in ("max", "min", "end")), to=0.055)
+    result = measured(
+        model, *(f"{what}({name})" for name in names for what in ("max", "min", "end")), to=0.055
+    )
     with Simulation(model, "compiled") as simulation:
         run = simulation.run(0.055, initial={"x": 0.345}, report_interval=0.01)
-    wanted = [number for of in names.values() for number in (of(run).max(), of(run).min(), of(run)[-1])]
+    wanted = [
+        number for of in names.values() for number in (of(run).max(), of(run).min(), of(run)[-1])
+    ]
     assert result == pytest.approx(wanted, rel=1e-12, abs=1e-300)
 
 
 @pytest.mark.parametrize("engine", ["compiled", "bullet"])
 def test_places_of_bodies_and_the_mass_center(walker, engine):
     """Numbers of the model that are varied count."""
-    names = ["center_of_mass_X", "center_of_mass_Y/speed", "LeftShank_Y", "Pelvis_X/speed", "platform_rz"]
-    vary = {"Pelvis_ty/speed": (0.0, 1.0), "LHip_rz": (0.0, 1.0), "LHip_rz/speed": (0.0, 3.0), "Pelvis/mass": (1, 5)}
+    names = [
+        "center_of_mass_X",
+        "center_of_mass_Y/speed",
+        "LeftShank_Y",
+        "Pelvis_X/speed",
+        "platform_rz",
+    ]
+    vary = {
+        "Pelvis_ty/speed": (0.0, 1.0),
+        "LHip_rz": (0.0, 1.0),
+        "LHip_rz/speed": (0.0, 3.0),
+        "Pelvis/mass": (1, 5),
+    }
     vary |= {"LeftShank/mass_center/1": (-0.2, 0.2), "platform_rz": (-0.1, 0.0)}
     row = (0.5, 0.3, 2.0, 4.0, 0.15, -0.05)
-    made = plan(walker, vary, measures=tuple(f"end({name})" for name in names), to=0.1, engine=engine)
+    made = plan(
+        walker, vary, measures=tuple(f"end({name})" for name in names), to=0.1, engine=engine
+    )
     result = [value[0] for value in Runner(made).run(np.array([row])).measures.values()]
     walker.tree().by_path["/bodyset/Pelvis"].mass = 4.0
     walker.tree().by_path["/bodyset/LeftShank"].mass_center = shank = (0.0, 0.15, 0.0)
@@ -62,7 +85,9 @@ def test_places_of_bodies_and_the_mass_center(walker, engine):
         mechanism.center_of_mass(q)[0],
         mechanism.center_of_mass_velocity(q, u)[1],
         (mechanism.body_transforms(q)["LeftShank"] @ [*shank, 1.0])[1],
-        mechanism.station_velocity("Pelvis", walker.tree().by_path["/bodyset/Pelvis"].mass_center, q, u)[0],
+        mechanism.station_velocity(
+            "Pelvis", walker.tree().by_path["/bodyset/Pelvis"].mass_center, q, u
+        )[0],
         -0.05,
     ]
     assert result == pytest.approx(wanted, rel=1e-12 if engine == "compiled" else 1e-7)
@@ -87,7 +112,9 @@ def test_arithmetic(text, value):
 def effort(run):
     """What a function can look at."""
     assert len(run.times) == 6
-    with pytest.raises(SettingError, match="a run has no 'mu/activatio'; did you mean 'mu/activation'"):
+    with pytest.raises(
+        SettingError, match="a run has no 'mu/activatio'; did you mean 'mu/activation'"
+    ):
         run.history("mu/activatio")
     return float((run.history("mu/activation") * run.history("mu")).sum())
 
@@ -105,10 +132,17 @@ def test_functions_look_at_the_same():
 
 
 def test_a_run_that_is_stopped_is_looked_at_up_to_its_end(walker):
-    made = plan(walker, {"RHip_rz": (0.0, 1.0)}, measures=("end(Pelvis_ty)", "max(time)"), below={"Pelvis_ty": 0.7})
+    made = plan(
+        walker,
+        {"RHip_rz": (0.0, 1.0)},
+        measures=("end(Pelvis_ty)", "max(time)"),
+        below={"Pelvis_ty": 0.7},
+    )
     block = Runner(made).run(np.array([[0.5]]))
     assert block.status == ["stopped"]
-    assert [block.measures[name][0] for name in made.measures] == pytest.approx([0.7, block.times[0]], abs=1e-6)
+    assert [block.measures[name][0] for name in made.measures] == pytest.approx(
+        [0.7, block.times[0]], abs=1e-6
+    )
 
 
 @pytest.mark.parametrize(

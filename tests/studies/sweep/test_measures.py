@@ -21,7 +21,9 @@ def block_of(walker, *measures, **choices):
 
 
 def test_against_the_summary_of_a_simulation(walker):
-    block = block_of(walker, "distance", "energy", "largest_force", "Pelvis_ty/value", "RHip_rz/speed", to=1.5)
+    block = block_of(
+        walker, "distance", "energy", "largest_force", "Pelvis_ty/value", "RHip_rz/speed", to=1.5
+    )
     for number, (hip,) in enumerate(ROWS.tolist()):
         with Simulation(walker, "compiled") as simulation:
             trajectory = simulation.run(1.5, initial={"RHip_rz": hip})
@@ -30,9 +32,14 @@ def test_against_the_summary_of_a_simulation(walker):
         energies = summary["energy_J"]
         result = {name: values[number] for name, values in block.measures.items()}
         assert result == {
-            "distance": trajectory.values[-1, column("Pelvis_tx")] - trajectory.values[0, column("Pelvis_tx")],
-            "energy": pytest.approx(energies["end"]["total"] - energies["start"]["total"], abs=1e-9),
-            "largest_force": max(item["force_N"] for item in summary["largest_contact_forces"].values()),
+            "distance": trajectory.values[-1, column("Pelvis_tx")]
+            - trajectory.values[0, column("Pelvis_tx")],
+            "energy": pytest.approx(
+                energies["end"]["total"] - energies["start"]["total"], abs=1e-9
+            ),
+            "largest_force": max(
+                item["force_N"] for item in summary["largest_contact_forces"].values()
+            ),
             "Pelvis_ty/value": trajectory.values[-1, column("Pelvis_ty")],
             "RHip_rz/speed": trajectory.speeds[-1, column("RHip_rz")],
         }
@@ -43,7 +50,9 @@ def test_steps_and_falls_are_those_of_the_walk(walker):
     with Simulation(walker, "compiled") as simulation:
         engine = simulation.engine
         infos = engine.mechanism.coordinates
-        y = engine.state.pack([info.default_value for info in infos], [info.default_speed for info in infos])
+        y = engine.state.pack(
+            [info.default_value for info in infos], [info.default_speed for info in infos]
+        )
         starts = np.tile(y, (3, 1))
         starts[:, engine.order.index(engine.mechanism.coordinate_index("RHip_rz"))] = ROWS[:, 0]
         walks = walk_many(engine, starts, 3.0)
@@ -51,21 +60,30 @@ def test_steps_and_falls_are_those_of_the_walk(walker):
     assert block.measures["scuffs"].tolist() == [len(walk.scuffs) for walk in walks]
     assert block.measures["time_to_fall"].tolist() == [walk.end for walk in walks]
     assert block.status == ["stopped" if walk.ending == "fell" else "done" for walk in walks]
-    assert [reason for reason in block.reasons if reason] == [f"fall: {w.fell_on}" for w in walks if w.fell_on]
+    assert [reason for reason in block.reasons if reason] == [
+        f"fall: {w.fell_on}" for w in walks if w.fell_on
+    ]
 
 
 def test_steps_of_models_of_other_numbers(walker):
     vary = {"/contactgeometryset/*Foot*/radius": (0.04, 0.06)}
-    block = Runner(plan(walker, vary, measures=("steps", "time_to_fall"), to=2.0)).run(np.array([[0.04], [0.06]]))
+    block = Runner(plan(walker, vary, measures=("steps", "time_to_fall"), to=2.0)).run(
+        np.array([[0.04], [0.06]])
+    )
     for number, radius in enumerate((0.04, 0.06)):
         for side in "LR":
             walker.tree().by_path[f"/contactgeometryset/{side}FootContact"].radius = radius
         with Simulation(walker, "compiled") as simulation:
             engine = simulation.engine
             infos = engine.mechanism.coordinates
-            y = engine.state.pack([info.default_value for info in infos], [info.default_speed for info in infos])
+            y = engine.state.pack(
+                [info.default_value for info in infos], [info.default_speed for info in infos]
+            )
             (walk,) = walk_many(engine, [y], 2.0)
-        assert (block.measures["steps"][number], block.measures["time_to_fall"][number]) == (len(walk.steps), walk.end)
+        assert (block.measures["steps"][number], block.measures["time_to_fall"][number]) == (
+            len(walk.steps),
+            walk.end,
+        )
 
 
 def drop(run):
@@ -105,12 +123,20 @@ def test_a_function_that_returns_nothing_fails(walker):
 
 
 def test_functions_of_ones_own(walker, tmp_path, monkeypatch):
-    (tmp_path / "own.py").write_text("def drop(run):\n    return run.start['Pelvis_ty'] - run.end['Pelvis_ty']\n")
+    (tmp_path / "own.py").write_text(
+        "def drop(run):\n    return run.start['Pelvis_ty'] - run.end['Pelvis_ty']\n"
+    )
     monkeypatch.chdir(tmp_path)
-    block = block_of(walker, drop, deepest, everything, "own.py:drop", "own:drop", to=1.0, report_interval=0.1)
+    block = block_of(
+        walker, drop, deepest, everything, "own.py:drop", "own:drop", to=1.0, report_interval=0.1
+    )
     assert block.reasons == [None] * 3
     first = block.measures[measure_name(drop)]
-    assert first.tolist() == block.measures["own.py:drop"].tolist() == block.measures["own:drop"].tolist()
+    assert (
+        first.tolist()
+        == block.measures["own.py:drop"].tolist()
+        == block.measures["own:drop"].tolist()
+    )
     assert (block.measures[measure_name(deepest)] <= 0.835 - np.maximum(first, 0.0)).all()
 
 
@@ -149,6 +175,8 @@ def test_what_there_is_not(walker, tmp_path):
     name = next(pendulum.components(osimlite.Coordinate)).name
     with pytest.raises(SettingError, match="no distance"):
         Runner(plan(pendulum, {name: (0.0, 1.0)}, measures=("distance",)))
-    block = Runner(plan(pendulum, {name: (0.0, 1.0)}, measures=("largest_force", "energy"))).run(np.array([[0.5]]))
+    block = Runner(plan(pendulum, {name: (0.0, 1.0)}, measures=("largest_force", "energy"))).run(
+        np.array([[0.5]])
+    )
     assert block.measures["largest_force"].tolist() == [0.0]
     assert block.measures["energy"][0] == pytest.approx(0.0, abs=1e-2)

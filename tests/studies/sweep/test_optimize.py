@@ -60,7 +60,9 @@ def test_the_best_model_does_what_was_found(made, tmp_path):
     result = optimize(made, DISTANCE, tmp_path / "new" / "folder", budget=40, popsize=8, seed=2)
     table = pq.read_table(result.history).to_pydict()
     assert table["evaluation"] == list(range(40)) and table["batch"] == [k // 8 for k in range(40)]
-    assert result.value == max(table["distance"]) and result.evaluation == table["distance"].index(result.value)
+    assert result.value == max(table["distance"]) and result.evaluation == table["distance"].index(
+        result.value
+    )
     for name, (low, high) in VARY.items():
         assert all(low <= x <= high for x in table[name])
         assert table[name][result.evaluation] == result.values[name]
@@ -73,7 +75,9 @@ def test_the_best_model_does_what_was_found(made, tmp_path):
     assert values[-1] - values[0] == result.value
     summary = json.loads((tmp_path / "new" / "folder" / SUMMARY).read_text())
     assert summary["value"] == result.value and summary["settings"]["seed"] == 2
-    assert sorted(path.name for path in (tmp_path / "new" / "folder").iterdir()) == sorted((HISTORY, BEST, SUMMARY))
+    assert sorted(path.name for path in (tmp_path / "new" / "folder").iterdir()) == sorted(
+        (HISTORY, BEST, SUMMARY)
+    )
 
 
 def test_it_begins_where_the_model_is(made, tmp_path):
@@ -85,7 +89,13 @@ def test_it_begins_where_the_model_is(made, tmp_path):
 def test_it_begins_where_another_search_has_ended(made, walker, tmp_path):
     first = optimize(made, DISTANCE, tmp_path / "first", budget=16, popsize=8)
     other = plan(walker, {**VARY, "LHip_rz": (-0.4, 0.0)}, to=0.5)
-    choices = {"start": found_by(tmp_path / "first"), "method": "cma", "budget": 4, "popsize": 4, "sigma": 1e-9}
+    choices = {
+        "start": found_by(tmp_path / "first"),
+        "method": "cma",
+        "budget": 4,
+        "popsize": 4,
+        "sigma": 1e-9,
+    }
     again = optimize(other, DISTANCE, tmp_path / "again", **choices)
     assert again.values == pytest.approx({**first.values, "LHip_rz": np.radians(-10.0)}, abs=1e-6)
     with pytest.raises(OsimliteError, match=r"'none.summary.json' is not the summary of a search"):
@@ -94,7 +104,9 @@ def test_it_begins_where_another_search_has_ended(made, walker, tmp_path):
 
 def test_it_looks_around_from_where_the_model_is(made, tmp_path):
     """The model as it is comes first, then points all over the ranges; what follows begins at the best of them."""
-    result = optimize(made, DISTANCE, tmp_path, method="sobol-cma", budget=40, popsize=8, sigma=1e-6, seed=3)
+    result = optimize(
+        made, DISTANCE, tmp_path, method="sobol-cma", budget=40, popsize=8, sigma=1e-6, seed=3
+    )
     table = pq.read_table(result.history).to_pydict()
     rows = np.array([table[name] for name in VARY]).T
     assert rows[0] == pytest.approx([np.radians(30.0), 0.0, 1.0])
@@ -125,7 +137,9 @@ def test_an_interrupted_search_goes_on(made, tmp_path, method):
         optimize(made, DISTANCE, tmp_path / "cut", resume=True, **{**choices, "seed": 5})
     again = optimize(made, DISTANCE, tmp_path / "cut", resume=True, workers=1, **choices)
     for name in (HISTORY, BEST, SUMMARY):
-        assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
+        assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), (
+            name
+        )
     assert again.value == whole.value
 
 
@@ -160,7 +174,9 @@ def test_every_run_that_is_allowed_is_made(made, tmp_path, method):
     assert whole.evaluations == 20
     few = optimize(made, DISTANCE, tmp_path / "two", method=method, budget=3, popsize=8)
     table = pq.read_table(few.history).to_pydict()
-    assert few.evaluations == 3 and few.value == max(table["distance"]) and table["batch"] == [0, 0, 0]
+    assert (
+        few.evaluations == 3 and few.value == max(table["distance"]) and table["batch"] == [0, 0, 0]
+    )
     optimize(made, DISTANCE, tmp_path / "two", method=method, budget=11, popsize=8, resume=True)
     optimize(made, DISTANCE, tmp_path / "two", method=method, budget=20, popsize=8, resume=True)
     assert (tmp_path / "two" / HISTORY).read_bytes() == (tmp_path / "whole" / HISTORY).read_bytes()
@@ -183,7 +199,11 @@ def test_functions_are_made_small_and_names_large_or_small(made, tmp_path):
 
 def endless(run):
     """No number that could be the best, but for one run in the middle."""
-    return float("nan") if abs(run.values["Pelvis_tx/speed"] - 1.0) > 0.5 else run.values["Pelvis_tx/speed"]
+    return (
+        float("nan")
+        if abs(run.values["Pelvis_tx/speed"] - 1.0) > 0.5
+        else run.values["Pelvis_tx/speed"]
+    )
 
 
 def never(run):
@@ -192,7 +212,9 @@ def never(run):
 
 
 def test_only_a_finite_number_is_the_best(made, walker, tmp_path):
-    best = optimize(made, Objective(endless), tmp_path / "a", budget=40, popsize=8, method="sobol-cma")
+    best = optimize(
+        made, Objective(endless), tmp_path / "a", budget=40, popsize=8, method="sobol-cma"
+    )
     assert 0.5 <= best.value <= 1.5 and best.values["Pelvis_tx/speed"] == best.value
     with pytest.raises(SimulationError, match="never' is not a finite number in any run"):
         optimize(made, Objective(never), tmp_path / "b", budget=8, popsize=8)
@@ -221,7 +243,9 @@ def test_parameters_begin_at_their_defaults(tmp_path):
 def test_failed_runs_are_worse_than_all_others(walker, tmp_path):
     path = "/forceset/RFootForce/contact_parameters/stiffness"
     made = plan(walker, {path: (-1e6, 1e6), "RHip_rz": (0.4, 0.6)}, to=0.2)
-    result = optimize(made, DISTANCE, tmp_path / "a", budget=24, popsize=8, start=[0.0, 0.5], seed=1)
+    result = optimize(
+        made, DISTANCE, tmp_path / "a", budget=24, popsize=8, start=[0.0, 0.5], seed=1
+    )
     table = pq.read_table(result.history).to_pydict()
     assert "failed" in table["status"] and table["status"][result.evaluation] == "done"
     with pytest.raises(SimulationError, match=r"no run came to its end: .*RFootForce"):
@@ -251,7 +275,9 @@ def test_what_cannot_be_is_said(made, walker, tmp_path):
             optimize(made, DISTANCE, tmp_path, **choices)
     with pytest.raises(SettingError, match="take --method nelder-mead"):
         optimize(plan(walker, {"RHip_rz": (0.3, 0.5)}), DISTANCE, tmp_path)
-    with pytest.raises(SettingError, match=r"'RHip_rz' is to have 3 values, .*: leave the number out"):
+    with pytest.raises(
+        SettingError, match=r"'RHip_rz' is to have 3 values, .*: leave the number out"
+    ):
         optimize(plan(walker, {"RHip_rz": "0.3:0.5:3"}), DISTANCE, tmp_path)
     assert not list(tmp_path.iterdir())
     with pytest.raises(SettingError, match="nothing to search"):

@@ -30,7 +30,8 @@ def test_a_measure_is_there_as_soon_as_it_is_registered(walker, monkeypatch):
 
 def test_generic_sweeps_load_nothing_of_walkers():
     program = (
-        "import sys; from osimlite.studies.sweep.registry import measure_named; from osimlite.studies.sweep import variants, runner;"
+        "import sys; from osimlite.studies.sweep.registry import measure_named;"
+        "from osimlite.studies.sweep import variants, runner;"
         "assert measure_named('distance') and measure_named('max(x)') is None;"
         "assert not [name for name in sys.modules if name.startswith('osimlite.studies.gait')];"
         "assert measure_named('steps').make.__module__ == 'osimlite.studies.gait.measures'"

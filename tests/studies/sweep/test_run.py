@@ -33,7 +33,9 @@ def made(walker):
 
 def test_the_file_is_the_same_from_any_number_of_workers(made, tmp_path):
     chosen = samples(made.variables, "sobol", 60, 5)
-    outcomes = [sweep(made, chosen, tmp_path / f"{count}.parquet", workers=count) for count in (1, 2, 3)]
+    outcomes = [
+        sweep(made, chosen, tmp_path / f"{count}.parquet", workers=count) for count in (1, 2, 3)
+    ]
     whole = outcomes[0].path.read_bytes()
     assert [outcome.path.read_bytes() == whole for outcome in outcomes] == [True] * 3
     table = pq.read_table(outcomes[0].path).to_pydict()
@@ -41,7 +43,11 @@ def test_the_file_is_the_same_from_any_number_of_workers(made, tmp_path):
     rows = chosen.block(0, 60)
     assert table["RHip_rz"] == rows[:, 0].tolist()
     assert outcomes[0].status == {"done": 60}
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["1.parquet", "2.parquet", "3.parquet"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "1.parquet",
+        "2.parquet",
+        "3.parquet",
+    ]
 
 
 def test_results_are_tables_and_show_themselves(made, tmp_path):
@@ -50,7 +56,11 @@ def test_results_are_tables_and_show_themselves(made, tmp_path):
     outcome = sweep(made, samples(made.variables, "sobol", 12, 5), tmp_path / "r.parquet")
     table, frame, data = outcome.to_arrow(), outcome.to_frame(), outcome.to_xarray()
     assert table.num_rows == 12 and frame.index.name == "run" and data.sizes == {"run": 12}
-    assert frame["distance"].tolist() == table["distance"].to_pylist() == data["distance"].values.tolist()
+    assert (
+        frame["distance"].tolist()
+        == table["distance"].to_pylist()
+        == data["distance"].values.tolist()
+    )
     html = outcome._repr_html_()
     assert "12 runs" in html and "and 2 more" in html and f"{frame['distance'][0]:.6g}" in html
     outcome.path.write_bytes(b"PAR1")
@@ -63,7 +73,9 @@ def test_processes_of_bullet_too(walker, tmp_path):
     pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     made = plan(walker, {"RHip_rz": (0.3, 0.7)}, to=0.2, engine="bullet")
     chosen = samples(made.variables, "random", 12, 1)
-    whole = [sweep(made, chosen, tmp_path / f"{n}.parquet", workers=n).path.read_bytes() for n in (1, 2)]
+    whole = [
+        sweep(made, chosen, tmp_path / f"{n}.parquet", workers=n).path.read_bytes() for n in (1, 2)
+    ]
     assert whole[0] == whole[1]
 
 
@@ -74,7 +86,9 @@ def test_settings_are_in_the_file(made, tmp_path):
     assert result["vary"][0] == {"name": "RHip_rz", "low": 0.3, "high": 0.7}
     assert result["vary"][1]["log"] is True
     assert (
-        result["engine"] == "compiled" and result["to"] == 0.3 and result["measures"] == ["distance", "largest_force"]
+        result["engine"] == "compiled"
+        and result["to"] == 0.3
+        and result["measures"] == ["distance", "largest_force"]
     )
 
 
@@ -120,7 +134,12 @@ def test_a_colon_in_the_name_of_a_file_is_no_protocol(made, tmp_path, monkeypatc
 
 def test_interrupted_before_anything_was_saved(made, tmp_path):
     with pytest.raises(Interrupted, match=r"^interrupted before any run was saved$"):
-        sweep(made, samples(made.variables, "sobol", 80, 5), tmp_path / "r.parquet", progress=Stopper(0))
+        sweep(
+            made,
+            samples(made.variables, "sobol", 80, 5),
+            tmp_path / "r.parquet",
+            progress=Stopper(0),
+        )
     assert not list(tmp_path.iterdir())
 
 
@@ -135,7 +154,9 @@ def test_other_settings_are_told_apart(made, walker, tmp_path):
     other = plan(walker, VARY, measures=("distance", "largest_force"), to=0.4)
     with pytest.raises(SettingError, match=r"other settings: model and to \(0.3 before, 0.4 now\)"):
         sweep(other, chosen, path, resume=True)
-    with pytest.raises(SettingError, match=r"other settings: wrapping \(opensim before, geodesic now\)"):
+    with pytest.raises(
+        SettingError, match=r"other settings: wrapping \(opensim before, geodesic now\)"
+    ):
         sweep(replace(made, wrapping="geodesic"), chosen, path, resume=True)
     (tmp_path / "x.parquet.partial").write_text("something else")
     with pytest.raises(SettingError, match="no interrupted sweep"):
@@ -152,7 +173,10 @@ def test_finished_results_are_spared_unless_forced(made, tmp_path):
     for resume in (False, True):
         with pytest.raises(SettingError, match="--force"):
             sweep(made, more, path, resume=resume)
-    assert sorted(each.name for each in tmp_path.iterdir()) == ["r.parquet"] and path.read_bytes() == first
+    assert (
+        sorted(each.name for each in tmp_path.iterdir()) == ["r.parquet"]
+        and path.read_bytes() == first
+    )
     assert sweep(made, few, path).path.read_bytes() == first
     with pytest.raises(Interrupted):
         sweep(made, more, path, force=True, workers=1, progress=Stopper(4))
@@ -200,7 +224,9 @@ def interrupted_three_times(tmp_path_factory):
     whole = sweep(made, chosen, folder / "whole.parquet").path.read_bytes()
     for count in (8, 16, 30):
         with pytest.raises(Interrupted):
-            sweep(made, chosen, folder / "r.parquet", resume=True, workers=1, progress=Stopper(count))
+            sweep(
+                made, chosen, folder / "r.parquet", resume=True, workers=1, progress=Stopper(count)
+            )
     partial = (folder / "r.parquet.partial").read_bytes()
     assert len(_ends(partial)) == 5
     return made, chosen, whole, partial
@@ -222,10 +248,19 @@ def _zeroed(content: bytes, place: int) -> bytes:
     ],
 )
 @pytest.mark.parametrize("batch", [1, 3])
-def test_damaged_batches_are_computed_again_and_said(interrupted_three_times, tmp_path, caplog, damage, part, batch):
+def test_damaged_batches_are_computed_again_and_said(
+    interrupted_three_times, tmp_path, caplog, damage, part, batch
+):
     made, chosen, whole, good = interrupted_three_times
     start, end = _ends(good)[batch : batch + 2]
-    inside = {"mark": 0, "length": 4, "longer": 11, "checksum": 12, "rows": (end - start) // 2, "last": end - start - 1}
+    inside = {
+        "mark": 0,
+        "length": 4,
+        "longer": 11,
+        "checksum": 12,
+        "rows": (end - start) // 2,
+        "last": end - start - 1,
+    }
     path = tmp_path / "r.parquet"
     damaged = damage(good, start + inside[part])
     assert damaged != good
@@ -233,7 +268,9 @@ def test_damaged_batches_are_computed_again_and_said(interrupted_three_times, tm
     outcome = sweep(made, chosen, path, resume=True)
     assert path.read_bytes() == whole
     (said,) = caplog.messages
-    assert "r.parquet.partial' is damaged or cut off" in said and f"first {outcome.before} run" in said
+    assert (
+        "r.parquet.partial' is damaged or cut off" in said and f"first {outcome.before} run" in said
+    )
     assert (outcome.before == 0) == (batch == 1)
     assert [result.name for result in tmp_path.iterdir()] == ["r.parquet"]
 
@@ -242,7 +279,11 @@ def test_undamaged_work_is_gone_on_with_in_silence(interrupted_three_times, tmp_
     made, chosen, whole, good = interrupted_three_times
     (tmp_path / "r.parquet.partial").write_bytes(good)
     outcome = sweep(made, chosen, tmp_path / "r.parquet", resume=True)
-    assert outcome.before >= 24 and (tmp_path / "r.parquet").read_bytes() == whole and not caplog.messages
+    assert (
+        outcome.before >= 24
+        and (tmp_path / "r.parquet").read_bytes() == whole
+        and not caplog.messages
+    )
 
 
 @pytest.mark.parametrize("place", [0, 5, 14, 40, -1])
@@ -250,7 +291,9 @@ def test_work_damaged_at_its_beginning_is_refused(interrupted_three_times, tmp_p
     made, chosen, _, good = interrupted_three_times
     damaged = _flipped(good, place % _ends(good)[1])
     (tmp_path / "r.parquet.partial").write_bytes(damaged)
-    with pytest.raises(SettingError, match=r"r\.parquet\.partial' is no interrupted sweep, or is damaged"):
+    with pytest.raises(
+        SettingError, match=r"r\.parquet\.partial' is no interrupted sweep, or is damaged"
+    ):
         sweep(made, chosen, tmp_path / "r.parquet", resume=True)
     assert [result.name for result in tmp_path.iterdir()] == ["r.parquet.partial"]
     assert (tmp_path / "r.parquet.partial").read_bytes() == damaged
@@ -299,9 +342,18 @@ def test_row_groups_do_not_depend_on_the_pieces(tmp_path, monkeypatch):
             first += size
         partial.close()
         partial.finish()
-    assert (tmp_path / "one").read_bytes() == (tmp_path / "many").read_bytes() == (tmp_path / "few").read_bytes()
+    assert (
+        (tmp_path / "one").read_bytes()
+        == (tmp_path / "many").read_bytes()
+        == (tmp_path / "few").read_bytes()
+    )
     file = pq.ParquetFile(tmp_path / "one")
-    assert [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)] == [10, 10, 10, 7]
+    assert [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)] == [
+        10,
+        10,
+        10,
+        7,
+    ]
     assert ranges(tmp_path / "one", ["x"])["x"] == (0.0, 0, 18.0, 36, 9.0)
 
 
@@ -328,7 +380,9 @@ def test_one_program_at_a_time_writes(made, tmp_path):
             told.append(error.value.message)
 
     sweep(made, chosen, path, progress=interfere)
-    assert "is being written" in told[0] and pq.read_table(path)["run"].to_pylist() == list(range(40))
+    assert "is being written" in told[0] and pq.read_table(path)["run"].to_pylist() == list(
+        range(40)
+    )
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
@@ -337,7 +391,9 @@ def test_a_full_disk_is_told(tmp_path):
     partial.add([[0, 1]])
     partial.stream.close()
     partial.stream = open("/dev/full", "ab", buffering=0)  # noqa: SIM115
-    with pytest.raises(OsimliteError, match="No space left on device; make room, then go on with --resume"):
+    with pytest.raises(
+        OsimliteError, match="No space left on device; make room, then go on with --resume"
+    ):
         partial.add([[2, 3]])
     partial.close()
 
@@ -368,7 +424,11 @@ def test_differences_in_words():
 
 def run_command(*words, **kwargs):
     return subprocess.Popen(
-        [sys.executable, "-m", "osimlite", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **kwargs
+        [sys.executable, "-m", "osimlite", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **kwargs,
     )
 
 
@@ -396,11 +456,19 @@ def test_a_command_that_is_ended_goes_on(signum, made, tmp_path: Path, walker):
         assert process.returncode == 130 and "--resume" in said, said
     assert partial.exists() and not (tmp_path / "results.parquet").exists()
     # What is left is many runs, which need not be made for the sake of this test.
-    made = plan(osimlite.read(tmp_path / "walker.osim"), {"RHip_rz": "0.3:0.7"}, to=3.0, accuracy=1e-5)
+    made = plan(
+        osimlite.read(tmp_path / "walker.osim"), {"RHip_rz": "0.3:0.7"}, to=3.0, accuracy=1e-5
+    )
     chosen = samples(made.variables, None, 4000)
     before: list[float] = []
     with pytest.raises(Interrupted):
-        sweep(made, chosen, tmp_path / "results.parquet", resume=True, progress=lambda n, of: _first(before, n))
+        sweep(
+            made,
+            chosen,
+            tmp_path / "results.parquet",
+            resume=True,
+            progress=lambda n, of: _first(before, n),
+        )
     there = Partial(tmp_path / "results.parquet", schema_of(made, chosen), resume=True)
     rows = []
     there.read(lambda batch: rows.extend(batch.to_pylist()))

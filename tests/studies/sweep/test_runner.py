@@ -39,7 +39,15 @@ NUMBERS = {
 }
 STATES = [
     f"{name}/{what}"
-    for name in ("Pelvis_rz", "Pelvis_tx", "Pelvis_ty", "RHip_rz", "LHip_rz", "RKnee_rz", "LKnee_rz")
+    for name in (
+        "Pelvis_rz",
+        "Pelvis_tx",
+        "Pelvis_ty",
+        "RHip_rz",
+        "LHip_rz",
+        "RKnee_rz",
+        "LKnee_rz",
+    )
     for what in ("value", "speed")
 ]
 
@@ -106,16 +114,25 @@ BODIES = sorted(name for name in NUMBERS if name.startswith("/bodyset/"))
 @settings(max_examples=30, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_a_run_is_the_simulation_of_the_changed_model(data):
-    among = data.draw(st.sampled_from([sorted(NUMBERS), [*FORCES, "RHip_rz"], [*BODIES, *FORCES[:1], "slope"]]))
+    among = data.draw(
+        st.sampled_from([sorted(NUMBERS), [*FORCES, "RHip_rz"], [*BODIES, *FORCES[:1], "slope"]])
+    )
     chosen = data.draw(st.lists(st.sampled_from(among), min_size=1, max_size=4, unique=True))
     if "platform_rz" in chosen and "slope" in chosen:
         chosen.remove("slope")
-    fractions = st.lists(st.sampled_from([0.0, 0.25, 0.5, 0.77, 1.0]), min_size=len(chosen), max_size=len(chosen))
+    fractions = st.lists(
+        st.sampled_from([0.0, 0.25, 0.5, 0.77, 1.0]), min_size=len(chosen), max_size=len(chosen)
+    )
     rows = [
-        [NUMBERS[name][0] + f * (NUMBERS[name][1] - NUMBERS[name][0]) for name, f in zip(chosen, row, strict=True)]
+        [
+            NUMBERS[name][0] + f * (NUMBERS[name][1] - NUMBERS[name][0])
+            for name, f in zip(chosen, row, strict=True)
+        ]
         for row in data.draw(st.lists(fractions, min_size=1, max_size=3))
     ]
-    made = plan(dynamic_walker(), {name: NUMBERS[name] for name in chosen}, measures=tuple(STATES), to=0.6)
+    made = plan(
+        dynamic_walker(), {name: NUMBERS[name] for name in chosen}, measures=tuple(STATES), to=0.6
+    )
     block = Runner(made).run(np.array(rows))
     assert block.status == ["done"] * len(rows)
     for number, row in enumerate(rows):
@@ -124,7 +141,9 @@ def test_a_run_is_the_simulation_of_the_changed_model(data):
 
 @pytest.mark.parametrize("chosen", [FORCES, BODIES, ["slope"], [*FORCES, *BODIES, "slope"]])
 def test_of_forces_masses_and_gravity_only_the_numbers_are_made_afresh(chosen):
-    made = plan(dynamic_walker(), {name: NUMBERS[name] for name in chosen}, measures=("energy",), to=0.6)
+    made = plan(
+        dynamic_walker(), {name: NUMBERS[name] for name in chosen}, measures=("energy",), to=0.6
+    )
     variants = Variants(made)
     for end in (1, 0):
         row = [NUMBERS[name][end] for name in chosen]
@@ -137,13 +156,17 @@ def test_of_forces_masses_and_gravity_only_the_numbers_are_made_afresh(chosen):
             assert np.array_equal(variant.engine.numbers, engine.numbers)
             energies = simulation.run(0.6).summary["energy_J"]
         energy = Runner(made).run(np.array([row])).measures["energy"][0]
-        assert energy == pytest.approx(energies["end"]["total"] - energies["start"]["total"], abs=1e-9)
+        assert energy == pytest.approx(
+            energies["end"]["total"] - energies["start"]["total"], abs=1e-9
+        )
 
 
 def test_controls_are_those_that_a_run_is_given():
     """Besides what the model does; only the numbers are made afresh, of other controllers too."""
     model = dynamic_walker()
-    model.add(*(CoordinateActuator(name=f"{side}_hip", coordinate=f"{side}Hip_rz") for side in "RL"))
+    model.add(
+        *(CoordinateActuator(name=f"{side}_hip", coordinate=f"{side}Hip_rz") for side in "RL")
+    )
     brain = PrescribedController(name="brain", socket_actuators=("/forceset/R_hip",))
     brain.ControlFunctions.objects.append(Constant(value=0.3))
     model.add(brain)
@@ -161,7 +184,9 @@ def test_controls_are_those_that_a_run_is_given():
     for number, (right, hip, left, own) in enumerate(rows.tolist()):
         brain.ControlFunctions.objects[0].value = own
         with Simulation(model, "compiled") as simulation:
-            trajectory = simulation.run(0.3, initial={"RHip_rz": hip}, controls={"R_hip": right, "L_hip": left})
+            trajectory = simulation.run(
+                0.3, initial={"RHip_rz": hip}, controls={"R_hip": right, "L_hip": left}
+            )
         ends = dict(zip(trajectory.coordinates, trajectory.values[-1].tolist(), strict=True))
         rates = dict(zip(trajectory.coordinates, trajectory.speeds[-1].tolist(), strict=True))
         for name in STATES:
@@ -174,13 +199,17 @@ def test_parameters_of_a_function():
         return dynamic_walker(**parameters)
 
     vary = {"thigh_length": (0.3, 0.5), "RHip_rz": (0.2, 0.6), "/bodyset/Pelvis/mass": (1.0, 2.0)}
-    made = plan(make, vary, parameters={"thigh_length": 0.4, "slope": 10.0}, measures=tuple(STATES), to=0.6)
+    made = plan(
+        make, vary, parameters={"thigh_length": 0.4, "slope": 10.0}, measures=tuple(STATES), to=0.6
+    )
     rows = np.array([[0.35, 0.5, 1.5], [0.45, 0.3, 1.0], [0.35, 0.5, 1.25]])
     block = Runner(made).run(rows)
     for number, (length, hip, mass) in enumerate(rows.tolist()):
         model = dynamic_walker(thigh_length=length)
         model.tree().by_path["/bodyset/Pelvis"].mass = mass
-        assert [block.measures[name][number] for name in STATES] == simulated(model, {"RHip_rz": hip}, {})
+        assert [block.measures[name][number] for name in STATES] == simulated(
+            model, {"RHip_rz": hip}, {}
+        )
 
 
 def test_a_number_that_becomes_zero_changes_the_structure():
@@ -191,7 +220,11 @@ def test_a_number_that_becomes_zero_changes_the_structure():
     assert block.status == ["done"] * 3
     for number, value in enumerate((0.2, 0.0, 0.1)):
         model = dynamic_walker()
-        model.tree().by_path["/jointset/RightThighToPelvis/Pelvis_offset"].translation = (0.0, 0.0, value)
+        model.tree().by_path["/jointset/RightThighToPelvis/Pelvis_offset"].translation = (
+            0.0,
+            0.0,
+            value,
+        )
         assert [block.measures[name][number] for name in STATES] == simulated(model, {}, {}, 0.3)
 
 
@@ -200,7 +233,9 @@ def test_runs_that_fail_are_told_of_and_harm_no_others(walker):
     made = plan(walker, {path: (-1e6, 1e6), "RHip_rz": "0rad:1e300rad"}, to=0.5)
     block = Runner(made).run(np.array([[1e6, 0.5], [-1e6, 0.5], [1e6, 1e300], [1e6, 0.5]]))
     assert block.status == ["done", "failed", "failed", "done"]
-    assert "RFootForce" in (block.reasons[1] or "") and "cannot be computed beyond" in (block.reasons[2] or "")
+    assert "RFootForce" in (block.reasons[1] or "") and "cannot be computed beyond" in (
+        block.reasons[2] or ""
+    )
     distance = block.measures["distance"]
     assert distance[0] == distance[3] and np.isnan(distance[1:3]).all()
 
@@ -213,12 +248,20 @@ def test_a_model_without_mass_is_a_row_with_a_reason(walker):
 
 
 def test_stops(walker):
-    made = plan(walker, {"RHip_rz": (0.3, 0.7)}, to=3.0, stops=(Stop("Pelvis_ty", 0.7), Stop("Pelvis_tx", 0.1, False)))
+    made = plan(
+        walker,
+        {"RHip_rz": (0.3, 0.7)},
+        to=3.0,
+        stops=(Stop("Pelvis_ty", 0.7), Stop("Pelvis_tx", 0.1, False)),
+    )
     made = Plan(**{**vars(made), "measures": ("Pelvis_ty/value", "Pelvis_tx/value")})
     block = Runner(made).run(np.array([[0.3], [0.5], [0.7]]))
     assert set(block.status) == {"stopped"}
     for number, reason in enumerate(block.reasons):
-        name, level = {"Pelvis_ty below 0.7": ("Pelvis_ty", 0.7), "Pelvis_tx above 0.1": ("Pelvis_tx", 0.1)}[reason]
+        name, level = {
+            "Pelvis_ty below 0.7": ("Pelvis_ty", 0.7),
+            "Pelvis_tx above 0.1": ("Pelvis_tx", 0.1),
+        }[reason]
         assert block.measures[f"{name}/value"][number] == pytest.approx(level, abs=1e-6)
 
 
@@ -229,9 +272,16 @@ def chain(parameters):
     first = SliderJoint(name="rail", coordinates=[Coordinate(name="x", default_speed_value=1.0)])
     links = [model.ground, cart]
     for number in range(int(parameters.get("links", 1.0))):
-        link = Body(name=f"link{number}", mass=1.0, mass_center=(0.0, -0.5, 0.0), inertia=(0.1, 0.1, 0.1, 0, 0, 0))
+        link = Body(
+            name=f"link{number}",
+            mass=1.0,
+            mass_center=(0.0, -0.5, 0.0),
+            inertia=(0.1, 0.1, 0.1, 0, 0, 0),
+        )
         links.append(model.add(link))
-        pin = PinJoint(name=f"pin{number}", coordinates=[Coordinate(name=f"q{number}", default_value=0.3)])
+        pin = PinJoint(
+            name=f"pin{number}", coordinates=[Coordinate(name=f"q{number}", default_value=0.3)]
+        )
         model.add(pin.between(links[-2], link))
     model.add(first.between(model.ground, cart))
     return model
@@ -261,10 +311,18 @@ def test_what_another_structure_lacks_is_a_reason():
     vary = {"links": (1.0, 2.0)}
     made = plan(chain, vary, parameters={"links": 2.0}, measures=("x/value",), to=0.2)
     below = plan(
-        lambda given: chain({"links": 2.0, **given}), vary, parameters={"links": 2.0}, below={"q1": -1.0}, to=0.2
+        lambda given: chain({"links": 2.0, **given}),
+        vary,
+        parameters={"links": 2.0},
+        below={"q1": -1.0},
+        to=0.2,
     )
     lacking = plan(
-        lambda given: chain({"links": 2.0, **given}), vary, parameters={"links": 2.0}, measures=("q1/value",), to=0.2
+        lambda given: chain({"links": 2.0, **given}),
+        vary,
+        parameters={"links": 2.0},
+        measures=("q1/value",),
+        to=0.2,
     )
     rows = np.array([[2.0], [1.0]])
     assert Runner(made).run(rows).status == ["done", "done"]
@@ -274,7 +332,9 @@ def test_what_another_structure_lacks_is_a_reason():
 
 
 def test_stops_may_carry_a_unit(walker):
-    made = plan(walker, {"RHip_rz": (0.3, 0.7)}, below={"Pelvis_ty": "50cm"}, above={"LHip_rz": "30deg"})
+    made = plan(
+        walker, {"RHip_rz": (0.3, 0.7)}, below={"Pelvis_ty": "50cm"}, above={"LHip_rz": "30deg"}
+    )
     assert made.stops == (Stop("Pelvis_ty", 0.5), Stop("LHip_rz", np.radians(30), False))
     for choices, words in (
         ({"below": {"Pelvis_ty": "70deg"}}, "give '70deg' in m, cm or mm"),
@@ -311,7 +371,9 @@ def test_bullet_gives_the_same_rows(walker):
     measures = ("distance", "largest_force", "energy", "RKnee_rz/speed")
     rows = np.array([[0.35, 1.0], [0.6, 1.5]])
     both = [
-        Runner(plan(walker, vary, measures=measures, to=1.0, accuracy=1e-9, engine=engine)).run(rows)
+        Runner(plan(walker, vary, measures=measures, to=1.0, accuracy=1e-9, engine=engine)).run(
+            rows
+        )
         for engine in ("compiled", "bullet")
     ]
     for name in measures:
@@ -340,7 +402,9 @@ made = plan(model, {"RHip_rz": (0.3, 0.5)}, to=0.005, engine=sys.argv[2])
 assert Runner(made).run(np.array([[0.4]])).status == ["done"]
 """
     walker = fixtures / "walker" / "DynamicWalkerModel.osim"
-    done = subprocess.run([sys.executable, "-c", code, walker, engine], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code, walker, engine], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     assert "numba is not installed" in done.stderr and "some thousand times slower" in done.stderr
 

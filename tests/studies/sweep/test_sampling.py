@@ -20,10 +20,19 @@ def variable(name, low=0.0, high=1.0, count=None, is_log=False):
     return Variable(name, Start((name,), False), low, high, count, is_log)
 
 
-THREE = (variable("a", -1.0, 2.0, 4), variable("b", 1e3, 1e6, 3, is_log=True), variable("c", 5.0, 5.0, 1))
+THREE = (
+    variable("a", -1.0, 2.0, 4),
+    variable("b", 1e3, 1e6, 3, is_log=True),
+    variable("c", 5.0, 5.0, 1),
+)
 
 
-@given(st.sampled_from(SAMPLERS), st.integers(1, 200), st.integers(0, 5), st.lists(st.integers(0, 200), max_size=4))
+@given(
+    st.sampled_from(SAMPLERS),
+    st.integers(1, 200),
+    st.integers(0, 5),
+    st.lists(st.integers(0, 200), max_size=4),
+)
 def test_any_pieces_make_the_whole(sampler, count, seed, cuts):
     result = Samples(THREE, sampler, 12 if sampler == "grid" else count, seed)
     whole = result.block(0, result.count)
@@ -31,10 +40,15 @@ def test_any_pieces_make_the_whole(sampler, count, seed, cuts):
     ends = sorted({0, result.count, *(cut for cut in cuts if cut < result.count)})
     pieces = [result.block(a, b - a) for a, b in pairwise(ends)]
     assert np.array_equal(np.concatenate(pieces), whole)
-    assert (whole >= [item.low for item in THREE]).all() and (whole <= [item.high for item in THREE]).all()
+    assert (whole >= [item.low for item in THREE]).all() and (
+        whole <= [item.high for item in THREE]
+    ).all()
 
 
-@given(st.sampled_from(SAMPLERS), st.lists(st.tuples(st.integers(0, 100), st.integers(1, 100)), max_size=6))
+@given(
+    st.sampled_from(SAMPLERS),
+    st.lists(st.tuples(st.integers(0, 100), st.integers(1, 100)), max_size=6),
+)
 def test_pieces_come_in_any_order(sampler, pieces):
     result = Samples(THREE, sampler, 12 if sampler == "grid" else 150, 1)
     whole = Samples(THREE, sampler, result.count, 1).block(0, result.count)
@@ -62,12 +76,17 @@ def test_latin_hypercube_has_one_in_every_layer(count, seed):
 
 def test_latin_hypercube_is_not_ordered():
     rows = Samples(tuple(variable(name) for name in "abcd"), "lhs", 4096, 1).block(0, 4096)
-    assert abs(np.corrcoef(np.column_stack((np.arange(4096), rows)), rowvar=False) - np.eye(5)).max() < 0.06
+    assert (
+        abs(np.corrcoef(np.column_stack((np.arange(4096), rows)), rowvar=False) - np.eye(5)).max()
+        < 0.06
+    )
 
 
 def test_seeds_differ_and_samples_fill_the_cube():
     for sampler in ("random", "sobol", "lhs"):
-        one, two, again = (Samples(THREE[:1], sampler, 1024, seed).block(0, 1024) for seed in (1, 2, 1))
+        one, two, again = (
+            Samples(THREE[:1], sampler, 1024, seed).block(0, 1024) for seed in (1, 2, 1)
+        )
         assert np.array_equal(one, again) and not np.array_equal(one, two)
         assert np.histogram(one, bins=8, range=(-1.0, 2.0))[0] == pytest.approx(128, abs=45)
 

@@ -59,7 +59,9 @@ def test_random_models_keep_their_states_through_an_interruption(seed, tmp_path_
     x, _, z = bushing.rotational_damping
     bushing.rotational_damping = (x, values[3, 1], z)
     with Simulation(random.model, "compiled") as simulation:
-        alone = simulation.run(0.02, accuracy=1e-7, initial={coordinate.name: values[3, 0]}).auxiliary
+        alone = simulation.run(
+            0.02, accuracy=1e-7, initial={coordinate.name: values[3, 0]}
+        ).auxiliary
     for path in paths:
         # Under constraints, a batch moves its start by a rounding.
         assert table[path][3] == pytest.approx(alone[path][-1], rel=1e-9, abs=1e-12)
@@ -85,10 +87,15 @@ def test_runs_may_start_in_equilibrium(engine):
     values = np.array([[0.3, 0.26, 0.2], [0.34, 0.28, 0.2], [0.3, 0.28, 0.2], [5.0, 0.27, 0.2]])
     block = Runner(made).run(values)
     assert block.status == ["done"] * 3 + ["failed"]
-    assert "no equilibrium was found of '/forceset/mu', whose path of 5 m is 4.68 m longer" in block.reasons[3]
+    assert (
+        "no equilibrium was found of '/forceset/mu', whose path of 5 m is 4.68 m longer"
+        in block.reasons[3]
+    )
     for index, (x, length, activation) in enumerate(values[:3]):
         force = muscle("thelen_default", tendon_slack_length=length, default_activation=activation)
         with Simulation(hung(force, [0.3, 0.3]), engine) as simulation:
             alone = simulation.run(0.02, accuracy=1e-6, initial={"x": x}, equilibrate=True)
         result = alone.auxiliary["/forceset/mu/fiber_length"][-1]
-        assert block.measures["/forceset/mu/fiber_length"][index] == pytest.approx(result, rel=1e-12)
+        assert block.measures["/forceset/mu/fiber_length"][index] == pytest.approx(
+            result, rel=1e-12
+        )

@@ -44,9 +44,15 @@ def test_names():
     assert one("slope").target == Slope()
     assert one("slope", parameters={"slope": 10.0}).target == Parameter("slope", 10.0)
     (place,) = one("/bodyset/Pelvis/mass_center/1").target.places
-    assert (place.component, place.steps, place.unit) == ("/bodyset/Pelvis", ("mass_center", 1), "m")
+    assert (place.component, place.steps, place.unit) == (
+        "/bodyset/Pelvis",
+        ("mass_center", 1),
+        "m",
+    )
     locked = one("platform_rz", "-12deg:-2deg")
-    assert isinstance(locked.target, Property) and locked.target.places[0].steps == ("default_value",)
+    assert isinstance(locked.target, Property) and locked.target.places[0].steps == (
+        "default_value",
+    )
     assert locked.low == math.radians(-12)
 
 
@@ -61,12 +67,19 @@ def test_controls():
     with pytest.raises(SettingError, match="did you mean 'motor/control'"):
         variables({"moter/control": "0:1"}, model, build_mechanism(model))
     with pytest.raises(SettingError, match="are the same number; vary one of them"):
-        variables({"motor/control": "0:1", "/forceset/motor/control": "0:1"}, model, build_mechanism(model))
+        variables(
+            {"motor/control": "0:1", "/forceset/motor/control": "0:1"},
+            model,
+            build_mechanism(model),
+        )
 
 
 def test_several_numbers_by_one_path():
     result = one("/forceset/*Foot*/contact_parameters/stiffness", "1e5:1e7:3:log")
-    assert [place.component for place in result.target.places] == ["/forceset/RFootForce", "/forceset/LFootForce"]
+    assert [place.component for place in result.target.places] == [
+        "/forceset/RFootForce",
+        "/forceset/LFootForce",
+    ]
     assert (result.low, result.high, result.count, result.is_log) == (1e5, 1e7, 3, True)
 
 
@@ -92,7 +105,9 @@ def test_units():
     assert one("RHip_rz", "20deg:40deg").high == pytest.approx(math.radians(40), abs=1e-15)
     assert one("Pelvis_tx", "10cm:0.5m").low == 0.1
     assert one("/forceset/RKneeLimitTorque/upper_limit", "5deg:10").low == 5.0
-    assert one("/forceset/RKneeLimitTorque/upper_limit", f"0:{math.pi}rad").high == pytest.approx(180.0)
+    assert one("/forceset/RKneeLimitTorque/upper_limit", f"0:{math.pi}rad").high == pytest.approx(
+        180.0
+    )
     for name, text, words in [
         ("RHip_rz", "1m:2m", "is in rad"),
         ("/bodyset/Pelvis/mass", "1deg:2", "is in kg"),
@@ -115,7 +130,10 @@ def test_units():
         ("/jointset/RightThigToPelvis/RHip_rz", "/jointset/RightThighToPelvis/RHip_rz"),
         ("/bodyset/Pelvis/mas", "/bodyset/Pelvis/mass"),
         ("/bodyset/Plvis/mass", "/bodyset/Pelvis/mass"),
-        ("/forceset/RFotForce/contact_parameters/stiffnes", "/forceset/RFootForce/contact_parameters/stiffness"),
+        (
+            "/forceset/RFotForce/contact_parameters/stiffnes",
+            "/forceset/RFootForce/contact_parameters/stiffness",
+        ),
     ],
 )
 def test_the_nearest_spelling_is_told(name, near):
@@ -124,7 +142,9 @@ def test_the_nearest_spelling_is_told(name, near):
 
 
 def test_a_path_without_its_slash_is_told():
-    with pytest.raises(SettingError, match="'bodyset/Pelvis/mass' to vary; did you mean '/bodyset/Pelvis/mass'"):
+    with pytest.raises(
+        SettingError, match="'bodyset/Pelvis/mass' to vary; did you mean '/bodyset/Pelvis/mass'"
+    ):
         one("bodyset/Pelvis/mass")
 
 
@@ -183,7 +203,10 @@ def test_values_stay_within_and_go_back(a, b, is_log, fraction):
 
 
 def test_degrees_taken_for_radians_are_doubted():
-    assert "20deg" in one("RHip_rz", "20:40").doubt and "range of -1.75 to 1.75 rad" in one("RHip_rz", "20:40").doubt
+    assert (
+        "20deg" in one("RHip_rz", "20:40").doubt
+        and "range of -1.75 to 1.75 rad" in one("RHip_rz", "20:40").doubt
+    )
     assert "40deg" in one("RHip_rz", "0:40").doubt and "20deg" in one("RHip_rz", (20.0, 40)).doubt
     for fine in ("20deg:40deg", "0.3:0.6", "-1:5"):
         assert one("RHip_rz", fine).doubt == ""

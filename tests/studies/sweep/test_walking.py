@@ -48,7 +48,9 @@ def walks_of(made, rows):
 @pytest.mark.full
 def test_progress_counts_steps_before_the_first_scuff(walker, vary):
     rows = points(vary)
-    made = plan(walker, vary, measures=("progress", "steps"), to=2.0, is_planted=True, accuracy=1e-5)
+    made = plan(
+        walker, vary, measures=("progress", "steps"), to=2.0, is_planted=True, accuracy=1e-5
+    )
     result = Runner(made).run(rows).measures["progress"]
     _, walks = walks_of(made, rows)
     assert result.astype(int).tolist() == [walk.clean_steps for walk in walks]
@@ -62,7 +64,9 @@ def test_progress_tells_how_near_the_next_step_was(walker):
     made = plan(walker, VARY, measures=("progress",), to=2.0, is_planted=True)
     result = Runner(made).run(rows).measures["progress"]
     _, walks = walks_of(made, rows)
-    scuffed = [(value, walk) for value, walk in zip(result.tolist(), walks, strict=True) if walk.scuffs]
+    scuffed = [
+        (value, walk) for value, walk in zip(result.tolist(), walks, strict=True) if walk.scuffs
+    ]
     assert len(scuffed) > 20
     for value, walk in scuffed:
         first = walk.scuffs[0]
@@ -109,14 +113,23 @@ def test_feet_may_be_given(walker):
     """With a knee in the part of a foot, a knee on the ground does not end the walk."""
     rows = points(VARY, 8)
     result = {}
-    for feet in (None, ("RFootForce", "LFootForce"), ("RFootForce + RKneeForce", "LFootForce + LKneeForce")):
-        made = plan(walker, VARY, measures=("time_to_fall", "scuffs"), to=1.5, is_planted=True, feet=feet)
+    for feet in (
+        None,
+        ("RFootForce", "LFootForce"),
+        ("RFootForce + RKneeForce", "LFootForce + LKneeForce"),
+    ):
+        made = plan(
+            walker, VARY, measures=("time_to_fall", "scuffs"), to=1.5, is_planted=True, feet=feet
+        )
         block = Runner(made).run(rows)
         result[feet] = [column.tolist() for column in block.measures.values()]
         assert made.settings()["feet"] == (None if feet is None else list(feet))
     by_structure, named, knees = result.values()
     assert named == by_structure
-    assert all(later >= fell for later, fell in zip(knees[0], named[0], strict=True)) and knees[0] != named[0]
+    assert (
+        all(later >= fell for later, fell in zip(knees[0], named[0], strict=True))
+        and knees[0] != named[0]
+    )
 
 
 def test_who_cannot_be_planted_is_told_before_any_run(walker):

@@ -18,7 +18,11 @@ from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.tools.running import run
 
 REFERENCE = "oracle/tools/reference"
-IK, ID, LOADS = "subject01_Setup_IK.xml", "subject01_Setup_InverseDynamics.xml", "subject01_walk1_grf.xml"
+IK, ID, LOADS = (
+    "subject01_Setup_IK.xml",
+    "subject01_Setup_InverseDynamics.xml",
+    "subject01_walk1_grf.xml",
+)
 TRUE_OF_IT = {"OSIM902"}
 """What is really wrong with OpenSim's own trial: markers of shoulders whose arms the model has not are 8 cm off."""
 
@@ -50,11 +54,15 @@ def trial(gait: Path, tmp_path: Path) -> Path:
 
 
 def warned(report) -> set[str]:
-    return {finding.code for finding in report.warnings if finding.code not in ("OSIM911", "OSIM912")}
+    return {
+        finding.code for finding in report.warnings if finding.code not in ("OSIM911", "OSIM912")
+    }
 
 
 def number(report, name: str, kind: str = "") -> Any:
-    return next(verdict for verdict in report.verdicts if verdict.name == name and kind in verdict.of)
+    return next(
+        verdict for verdict in report.verdicts if verdict.name == name and kind in verdict.of
+    )
 
 
 def test_a_trial_of_opensims_has_no_false_alarm(gait: Path) -> None:
@@ -117,7 +125,11 @@ def test_markers_that_were_exchanged_are_named(trial: Path, pair, times) -> None
 
 def test_feet_that_were_exchanged_are_found(trial: Path) -> None:
     text = (trial / LOADS).read_text()
-    swapped = text.replace("calcn_r", "calcn_?").replace("calcn_l", "calcn_r").replace("calcn_?", "calcn_l")
+    swapped = (
+        text.replace("calcn_r", "calcn_?")
+        .replace("calcn_l", "calcn_r")
+        .replace("calcn_?", "calcn_l")
+    )
     (trial / LOADS).write_text(swapped)
     findings = [finding for finding in osimlite.check_trial(trial) if finding.code == "OSIM906"]
     assert len(findings) == 2 and all(finding.line is not None for finding in findings)
@@ -125,7 +137,9 @@ def test_feet_that_were_exchanged_are_found(trial: Path) -> None:
 
 
 @pytest.mark.parametrize(("cutoff", "word"), [(1.5, "change of"), (-1.0, "noise")])
-def test_a_filter_that_takes_motion_or_leaves_noise_is_found(trial: Path, cutoff: float, word: str) -> None:
+def test_a_filter_that_takes_motion_or_leaves_noise_is_found(
+    trial: Path, cutoff: float, word: str
+) -> None:
     setup = osimlite.read_document(trial / ID)
     setup.lowpass_cutoff_frequency_for_coordinates = cutoff
     osimlite.write(setup, trial / ID)
@@ -148,7 +162,9 @@ def test_what_is_missing_is_told_and_not_checked(trial: Path) -> None:
     report = osimlite.check_trial(trial)
     assert any("subject01_walk1.trc" in why for why in report.unchecked)
     assert any("inverse_dynamics.sto" in why for why in report.unchecked)
-    assert not [verdict for verdict in report.verdicts if verdict.name in ("marker-error", "residual-force")]
+    assert not [
+        verdict for verdict in report.verdicts if verdict.name in ("marker-error", "residual-force")
+    ]
 
 
 def tables(folder: Path) -> None:
@@ -156,15 +172,21 @@ def tables(folder: Path) -> None:
     times = np.linspace(0.0, 1.0, 51)
     bump = np.exp(-(((times - 0.5) / 0.05) ** 2))
     forces = np.column_stack([30.0 * bump, 2.0 * bump, 60.0 * bump])
-    write_sto(folder / "walk_Actuation_force.sto", "ActuationForces", times, ["FX", "FY", "MZ"], forces)
+    write_sto(
+        folder / "walk_Actuation_force.sto", "ActuationForces", times, ["FX", "FY", "MZ"], forces
+    )
     errors = np.column_stack([0.06 * bump, np.radians(1.0) * bump])
-    write_sto(folder / "walk_pErr.sto", "PositionErrors", times, ["pelvis_tx", "knee_angle_r"], errors)
+    write_sto(
+        folder / "walk_pErr.sto", "PositionErrors", times, ["pelvis_tx", "knee_angle_r"], errors
+    )
 
 
 def test_results_without_a_setup_are_judged_by_what_they_say(tmp_path: Path) -> None:
     tables(tmp_path)
     report = osimlite.check_trial(tmp_path)
-    shown: dict[str, Any] = {verdict.of: (verdict.verdict, verdict.value) for verdict in report.verdicts}
+    shown: dict[str, Any] = {
+        verdict.of: (verdict.verdict, verdict.value) for verdict in report.verdicts
+    }
     assert shown["the peak of FX of 'walk_Actuation_force.sto'"] == ("bad", pytest.approx(30.0))
     assert shown["the peak of FY of 'walk_Actuation_force.sto'"] == ("good", pytest.approx(2.0))
     # Without loads Hicks' limit is not known, and OpenSim's is 75 N m.
@@ -188,7 +210,19 @@ def test_the_command_shows_verdicts_and_exits_as_validate(tmp_path: Path, capsys
     out = capsys.readouterr().out
     assert stopped.value.code == 1 and "OSIM911" in out and "Not looked at: all else" in out
     assert any(line.startswith("bad") and "30 N" in line for line in out.splitlines())
-    assert max(map(len, (line for line in out.splitlines() if str(tmp_path) not in line and line[:1] != "N"))) <= 80
+    assert (
+        max(
+            map(
+                len,
+                (
+                    line
+                    for line in out.splitlines()
+                    if str(tmp_path) not in line and line[:1] != "N"
+                ),
+            )
+        )
+        <= 80
+    )
     with pytest.raises(SystemExit) as stopped:
         main(["check-trial", str(tmp_path), "--fail-on", "error", "--format", "json"])
     assert stopped.value.code == 0
@@ -197,7 +231,11 @@ def test_the_command_shows_verdicts_and_exits_as_validate(tmp_path: Path, capsys
     with pytest.raises(SystemExit):
         main(["check-trial", str(tmp_path), "--format", "sarif"])
     sarif = json.loads(capsys.readouterr().out)
-    assert {rule["id"] for rule in sarif["runs"][0]["tool"]["driver"]["rules"]} == {"OSIM911", "OSIM912", "OSIM914"}
+    assert {rule["id"] for rule in sarif["runs"][0]["tool"]["driver"]["rules"]} == {
+        "OSIM911",
+        "OSIM912",
+        "OSIM914",
+    }
 
 
 def test_a_folder_without_anything_of_a_trial_is_an_error(tmp_path: Path) -> None:

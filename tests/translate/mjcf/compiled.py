@@ -13,9 +13,8 @@ from osimlite.translate.mjcf.export import Mjcf
 class Compiled:
     """A translation as MuJoCo has it, bodies and joints by name.
 
-    Args:
-        mjcf: what to compile.
-        own: give bodies the model's own inertias where they are impossible, and what is not of the model none.
+    Args: mjcf: what to compile. own: give bodies the model's own inertias where they are
+        impossible, and what is not of the model none.
     """
 
     def __init__(self, mjcf: Mjcf, *, own: bool = False) -> None:

@@ -17,12 +17,22 @@ def older(request) -> str:
     place = request.config.cache.mkdir(f"mujoco-{OLDER}")
     python = place / ("Scripts" if sys.platform == "win32" else "bin") / "python"
     uv = shutil.which("uv")
-    make = [uv, "venv", "-q", "--clear", "-p", sys.executable, place] if uv else [sys.executable, "-m", "venv", place]
-    pip = [uv, "pip", "install", "-q", "-p", python] if uv else [python, "-m", "pip", "install", "-q"]
+    make = (
+        [uv, "venv", "-q", "--clear", "-p", sys.executable, place]
+        if uv
+        else [sys.executable, "-m", "venv", place]
+    )
+    pip = (
+        [uv, "pip", "install", "-q", "-p", python] if uv else [python, "-m", "pip", "install", "-q"]
+    )
     if not (place / "ready").exists():
         for command in (make, [*pip, f"mujoco=={OLDER}"]):
-            made = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+            made = subprocess.run(
+                list(map(str, command)), capture_output=True, text=True, check=False
+            )
             if made.returncode:
-                pytest.skip(f"MuJoCo {OLDER} cannot be installed beside this one: {made.stderr.strip()[-200:]}")
+                pytest.skip(
+                    f"MuJoCo {OLDER} cannot be installed beside this one: {made.stderr.strip()[-200:]}"
+                )
         (place / "ready").touch()
     return str(python)

@@ -34,7 +34,9 @@ def test_our_own(model, text, tmp_path):
     assert check.bodies.max < 3e-4
     for muscle in check.muscles:
         assert muscle.length.rms < 2e-4 and muscle.worst_arm.rms < 1.5e-3, muscle.name
-        assert muscle.fiber == pytest.approx(1.0, abs=1e-12) and muscle.tendon == pytest.approx(0.0, abs=1e-12)
+        assert muscle.fiber == pytest.approx(1.0, abs=1e-12) and muscle.tendon == pytest.approx(
+            0.0, abs=1e-12
+        )
         assert muscle.force.rms < 0.15
     assert {"hip_flexion_r", "knee_angle_r"} == check.muscles[0].arms.keys()
     assert json.loads(check.to_json())["muscles"][0]["length"]["unit"] == "m"
@@ -61,7 +63,9 @@ def test_what_is_wrong_is_found(model, text, tmp_path):
 def test_files_that_cannot_be_compared(model, tmp_path):
     with pytest.raises(ModelError, match="has no muscles or other paths"):
         checked(osimlite.Model(name="bare"), "<mujoco/>", tmp_path)
-    with pytest.raises(ModelError, match="no tendon or actuator with the name of a muscle of the model, such as"):
+    with pytest.raises(
+        ModelError, match="no tendon or actuator with the name of a muscle of the model, such as"
+    ):
         checked(model, "<mujoco/>", tmp_path)
     with pytest.raises(OsimliteError, match="MuJoCo does not load it"):
         checked(model, "<mujoco><joint/></mujoco>", tmp_path)

@@ -55,7 +55,11 @@ CONSTRAINTS = {
         location_body_2=(0.1, 0.0, 0.1),
     ),
     "distance": lambda: ConstantDistanceConstraint(
-        name="c", socket_body_1="/ground", socket_body_2=B, location_body_1=(0.2, -0.3, 0), constant_distance=0.9
+        name="c",
+        socket_body_1="/ground",
+        socket_body_2=B,
+        location_body_1=(0.2, -0.3, 0),
+        constant_distance=0.9,
     ),
     "line": lambda: PointOnLineConstraint(
         name="c",
@@ -92,7 +96,9 @@ def test_a_weld_holds_two_frames_on_each_other():
     coordinates = [Coordinate(name=f"h{k}", default_value=value) for k, value in enumerate(near)]
     model.add(held)
     model.add(FreeJoint(name="free", coordinates=coordinates).between(model.ground, held))
-    weld = WeldConstraint(name="c", socket_frame1="/componentset/hook", socket_frame2="/bodyset/held")
+    weld = WeldConstraint(
+        name="c", socket_frame1="/componentset/hook", socket_frame2="/bodyset/held"
+    )
     model.constraint_set.objects.append(weld)
     (bond,) = (item for item in osimlite.mechanism(model).constraints if item.name == weld.path)
     _, q = settled(model, 0.1)
@@ -101,7 +107,9 @@ def test_a_weld_holds_two_frames_on_each_other():
 
 def test_a_constraint_that_mujoco_has_not_is_told():
     model = chain()
-    rolling = RollingOnSurfaceConstraint(name="c", socket_rolling_body=A, socket_surface_body="/ground")
+    rolling = RollingOnSurfaceConstraint(
+        name="c", socket_rolling_body=A, socket_surface_body="/ground"
+    )
     model.constraint_set.objects.append(rolling)
     assert [(r.component, r.how) for r in to_mjcf(model).fidelity if r.kind == "constraint"] == [
         (rolling.path, "dropped")
@@ -124,11 +132,15 @@ def falling(*, on_a_body: bool = False):
         below = floor.path
     quarter = -np.pi / 2
     model.add(
-        ContactHalfSpace(name="plane", socket_frame=below, orientation=(0.0, 0.0, quarter), location=(0, 0.05, 0)),
+        ContactHalfSpace(
+            name="plane", socket_frame=below, orientation=(0.0, 0.0, quarter), location=(0, 0.05, 0)
+        ),
         ContactSphere(name="sphere", socket_frame=ball.path, radius=0.1, location=(0.0, 0.02, 0.0)),
     )
     law = HuntCrossleyForce(name="law")
-    material = HuntCrossleyForce.ContactParameters(geometry=("plane", "sphere"), stiffness=1e6, dynamic_friction=0.5)
+    material = HuntCrossleyForce.ContactParameters(
+        geometry=("plane", "sphere"), stiffness=1e6, dynamic_friction=0.5
+    )
     law.contact_parameters.objects.append(material)
     model.add(law)
     return model
@@ -140,23 +152,36 @@ def test_a_ball_comes_to_lie_on_a_half_space(on_a_body):
     compiled, _ = settled(model, 1.5)
     assert compiled.data.body("ball").xpos[1] == pytest.approx(0.05 + 0.1 - 0.02, abs=5e-3)
     (record,) = (record for record in to_mjcf(model).fidelity if record.kind == "contact")
-    assert record.how == "approximate" and "another" in record.done and record.detail == "pairs plane.sphere"
+    assert (
+        record.how == "approximate"
+        and "another" in record.done
+        and record.detail == "pairs plane.sphere"
+    )
 
 
 def test_without_contact_it_falls_through_and_that_is_told():
     mjcf = to_mjcf(falling(), contact="none")
     assert "<pair" not in mjcf.text and "touches" not in mjcf.text
-    assert {record.kind for record in mjcf.fidelity if record.how == "dropped"} == {"force", "contact-geometry"}
+    assert {record.kind for record in mjcf.fidelity if record.how == "dropped"} == {
+        "force",
+        "contact-geometry",
+    }
 
 
 def test_a_mesh_touches_by_its_convex_hull(tmp_path):
-    (tmp_path / "wedge.obj").write_text("v 0 0 0\nv .2 0 0\nv 0 .2 0\nv 0 0 .2\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    (tmp_path / "wedge.obj").write_text(
+        "v 0 0 0\nv .2 0 0\nv 0 .2 0\nv 0 0 .2\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
     model = falling()
     model.add(ContactMesh(name="mesh", socket_frame="/bodyset/ball", filename="wedge.obj"))
     model["/forceset/law"].contact_parameters.objects[0].geometry = ("plane", "mesh")
     mjcf = to_mjcf(model, folder=tmp_path)
     compiled = Compiled(mjcf)
     assert compiled.model.npair == 1
-    assert ("contact-geometry", "its convex hull") in {(record.kind, record.done) for record in mjcf.fidelity}
+    assert ("contact-geometry", "its convex hull") in {
+        (record.kind, record.done) for record in mjcf.fidelity
+    }
     gone = to_mjcf(model)
-    assert "<pair" not in gone.text and [record.how for record in gone.fidelity if record.kind == "mesh"] == ["dropped"]
+    assert "<pair" not in gone.text and [
+        record.how for record in gone.fidelity if record.kind == "mesh"
+    ] == ["dropped"]

@@ -32,7 +32,11 @@ def random_pose(mechanism: Mechanism, random: np.random.Generator) -> Array:
     for index, info in enumerate(mechanism.coordinates):
         low, high = info.range
         if not info.locked:
-            q[index] = random.uniform(low, high) if 0.0 <= high - low <= 4.0 * np.pi else q[index] + random.uniform()
+            q[index] = (
+                random.uniform(low, high)
+                if 0.0 <= high - low <= 4.0 * np.pi
+                else q[index] + random.uniform()
+            )
     for coupler in mechanism.constraints:
         if isinstance(coupler, Coupler):
             q[coupler.dependent] = coupler.function.evaluate(q[list(coupler.independent)])[0]
@@ -45,8 +49,14 @@ def run(compiled: Compiled) -> None:
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     for _ in range(1000):
         mujoco.mj_step(model, data)
-    runs = all(np.isfinite(each).all() and (np.abs(each) < 1e10).all() for each in (data.qpos, data.qvel, data.qacc))
-    assert runs or {record.kind for record in compiled.mjcf.fidelity} & {"singular", "overstretched"}
+    runs = all(
+        np.isfinite(each).all() and (np.abs(each) < 1e10).all()
+        for each in (data.qpos, data.qvel, data.qacc)
+    )
+    assert runs or {record.kind for record in compiled.mjcf.fidelity} & {
+        "singular",
+        "overstretched",
+    }
 
 
 def test_real_models(corpus_model):
@@ -67,7 +77,9 @@ def test_real_models(corpus_model):
     own, mechanism = Compiled(mjcf, own=True), mjcf.robot.mechanism
     free = [place for place, info in enumerate(mechanism.coordinates) if not info.locked]
     said = {
-        record.detail.split()[1]: record.errors["value"].max for record in mjcf.fidelity if record.kind == "function"
+        record.detail.split()[1]: record.errors["value"].max
+        for record in mjcf.fidelity
+        if record.kind == "function"
     }
     random = np.random.default_rng(1)
     for _ in range(5):
@@ -80,6 +92,8 @@ def test_real_models(corpus_model):
         rates = np.linalg.inv(mechanism.rate_matrix(q))
         wanted = (rates.T @ mechanism.mass_matrix(q) @ rates)[np.ix_(free, free)]
         scale = max(1.0, np.abs(wanted).max(initial=0.0))
-        np.testing.assert_allclose(own.mass_matrix(q)[np.ix_(free, free)], wanted, rtol=0.0, atol=1e-12 * scale)
+        np.testing.assert_allclose(
+            own.mass_matrix(q)[np.ix_(free, free)], wanted, rtol=0.0, atol=1e-12 * scale
+        )
         for name, difference in off(own, q).items():
             assert abs(difference) <= 1.05 * said.get(name, 0.0) + 1e-12, name

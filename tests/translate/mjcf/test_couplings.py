@@ -33,9 +33,13 @@ def on_a_function(function, *, range=(-1.0, 2.0), name="tx") -> Model:
     """A body that turns by a coordinate, and slides by a function of it."""
     model = Model(name="one")
     body = model.add(Body(name="b", mass=1.0, inertia=INERTIA))
-    joint = CustomJoint(name="j", coordinates=[Coordinate(name="q", range=range, default_value=0.3)])
+    joint = CustomJoint(
+        name="j", coordinates=[Coordinate(name="q", range=range, default_value=0.3)]
+    )
     transform = joint.spatial_transform
-    transform.rotation3 = TransformAxis(coordinates=("q",), axis=(0, 0, 1), function=LinearFunction())
+    transform.rotation3 = TransformAxis(
+        coordinates=("q",), axis=(0, 0, 1), function=LinearFunction()
+    )
     transform.translation1 = TransformAxis(coordinates=("q",), axis=(1, 0, 0), function=function)
     model.add(joint.between(model.ground, body))
     return model
@@ -58,7 +62,8 @@ def off(compiled: Compiled, q: np.ndarray) -> dict[str, float]:
     """How far each following joint is from where the model has it, with all others where the model has them."""
     values = compiled.mjcf.joint_values(q)
     return {
-        name: float(np.polynomial.polynomial.polyval(values[leader] if leader else 0.0, polynomial)) - values[name]
+        name: float(np.polynomial.polynomial.polyval(values[leader] if leader else 0.0, polynomial))
+        - values[name]
         for name, (leader, polynomial) in equalities(compiled).items()
         if name in values and (leader is None or leader in values)
     }
@@ -68,7 +73,9 @@ EXACT = {
     "line": LinearFunction(coefficients=(0.2, 0.1)),
     "cubic": PolynomialFunction(coefficients=(0.3, -0.2, 0.1, 0.05)),
     "quartic": PolynomialFunction(coefficients=(0.1, 0.3, -0.2, 0.1, 0.05)),
-    "scaled": MultiplierFunction(function=PolynomialFunction(coefficients=(0.3, -0.2, 0.1)), scale=0.4),
+    "scaled": MultiplierFunction(
+        function=PolynomialFunction(coefficients=(0.3, -0.2, 0.1)), scale=0.4
+    ),
 }
 
 
@@ -116,7 +123,9 @@ def test_a_quartic_of_a_quartic_is_closer():
 def test_motions_are_nearly_those_of_the_model(turns):
     model = on_a_function(FITTED["sine"])
     axes = model["/jointset/j"].spatial_transform
-    axes.translation3 = TransformAxis(coordinates=("q",), axis=(0, 0, 1), function=Sine(amplitude=0.2, omega=1.0))
+    axes.translation3 = TransformAxis(
+        coordinates=("q",), axis=(0, 0, 1), function=Sine(amplitude=0.2, omega=1.0)
+    )
     if not turns:
         axes.rotation3.function = Constant(value=0.0)
     model.add(SpringGeneralizedForce(name="s", coordinate="q", stiffness=20.0, rest_length=0.8))
@@ -142,7 +151,9 @@ def coupled(function) -> Model:
     body = model.add(Body(name="c", mass=1.0, inertia=INERTIA))
     joint = CustomJoint(name="k", coordinates=[Coordinate(name="beta", range=(-9.0, 9.0))])
     joint.spatial_transform.rotation1 = TransformAxis(
-        coordinates=("beta",), axis=(1, 0, 0), function=PolynomialFunction(coefficients=(1.0, 0.0, 0.0))
+        coordinates=("beta",),
+        axis=(1, 0, 0),
+        function=PolynomialFunction(coefficients=(1.0, 0.0, 0.0)),
     )
     model.add(joint.between(model["/bodyset/b"], body))
     model.constraint_set.objects.append(
@@ -190,10 +201,19 @@ def test_a_body_stays_on_its_ellipsoid():
     model = Model(name="shoulder")
     body = model.add(Body(name="scapula", mass=1.0, inertia=INERTIA, mass_center=(0.0, 0.0, 0.1)))
     coordinates = [
-        Coordinate(name=name, default_value=value) for name, value in zip("abc", (0.3, 0.4, -0.2), strict=True)
+        Coordinate(name=name, default_value=value)
+        for name, value in zip("abc", (0.3, 0.4, -0.2), strict=True)
     ]
     joint = EllipsoidJoint(name="j", radii_x_y_z=(0.1, 0.25, 0.18), coordinates=coordinates)
-    model.add(joint.between(model.ground, body, at=(0.1, 0.2, 0.3), turned=(0.2, 0.1, 0.5), child_at=(0.01, 0.02, 0.0)))
+    model.add(
+        joint.between(
+            model.ground,
+            body,
+            at=(0.1, 0.2, 0.3),
+            turned=(0.2, 0.1, 0.5),
+            child_at=(0.01, 0.02, 0.0),
+        )
+    )
     mjcf = to_mjcf(model)
     compiled, mechanism = Compiled(mjcf), mjcf.robot.mechanism
     mujoco.mj_resetDataKeyframe(compiled.model, compiled.data, 0)
@@ -204,4 +224,6 @@ def test_a_body_stays_on_its_ellipsoid():
     mujoco.mj_forward(compiled.model, compiled.data)
     q = {name: compiled.data.joint(name).qpos[0] for name in "abc"}
     assert abs(q["a"] - 0.3) > 0.05
-    np.testing.assert_allclose(compiled.body("scapula"), mechanism.body_transforms(q)["scapula"], rtol=0.0, atol=1e-4)
+    np.testing.assert_allclose(
+        compiled.body("scapula"), mechanism.body_transforms(q)["scapula"], rtol=0.0, atol=1e-4
+    )

@@ -43,7 +43,9 @@ def test_both_versions_of_mujoco_have_the_same_bodies(older, corpus, tmp_path):
         files += mjcf.write(tmp_path / item.id)[:1]
         assert "for MuJoCo 3." in mjcf.text
     old, new = (
-        subprocess.run([python, "-c", READER, *map(str, files)], capture_output=True, text=True, check=True)
+        subprocess.run(
+            [python, "-c", READER, *map(str, files)], capture_output=True, text=True, check=True
+        )
         for python in (older, sys.executable)
     )
     for first, second in zip(old.stdout.splitlines(), new.stdout.splitlines(), strict=True):
@@ -61,7 +63,9 @@ def test_every_component_of_the_walker_is_accounted_for():
     assert mjcf.fidelity.translated["/jointset/PlatformToGround/platform_rz"].startswith("locked")
     assert {record.kind for record in mjcf.fidelity} == {"contact", "ellipsoid", "limit-force"}
     account = json.loads(mjcf.fidelity.to_json())
-    assert account["target"] == "mjcf 4" and {record["how"] for record in account["records"]} == {"approximate"}
+    assert account["target"] == "mjcf 4" and {record["how"] for record in account["records"]} == {
+        "approximate"
+    }
 
 
 # -------------------------------------------------------------------------------------------------- names and files
@@ -70,10 +74,18 @@ def twins() -> Model:
     model = Model(name="two legs")
     for side in "lr":
         body = model.add(Body(name=f"leg_{side}", mass=1.0, inertia=(0.1, 0.1, 0.1, 0, 0, 0)))
-        body.attach(Sphere(radius=0.1), Brick(half_lengths=(0.1, 0.2, 0.3)), Cylinder(radius=0.1, half_height=0.2))
-        joint = PinJoint(name=f"knee_{side}", coordinates=[Coordinate(name="angle", default_value=0.2)])
+        body.attach(
+            Sphere(radius=0.1),
+            Brick(half_lengths=(0.1, 0.2, 0.3)),
+            Cylinder(radius=0.1, half_height=0.2),
+        )
+        joint = PinJoint(
+            name=f"knee_{side}", coordinates=[Coordinate(name="angle", default_value=0.2)]
+        )
         model.add(joint.between(model.ground, body))
-        model.add(Marker(name=f"toe_{side}", socket_parent_frame=body.path, location=(0.1, 0.2, 0.3)))
+        model.add(
+            Marker(name=f"toe_{side}", socket_parent_frame=body.path, location=(0.1, 0.2, 0.3))
+        )
     return model
 
 
@@ -81,7 +93,10 @@ def test_names_are_those_of_the_model_and_paths_where_two_share_one():
     mjcf = to_mjcf(twins())
     model = mujoco.MjModel.from_xml_string(mjcf.text)
     assert [model.body(k).name for k in range(model.nbody)] == ["world", "leg_l", "leg_r"]
-    assert [model.joint(k).name for k in range(2)] == ["jointset.knee_l.angle", "jointset.knee_r.angle"]
+    assert [model.joint(k).name for k in range(2)] == [
+        "jointset.knee_l.angle",
+        "jointset.knee_r.angle",
+    ]
     assert {model.site(k).name for k in range(model.nsite)} == {"toe_l", "toe_r"}
     np.testing.assert_array_equal(model.site("toe_r").pos, (0.1, 0.2, 0.3))
     np.testing.assert_allclose(model.geom("leg_l_geom_2").size, (0.1, 0.2, 0.3), rtol=1e-15)
@@ -89,7 +104,9 @@ def test_names_are_those_of_the_model_and_paths_where_two_share_one():
     assert not model.geom_contype.any() and not model.geom_conaffinity.any()
     assert model.body("leg_l").mass == 1.0
     # The camera looks along the horizon, upright.
-    np.testing.assert_allclose(model.camera("side").mat0.reshape(3, 3), np.eye(3), rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(
+        model.camera("side").mat0.reshape(3, 3), np.eye(3), rtol=0.0, atol=1e-12
+    )
     assert model.key("default").qpos.tolist() == [0.2, 0.2]
 
 
@@ -101,11 +118,18 @@ def test_ranges_are_there_and_limit_nothing():
 
 def test_files_are_written_and_meshes_come_along(tmp_path, fixtures):
     model = twins()
-    model["/bodyset/leg_l"].attach(Mesh(mesh_file="ascii.vtp"), Mesh(mesh_file="ascii.vtp", scale_factors=(1, 2, -1)))
+    model["/bodyset/leg_l"].attach(
+        Mesh(mesh_file="ascii.vtp"), Mesh(mesh_file="ascii.vtp", scale_factors=(1, 2, -1))
+    )
     mjcf = osimlite.to_mjcf(model, folder=fixtures / "meshes", name="legs")
     assert isinstance(mjcf, Mjcf)
     written = mjcf.write(tmp_path / "out")
-    assert [path.name for path in written] == ["legs.xml", "ascii.obj", "ascii_2.obj", "fidelity.json"]
+    assert [path.name for path in written] == [
+        "legs.xml",
+        "ascii.obj",
+        "ascii_2.obj",
+        "fidelity.json",
+    ]
     compiled = mujoco.MjModel.from_xml_path(str(written[0]))
     assert compiled.nmesh == 2
     plain = to_mjcf(model, folder=fixtures / "meshes", visuals=False)
@@ -116,7 +140,10 @@ def test_files_are_written_and_meshes_come_along(tmp_path, fixtures):
 def test_what_mujoco_would_refuse_is_told_and_mended():
     model = Model(name="odd")
     below = model.ground
-    for name, mass, inertia in (("ghost", 0.0, (0.0,) * 6), ("odd", 1.0, (1.0, 1.0, 5.0, 0.1, 0, 0))):
+    for name, mass, inertia in (
+        ("ghost", 0.0, (0.0,) * 6),
+        ("odd", 1.0, (1.0, 1.0, 5.0, 0.1, 0, 0)),
+    ):
         body = model.add(Body(name=name, mass=mass, inertia=inertia))
         kind = PinJoint if name == "ghost" else SliderJoint
         joint = kind(name=f"j_{name}", coordinates=[Coordinate(name=f"q_{name}")])
@@ -124,10 +151,12 @@ def test_what_mujoco_would_refuse_is_told_and_mended():
         below = body
     mjcf = to_mjcf(model)
     told = {record.kind: record for record in mjcf.fidelity}
-    assert told["massless"].component == "/bodyset/ghost" and "mjMINVAL" in told["massless"].cannot_say
-    assert "balanceinertia" in told["inertia"].done and told["inertia"].errors["moment"].max == pytest.approx(
-        3.1, abs=0.2
+    assert (
+        told["massless"].component == "/bodyset/ghost" and "mjMINVAL" in told["massless"].cannot_say
     )
+    assert "balanceinertia" in told["inertia"].done and told["inertia"].errors[
+        "moment"
+    ].max == pytest.approx(3.1, abs=0.2)
     assert "singular" not in told
     compiled = mujoco.MjModel.from_xml_string(mjcf.text)
     assert compiled.body("ghost").mass < 1e-12
@@ -138,7 +167,10 @@ def test_what_mujoco_would_refuse_is_told_and_mended():
 
 @pytest.mark.parametrize(
     ("choice", "said"),
-    [({"mujoco": 2}, "MuJoCo 3 or 4, not 2"), ({"contact": "soft"}, "'native' or 'none', not 'soft'")],
+    [
+        ({"mujoco": 2}, "MuJoCo 3 or 4, not 2"),
+        ({"contact": "soft"}, "'native' or 'none', not 'soft'"),
+    ],
 )
 def test_choices_that_are_none_are_refused(choice, said):
     with pytest.raises(OsimliteError, match=said):

@@ -31,8 +31,13 @@ def joint_with(surface):
     surface.name = "surface"
     body.WrapObjectSet.objects.append(surface)
     path = GeometryPath(name="path")
-    for name, frame, place in (("a", "/ground", (0.03, 0.3, 0.01)), ("b", "/bodyset/arm", (0.05, -0.3, 0.0))):
-        path.path_point_set.objects.append(PathPoint(name=name, socket_parent_frame=frame, location=place))
+    for name, frame, place in (
+        ("a", "/ground", (0.03, 0.3, 0.01)),
+        ("b", "/bodyset/arm", (0.05, -0.3, 0.0)),
+    ):
+        path.path_point_set.objects.append(
+            PathPoint(name=name, socket_parent_frame=frame, location=place)
+        )
     path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="surface"))
     model.add(PathActuator(name="cable", geometry_path=path))
     return model
@@ -60,8 +65,16 @@ def test_a_cylinder_that_is_crossed_squarely_is_exact(version):
 @pytest.mark.parametrize(
     ("surface", "chosen", "after"),
     [
-        (WrapEllipsoid(dimensions=(0.06, 0.1, 0.15), quadrant="x", translation=(0.02, 0.0, 0.0)), 0.02, 0.003),
-        (WrapTorus(inner_radius=0.02, outer_radius=0.06, xyz_body_rotation=(1.5, 0.0, 0.0)), 0.02, 0.01),
+        (
+            WrapEllipsoid(dimensions=(0.06, 0.1, 0.15), quadrant="x", translation=(0.02, 0.0, 0.0)),
+            0.02,
+            0.003,
+        ),
+        (
+            WrapTorus(inner_radius=0.02, outer_radius=0.06, xyz_body_rotation=(1.5, 0.0, 0.0)),
+            0.02,
+            0.01,
+        ),
     ],
 )
 def test_what_mujoco_has_not_is_near_and_nearer_if_fitted(surface, chosen, after):
@@ -82,4 +95,6 @@ def test_a_quartic_of_a_quartic():
         wanted = [function.derivatives(value)[0] for value in x]
         np.testing.assert_allclose(np.polynomial.polynomial.polyval(helper, row), wanted, atol=2e-4)
     drive, slides = composition(functions[1:], (-2.0, 0.2))
-    assert drive.tolist() == [0.0, 1.0, 0.0, 0.0, 0.0] and slides.tolist() == [[0.2, 0.0, 0.1, 0.0, 0.0]]
+    assert drive.tolist() == [0.0, 1.0, 0.0, 0.0, 0.0] and slides.tolist() == [
+        [0.2, 0.0, 0.1, 0.0, 0.0]
+    ]

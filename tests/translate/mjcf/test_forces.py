@@ -43,14 +43,23 @@ def chain(*forces) -> Model:
     below, count = model.ground, 0
     for number, kind in enumerate((SliderJoint, PinJoint, UniversalJoint, PinJoint)):
         inertia = (0.02, 0.03, 0.04, 0, 0, 0)
-        body = model.add(Body(name=f"b{number}", mass=1.0, mass_center=(0, -0.2, 0), inertia=inertia))
+        body = model.add(
+            Body(name=f"b{number}", mass=1.0, mass_center=(0, -0.2, 0), inertia=inertia)
+        )
         names = [f"q{count + k}" for k in range(2 if kind is UniversalJoint else 1)]
         count += len(names)
-        joint = kind(name=f"j{number}", coordinates=[Coordinate(name=name, default_value=0.3) for name in names])
-        model.add(joint.between(below, body, at=(0, -0.4 if number else 0, 0), turned=(0.4, 0.1, 0.2)))
+        joint = kind(
+            name=f"j{number}",
+            coordinates=[Coordinate(name=name, default_value=0.3) for name in names],
+        )
+        model.add(
+            joint.between(below, body, at=(0, -0.4 if number else 0, 0), turned=(0.4, 0.1, 0.2))
+        )
         below = body
     model.add(
-        PhysicalOffsetFrame(name="hook", socket_parent=B, translation=(0.1, 0.0, 0.02), orientation=(0.1, 0.5, 0))
+        PhysicalOffsetFrame(
+            name="hook", socket_parent=B, translation=(0.1, 0.0, 0.02), orientation=(0.1, 0.5, 0)
+        )
     )
     if forces:
         model.add(*forces)
@@ -66,7 +75,9 @@ def both(model: Model, q, u, control: float = 0.7) -> tuple[np.ndarray, np.ndarr
     if names:
         system.drive(driven(forces.controls, dict.fromkeys(names, control), 1.0))
     n, z = len(mechanism.coordinates), system.state.size - 2 * len(mechanism.coordinates)
-    y = np.concatenate((np.array(q)[list(system.order)], np.array(u)[list(system.order)], np.full(z, control)))
+    y = np.concatenate(
+        (np.array(q)[list(system.order)], np.array(u)[list(system.order)], np.full(z, control))
+    )
     wanted = np.empty(n)
     wanted[list(system.order)] = system.applied(0.0, y.tolist())[n : 2 * n]
 
@@ -79,9 +90,13 @@ def both(model: Model, q, u, control: float = 0.7) -> tuple[np.ndarray, np.ndarr
 
 
 FORCES = {
-    "coordinate": CoordinateActuator(name="f", coordinate="q1", optimal_force=12.0, min_control=-1, max_control=1),
+    "coordinate": CoordinateActuator(
+        name="f", coordinate="q1", optimal_force=12.0, min_control=-1, max_control=1
+    ),
     "activation": ActivationCoordinateActuator(name="f", coordinate="q1", optimal_force=12.0),
-    "spring": SpringGeneralizedForce(name="f", coordinate="q2", stiffness=30.0, rest_length=0.1, viscosity=2.0),
+    "spring": SpringGeneralizedForce(
+        name="f", coordinate="q2", stiffness=30.0, rest_length=0.1, viscosity=2.0
+    ),
     "points": PointToPointSpring(
         name="f",
         socket_body1=A,
@@ -90,21 +105,38 @@ FORCES = {
         stiffness=80.0,
         rest_length=0.2,
     ),
-    "apart": PointToPointActuator(name="f", bodyA="b1", bodyB="b3", pointA=(0.1, 0.2, 0), optimal_force=50.0),
-    "torque in its own axes": TorqueActuator(
-        name="f", bodyA="/componentset/hook", bodyB="ground", torque_is_global=False, axis=(1.0, 2.0, 2.0)
+    "apart": PointToPointActuator(
+        name="f", bodyA="b1", bodyB="b3", pointA=(0.1, 0.2, 0), optimal_force=50.0
     ),
-    "torque in ground": TorqueActuator(name="f", bodyA="b3", bodyB="ground", axis=(1.0, 2.0, 2.0), optimal_force=3.0),
-    "torque in a body": TorqueActuator(name="f", bodyA="b1", bodyB="b3", torque_is_global=False, axis=(1.0, 2.0, 2.0)),
-    "point": PointActuator(name="f", body="b3", point=(0.1, 0.0, 0.2), direction=(0.0, 3.0, 4.0), optimal_force=9.0),
-    "point in ground": PointActuator(name="f", body="b3", direction=(0.0, 3.0, 4.0), force_is_global=True),
+    "torque in its own axes": TorqueActuator(
+        name="f",
+        bodyA="/componentset/hook",
+        bodyB="ground",
+        torque_is_global=False,
+        axis=(1.0, 2.0, 2.0),
+    ),
+    "torque in ground": TorqueActuator(
+        name="f", bodyA="b3", bodyB="ground", axis=(1.0, 2.0, 2.0), optimal_force=3.0
+    ),
+    "torque in a body": TorqueActuator(
+        name="f", bodyA="b1", bodyB="b3", torque_is_global=False, axis=(1.0, 2.0, 2.0)
+    ),
+    "point": PointActuator(
+        name="f", body="b3", point=(0.1, 0.0, 0.2), direction=(0.0, 3.0, 4.0), optimal_force=9.0
+    ),
+    "point in ground": PointActuator(
+        name="f", body="b3", direction=(0.0, 3.0, 4.0), force_is_global=True
+    ),
 }
 
 
 @pytest.mark.parametrize("force", FORCES.values(), ids=FORCES)
 def test_generalized_forces_are_those_of_opensims_law(force):
     model = chain(force)
-    for q, u in (((0.1, 0.2, -0.3, 0.4, 0.5), (1.0, -2.0, 0.5, 0.7, 3.0)), ((-0.4, 1.0, 0.9, -0.8, 0.1), np.zeros(5))):
+    for q, u in (
+        ((0.1, 0.2, -0.3, 0.4, 0.5), (1.0, -2.0, 0.5, 0.7, 3.0)),
+        ((-0.4, 1.0, 0.9, -0.8, 0.1), np.zeros(5)),
+    ):
         result, wanted = both(model, q, u)
         assert np.abs(wanted).max() > 0.1
         np.testing.assert_allclose(result, wanted, rtol=1e-9, atol=1e-9)
@@ -119,7 +151,9 @@ def test_a_body_actuator_is_six_actuators():
     compiled.place(q)
     mechanism = osimlite.mechanism(model)
     moved = mechanism.jacobian(B, q, (0.1, 0.0, 0.2))
-    np.testing.assert_allclose(compiled.data.qfrc_actuator, moved.T @ np.arange(1.0, 7.0), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        compiled.data.qfrc_actuator, moved.T @ np.arange(1.0, 7.0), rtol=1e-9, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("lower", [2.0, 5.0])
@@ -169,6 +203,10 @@ def test_what_cannot_act_is_told():
     locked["/jointset/j1/q1"].locked = True
     off = chain(SpringGeneralizedForce(name="f", coordinate="q1", appliesForce=False))
     nobody = chain(PointActuator(name="f"))
-    for model, said in ((locked, "is locked"), (off, "appliesForce is false"), (nobody, "names no frame")):
+    for model, said in (
+        (locked, "is locked"),
+        (off, "appliesForce is false"),
+        (nobody, "names no frame"),
+    ):
         (record,) = to_mjcf(model).fidelity.records
         assert record.how == "dropped" and said in record.done

@@ -31,8 +31,13 @@ def test_fibers_and_tendons_keep_their_lengths(corpus):
         angle = muscle.pennation_angle_at_optimal
         assert fiber == pytest.approx(muscle.optimal_fiber_length * cos(angle), rel=1e-12)
         assert low - first * fiber == pytest.approx(muscle.tendon_slack_length, rel=1e-12)
-        assert actuator.gainprm[2] == pytest.approx(muscle.max_isometric_force * cos(angle), rel=1e-12)
-        assert actuator.dynprm[:2].tolist() == [muscle.activation_time_constant, muscle.deactivation_time_constant]
+        assert actuator.gainprm[2] == pytest.approx(
+            muscle.max_isometric_force * cos(angle), rel=1e-12
+        )
+        assert actuator.dynprm[:2].tolist() == [
+            muscle.activation_time_constant,
+            muscle.deactivation_time_constant,
+        ]
 
 
 @pytest.mark.parametrize("activation", [0.0, 0.3, 1.0])
@@ -50,7 +55,9 @@ def test_tension_is_mujocos(activation):
         mujoco.mj_forward(model, data)
         result.append(-data.actuator_force[0])
     np.testing.assert_allclose(curves.tension(lengths, activation), result, rtol=1e-12, atol=1e-9)
-    read = Curves.read(model.actuator_lengthrange[0], model.actuator_gainprm[0], model.actuator_biasprm[0])
+    read = Curves.read(
+        model.actuator_lengthrange[0], model.actuator_gainprm[0], model.actuator_biasprm[0]
+    )
     assert read == pytest.approx(curves)
 
 
@@ -59,7 +66,9 @@ def test_isometric_forces_are_near_and_nearer_if_fitted(corpus):
     worst = {}
     for fit in ("none", "force"):
         fidelity = to_mjcf(model, visuals=False, fit=fit).fidelity
-        errors = [record.errors["isometric force"].rms for record in fidelity if record.kind == "muscle"]
+        errors = [
+            record.errors["isometric force"].rms for record in fidelity if record.kind == "muscle"
+        ]
         assert len(errors) == 18
         worst[fit] = np.median(errors)
     assert worst["force"] < worst["none"] < 0.04
@@ -69,8 +78,14 @@ def test_a_slack_spring_pulls_nothing(corpus):
     model = gait(corpus)
     path = GeometryPath(name="path")
     for name, frame in (("a", "/ground"), ("b", "/bodyset/pelvis")):
-        path.path_point_set.objects.append(PathPoint(name=name, socket_parent_frame=frame, location=(0.0, 0.1, 0.0)))
-    model.add(PathSpring(name="cord", geometry_path=path, resting_length=0.3, stiffness=200.0, dissipation=0.1))
+        path.path_point_set.objects.append(
+            PathPoint(name=name, socket_parent_frame=frame, location=(0.0, 0.1, 0.0))
+        )
+    model.add(
+        PathSpring(
+            name="cord", geometry_path=path, resting_length=0.3, stiffness=200.0, dissipation=0.1
+        )
+    )
     mjcf = to_mjcf(model, visuals=False)
     assert "damping" in {record.kind for record in mjcf.fidelity}
     compiled = mujoco.MjModel.from_xml_string(mjcf.text)
@@ -81,13 +96,20 @@ def test_a_slack_spring_pulls_nothing(corpus):
         data.qpos[place] = 0.3 + stretch
         mujoco.mj_forward(compiled, data)
         expected = isometric_tension(model["/forceset/cord"], np.array([0.3 + stretch]), (0.0,))
-        assert -data.qfrc_spring[compiled.joint("pelvis_tx").dofadr[0]] == pytest.approx(expected.item(), abs=1e-9)
+        assert -data.qfrc_spring[compiled.joint("pelvis_tx").dofadr[0]] == pytest.approx(
+            expected.item(), abs=1e-9
+        )
 
 
 def test_the_activation_of_a_muscle_with_a_mass_lags_too(corpus):
     old = gait(corpus)["/forceset/soleus_r"]
-    muscle = osimlite.Millard2012AccelerationMuscle(name="soleus_r", max_isometric_force=old.max_isometric_force)
-    muscle.optimal_fiber_length, muscle.tendon_slack_length = old.optimal_fiber_length, old.tendon_slack_length
+    muscle = osimlite.Millard2012AccelerationMuscle(
+        name="soleus_r", max_isometric_force=old.max_isometric_force
+    )
+    muscle.optimal_fiber_length, muscle.tendon_slack_length = (
+        old.optimal_fiber_length,
+        old.tendon_slack_length,
+    )
     muscle.muscle_first_order_activation_dynamic_model.activation_time_constant = 0.012
     muscle.geometry_path = old.geometry_path.copy_deep()
     model = gait(corpus)

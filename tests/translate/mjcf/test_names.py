@@ -49,7 +49,11 @@ HOSTILE = (
     "🦵", "a_1", "a_2", "a_speck", "a_carrier", "world_speck", "bodyset.a", "jointset.a.a", "forceset.a", "a_helper",
     "a_rx", "a_ry", "a_frame", "carrier", "a_x", "_", "a_", "around", "path", "osimlite.states", "x" * 500,
 )  # fmt: skip
-NAMES = st.one_of(st.sampled_from(HOSTILE), st.text(st.sampled_from("aA_. /\t\n12"), max_size=4), st.text(max_size=6))
+NAMES = st.one_of(
+    st.sampled_from(HOSTILE),
+    st.text(st.sampled_from("aA_. /\t\n12"), max_size=4),
+    st.text(max_size=6),
+)
 
 
 def hostile(names: Iterable[str]) -> Model:
@@ -67,14 +71,20 @@ def hostile(names: Iterable[str]) -> Model:
 
     model = Model(name=name())
     inertia = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
-    first, second, third, fourth = (model.add(Body(name=name("body"), mass=1.0, inertia=inertia)) for _ in range(4))
+    first, second, third, fourth = (
+        model.add(Body(name=name("body"), mass=1.0, inertia=inertia)) for _ in range(4)
+    )
     pin, knee = (
         Coordinate(name=name("coordinate"), range=(-1.0, 1.0)),
         Coordinate(name=name("coordinate"), range=(0.0, 1.0)),
     )
-    free = FreeJoint(name=name("joint"), coordinates=[Coordinate(name=name("coordinate")) for _ in range(6)])
+    free = FreeJoint(
+        name=name("joint"), coordinates=[Coordinate(name=name("coordinate")) for _ in range(6)]
+    )
     model.add(free.between(model.ground, first))
-    model.add(PinJoint(name=name("joint"), coordinates=[pin]).between(first, second, at=(0.0, -0.4, 0.0)))
+    model.add(
+        PinJoint(name=name("joint"), coordinates=[pin]).between(first, second, at=(0.0, -0.4, 0.0))
+    )
     bent = CustomJoint(name=name("joint"), coordinates=[knee])
     curve = SimmSpline(name="function", x=(0.0, 0.5, 1.0, 1.5), y=(0.0, 0.1, 0.0, -0.1))
     for axis, function in (
@@ -98,12 +108,16 @@ def hostile(names: Iterable[str]) -> Model:
         )
     )
     model.add(PointConstraint(name=name("constraint"), socket_body_1=second, socket_body_2=fourth))
-    frame = model.add(PhysicalOffsetFrame(name=name("frame"), socket_parent=second, translation=(0.0, 0.1, 0.0)))
+    frame = model.add(
+        PhysicalOffsetFrame(name=name("frame"), socket_parent=second, translation=(0.0, 0.1, 0.0))
+    )
     frame.attach(Sphere(radius=0.05))
     for body in (first, second):
         model.add(Marker(name=name("marker"), socket_parent_frame=body))
     second.wrap_object_set.objects.append(WrapCylinder(name=name("wrap"), radius=0.05, length=0.3))
-    third.wrap_object_set.objects.append(WrapEllipsoid(name=name("wrap"), dimensions=(0.05, 0.04, 0.03)))
+    third.wrap_object_set.objects.append(
+        WrapEllipsoid(name=name("wrap"), dimensions=(0.05, 0.04, 0.03))
+    )
     for surface in (second.wrap_object_set.objects[0], third.wrap_object_set.objects[0]):
         moving = MovingPathPoint(
             name=name(),
@@ -113,7 +127,8 @@ def hostile(names: Iterable[str]) -> Model:
             socket_z_coordinate=knee,
         )
         moving.x_location, moving.y_location, moving.z_location = (
-            curve.copy_deep() if index == 0 else LinearFunction(coefficients=(0.0, 0.1)) for index in range(3)
+            curve.copy_deep() if index == 0 else LinearFunction(coefficients=(0.0, 0.1))
+            for index in range(3)
         )
         points = [
             PathPoint(name=name(), socket_parent_frame=first, location=(0.1, 0.0, 0.0)),
@@ -124,12 +139,18 @@ def hostile(names: Iterable[str]) -> Model:
             path_point_set=PathPointSet(objects=points),
             path_wrap_set=PathWrapSet(objects=[PathWrap(name=name(), wrap_object=surface.name)]),
         )
-        model.add(Millard2012EquilibriumMuscle(name=name("force"), geometry_path=path, tendon_slack_length=0.5))
+        model.add(
+            Millard2012EquilibriumMuscle(
+                name=name("force"), geometry_path=path, tendon_slack_length=0.5
+            )
+        )
     model.add(CoordinateActuator(name=name("force"), coordinate=pin))
     model.add(BushingForce(name=name("force"), socket_frame1=model.ground, socket_frame2=first))
     floor = model.add(ContactHalfSpace(name=name("contact"), socket_frame=model.ground))
     ball = model.add(ContactSphere(name=name("contact"), socket_frame=third, radius=0.05))
-    material = HuntCrossleyForce.ContactParameters(geometry=(ball, floor), stiffness=1e6, dissipation=1.0)
+    material = HuntCrossleyForce.ContactParameters(
+        geometry=(ball, floor), stiffness=1e6, dissipation=1.0
+    )
     contact = HuntCrossleyForce.ContactParametersSet(objects=[material])
     model.add(HuntCrossleyForce(name=name("force"), contact_parameters=contact))
     return model
@@ -139,7 +160,11 @@ def named(text: str) -> list[tuple[str, str]]:
     """The tag and the name of everything in the world of an MJCF that has a name, as a reader of XML has it."""
     world = etree.fromstring(text.encode()).find("worldbody")
     assert world is not None
-    return [(str(element.tag), str(element.attrib["name"])) for element in world.iter() if "name" in element.attrib]
+    return [
+        (str(element.tag), str(element.attrib["name"]))
+        for element in world.iter()
+        if "name" in element.attrib
+    ]
 
 
 @settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow])
@@ -173,7 +198,9 @@ def test_what_has_another_name_is_in_the_account() -> None:
 
 def test_what_keeps_its_name_is_not() -> None:
     mjcf = osimlite.to_mjcf(hostile(f"n{k}" for k in range(50)))
-    assert not {path for path in mjcf.fidelity.renamed if path.startswith(("/bodyset", "/jointset"))}
+    assert not {
+        path for path in mjcf.fidelity.renamed if path.startswith(("/bodyset", "/jointset"))
+    }
 
 
 def test_a_number_that_is_not_finite_is_refused_with_its_place() -> None:

@@ -24,10 +24,26 @@ from tests.translate.mjcf.test_names import HOSTILE, hostile
 FIXTURES = Path(__file__).resolve().parents[3] / "fixtures"
 FILES = ("lint/skeleton.osim", "lint/limb.osim", "walker/DynamicWalkerModel.osim")
 NUMBERS = st.one_of(
-    st.sampled_from((1e-320, 1e308, -1e308, -0.0, 0.0, float("inf"), float("-inf"), float("nan"), 1e-16, 1e30, -1.0)),
+    st.sampled_from(
+        (
+            1e-320,
+            1e308,
+            -1e308,
+            -0.0,
+            0.0,
+            float("inf"),
+            float("-inf"),
+            float("nan"),
+            1e-16,
+            1e30,
+            -1.0,
+        )
+    ),
     st.floats(),
 )
-OPTIONS = st.sampled_from(({}, {}, {"mujoco": 3}, {"driver": True}, {"contact": "none"}, {"spline": "quartic"}))
+OPTIONS = st.sampled_from(
+    ({}, {}, {"mujoco": 3}, {"driver": True}, {"contact": "none"}, {"spline": "quartic"})
+)
 
 
 def numbers(model: Model) -> list[tuple[Object, str, int | None]]:
@@ -69,20 +85,30 @@ def with_shape(shape: Geometry) -> Model:
     return model
 
 
-@settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much], deadline=None)
+@settings(
+    max_examples=15,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
+    deadline=None,
+)
 @given(st.sampled_from((None, *FILES)), st.data(), OPTIONS)
-def test_mujoco_takes_models_with_any_numbers(file: str | None, data: st.DataObject, options: dict[str, Any]) -> None:
+def test_mujoco_takes_models_with_any_numbers(
+    file: str | None, data: st.DataObject, options: dict[str, Any]
+) -> None:
     if file is None:
         names = st.one_of(st.sampled_from(HOSTILE), st.text(max_size=6))
         model = hostile(data.draw(st.lists(names, min_size=50, max_size=50)))
     else:
         model = osimlite.read(FIXTURES / file)
     places = numbers(model)
-    for place in data.draw(st.lists(st.sampled_from(range(len(places))), min_size=1, max_size=3, unique=True)):
+    for place in data.draw(
+        st.lists(st.sampled_from(range(len(places))), min_size=1, max_size=3, unique=True)
+    ):
         thing, name, which = places[place]
         value, new = getattr(thing, name), data.draw(NUMBERS)
         try:
-            setattr(thing, name, new if which is None else (*value[:which], new, *value[which + 1 :]))
+            setattr(
+                thing, name, new if which is None else (*value[:which], new, *value[which + 1 :])
+            )
         except ValidationError:
             assume(False)
     taken(model, **options)
@@ -135,7 +161,10 @@ def test_an_axis_whose_length_is_no_number_is_refused(size: float) -> None:
 
 @pytest.mark.parametrize(
     ("name", "number"),
-    [*(("max_contraction_velocity", number) for number in (1e-320, 0.0, -1.0)), ("optimal_fiber_length", 1e-30)],
+    [
+        *(("max_contraction_velocity", number) for number in (1e-320, 0.0, -1.0)),
+        ("optimal_fiber_length", 1e-30),
+    ],
 )
 def test_a_muscle_that_cannot_shorten_is_left_out_with_a_word(name: str, number: float) -> None:
     model = hostile(f"n{k}" for k in range(50))
@@ -150,10 +179,17 @@ def test_a_muscle_that_cannot_shorten_is_left_out_with_a_word(name: str, number:
 
 @pytest.mark.parametrize("factor", [1e308, -1e308, float("inf"), float("nan")])
 @pytest.mark.parametrize("spline", ["series", "quartic"])
-def test_a_function_that_cannot_be_fitted_is_refused_with_its_number(factor: float, spline: Any) -> None:
+def test_a_function_that_cannot_be_fitted_is_refused_with_its_number(
+    factor: float, spline: Any
+) -> None:
     model = hostile(f"n{k}" for k in range(50))
     coupler = next(iter(model.components(CoordinateCouplerConstraint)))
-    coupler.coupled_coordinates_function = SimmSpline(x=(-1.0, 0.0, 0.5, 1.0), y=(0.0, 0.1, 0.4, 0.5))
+    coupler.coupled_coordinates_function = SimmSpline(
+        x=(-1.0, 0.0, 0.5, 1.0), y=(0.0, 0.1, 0.4, 0.5)
+    )
     coupler.scale_factor = factor
-    with pytest.raises(OsimliteError, match=r"^scale_factor of '/constraintset/n18', \S+, is too large or too small"):
+    with pytest.raises(
+        OsimliteError,
+        match=r"^scale_factor of '/constraintset/n18', \S+, is too large or too small",
+    ):
         osimlite.to_mjcf(model, spline=spline)

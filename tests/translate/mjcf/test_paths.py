@@ -83,7 +83,11 @@ def test_a_locked_coordinate_moves_no_point(corpus):
 def test_a_point_that_moves_stays_where_it_must_under_load(carrier):
     model = Model(name="sliding")
     body = model.add(Body(name="arm", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
-    model.add(PinJoint(name="pin", coordinates=[Coordinate(name="q", range=(-1.0, 1.0))]).between(model.ground, body))
+    model.add(
+        PinJoint(name="pin", coordinates=[Coordinate(name="q", range=(-1.0, 1.0))]).between(
+            model.ground, body
+        )
+    )
     path = GeometryPath(name="path")
     guided = MovingPathPoint(name="a", socket_parent_frame=carrier)
     for axis, size in zip("xyz", (0.1, 0.2, 0.05), strict=True):
@@ -93,14 +97,20 @@ def test_a_point_that_moves_stays_where_it_must_under_load(carrier):
     if carrier != "/ground":
         other.socket_parent_frame = "/ground"
     path.path_point_set.objects += [guided, other]
-    model.add(PathSpring(name="cord", geometry_path=path, resting_length=0.1, stiffness=500.0, dissipation=0.0))
+    model.add(
+        PathSpring(
+            name="cord", geometry_path=path, resting_length=0.1, stiffness=500.0, dissipation=0.0
+        )
+    )
     compiled = Compiled(to_mjcf(model, visuals=False))
     mujoco.mj_resetDataKeyframe(compiled.model, compiled.data, 0)
     for _ in range(100):
         mujoco.mj_step(compiled.model, compiled.data)
     mujoco.mj_forward(compiled.model, compiled.data)
     q = compiled.data.joint("q").qpos[0]
-    assert q == pytest.approx(osimlite.simulate(model, to=0.1, accuracy=1e-9).values[-1, 0], rel=0.01)
+    assert q == pytest.approx(
+        osimlite.simulate(model, to=0.1, accuracy=1e-9).values[-1, 0], rel=0.01
+    )
     length = osimlite.paths(model).lengths({"q": q})["/forceset/cord"]
     assert compiled.data.tendon("cord").length[0] == pytest.approx(length, abs=1e-4)
 
@@ -114,8 +124,14 @@ def test_odd_paths_come_to_an_end():
     model.add(slide.between(model.ground, body))
     body.WrapObjectSet.objects.append(WrapCylinder(name="line", radius=0.0, length=1.0))
     path = GeometryPath(name="path")
-    middle = ConditionalPathPoint(name="b", socket_coordinate="/jointset/slide/x", range=(0.2, -0.2))
-    for point, frame in ((PathPoint(name="a"), "/ground"), (middle, "/ground"), (PathPoint(name="c"), "/bodyset/arm")):
+    middle = ConditionalPathPoint(
+        name="b", socket_coordinate="/jointset/slide/x", range=(0.2, -0.2)
+    )
+    for point, frame in (
+        (PathPoint(name="a"), "/ground"),
+        (middle, "/ground"),
+        (PathPoint(name="c"), "/bodyset/arm"),
+    ):
         point.socket_parent_frame = frame
         path.path_point_set.objects.append(point)
     path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="line"))

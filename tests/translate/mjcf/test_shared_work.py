@@ -31,7 +31,11 @@ def test_poses_know_what_paths_say_one_by_one() -> None:
     coordinates[2].locked, coordinates[2].default_value = True, 0.3
     for number, coordinate in enumerate(coordinates):
         body = model.add(Body(name=f"b{number}", mass=1.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0)))
-        model.add(PinJoint(name=f"j{number}", coordinates=[coordinate]).between(below, body, at=(0.0, -0.4, 0.1)))
+        model.add(
+            PinJoint(name=f"j{number}", coordinates=[coordinate]).between(
+                below, body, at=(0.0, -0.4, 0.1)
+            )
+        )
         below = body
     model.add(
         CoordinateCouplerConstraint(
@@ -53,9 +57,13 @@ def test_poses_know_what_paths_say_one_by_one() -> None:
     for number, q in enumerate(poses.q):
         (length,), (arms,) = paths.lengths(q).values(), paths.moment_arms(q).values()
         assert truth["/forceset/spring"].lengths[number] == length
-        assert truth["/forceset/spring"].arms[number].tolist() == [arms.get(name, 0.0) for name in names]
+        assert truth["/forceset/spring"].arms[number].tolist() == [
+            arms.get(name, 0.0) for name in names
+        ]
         state, coupling = paths.mechanism.at(q), paths.coupling(q)
         assert np.array_equal(poses.rates[number], coupling[:, poses.moving])
         for body in (-1, 0, 1, 2):
             assert np.array_equal(poses.rotations[body, number], state.rotations[body])
-            assert np.array_equal(poses.jacobians[body, number], state.jacobians[body] @ coupling[:, poses.moving])
+            assert np.array_equal(
+                poses.jacobians[body, number], state.jacobians[body] @ coupling[:, poses.moving]
+            )

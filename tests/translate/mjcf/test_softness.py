@@ -11,7 +11,9 @@ import osimlite
 
 
 def test_a_falling_leg_keeps_its_knees_and_helpers(shared: Path) -> None:
-    mjcf = osimlite.to_mjcf(osimlite.read(shared / "corpus" / "models" / "m0005" / "gait10dof18musc.osim"))
+    mjcf = osimlite.to_mjcf(
+        osimlite.read(shared / "corpus" / "models" / "m0005" / "gait10dof18musc.osim")
+    )
     model = mujoco.MjModel.from_xml_string(mjcf.text, mjcf.files)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)

@@ -43,7 +43,10 @@ def spring(stiffness: float) -> PointToPointSpring:
 
 def bushing(damping: float) -> BushingForce:
     return BushingForce(
-        name="f", socket_frame1="/ground", socket_frame2=BLOCK, translational_damping=(damping, 0.0, 0.0)
+        name="f",
+        socket_frame1="/ground",
+        socket_frame2=BLOCK,
+        translational_damping=(damping, 0.0, 0.0),
     )
 
 
@@ -52,7 +55,11 @@ def muscle(fiber: float) -> Millard2012EquilibriumMuscle:
     for name, frame in (("a", "/ground"), ("b", BLOCK)):
         path.path_point_set.objects.append(PathPoint(name=name, socket_parent_frame=frame))
     return Millard2012EquilibriumMuscle(
-        name="f", geometry_path=path, optimal_fiber_length=fiber, tendon_slack_length=0.02, max_isometric_force=100.0
+        name="f",
+        geometry_path=path,
+        optimal_fiber_length=fiber,
+        tendon_slack_length=0.02,
+        max_isometric_force=100.0,
     )
 
 
@@ -69,7 +76,9 @@ def test_the_step_is_shorter_than_what_springs_do(force, step, rate):
     mjcf = to_mjcf(sled(force))
     model = Compiled(mjcf).model
     assert model.opt.timestep == step
-    assert [f"{rate} 1/s" in record.detail for record in mjcf.fidelity if record.kind == "stiff"] == [True] * bool(rate)
+    assert [
+        f"{rate} 1/s" in record.detail for record in mjcf.fidelity if record.kind == "stiff"
+    ] == [True] * bool(rate)
 
 
 def test_a_stiff_spring_keeps_its_energy():
@@ -82,7 +91,9 @@ def test_a_stiff_spring_keeps_its_energy():
 
 @pytest.mark.parametrize(("fiber", "told"), [(0.03, 1), (0.08, 0)])
 def test_torn_muscles_are_told(fiber, told):
-    records = [record for record in to_mjcf(sled(muscle(fiber))).fidelity if record.kind == "overstretched"]
+    records = [
+        record for record in to_mjcf(sled(muscle(fiber))).fidelity if record.kind == "overstretched"
+    ]
     assert len(records) == told
     assert all(record.component == "/forceset/f" for record in records)
 

@@ -30,7 +30,9 @@ print(json.dumps([mujoco.__version__, lengths]))
 
 def text(kind, side):
     """A tendon between two bodies that can be put anywhere, around a geom at the origin."""
-    where = "" if side is None else f'<site name="side" pos="{" ".join(map(repr, side.tolist()))}"/>'
+    where = (
+        "" if side is None else f'<site name="side" pos="{" ".join(map(repr, side.tolist()))}"/>'
+    )
     return f"""<mujoco><worldbody>{where}
         <geom name="geom" type="{kind}" size="{RADIUS} {1 if kind == "cylinder" else ""}" contype="0" conaffinity="0"/>
         <body mocap="true"><site name="a"/></body><body mocap="true"><site name="b"/></body></worldbody>
@@ -47,15 +49,29 @@ def test_as_mujoco(which, kind, distance, request):
     ends, direction = random.normal(size=(2, 400, 3)), random.normal(size=3)
     side = None if distance is None else distance * direction / np.linalg.norm(direction)
     given = json.dumps([text(kind, side), ends.swapaxes(0, 1).tolist()])
-    made = subprocess.run([python, "-c", READER], input=given, capture_output=True, text=True, check=True)
+    made = subprocess.run(
+        [python, "-c", READER], input=given, capture_output=True, text=True, check=True
+    )
     version, lengths = json.loads(made.stdout)
 
     first, second = ends
     sites = None if side is None else side[None, None]
     one = np.array([0])
-    result = bend(kind, np.array([[RADIUS]]), first[None], second[None], sites, one, int(version.partition(".")[0]))
-    touches, leaves, returns, length = (way[result.choice[0], 0, np.arange(len(first))] for way in result[:4])
-    around = np.linalg.norm(leaves - first, axis=1) + length + np.linalg.norm(second - returns, axis=1)
+    result = bend(
+        kind,
+        np.array([[RADIUS]]),
+        first[None],
+        second[None],
+        sites,
+        one,
+        int(version.partition(".")[0]),
+    )
+    touches, leaves, returns, length = (
+        way[result.choice[0], 0, np.arange(len(first))] for way in result[:4]
+    )
+    around = (
+        np.linalg.norm(leaves - first, axis=1) + length + np.linalg.norm(second - returns, axis=1)
+    )
     whole = np.where(touches, around, np.linalg.norm(second - first, axis=1))
     assert 0.05 < touches.mean() < 0.95
     np.testing.assert_allclose(whole, lengths, rtol=0.0, atol=1e-11)

@@ -1,8 +1,9 @@
 """Old formats to the current one, on the element tree and before any class is read.
 
-Each module holds the steps to one version of the format, which its name gives; `upgrade` runs those that a document
-needs, oldest first. What the steps do is what OpenSim 4.6 does (its component paths come out the same), without its
-rounding of numbers to six digits and without the references it breaks.
+Each module holds the steps to one version of the format, which its name gives; `upgrade` runs those
+that a document needs, oldest first. What the steps do is what OpenSim 4.6 does (its component paths
+come out the same), without its rounding of numbers to six digits and without the references it
+breaks.
 """
 
 from __future__ import annotations
@@ -26,7 +27,16 @@ from osimlite.io.document.upgrade.draft import (
 from osimlite.io.document.upgrade.v40600_class_names import class_names
 from osimlite.schema.model import CURRENT_VERSION
 
-__all__ = ["Change", "Refusal", "Refused", "Step", "Upgraded", "steps", "upgrade", "with_present_names"]
+__all__ = [
+    "Change",
+    "Refusal",
+    "Refused",
+    "Step",
+    "Upgraded",
+    "steps",
+    "upgrade",
+    "with_present_names",
+]
 
 
 def steps(version: int = 0) -> list[Step]:
@@ -64,7 +74,11 @@ class Upgraded:
     def numbers(self) -> list[int] | None:
         """For every element of the tree the number of the one it came from; None if all are where they were."""
         draft = self._draft
-        return [draft.numbers[element] for element in draft.root.iter(etree.Element)] if draft.moves else None
+        return (
+            [draft.numbers[element] for element in draft.root.iter(etree.Element)]
+            if draft.moves
+            else None
+        )
 
     @property
     def moved(self) -> dict[tuple[int, str], int]:

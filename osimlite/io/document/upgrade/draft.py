@@ -41,7 +41,9 @@ class Change(NamedTuple):
 class Refusal(NamedTuple):
     """Something over which OpenSim's own upgrade of a document fails, where osimlite's does not."""
 
-    owner: int  # the object that OpenSim is bringing up to date then; of one that it never reads nothing is asked
+    # the object that OpenSim is bringing up to date then; of one that it never reads nothing is
+    # asked
+    owner: int
     number: int  # the element concerned, in document order
     message: str  # what is wrong, in one clause
 
@@ -74,16 +76,20 @@ REGISTERED: list[Step] = []
 """Every step whose module has been imported."""
 
 
-def step(*, below: int, order: int | None = None) -> Callable[[Callable[[Draft], None]], Callable[[Draft], None]]:
+def step(
+    *, below: int, order: int | None = None
+) -> Callable[[Callable[[Draft], None]], Callable[[Draft], None]]:
     """Register a function as the step that documents of a version under `below` need.
 
-    The first line of its docstring says what it does to a document. `order` stands in for `below` where a step must
-    run sooner than its number says.
+    The first line of its docstring says what it does to a document. `order` stands in for `below`
+    where a step must run sooner than its number says.
     """
 
     def register(function: Callable[[Draft], None]) -> Callable[[Draft], None]:
         what = (function.__doc__ or "").strip().splitlines()[0].rstrip(".")
-        REGISTERED.append(Step(below, below if order is None else order, function.__name__, what, function))
+        REGISTERED.append(
+            Step(below, below if order is None else order, function.__name__, what, function)
+        )
         return function
 
     return register
@@ -167,14 +173,23 @@ class Draft:
         Objects of unknown classes count as what the set they stand in says.
         """
         tags = {tag for kind in kinds for tag in self._tags.get(kind, ())}
-        sets = [owner for owner, kind in _FAMILY_OF_MEMBERS.items() if kind in kinds and owner in self._tags]
+        sets = [
+            owner
+            for owner, kind in _FAMILY_OF_MEMBERS.items()
+            if kind in kinds and owner in self._tags
+        ]
         result = list(self.root.iter(*tags)) if tags else []
         if sets:
             strange = [
-                member for owner in self.root.iter(*sets) for member in members(owner) if not families(member.tag)
+                member
+                for owner in self.root.iter(*sets)
+                for member in members(owner)
+                if not families(member.tag)
             ]
             if strange:
-                result = sorted(dict.fromkeys([*result, *strange]), key=lambda element: self.numbers[element])
+                result = sorted(
+                    dict.fromkeys([*result, *strange]), key=lambda element: self.numbers[element]
+                )
         return result
 
     def tagged(self, *tags: str) -> list[Element]:
@@ -182,7 +197,13 @@ class Draft:
         return list(self.root.iter(*tags))
 
     def add(
-        self, parent: Element, tag: str, text: str | None = None, *, source: Element, name: str | None = None
+        self,
+        parent: Element,
+        tag: str,
+        text: str | None = None,
+        *,
+        source: Element,
+        name: str | None = None,
     ) -> Element:
         """Append a new element made from `source`."""
         made = etree.SubElement(parent, tag)
@@ -237,7 +258,9 @@ class Draft:
         """Record that OpenSim fails over an element when it brings its owner up to date."""
         self.refusals.append(Refusal(self.numbers[owner], self.numbers[element], message))
 
-    def changed(self, element: Element, *, at: Element | None = None, lost: str | None = None) -> None:
+    def changed(
+        self, element: Element, *, at: Element | None = None, lost: str | None = None
+    ) -> None:
         """Record that the current step changed an element, at which place inside, and what was lost."""
         assert self.step is not None
         self._changes.append((self.step, element, element if at is None else at, lost))

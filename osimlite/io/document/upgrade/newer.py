@@ -1,7 +1,8 @@
 """Content that is newer than the version a document states.
 
-OpenSim trusts the number and reads such a document by the rules of the old format. To bring it up to
-date by these rules would add what is there already in its new form: a second inertia, other frames.
+OpenSim trusts the number and reads such a document by the rules of the old format. To bring it up
+to date by these rules would add what is there already in its new form: a second inertia, other
+frames.
 """
 
 from __future__ import annotations

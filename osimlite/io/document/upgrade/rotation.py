@@ -24,7 +24,9 @@ def compose(outer: str | None, inner: str | None) -> tuple[str, str] | None:
         return " ".join(words[:3]), " ".join(words[3:])
     (outer_turn, outer_shift), (inner_turn, inner_shift) = (_placed(text) for text in texts)
     angles = _angles(turned_axes(outer_turn, inner_turn))
-    return " ".join(map(repr, angles)), " ".join(map(repr, plus(outer_shift, along_axes(outer_turn, inner_shift))))
+    return " ".join(map(repr, angles)), " ".join(
+        map(repr, plus(outer_shift, along_axes(outer_turn, inner_shift)))
+    )
 
 
 def _moves(text: str | None) -> bool:

@@ -1,7 +1,7 @@
 """What OpenSim's own upgrade of an old document insists on: where it is missing or unreadable, OpenSim loads nothing.
 
-Each entry was read in OpenSim's sources and tried. What remains a property of the current format is read leniently
-later; it is not here.
+Each entry was read in OpenSim's sources and tried. What remains a property of the current format is
+read leniently later; it is not here.
 """
 
 from __future__ import annotations
@@ -30,9 +30,15 @@ def check(draft: Draft) -> None:
                 for path in paths.split():
                     for place in _at(owner, path):
                         if not _is_value(place):
-                            draft.refuse(owner, place, f"<{place.tag}> must be {words} and holds elements or comments")
+                            draft.refuse(
+                                owner,
+                                place,
+                                f"<{place.tag}> must be {words} and holds elements or comments",
+                            )
                         elif not reads(plain(place)):
-                            draft.refuse(owner, place, f"<{place.tag}> is '{plain(place)[:60]}', not {words}")
+                            draft.refuse(
+                                owner, place, f"<{place.tag}> is '{plain(place)[:60]}', not {words}"
+                            )
     if draft.version < 30501:
         _bodies(draft)
     if draft.version < 30508:
@@ -44,7 +50,9 @@ def check(draft: Draft) -> None:
     if draft.version < 30502:
         for frame in draft.every("PhysicalFrame"):
             visible = frame.find("VisibleObject")
-            named = draft.version < 20101 or (visible is not None and visible.find("GeometrySet") is not None)
+            named = draft.version < 20101 or (
+                visible is not None and visible.find("GeometrySet") is not None
+            )
             if visible is not None and named and "name" not in frame.attrib:
                 draft.refuse(frame, frame, f"<{frame.tag}> has geometry and no name")
 
@@ -55,7 +63,11 @@ def _bodies(draft: Draft) -> None:
         return
     objects = draft.model.find("BodySet/objects")
     if objects is None:
-        draft.refuse(draft.model, draft.model, "the model has no <BodySet> with <objects>, not even one with ground")
+        draft.refuse(
+            draft.model,
+            draft.model,
+            "the model has no <BodySet> with <objects>, not even one with ground",
+        )
         return
     bodies = objects.findall("Body")
     ground = next((body for body in bodies if body.get("name") == "ground"), None)
@@ -71,7 +83,9 @@ def _bodies(draft: Draft) -> None:
             if parent is None:
                 draft.refuse(body, inside[0], f"<{inside[0].tag}> has no <parent_body>")
             elif not _is_value(parent):
-                draft.refuse(body, parent, "<parent_body> must be a name and holds elements or comments")
+                draft.refuse(
+                    body, parent, "<parent_body> must be a name and holds elements or comments"
+                )
 
 
 def _connectors(draft: Draft, component: Element) -> None:
@@ -82,7 +96,9 @@ def _connectors(draft: Draft, component: Element) -> None:
         if "name" not in connector.attrib:
             draft.refuse(component, connector, f"<{connector.tag}> in <connectors> has no name")
         elif connectee is None or not _is_value(connectee):
-            draft.refuse(component, connector, f"<{connector.tag}> has no <connectee_name> with a name in it")
+            draft.refuse(
+                component, connector, f"<{connector.tag}> has no <connectee_name> with a name in it"
+            )
 
 
 def _joint(draft: Draft, joint: Element) -> None:
@@ -97,7 +113,9 @@ def _joint(draft: Draft, joint: Element) -> None:
     for side in ("parent", "child"):
         if not names & {f"{side}_frame", f"{side}_body"}:
             draft.refuse(
-                joint, joint, f"<{joint.tag}> has no <Connector_PhysicalFrame_ name='{side}_frame'> in <connectors>"
+                joint,
+                joint,
+                f"<{joint.tag}> has no <Connector_PhysicalFrame_ name='{side}_frame'> in <connectors>",
             )
             return
 
@@ -117,7 +135,14 @@ def _is_value(element: Element) -> bool:
     """Whether an element is nothing but one text."""
     if elements(element):
         return False
-    return sum(1 for piece in (element.text, *(node.tail for node in element)) if piece and piece.strip()) <= 1
+    return (
+        sum(
+            1
+            for piece in (element.text, *(node.tail for node in element))
+            if piece and piece.strip()
+        )
+        <= 1
+    )
 
 
 def _is_number(text: str) -> bool:
@@ -136,7 +161,9 @@ def _is_whole(text: str) -> bool:
 def _is_vector(size: int) -> Callable[[str], bool]:
     def reads(text: str) -> bool:
         result = _vector_pattern(size).fullmatch(text)
-        return result is not None and not any(number and isinf(float(number)) for number in result.groups())
+        return result is not None and not any(
+            number and isinf(float(number)) for number in result.groups()
+        )
 
     return reads
 
@@ -159,7 +186,13 @@ _KINDS: dict[str, tuple[Callable[[str], bool], str]] = {
 _PLACES = "location_in_parent orientation_in_parent location_in_child orientation_in_child"
 
 _READ: tuple[tuple[str, int, int, str, str], ...] = (
-    ("Body", 0, 30500, "inertia_xx inertia_yy inertia_zz inertia_xy inertia_xz inertia_yz", "number"),
+    (
+        "Body",
+        0,
+        30500,
+        "inertia_xx inertia_yy inertia_zz inertia_xy inertia_xz inertia_yz",
+        "number",
+    ),
     ("PhysicalFrame", 0, 30502, "VisibleObject/scale_factors", "three"),
     ("PhysicalFrame", 0, 30502, "VisibleObject/transform", "six"),
     ("PhysicalFrame", 0, 20101, "VisibleObject/geometry_files", "text"),
@@ -172,8 +205,20 @@ _READ: tuple[tuple[str, int, int, str, str], ...] = (
     ("Joint", 0, 30500, "location orientation", "three"),
     ("Joint", 0, 30514, "reverse", "text"),
     ("Coordinate", 0, 30514, "motion_type", "text"),
-    ("TwoFrameLinker", 0, 30505, "location_body_1 orientation_body_1 location_body_2 orientation_body_2", "three"),
-    ("WeldConstraint", 0, 30505, "location_body_1 orientation_body_1 location_body_2 orientation_body_2", "three"),
+    (
+        "TwoFrameLinker",
+        0,
+        30505,
+        "location_body_1 orientation_body_1 location_body_2 orientation_body_2",
+        "three",
+    ),
+    (
+        "WeldConstraint",
+        0,
+        30505,
+        "location_body_1 orientation_body_1 location_body_2 orientation_body_2",
+        "three",
+    ),
     ("ContactGeometry", 0, 30507, "display_preference", "text"),
     ("Muscle", 0, 30513, "min_control max_control", "number"),
     ("GeometryPath", 0, 30516, "VisibleObject/display_preference", "whole"),

@@ -17,7 +17,10 @@ def engine(draft: Draft) -> None:
     for holder in model.findall("DynamicsEngine"):
         for inner in elements(holder):
             if inner.tag != "SimbodyEngine":
-                lost = ", ".join(sorted({f"<{part.tag}>" for part in elements(inner)})) or "its content"
+                lost = (
+                    ", ".join(sorted({f"<{part.tag}>" for part in elements(inner)}))
+                    or "its content"
+                )
                 raise Refused(
                     f"document version {draft.version} describes its bodies for a <{inner.tag}>, which no later format "
                     f"can say: {lost} would be lost; export the model for Simbody with the program that wrote it",

@@ -20,8 +20,9 @@ _POINT = ("XAttachment", "YAttachment", "ZAttachment")
 def scale_factors(draft: Draft) -> None:
     """<scale_factors> of custom joints and moving points multiply their functions of place.
 
-    Along an axis that is none of x, y, z the factors count as far as the axis goes that way, as OpenSim scales now. A
-    translation without a function, or one equal to its coordinate, is not scaled.
+    Along an axis that is none of x, y, z the factors count as far as the axis goes that way, as
+    OpenSim scales now. A translation without a function, or one equal to its coordinate, is not
+    scaled.
     """
     for joint, factors in having(draft.tagged("CustomJoint"), "scale_factors"):
         scales = reals(plain(factors), 3)
@@ -30,7 +31,9 @@ def scale_factors(draft: Draft) -> None:
         for axis in joint.iter("TransformAxis"):
             direction = reals(text_of(axis, "axis"), 3)
             if axis.get("name", "").startswith("translation") and direction is not None:
-                x, y, z = (abs(part) * factor for part, factor in zip(direction, scales, strict=True))
+                x, y, z = (
+                    abs(part) * factor for part, factor in zip(direction, scales, strict=True)
+                )
                 _multiply(draft, axis.find("function"), x + y + z, factors)
         draft.changed(joint, at=factors)
         draft.remove(factors)
@@ -50,7 +53,10 @@ def _multiply(draft: Draft, holder: Element | None, scale: float, source: Elemen
     if holder is None or not functions or scale == 1.0:
         return
     function = functions[0]
-    if function.tag == "LinearFunction" and reals(text_of(function, "coefficients"), 2) == [1.0, 0.0]:
+    if function.tag == "LinearFunction" and reals(text_of(function, "coefficients"), 2) == [
+        1.0,
+        0.0,
+    ]:
         return
     product = draft.add(holder, "MultiplierFunction", source=function)
     draft.move(function, draft.add(product, "function", source=function))

@@ -24,7 +24,9 @@ def transform_axes(draft: Draft) -> None:
     for joint, old in having(draft.tagged("CustomJoint"), "TransformAxisSet"):
         given: dict[str, list[Element]] = {"rotation": [], "translation": []}
         for axis in members(old):
-            given["rotation" if is_true(text_of(axis, "is_rotation") or "") else "translation"].append(axis)
+            given[
+                "rotation" if is_true(text_of(axis, "is_rotation") or "") else "translation"
+            ].append(axis)
         spatial = draft.add(joint, "SpatialTransform", source=old)
         for kind, axes in given.items():
             if len(axes) > 3:
@@ -56,7 +58,10 @@ def _carry(draft: Draft, axis: Element, spatial: Element, name: str) -> None:
 
 def _directions(given: list[str | None]) -> list[str]:
     """The texts of three independent directions, of which the first are given."""
-    known = [vector(reals(text, 3) or reals(unit, 3), 0) for text, unit in zip(given, _UNIT, strict=False)]
+    known = [
+        vector(reals(text, 3) or reals(unit, 3), 0)
+        for text, unit in zip(given, _UNIT, strict=False)
+    ]
     texts = [text or unit for text, unit in zip(given, _UNIT, strict=False)]
     if not known:
         return [*_UNIT]

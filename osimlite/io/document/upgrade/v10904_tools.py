@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from osimlite.io.document.upgrade.draft import Draft, Element, plain, step
 
-_SPRINGS = [f"body{number}_{kind}_corrective_spring_active" for number in (1, 2) for kind in ("linear", "torsional")]
+_SPRINGS = [
+    f"body{number}_{kind}_corrective_spring_active"
+    for number in (1, 2)
+    for kind in ("linear", "torsional")
+]
 
 
 @step(below=10904)
@@ -14,7 +18,9 @@ def tool_controls(draft: Draft) -> None:
         file = tool.find("controls_file")
         if file is not None:
             if plain(file) not in ("", "Unassigned"):
-                draft.move(file, draft.add(_controllers(draft, tool), "ControlSetController", source=file))
+                draft.move(
+                    file, draft.add(_controllers(draft, tool), "ControlSetController", source=file)
+                )
             else:
                 draft.remove(file)
             draft.changed(tool)
@@ -23,7 +29,9 @@ def tool_controls(draft: Draft) -> None:
             controller = draft.add(_controllers(draft, tool), "CorrectionController", source=spring)
             draft.add(controller, "kp", "16", source=spring)
             draft.add(controller, "kv", "8", source=spring)
-            draft.changed(tool, at=spring, lost="corrective springs, whose place a CorrectionController takes")
+            draft.changed(
+                tool, at=spring, lost="corrective springs, whose place a CorrectionController takes"
+            )
             for tag in _SPRINGS:
                 for child in tool.findall(tag):
                     draft.remove(child)

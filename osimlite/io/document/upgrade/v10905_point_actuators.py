@@ -18,9 +18,10 @@ _VECTOR = {"PointActuator": ("direction", "1 0 0"), "TorqueActuator": ("axis", "
 def actuator_bodies(draft: Draft) -> None:
     """Point and torque actuators say where they act, with the opposite direction.
 
-    The direction was one in the frame of the body reacted from, which is ground unless the document says otherwise.
-    OpenSim sets force_is_global for that too, but leaves it out when it prints the model. It turns the direction round
-    by the version alone, also where the tags are the later ones: a set of actuators without a version pushes backwards.
+    The direction was one in the frame of the body reacted from, which is ground unless the document
+    says otherwise. OpenSim sets force_is_global for that too, but leaves it out when it prints the
+    model. It turns the direction round by the version alone, also where the tags are the later
+    ones: a set of actuators without a version pushes backwards.
     """
     for actuator in draft.tagged(*_RENAMED):
         for child in elements(actuator):
@@ -45,4 +46,7 @@ def actuator_bodies(draft: Draft) -> None:
 
 def _opposite(element: Element) -> str:
     """A vector's text with every sign turned round."""
-    return " ".join(word[1:] if word.startswith("-") else "-" + word.lstrip("+") for word in plain(element).split())
+    return " ".join(
+        word[1:] if word.startswith("-") else "-" + word.lstrip("+")
+        for word in plain(element).split()
+    )

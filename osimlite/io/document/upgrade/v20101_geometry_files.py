@@ -14,10 +14,14 @@ def geometry_files(draft: Draft) -> None:
         source = visible if files is None else files
         scale = text_of(visible, "scale_factors") or "1 1 1"
         for count, file in enumerate((text_of(visible, "geometry_files") or "").split()):
-            mesh = draft.add(attached, "Mesh", source=source, name=f"{body.get('name', '')}_geom_{count}")
+            mesh = draft.add(
+                attached, "Mesh", source=source, name=f"{body.get('name', '')}_geom_{count}"
+            )
             draft.add(mesh, "socket_frame", "..", source=source)
             draft.add(mesh, "scale_factors", scale, source=source)
             draft.add(mesh, "mesh_file", file, source=source)
         placed = any(reals(text_of(visible, "transform"), 6) or ())
-        draft.changed(body, at=visible, lost="where the shown geometry stood in the body" if placed else None)
+        draft.changed(
+            body, at=visible, lost="where the shown geometry stood in the body" if placed else None
+        )
         draft.remove(visible)

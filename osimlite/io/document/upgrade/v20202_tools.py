@@ -21,7 +21,8 @@ def external_loads(draft: Draft) -> None:
         if file != "Unassigned" and not file.endswith(".xml"):
             pushed = " and ".join(body for body in bodies if body) or "no body"
             draft.changed(
-                tool, lost=f"external_loads_file {file} pushes {pushed}: write ExternalLoads and name them instead"
+                tool,
+                lost=f"external_loads_file {file} pushes {pushed}: write ExternalLoads and name them instead",
             )
 
 
@@ -34,7 +35,11 @@ def one_trial(draft: Draft) -> None:
         if trials is None or not result:
             # A tool at the top, without a document around it, is taken as it is.
             if draft.numbers[tool]:
-                draft.refuse(tool, tool, "an InverseKinematicsTool without an IKTrialSet, which old versions had")
+                draft.refuse(
+                    tool,
+                    tool,
+                    "an InverseKinematicsTool without an IKTrialSet, which old versions had",
+                )
             continue
         for child in list(result[0]):
             if is_element(child):
@@ -57,14 +62,19 @@ def inverse_dynamics(draft: Draft) -> None:
     """An AnalyzeTool with the analysis InverseDynamics is an InverseDynamicsTool."""
     for tool in draft.tagged("InverseDynamicsTool"):
         if draft.numbers[tool]:
-            draft.refuse(tool, tool, "an InverseDynamicsTool, which old versions called AnalyzeTool")
+            draft.refuse(
+                tool, tool, "an InverseDynamicsTool, which old versions called AnalyzeTool"
+            )
     for tool in draft.tagged("AnalyzeTool"):
         analyses = tool.find("AnalysisSet/objects")
         analysis = None if analyses is None else analyses.find("InverseDynamics")
         if analyses is None or analysis is None:
             continue
         uses_forces = is_true(text_of(analysis, "use_model_force_set") or "false")
-        times = " ".join(text_of(tool, tag) or default for tag, default in (("initial_time", "0"), ("final_time", "1")))
+        times = " ".join(
+            text_of(tool, tag) or default
+            for tag, default in (("initial_time", "0"), ("final_time", "1"))
+        )
         for child in elements(analysis):
             if child.tag not in (*_OF_ANALYSES, "use_model_force_set"):
                 draft.move(child, tool)
@@ -73,10 +83,19 @@ def inverse_dynamics(draft: Draft) -> None:
                 draft.remove(child)
         draft.add(tool, "time_range", times, source=analysis)
         draft.add(tool, "forces_to_exclude", "" if uses_forces else "Muscles", source=analysis)
-        draft.add(tool, "output_gen_force_file", f"{tool.get('name', '')}_InverseDynamics.sto", source=analysis)
+        draft.add(
+            tool,
+            "output_gen_force_file",
+            f"{tool.get('name', '')}_InverseDynamics.sto",
+            source=analysis,
+        )
         for other in elements(analyses):
             if other is not analysis:
-                draft.changed(tool, at=other, lost=f"the analysis {other.tag} beside it, which needs a tool of its own")
+                draft.changed(
+                    tool,
+                    at=other,
+                    lost=f"the analysis {other.tag} beside it, which needs a tool of its own",
+                )
         for analysis_set in tool.findall("AnalysisSet"):
             draft.remove(analysis_set)
         draft.rename(tool, "InverseDynamicsTool")

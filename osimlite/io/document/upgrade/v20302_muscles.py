@@ -11,7 +11,11 @@ def muscle_paths(draft: Draft) -> None:
     for muscle in draft.every("Muscle"):
         if muscle.find("GeometryPath") is not None:
             continue
-        parts = [part for tag in ("PathPointSet", "PathWrapSet") if (part := muscle.find(tag)) is not None]
+        parts = [
+            part
+            for tag in ("PathPointSet", "PathWrapSet")
+            if (part := muscle.find(tag)) is not None
+        ]
         path = draft.add(muscle, "GeometryPath", source=parts[0] if parts else muscle)
         for part in parts:
             draft.move(part, path)

@@ -15,9 +15,14 @@ def body_inertia(draft: Draft) -> None:
             continue
         parts = {axes: body.find(f"inertia_{axes}") for axes in _INERTIA}
         given = [part for part in parts.values() if part is not None]
-        words = [default if (part := parts[axes]) is None else plain(part) for axes, default in _INERTIA.items()]
+        words = [
+            default if (part := parts[axes]) is None else plain(part)
+            for axes, default in _INERTIA.items()
+        ]
         # The place of one that cannot be read, so that it can be found.
-        odd = next((part for part in given if reals(plain(part), 1) is None), given[0] if given else body)
+        odd = next(
+            (part for part in given if reals(plain(part), 1) is None), given[0] if given else body
+        )
         draft.add(body, "inertia", " ".join(words), source=odd)
         for part in given:
             draft.remove(part)

@@ -5,10 +5,26 @@ from __future__ import annotations
 from osimlite.base.text import unused
 from osimlite.io.document.upgrade.draft import Draft, Element, families, plain, step
 
-_PROSE = {"credits", "publications", "data_file", "datafile", "file_name", "filename", "geometry_file", "mesh_file"}
+_PROSE = {
+    "credits",
+    "publications",
+    "data_file",
+    "datafile",
+    "file_name",
+    "filename",
+    "geometry_file",
+    "mesh_file",
+}
 """Elements whose text is never the name of a component."""
 
-_LISTS = {"actuator_list", "coordinates", "geometry", "independent_coordinate_names", "members", "muscle_list"}
+_LISTS = {
+    "actuator_list",
+    "coordinates",
+    "geometry",
+    "independent_coordinate_names",
+    "members",
+    "muscle_list",
+}
 """Elements whose text may be several names."""
 
 
@@ -28,7 +44,9 @@ def names(draft: Draft) -> None:
                 draft.changed(component)
         elif any(space in name for space in " \t\n\r"):
             new = "".join(name.split())
-            siblings = () if parent is None else (other for other in parent if other is not component)
+            siblings = (
+                () if parent is None else (other for other in parent if other is not component)
+            )
             taken = {sibling.get("name") for sibling in siblings}
             free = unused(new, taken, 0)
             component.set("name", free)
@@ -43,7 +61,9 @@ def _follow(draft: Draft, renamed: dict[str, str]) -> None:
         if len(element) == 0:
             text = plain(element)
             if " " in text and element.tag not in _PROSE:
-                new = renamed.get(text) or (_in_list(text, renamed) if element.tag in _LISTS else text)
+                new = renamed.get(text) or (
+                    _in_list(text, renamed) if element.tag in _LISTS else text
+                )
                 if new != text:
                     element.text = new
                     draft.changed(_owner(element), at=element)

@@ -14,7 +14,9 @@ def _renaming(name: str, below: int, family: str, **tags: str) -> None:
                 draft.changed(component)
 
     renamed.__name__ = name
-    renamed.__doc__ = f"Of a {family} {' and '.join(f'<{old}> is called <{new}>' for old, new in tags.items())}."
+    renamed.__doc__ = (
+        f"Of a {family} {' and '.join(f'<{old}> is called <{new}>' for old, new in tags.items())}."
+    )
     step(below=below)(renamed)
 
 
@@ -26,4 +28,10 @@ _renaming(
     "moving_locations", 30000, "MovingPathPoint",
     XAttachment="x_location", YAttachment="y_location", ZAttachment="z_location",
 )  # fmt: skip
-_renaming("joint_child_places", 30500, "Joint", location="location_in_child", orientation="orientation_in_child")
+_renaming(
+    "joint_child_places",
+    30500,
+    "Joint",
+    location="location_in_child",
+    orientation="orientation_in_child",
+)

@@ -19,7 +19,14 @@ _KEPT_BY_GROUND = {"VisibleObject", "WrapObjectSet", "attached_geometry", "compo
 def ground(draft: Draft) -> None:
     """The body called ground becomes the model's <Ground>."""
     for model, bodies in draft.of_model("BodySet"):
-        body = next((body for body in members(bodies) if body.tag == "Body" and body.get("name") == "ground"), None)
+        body = next(
+            (
+                body
+                for body in members(bodies)
+                if body.tag == "Body" and body.get("name") == "ground"
+            ),
+            None,
+        )
         if body is not None:
             for child in elements(body):
                 if child.tag not in _KEPT_BY_GROUND:
@@ -45,7 +52,10 @@ def joints(draft: Draft) -> None:
 
 
 def _settle(draft: Draft, joint: Element, body: Element, objects: Element) -> None:
-    parent = next((child for child in elements(joint) if child.tag in ("parent_body", "socket_parent_body")), None)
+    parent = next(
+        (child for child in elements(joint) if child.tag in ("parent_body", "socket_parent_body")),
+        None,
+    )
     if parent is not None:
         parent.text = plain(parent)
         draft.rename(parent, "socket_parent_frame")

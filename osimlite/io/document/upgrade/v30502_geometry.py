@@ -30,12 +30,18 @@ def display_geometry(draft: Draft) -> None:
         draft.remove(visible)
 
 
-def _mesh(draft: Draft, body: Element, visible: Element, attached: Element, piece: Element, count: int) -> None:
+def _mesh(
+    draft: Draft, body: Element, visible: Element, attached: Element, piece: Element, count: int
+) -> None:
     name = body.get("name", "")
     place = compose(text_of(visible, "transform"), text_of(piece, "transform"))
     if place is not None:
         orientation, translation = place
-        source = piece.find("transform") if piece.find("transform") is not None else visible.find("transform")
+        source = (
+            piece.find("transform")
+            if piece.find("transform") is not None
+            else visible.find("transform")
+        )
         assert source is not None
         frame = draft.add(
             draft.list_in(body, "components", source=source),
@@ -54,7 +60,12 @@ def _mesh(draft: Draft, body: Element, visible: Element, attached: Element, piec
     source = scale if scale is not None else outer if outer is not None else piece
     draft.add(mesh, "scale_factors", _product(scale, outer), source=source)
     file = piece.find("geometry_file")
-    draft.add(mesh, "mesh_file", "" if file is None else plain(file), source=piece if file is None else file)
+    draft.add(
+        mesh,
+        "mesh_file",
+        "" if file is None else plain(file),
+        source=piece if file is None else file,
+    )
     appearance = draft.add(mesh, "Appearance", source=piece)
     for child in elements(piece):
         if child.tag in ("color", "opacity"):

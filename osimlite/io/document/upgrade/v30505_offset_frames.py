@@ -6,14 +6,20 @@ from osimlite.base.text import unused
 from osimlite.io.document.upgrade.draft import Draft, Element, body_path, plain, reals, step
 
 _ZERO = "0 0 0"
-_LINKERS = ("BushingForce", "FunctionBasedBushingForce", "ExpressionBasedBushingForce", "WeldConstraint")
+_LINKERS = (
+    "BushingForce",
+    "FunctionBasedBushingForce",
+    "ExpressionBasedBushingForce",
+    "WeldConstraint",
+)
 
 
 @step(below=30505)
 def joint_frames(draft: Draft) -> None:
     """Locations and orientations of a joint become an offset frame on either side.
 
-    Both frames are made even where they coincide with the bodies, because OpenSim does so and paths count them.
+    Both frames are made even where they coincide with the bodies, because OpenSim does so and paths
+    count them.
     """
     for joint in draft.every("Joint"):
         for side in ("parent", "child"):
@@ -51,7 +57,9 @@ def linker_frames(draft: Draft) -> None:
             draft.changed(linker)
 
 
-def _frame(draft: Draft, owner: Element, body: str, socket: Element, place: list[Element | None]) -> str:
+def _frame(
+    draft: Draft, owner: Element, body: str, socket: Element, place: list[Element | None]
+) -> str:
     """Add an offset frame of `body` to the owner's list; return its name.
 
     OpenSim calls both frames of one body the same, and then finds the first for either side.

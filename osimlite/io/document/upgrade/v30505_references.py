@@ -22,7 +22,10 @@ _CONSTRAINTS = {
 def constraint_bodies(draft: Draft) -> None:
     """Constraints and springs between two bodies name them by path."""
     for constraint in draft.tagged(*_CONSTRAINTS):
-        result = [_to_body(draft, constraint, tag, f"socket_{tag}") for tag in _CONSTRAINTS[constraint.tag]]
+        result = [
+            _to_body(draft, constraint, tag, f"socket_{tag}")
+            for tag in _CONSTRAINTS[constraint.tag]
+        ]
         if any(result):
             draft.changed(constraint)
 
@@ -40,16 +43,33 @@ def _naming(name: str, below: int, whose: str, family: str, tag: str, socket: st
 
 
 _naming("marker_frames", 30501, "A marker names its", "Marker", "body", "socket_parent_frame")
-_naming("point_bodies", 30505, "Path points name their", "AbstractPathPoint", "body", "socket_parent_frame")
-_naming("contact_bodies", 30505, "Contact geometry names its", "ContactGeometry", "body_name", "socket_frame")
-_naming("force_frames", 30506, "A prescribed force names its", "PrescribedForce", "body", "socket_frame")
+_naming(
+    "point_bodies",
+    30505,
+    "Path points name their",
+    "AbstractPathPoint",
+    "body",
+    "socket_parent_frame",
+)
+_naming(
+    "contact_bodies",
+    30505,
+    "Contact geometry names its",
+    "ContactGeometry",
+    "body_name",
+    "socket_frame",
+)
+_naming(
+    "force_frames", 30506, "A prescribed force names its", "PrescribedForce", "body", "socket_frame"
+)
 
 
 @step(below=30505)
 def point_coordinates(draft: Draft) -> None:
     """Conditional and moving path points name their coordinates by path.
 
-    OpenSim takes the first object of that name for the coordinate, whatever it is; here only coordinates count.
+    OpenSim takes the first object of that name for the coordinate, whatever it is; here only
+    coordinates count.
     """
     paths: dict[str, str] | None = None
     taken: dict[str, str] = {}
@@ -87,14 +107,19 @@ def _to_body(draft: Draft, owner: Element, tag: str, socket: str) -> bool:
 def _path_by_opensim(draft: Draft, name: str) -> str:
     """What OpenSim takes for the path of a coordinate: it looks for any element with that name, and two levels up.
 
-    It has put the joints behind the bodies then, and what held the axes of a joint before the element in front of it.
+    It has put the joints behind the bodies then, and what held the axes of a joint before the
+    element in front of it.
     """
 
     def order(element: Element) -> tuple[int, bool, float, int]:
         number, top = float(draft.numbers[element]), element
         while (above := top.getparent()) is not None and above is not draft.model:
             if top.tag == "SpatialTransform":
-                before = [child for child in top.itersiblings(etree.Element, preceding=True) if child.tag != "reverse"]
+                before = [
+                    child
+                    for child in top.itersiblings(etree.Element, preceding=True)
+                    if child.tag != "reverse"
+                ]
                 if before and before[0].tag == "CoordinateSet":
                     number = draft.numbers[before[0]] - 0.5
             top = above
@@ -112,10 +137,14 @@ def _coordinate_paths(draft: Draft) -> dict[str, str]:
     """The path of the first coordinate of each name; joints of the same name are told apart as OpenSim does."""
     paths: dict[str, str] = {}
     taken: set[str] = set()
-    for joint in (joint for _, joint_set in draft.of_model("JointSet") for joint in members(joint_set)):
+    for joint in (
+        joint for _, joint_set in draft.of_model("JointSet") for joint in members(joint_set)
+    ):
         name = joint.get("name") or joint.tag.lower()
         free = unused(name, taken, 0)
         taken.add(free)
         for coordinate in joint.iter("Coordinate"):
-            paths.setdefault(coordinate.get("name", ""), f"/jointset/{free}/{coordinate.get('name')}")
+            paths.setdefault(
+                coordinate.get("name", ""), f"/jointset/{free}/{coordinate.get('name')}"
+            )
     return paths

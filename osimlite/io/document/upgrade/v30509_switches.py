@@ -8,7 +8,11 @@ from osimlite.io.document.upgrade.draft import Draft, having, is_true, plain, st
 @step(below=30509)
 def switched_on(draft: Draft) -> None:
     """<isDisabled> turns round: appliesForce, isEnforced, enabled."""
-    for family, new in (("Force", "appliesForce"), ("Constraint", "isEnforced"), ("Controller", "enabled")):
+    for family, new in (
+        ("Force", "appliesForce"),
+        ("Constraint", "isEnforced"),
+        ("Controller", "enabled"),
+    ):
         _turn_round(draft, family, new)
 
 

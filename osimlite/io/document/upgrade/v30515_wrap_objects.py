@@ -25,12 +25,21 @@ def wrap_appearance(draft: Draft) -> None:
             if part is not None:
                 draft.remove(part)
         if set_by is not None or visible is not None:
-            lost = "where the shown surface stood off the wrap object" if _stands_off(wrap, visible) else None
+            lost = (
+                "where the shown surface stood off the wrap object"
+                if _stands_off(wrap, visible)
+                else None
+            )
             draft.changed(wrap, lost=lost)
 
 
 def _appearance(
-    draft: Draft, wrap: Element, source: Element, color: Element | None, representation: str, hidden: bool
+    draft: Draft,
+    wrap: Element,
+    source: Element,
+    color: Element | None,
+    representation: str,
+    hidden: bool,
 ) -> None:
     appearance = draft.add(wrap, "Appearance", source=source)
     if hidden:
@@ -45,6 +54,12 @@ def _appearance(
 def _stands_off(wrap: Element, visible: Element | None) -> bool:
     """Whether the surface was shown elsewhere than where the wrap object is."""
     shown = None if visible is None else reals(text_of(visible, "transform"), 6)
-    angles, place = (reals(text_of(wrap, tag), 3) or [0.0] * 3 for tag in ("xyz_body_rotation", "translation"))
+    angles, place = (
+        reals(text_of(wrap, tag), 3) or [0.0] * 3 for tag in ("xyz_body_rotation", "translation")
+    )
     here = [*angles, *place]
-    return shown is not None and any(shown) and any(abs(a - b) > 1e-4 for a, b in zip(shown, here, strict=True))
+    return (
+        shown is not None
+        and any(shown)
+        and any(abs(a - b) > 1e-4 for a, b in zip(shown, here, strict=True))
+    )

@@ -12,7 +12,9 @@ _COLORS = {"Muscle": ".8 .1 .1", "Ligament": "0 1 0"}
 def path_appearance(draft: Draft) -> None:
     """Colour and display preference of a path become its <Appearance>; muscles are red, ligaments green."""
     usual = {
-        path: color for family, color in _COLORS.items() for _, path in having(draft.every(family), "GeometryPath")
+        path: color
+        for family, color in _COLORS.items()
+        for _, path in having(draft.every(family), "GeometryPath")
     }
     for path in draft.tagged("GeometryPath"):
         color = path.find("default_color")

@@ -22,7 +22,8 @@ _SUFFIX = re.compile(r"((?:socket|input)_.*)_connectee_names?")
 def connectors(draft: Draft) -> None:
     """The entries of <connectors> become one element each.
 
-    This and the next two come before the steps that write sockets, so that those find one spelling only.
+    This and the next two come before the steps that write sockets, so that those find one spelling
+    only.
     """
     for component, old in having(draft.every("Component"), "connectors"):
         if not all(re.fullmatch(r"\w+", connector.get("name", "")) for connector in elements(old)):
@@ -65,14 +66,20 @@ def set_levels(draft: Draft) -> None:
     """
     paths = {"ground": "/ground"}
     for _, bodies in draft.of_model("BodySet"):
-        paths.update((name, f"/bodyset/{name}") for body in members(bodies) if (name := body.get("name")))
+        paths.update(
+            (name, f"/bodyset/{name}") for body in members(bodies) if (name := body.get("name"))
+        )
     for component in draft.every("Component"):
         for child in elements(component):
             if not child.tag.startswith("socket_") or component.find(child.tag) is not child:
                 continue
             text = plain(child)
             last = text.rpartition("/")[2]
-            if last in paths and not text.startswith("/") and not _leads_somewhere(component, text, paths):
+            if (
+                last in paths
+                and not text.startswith("/")
+                and not _leads_somewhere(component, text, paths)
+            ):
                 child.text = paths[last]
                 draft.changed(component, at=child)
 

@@ -18,7 +18,12 @@ def axis_functions(draft: Draft) -> None:
         if holder is None:
             holder = draft.add(axis, "function", source=axis)
         if len(coordinates) == 1:
-            draft.add(draft.add(holder, "LinearFunction", source=holder), "coefficients", "1 0", source=holder)
+            draft.add(
+                draft.add(holder, "LinearFunction", source=holder),
+                "coefficients",
+                "1 0",
+                source=holder,
+            )
         elif not coordinates:
             draft.add(draft.add(holder, "Constant", source=holder), "value", "0", source=holder)
         else:

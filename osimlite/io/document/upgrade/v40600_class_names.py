@@ -39,8 +39,8 @@ RENAMED_MEMBERS = {"Force": "PointActuator", "Torque": "TorqueActuator"}
 def class_names(draft: Draft) -> None:
     """Classes get their present names.
 
-    It comes first: the steps after it know the present names only. Defaults of a class under its old name keep it:
-    OpenSim passes over them.
+    It comes first: the steps after it know the present names only. Defaults of a class under its
+    old name keep it: OpenSim passes over them.
     """
     for element in draft.tagged(*RENAMED, *RENAMED_MEMBERS):
         parent = element.getparent()

@@ -17,7 +17,9 @@ def controller_actuators(draft: Draft) -> None:
     listed = [*having(draft.every("Controller"), "actuator_list")]
     if not listed:
         return
-    actuators = [(path_of(actuator), actuator.get("name", "")) for actuator in draft.every("Actuator")]
+    actuators = [
+        (path_of(actuator), actuator.get("name", "")) for actuator in draft.every("Actuator")
+    ]
     forces = [
         (path_of(force), force.get("name", ""))
         for force_set in draft.tagged("ForceSet")
@@ -32,7 +34,9 @@ def controller_actuators(draft: Draft) -> None:
         if any(word.lower() == "all" for word in words):
             paths = [path for path, _ in actuators]
             if draft.model is None:
-                lost = "that it drives all actuators, which a document without the model cannot name"
+                lost = (
+                    "that it drives all actuators, which a document without the model cannot name"
+                )
         else:
             paths = [by_name.get(word, f"/forceset/{word}") for word in words]
             known = [path for path in paths if path in {*by_name.values()}]

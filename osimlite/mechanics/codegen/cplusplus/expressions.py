@@ -1,7 +1,8 @@
 """Expressions of kernels as C++.
 
-Python evaluates operands and arguments from left to right; C++ leaves the order open. Where one operand writes memory
-that another may read or write, the operands become variables before the statement, in Python's order.
+Python evaluates operands and arguments from left to right; C++ leaves the order open. Where one
+operand writes memory that another may read or write, the operands become variables before the
+statement, in Python's order.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from osimlite.mechanics.codegen.cplusplus.types import (
     type_of_constant,
 )
 
-PRIMARY, UNARY, PRODUCT, SUM, SHIFT, ORDER, EQUALITY, BIT_AND, BIT_XOR, BIT_OR, AND, OR, CHOICE = range(13, 0, -1)
+PRIMARY, UNARY, PRODUCT, SUM, SHIFT, ORDER, EQUALITY, BIT_AND, BIT_XOR, BIT_OR, AND, OR, CHOICE = (
+    range(13, 0, -1)
+)
 """Precedences of C++ operators: a higher number binds more closely."""
 
 OPERATORS: dict[type[ast.operator], tuple[str, int]] = {
@@ -177,7 +180,9 @@ class ExpressionWriter:
         for index, node in enumerate(nodes):
             text = write(node)
             if is_hazard and index in active[:-1]:
-                kind = self.function.require_type(node.value if isinstance(node, ast.Starred) else node)
+                kind = self.function.require_type(
+                    node.value if isinstance(node, ast.Starred) else node
+                )
                 text = self.hold(kind, text)
             texts.append(text)
         return texts
@@ -205,7 +210,9 @@ class ExpressionWriter:
         index %= len(kind.parts)
         if kind.is_array:
             return f"{text}.items[{index}]"
-        return f"{text}.{escape_name(kind.record._fields[index]) if kind.record else f'item{index}'}"
+        return (
+            f"{text}.{escape_name(kind.record._fields[index]) if kind.record else f'item{index}'}"
+        )
 
     def build(self, kind: Tuple, texts: Sequence[str], have: Sequence[Type]) -> str:
         """Return the text of a new tuple.
@@ -215,7 +222,10 @@ class ExpressionWriter:
             texts: the items.
             have: types of the items.
         """
-        parts = [self.cast(text, own, want) for text, own, want in zip(texts, have, kind.parts, strict=True)]
+        parts = [
+            self.cast(text, own, want)
+            for text, own, want in zip(texts, have, kind.parts, strict=True)
+        ]
         inner = f"{{{', '.join(parts)}}}"
         return self.names.name_type(kind) + (f"{{{inner}}}" if kind.is_array else inner)
 
@@ -229,10 +239,15 @@ class ExpressionWriter:
         """
         have = self.function.require_type(node)
         if have is not want and isinstance(want, Tuple):
-            if isinstance(node, ast.Tuple) and not any(isinstance(part, ast.Starred) for part in node.elts):
+            if isinstance(node, ast.Tuple) and not any(
+                isinstance(part, ast.Starred) for part in node.elts
+            ):
                 wanted = dict(zip(node.elts, want.parts, strict=True))
                 texts = self.ordered(node.elts, lambda part: self.text_as(part, wanted[part]))
-                kinds = [self.function.require_type(part) if is_number(own) else own for part, own in wanted.items()]
+                kinds = [
+                    self.function.require_type(part) if is_number(own) else own
+                    for part, own in wanted.items()
+                ]
                 return self.build(want, texts, kinds)
             if isinstance(node, ast.IfExp):
                 code = self.choose(node, want)
@@ -251,7 +266,9 @@ class ExpressionWriter:
                 return Code(f" {sign} ".join(texts), precedence)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 code = self.condition(operand)
-                return Code(f"!{code.text}" if code.precedence == PRIMARY else f"!({code.text})", UNARY)
+                return Code(
+                    f"!{code.text}" if code.precedence == PRIMARY else f"!({code.text})", UNARY
+                )
         code = self.code(node)
         if self.function.require_type(node) is BOOLEAN:
             return code
@@ -278,7 +295,9 @@ class ExpressionWriter:
                     return self.constant(ast.unparse(node).replace(".", "_"), value)
                 kind = self.function.require_type(owner)
                 assert isinstance(kind, Tuple)
-                return Code(self.item(self.text(owner, PRIMARY), kind, kind.record._fields.index(name)))
+                return Code(
+                    self.item(self.text(owner, PRIMARY), kind, kind.record._fields.index(name))
+                )
             case ast.Tuple():
                 return self.new_tuple(node)
             case ast.Subscript(value=owner, slice=index):
@@ -289,8 +308,12 @@ class ExpressionWriter:
                 sign = {ast.USub: "-", ast.UAdd: "+", ast.Invert: "~"}[type(op)]
                 return Code(f"{sign}{self.text(operand, PRIMARY)}", UNARY)
             case ast.BinOp(left=left, op=op, right=right):
-                texts = self.ordered([left, right], lambda part: self._operand(part, op, part is right))
-                return self.operation(texts, op, [self.function.require_type(part) for part in (left, right)], node)
+                texts = self.ordered(
+                    [left, right], lambda part: self._operand(part, op, part is right)
+                )
+                return self.operation(
+                    texts, op, [self.function.require_type(part) for part in (left, right)], node
+                )
             case ast.BoolOp():
                 return self.either(node)
             case ast.Compare():
@@ -311,7 +334,8 @@ class ExpressionWriter:
         """Return the text of a value of a module."""
         if isinstance(value, tuple):
             return Code(self.names.name_constant(name, value))
-        # A function that is passed on is a part of the specialisation that is called, and no argument.
+        # A function that is passed on is a part of the specialisation that is called, and no
+        # argument.
         return Code("") if isinstance(value, FunctionType) else self.number(value)
 
     def new_tuple(self, node: ast.Tuple) -> Code:
@@ -325,14 +349,19 @@ class ExpressionWriter:
         """Return the text of an item of a vector or a tuple."""
         kind = self.function.require_type(owner)
         if isinstance(kind, Pointer):
-            texts = self.ordered([owner, index], lambda part: self.text(part, PRIMARY if part is owner else CHOICE))
+            texts = self.ordered(
+                [owner, index], lambda part: self.text(part, PRIMARY if part is owner else CHOICE)
+            )
             return Code(f"{texts[0]}[{texts[1]}]")
         assert isinstance(kind, Tuple)
         constant = self.function.constant_index(index)
         if constant is not None:
             return Code(self.item(self.text(owner, PRIMARY), kind, constant))
-        texts = self.ordered([owner, index], lambda part: self.text(part, PRIMARY if part is owner else CHOICE))
-        # A variable index counts from the start: a test whether it is negative costs more than the laws' curves may.
+        texts = self.ordered(
+            [owner, index], lambda part: self.text(part, PRIMARY if part is owner else CHOICE)
+        )
+        # A variable index counts from the start: a test whether it is negative costs more than the
+        # laws' curves may.
         return Code(f"{texts[0]}.items[{texts[1]}]")
 
     def _operand(self, node: ast.expr, op: ast.operator, is_right: bool) -> str:
@@ -343,7 +372,9 @@ class ExpressionWriter:
             return self.text(node, PRIMARY)
         return self.text(node, precedence + is_right)
 
-    def operation(self, texts: Sequence[str], op: ast.operator, kinds: Sequence[Type], node: ast.AST) -> Code:
+    def operation(
+        self, texts: Sequence[str], op: ast.operator, kinds: Sequence[Type], node: ast.AST
+    ) -> Code:
         """Return the text of an operation.
 
         Args:
@@ -356,7 +387,9 @@ class ExpressionWriter:
         are_integers = all(map(is_integral, kinds))
         if type(op) in FUNCTIONS:
             # The functions of the header have an overload for integers and one for floats.
-            is_whole = are_integers and not (isinstance(op, ast.Pow) and self.function.is_negative(right_of(node)))
+            is_whole = are_integers and not (
+                isinstance(op, ast.Pow) and self.function.is_negative(right_of(node))
+            )
             if is_integral(kinds[0]):
                 one = f"static_cast<{'int64_t' if is_whole else 'double'}>({one})"
             if is_integral(kinds[1]):
@@ -375,7 +408,11 @@ class ExpressionWriter:
     def _may_overflow(self, node: ast.AST) -> bool:
         """Return whether a product has a factor that only generators of random numbers have."""
         factors = [node.left, node.right] if isinstance(node, ast.BinOp) else [right_of(node)]
-        return any(abs(self.function.constant_index(part) or 0) >= 2**31 for part in factors if part is not None)
+        return any(
+            abs(self.function.constant_index(part) or 0) >= 2**31
+            for part in factors
+            if part is not None
+        )
 
     def either(self, node: ast.BoolOp) -> Code:
         """Return the text of `and` or `or`; of numbers it is the one that decides."""
@@ -389,11 +426,17 @@ class ExpressionWriter:
         have = self.function.require_type(first)
         if not others:
             return self.cast(self.text(first), have, kind)
-        name = self.text(first) if isinstance(first, ast.Name) else self.hold(have, self.text(first))
+        name = (
+            self.text(first) if isinstance(first, ast.Name) else self.hold(have, self.text(first))
+        )
         own = self.cast(name, have, kind)
         rest = self.guarded(self._decide, op, others, kind)
         test = name if have is BOOLEAN else f"{name} != 0"
-        return f"({test} ? {rest} : {own})" if isinstance(op, ast.And) else f"({test} ? {own} : {rest})"
+        return (
+            f"({test} ? {rest} : {own})"
+            if isinstance(op, ast.And)
+            else f"({test} ? {own} : {rest})"
+        )
 
     def compare(self, node: ast.Compare) -> Code:
         """Return the text of a chain of comparisons."""
@@ -411,7 +454,9 @@ class ExpressionWriter:
             texts.append(self.guarded(self._comparand, operand))
         signs = [COMPARISONS[type(op)][0] for op in node.ops]
         parts = [f"{a} {sign} {b}" for a, sign, b in zip(texts[:-1], signs, texts[1:], strict=True)]
-        return Code(" && ".join(parts), COMPARISONS[type(node.ops[0])][1] if len(parts) == 1 else AND)
+        return Code(
+            " && ".join(parts), COMPARISONS[type(node.ops[0])][1] if len(parts) == 1 else AND
+        )
 
     def _comparand(self, node: ast.expr) -> str:
         # Compilers warn where one comparison stands in another without parentheses.
@@ -424,7 +469,9 @@ class ExpressionWriter:
         text = self._comparand(node.left)
         if not is_simple(node.left):
             text = self.hold(self.function.require_type(node.left), text)
-        tests = [f"{text} == {self.guarded(self._comparand, item)}" for item in node.comparators[0].elts]
+        tests = [
+            f"{text} == {self.guarded(self._comparand, item)}" for item in node.comparators[0].elts
+        ]
         inner = f"({' || '.join(tests) or 'false'})"
         return Code(inner) if isinstance(node.ops[0], ast.In) else Code(f"!{inner}", UNARY)
 
@@ -437,7 +484,9 @@ class ExpressionWriter:
         """
         test = self.condition(node.test)
         question = test.text if test.precedence > CHOICE else f"({test.text})"
-        first, second = (self.guarded(self._chosen, part, kind) for part in (node.body, node.orelse))
+        first, second = (
+            self.guarded(self._chosen, part, kind) for part in (node.body, node.orelse)
+        )
         return Code(f"{question} ? {first} : {second}", CHOICE)
 
     def _chosen(self, node: ast.expr, kind: Type) -> str:
@@ -458,7 +507,11 @@ class ExpressionWriter:
             if not isinstance(node, ast.Starred):
                 return self.text(node)
             text = self.text(node.value)
-            return text if isinstance(node.value, ast.Name) else self.hold(self.function.require_type(node.value), text)
+            return (
+                text
+                if isinstance(node.value, ast.Name)
+                else self.hold(self.function.require_type(node.value), text)
+            )
 
         texts: list[str] = []
         kinds: list[Type] = []
@@ -490,10 +543,20 @@ class ExpressionWriter:
             return Code(self.build(kind, texts, kinds))
         if isinstance(function, FunctionType):
             complete = self.function.complete_arguments(function, tuple(kinds))
-            defaults = (function.__defaults__ or ())[len(kinds) - len(complete) :] if len(complete) > len(kinds) else ()
-            texts += [self.constant(f"{function.__name__}_default", value).text for value in defaults]
+            defaults = (
+                (function.__defaults__ or ())[len(kinds) - len(complete) :]
+                if len(complete) > len(kinds)
+                else ()
+            )
+            texts += [
+                self.constant(f"{function.__name__}_default", value).text for value in defaults
+            ]
             called = self.function.specialise(function, complete)
-            given = [text for text, kind in zip(texts, complete, strict=True) if not isinstance(kind, Callee)]
+            given = [
+                text
+                for text, kind in zip(texts, complete, strict=True)
+                if not isinstance(kind, Callee)
+            ]
             return Code(f"{self.names.name_function(called)}({', '.join(given)})")
         raise self.function.refuse(node)
 

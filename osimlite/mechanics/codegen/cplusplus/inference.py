@@ -1,7 +1,8 @@
 """Types of the variables and expressions of one function, for given types of its arguments.
 
-A function is read again and again until no type changes: within a loop, a variable may be used before the statement
-that decides its type. Annotations are ignored, because one force law serves floats and numbers with derivatives.
+A function is read again and again until no type changes: within a loop, a variable may be used
+before the statement that decides its type. Annotations are ignored, because one force law serves
+floats and numbers with derivatives.
 """
 
 from __future__ import annotations
@@ -68,7 +69,12 @@ class Specialisation(Kernel):
         self.arguments = tuple(arguments)
         if len(self.arguments) != len(self.given):
             raise self.refuse(self.tree.args, f"called with {len(self.arguments)} arguments")
-        for node in self.tree.args.kwonlyargs, self.tree.args.vararg, self.tree.args.kwarg, self.tree.args.posonlyargs:
+        for node in (
+            self.tree.args.kwonlyargs,
+            self.tree.args.vararg,
+            self.tree.args.kwarg,
+            self.tree.args.posonlyargs,
+        ):
             if node:
                 raise self.refuse(self.tree.args)
         self.variables: dict[str, Type | None] = dict(zip(self.given, arguments, strict=True))
@@ -142,7 +148,9 @@ class Specialisation(Kernel):
             for part in iterated.elts:
                 self._assign(target, self.type_of(part))
         else:
-            raise self.refuse(iterated, "a loop is over range() or over a tuple that is written out")
+            raise self.refuse(
+                iterated, "a loop is over range() or over a tuple that is written out"
+            )
 
     def _assign(self, target: ast.expr, kind: Type | None) -> None:
         match target:
@@ -162,7 +170,11 @@ class Specialisation(Kernel):
                 if element is not None and not isinstance(self.type_of(vector), Pointer):
                     raise self.refuse(target, "an item of a tuple is assigned")
                 self.effects |= WRITES
-                if kind is not None and element is not None and join_types(element, kind) is not element:
+                if (
+                    kind is not None
+                    and element is not None
+                    and join_types(element, kind) is not element
+                ):
                     raise self.refuse(target, f"{kind!r} is stored in a vector of {element!r}")
             case _:
                 raise self.refuse(target)
@@ -208,7 +220,11 @@ class Specialisation(Kernel):
                 kind = self.type_of(owner)
                 if kind is None:
                     return None
-                if isinstance(kind, Tuple) and kind.record is not None and name in kind.record._fields:
+                if (
+                    isinstance(kind, Tuple)
+                    and kind.record is not None
+                    and name in kind.record._fields
+                ):
                     return kind.parts[kind.record._fields.index(name)]
                 raise self.refuse(node)
             case ast.Tuple(elts=parts):
@@ -262,7 +278,10 @@ class Specialisation(Kernel):
     def _type_of_constant(self, node: ast.expr, value: Any) -> Type:
         kind = type_of_constant(value)
         if kind is None:
-            raise self.refuse(node, f"{type(value).__name__} is no number" if value is not None else "it is not known")
+            raise self.refuse(
+                node,
+                f"{type(value).__name__} is no number" if value is not None else "it is not known",
+            )
         return kind
 
     def _type_of_item(self, node: ast.expr, owner: ast.expr, index: ast.expr) -> Type | None:
@@ -290,10 +309,13 @@ class Specialisation(Kernel):
             raise self.refuse(node, f"{kind!r} has no items")
         return None
 
-    def _type_of_operation(self, node: ast.AST, left: ast.expr, op: ast.operator, right: ast.expr) -> Type | None:
+    def _type_of_operation(
+        self, node: ast.AST, left: ast.expr, op: ast.operator, right: ast.expr
+    ) -> Type | None:
         one, two = self._check_number(left), self._check_number(right)
         if one is None or two is None:
-            # A loop may use a variable before it is known whether integers or floats are stored in it.
+            # A loop may use a variable before it is known whether integers or floats are stored in
+            # it.
             one = two = one or two
         if one is None or two is None:
             return None
@@ -312,7 +334,9 @@ class Specialisation(Kernel):
             return FLOAT
         return INTEGER if kind is BOOLEAN else kind
 
-    def _type_of_call(self, node: ast.Call, function: Any, arguments: Sequence[ast.expr]) -> Type | None:
+    def _type_of_call(
+        self, node: ast.Call, function: Any, arguments: Sequence[ast.expr]
+    ) -> Type | None:
         kinds = self.infer_types(arguments)
         if isinstance(function, FunctionType) and function not in INTRINSICS:
             if kinds is None:
@@ -343,8 +367,12 @@ class Specialisation(Kernel):
     def value(self, node: ast.expr) -> Any:
         """Return what a global name, or an attribute of a record or module, stands for; None if nothing."""
         if isinstance(node, ast.Attribute):
-            owner = self.value(node.value) if isinstance(node.value, ast.Name | ast.Attribute) else None
-            return getattr(owner, node.attr, None) if isinstance(owner, Record | ModuleType) else None
+            owner = (
+                self.value(node.value) if isinstance(node.value, ast.Name | ast.Attribute) else None
+            )
+            return (
+                getattr(owner, node.attr, None) if isinstance(owner, Record | ModuleType) else None
+            )
         if not isinstance(node, ast.Name) or node.id in self._locals:
             return None
         scope = self.function.__globals__
@@ -412,7 +440,11 @@ class Specialisation(Kernel):
     def complete_fields(record: Any, kinds: tuple[Type, ...]) -> tuple[Type, ...]:
         """Return the types of all fields of a new named tuple, including those left at their defaults."""
         rest = record._fields[len(kinds) :]
-        defaults = [type_of_constant(record._field_defaults[name]) for name in rest if name in record._field_defaults]
+        defaults = [
+            type_of_constant(record._field_defaults[name])
+            for name in rest
+            if name in record._field_defaults
+        ]
         return kinds + tuple(kind for kind in defaults if kind is not None)
 
     # ------------------------------------------------------------------------------------------------- effects

@@ -42,11 +42,10 @@ Types = Sequence[Type]
 class Intrinsic(NamedTuple):
     """How a function that is no kernel is written.
 
-    Attributes:
-        infer: returns the type of the result from the arguments and their types.
-        write: returns the text from those of the arguments, their types, and the type of the result.
-        early: type of the result while the types of the arguments are not known yet, if it depends on none.
-        has_effects: whether it may read and write memory.
+    Attributes: infer: returns the type of the result from the arguments and their types. write:
+        returns the text from those of the arguments, their types, and the type of the result.
+        early: type of the result while the types of the arguments are not known yet, if it depends
+        on none. has_effects: whether it may read and write memory.
     """
 
     infer: Callable[[Reader, Nodes, Types], Type]
@@ -76,7 +75,10 @@ def _dual_or_float(kinds: Types) -> Type:
 
 def _convert_to_floats(codes: Sequence[str], kinds: Types) -> list[str]:
     """Return the texts of numbers with integers as floats."""
-    return [cast_to(code, kind, FLOAT) if is_integral(kind) else code for code, kind in zip(codes, kinds, strict=True)]
+    return [
+        cast_to(code, kind, FLOAT) if is_integral(kind) else code
+        for code, kind in zip(codes, kinds, strict=True)
+    ]
 
 
 # ------------------------------------------------------------------------------------------------- families
@@ -133,7 +135,11 @@ def _infer_integer(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
 
 
 def _write_integer(codes: Sequence[str], kinds: Types, result: Type) -> str:
-    return cast_to(codes[0], kinds[0], INTEGER) if is_integral(kinds[0]) else f"py::to_integer({codes[0]})"
+    return (
+        cast_to(codes[0], kinds[0], INTEGER)
+        if is_integral(kinds[0])
+        else f"py::to_integer({codes[0]})"
+    )
 
 
 def _write_rounded(name: str) -> Callable[[Sequence[str], Types, Type], str]:
@@ -170,7 +176,11 @@ def _infer_magnitude(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
 
 def _write_magnitude(codes: Sequence[str], kinds: Types, result: Type) -> str:
     # The overload for integers is no better match for a literal than that for floats.
-    return f"py::abs(static_cast<int64_t>({codes[0]}))" if is_integral(kinds[0]) else f"py::abs({codes[0]})"
+    return (
+        f"py::abs(static_cast<int64_t>({codes[0]}))"
+        if is_integral(kinds[0])
+        else f"py::abs({codes[0]})"
+    )
 
 
 # -------------------------------------------------------------------------------------------------- vectors
@@ -262,7 +272,9 @@ INTRINSICS: dict[Any, Intrinsic] = {
     abs: Intrinsic(_infer_magnitude, _write_magnitude),
     min: _extreme("min"),
     max: _extreme("max"),
-    pointers.at: Intrinsic(_infer_offset, lambda codes, kinds, result: f"({codes[0]} + {codes[1]})"),
+    pointers.at: Intrinsic(
+        _infer_offset, lambda codes, kinds, result: f"({codes[0]} + {codes[1]})"
+    ),
     pointers.call: Intrinsic(_infer_call, _write_call, INTEGER, has_effects=True),
     carried.settled: Intrinsic(_infer_settled, _write_settled),
     carried.is_nothing: _declare_fixed_result("is_nothing", BOOLEAN),

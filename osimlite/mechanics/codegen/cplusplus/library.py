@@ -75,13 +75,16 @@ class Library:
             function: the function.
             directions: how many derivatives its numbers carry; 0 for plain numbers.
 
-        Raises:
-            TranslationError: the function, or one that it calls, uses something that has no counterpart in C++.
+        Raises: TranslationError: the function, or one that it calls, uses something that has no
+            counterpart in C++.
         """
         number = dual(directions) if directions else FLOAT
         try:
             assert isinstance(function, FunctionType)
-            kinds = [self._parameter(function, item, number) for item in signature(function).parameters.values()]
+            kinds = [
+                self._parameter(function, item, number)
+                for item in signature(function).parameters.values()
+            ]
             specialisation = self.specialise(function, kinds)
             self._writing.append(symbol)
             self.called[symbol] = set()
@@ -103,7 +106,9 @@ class Library:
 
     @staticmethod
     def _parameter(function: Callable[..., Any], parameter: Parameter, number: Type) -> Type:
-        annotation = str(getattr(parameter.annotation, "__name__", parameter.annotation)).strip("'\"")
+        annotation = str(getattr(parameter.annotation, "__name__", parameter.annotation)).strip(
+            "'\""
+        )
         if annotation not in PARAMETERS:
             kernel = Kernel(function, "C++")
             reason = f"the parameter '{parameter.name}' of an exported function is Floats, Ints, float or int"
@@ -113,8 +118,8 @@ class Library:
     def specialise(self, function: FunctionType, kinds: Sequence[Type]) -> Specialisation:
         """Return a function for given types of its arguments.
 
-        Raises:
-            TranslationError: the function calls itself, or uses something that has no counterpart in C++.
+        Raises: TranslationError: the function calls itself, or uses something that has no
+            counterpart in C++.
         """
         key = function, tuple(kinds)
         if key not in self._specialisations:
@@ -174,7 +179,9 @@ class Library:
             name = self._free(kind.record.__name__)
             fields = [escape_name(field) for field in kind.record._fields]
         else:
-            name = self._free("Tuple_" + "_".join(re.sub(r"\W+", "", part.replace("*", "s")) for part in parts))
+            name = self._free(
+                "Tuple_" + "_".join(re.sub(r"\W+", "", part.replace("*", "s")) for part in parts)
+            )
             fields = [f"item{index}" for index in range(len(parts))]
         lines = [f"    {part} {field};" for part, field in zip(parts, fields, strict=True)]
         self.structs.append("\n".join((f"struct {name} {{", *lines, "};")))
@@ -233,9 +240,8 @@ class Library:
 def write_library(kernels: Kernels) -> str:
     """Return kernels as the text of one C++ translation unit.
 
-    Args:
-        kernels: by the name of the exported symbol, the function and how many derivatives its numbers carry; 0 for
-            plain numbers.
+    Args: kernels: by the name of the exported symbol, the function and how many derivatives its
+        numbers carry; 0 for plain numbers.
 
     Returns:
         The whole text but the header, which it includes as `kernel_runtime.h`.
@@ -249,11 +255,11 @@ def write_library(kernels: Kernels) -> str:
 def write_units(kernels: Kernels, count: int) -> list[str]:
     """Return kernels as the texts of several translation units of about equal size, to be compiled in parallel.
 
-    Functions that kernels of two units call are repeated. Fewer units are returned where there are fewer kernels.
+    Functions that kernels of two units call are repeated. Fewer units are returned where there are
+    fewer kernels.
 
-    Args:
-        kernels: by the name of the exported symbol, the function and how many derivatives its numbers carry.
-        count: the largest number of units.
+    Args: kernels: by the name of the exported symbol, the function and how many derivatives its
+        numbers carry. count: the largest number of units.
 
     Raises:
         TranslationError: a kernel uses something that has no counterpart in C++.
@@ -263,7 +269,9 @@ def write_units(kernels: Kernels, count: int) -> list[str]:
     reached = {symbol: library.reach([symbol]) for symbol in kernels}
     groups: list[tuple[set[str], list[str]]] = [(set(), []) for _ in range(count)]
     for symbol in sorted(kernels, key=lambda symbol: -sum(sizes[name] for name in reached[symbol])):
-        functions, symbols = min(groups, key=lambda group: sum(sizes[name] for name in group[0] | reached[symbol]))
+        functions, symbols = min(
+            groups, key=lambda group: sum(sizes[name] for name in group[0] | reached[symbol])
+        )
         functions |= reached[symbol]
         symbols.append(symbol)
     return [library.text(symbols) for _, symbols in groups if symbols]
@@ -272,8 +280,8 @@ def write_units(kernels: Kernels, count: int) -> list[str]:
 def make_library(kernels: Kernels) -> Library:
     """Return a library that exports kernels.
 
-    Args:
-        kernels: by the name of the exported symbol, the function and how many derivatives its numbers carry.
+    Args: kernels: by the name of the exported symbol, the function and how many derivatives its
+        numbers carry.
     """
     library = Library()
     for symbol, (function, directions) in kernels.items():

@@ -56,7 +56,9 @@ class FunctionWriter(ExpressionWriter):
             parameters.append(f"{self.names.name_type(kind)} {given}")
             if own is not kind:
                 # The function stores wider numbers in it.
-                copies.append(f"{self.names.name_type(own)} {local} = {self.convert(given, kind, own)};")
+                copies.append(
+                    f"{self.names.name_type(own)} {local} = {self.convert(given, kind, own)};"
+                )
                 copies[-1:-1] = self._take_pending()
         outer = [
             f"{self.names.name_type(found)} {self.local(variable)};"
@@ -112,7 +114,11 @@ class FunctionWriter(ExpressionWriter):
             case ast.If():
                 return self.branch(node)
             case ast.While():
-                return [f"while ({self.guarded(self._condition_of, node)}) {{", *self.inner_block(node.body), "}"]
+                return [
+                    f"while ({self.guarded(self._condition_of, node)}) {{",
+                    *self.inner_block(node.body),
+                    "}",
+                ]
             case ast.For(target=ast.Name(id=name), iter=iterated, body=body):
                 return self.loop(node, name, iterated, body)
             case ast.Break():
@@ -136,10 +142,13 @@ class FunctionWriter(ExpressionWriter):
         return self.condition(node.test).text
 
     # ------------------------------------------------------------------------------------------------- loops
-    def loop(self, node: ast.For, name: str, iterated: ast.expr, body: Sequence[ast.stmt]) -> list[str]:
+    def loop(
+        self, node: ast.For, name: str, iterated: ast.expr, body: Sequence[ast.stmt]
+    ) -> list[str]:
         """Return the lines of a for statement.
 
-        As in Python, what the body stores in the variable of the loop makes no difference to the next round.
+        As in Python, what the body stores in the variable of the loop makes no difference to the
+        next round.
         """
         is_own = name == "_" or name in self._places.loop_variables.get(node, ())
         counter = self.new_name("index") if name == "_" or not is_own else self.local(name)
@@ -202,7 +211,9 @@ class FunctionWriter(ExpressionWriter):
         if isinstance(value, ast.Tuple) and self._are_separate(targets, value):
             return self._assign_items(node, targets, value)
         text = self.text(value)
-        held = text if is_number(kind) and isinstance(value, ast.Constant) else self.hold(kind, text)
+        held = (
+            text if is_number(kind) and isinstance(value, ast.Constant) else self.hold(kind, text)
+        )
         lines = self._take_pending()
         return lines + [line for target in targets for line in self.store(node, target, held, kind)]
 
@@ -213,17 +224,23 @@ class FunctionWriter(ExpressionWriter):
             isinstance(part, ast.Starred) for part in value.elts
         )
 
-    def _assign_one(self, node: ast.stmt, target: ast.expr, value: ast.expr, kind: Type) -> list[str]:
+    def _assign_one(
+        self, node: ast.stmt, target: ast.expr, value: ast.expr, kind: Type
+    ) -> list[str]:
         if isinstance(target, ast.Name):
             own = self.function.variables.get(target.id)
             if own is None:
                 return [f"{self.text(value)};"] if self.function.effects_of(value) & WRITES else []
-            return [f"{self._definition(node, target.id)}{self.local(target.id)} = {self.text_as(value, own)};"]
+            return [
+                f"{self._definition(node, target.id)}{self.local(target.id)} = {self.text_as(value, own)};"
+            ]
         # C++17 evaluates what is assigned before the place that it is assigned to, as Python does.
         text = self.text(value)
         return [f"{self.text(target)} = {text};"]
 
-    def _assign_items(self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.Tuple) -> list[str]:
+    def _assign_items(
+        self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.Tuple
+    ) -> list[str]:
         """Return the lines of a tuple assignment: all values are computed before the first is stored."""
         first = targets[0]
         assert isinstance(first, ast.Tuple)
@@ -237,7 +254,11 @@ class FunctionWriter(ExpressionWriter):
         held = []
         for part in value.elts:
             text = self.text(part)
-            held.append(text if isinstance(part, ast.Constant) else self.hold(self.function.require_type(part), text))
+            held.append(
+                text
+                if isinstance(part, ast.Constant)
+                else self.hold(self.function.require_type(part), text)
+            )
             lines += self._take_pending()
         for target in targets:
             assert isinstance(target, ast.Tuple)
@@ -269,7 +290,9 @@ class FunctionWriter(ExpressionWriter):
             case ast.Name(id=name):
                 own = self.function.variables[name]
                 assert own is not None
-                return [f"{self._definition(node, name)}{self.local(name)} = {self.convert(text, kind, own)};"]
+                return [
+                    f"{self._definition(node, name)}{self.local(name)} = {self.convert(text, kind, own)};"
+                ]
             case ast.Tuple(elts=parts):
                 assert isinstance(kind, Tuple)
                 lines = []
@@ -285,10 +308,14 @@ class FunctionWriter(ExpressionWriter):
             return ""
         kind = self.function.variables[name]
         assert kind is not None
-        constant = "const " if name in self._places.constants and not isinstance(kind, Pointer) else ""
+        constant = (
+            "const " if name in self._places.constants and not isinstance(kind, Pointer) else ""
+        )
         return f"{constant}{self.names.name_type(kind)} "
 
-    def augment(self, node: ast.AugAssign, target: ast.expr, op: ast.operator, value: ast.expr) -> list[str]:
+    def augment(
+        self, node: ast.AugAssign, target: ast.expr, op: ast.operator, value: ast.expr
+    ) -> list[str]:
         """Return the lines of an augmented assignment."""
         kinds = [self.function.require_type(to_load(target)), self.function.require_type(value)]
         is_written = bool(self.function.effects_of(value) & WRITES)
@@ -296,8 +323,14 @@ class FunctionWriter(ExpressionWriter):
             place = f"{self.text(target.value)}[{self._store_index(target.slice, is_written)}]"
         else:
             place = self.text(target)
-        before = self.hold(kinds[0], place) if is_written and isinstance(target, ast.Subscript) else place
-        is_direct = type(op) in OPERATORS and not (isinstance(op, ast.Div) and all(map(is_integral, kinds)))
+        before = (
+            self.hold(kinds[0], place)
+            if is_written and isinstance(target, ast.Subscript)
+            else place
+        )
+        is_direct = type(op) in OPERATORS and not (
+            isinstance(op, ast.Div) and all(map(is_integral, kinds))
+        )
         if is_direct and before == place:
             return [f"{place} {OPERATORS[type(op)][0]}= {self.text(value)};"]
         texts = [before, self._operand(value, op, is_right=True)]
@@ -350,16 +383,24 @@ class VariablePlaces:
             if self._defines(first, name):
                 self.definitions[name] = first
             else:
-                # It may keep its value from one round of a loop to the next, or from one branch to another.
+                # It may keep its value from one round of a loop to the next, or from one branch to
+                # another.
                 self.outer.append(name)
 
     def _place_within(self, node: ast.stmt, name: str) -> bool:
         """Find the place of a variable that is used in one compound statement only."""
         blocks = [
-            block for field in ("body", "orelse") for block in [getattr(node, field, None)] if isinstance(block, list)
+            block
+            for field in ("body", "orelse")
+            for block in [getattr(node, field, None)]
+            if isinstance(block, list)
         ]
         heads = [child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.stmt)]
-        if isinstance(node, ast.For) and isinstance(node.target, ast.Name) and node.target.id == name:
+        if (
+            isinstance(node, ast.For)
+            and isinstance(node.target, ast.Name)
+            and node.target.id == name
+        ):
             stored = {
                 part.id
                 for statement in node.body
@@ -372,7 +413,11 @@ class VariablePlaces:
             return True
         if any(name in self._find_used_names(head) for head in heads):
             return False
-        users = [block for block in blocks if any(name in self._find_used_names(statement) for statement in block)]
+        users = [
+            block
+            for block in blocks
+            if any(name in self._find_used_names(statement) for statement in block)
+        ]
         if len(users) != 1:
             return False
         self._place(users[0], [name])

@@ -1,7 +1,8 @@
 """Types of values in the C++ that kernels become.
 
-A kernel has no type declarations that can be relied on. Its types follow from those of its arguments, so every type is
-a value here that the inference compares, joins and passes on. Equal types are the same object.
+A kernel has no type declarations that can be relied on. Its types follow from those of its
+arguments, so every type is a value here that the inference compares, joins and passes on. Equal
+types are the same object.
 """
 
 from __future__ import annotations

@@ -27,7 +27,9 @@ def drives(builder: ElementBuilder, controller: PrescribedController) -> Iterato
     path, given = builder.path(controller), controller.ControlFunctions.objects
     actuators = named(builder, controller)
     if len(given) != len(actuators):
-        raise ModelError(f"'{path}' has {len(given)} functions for {len(actuators)} actuators; give it one for each")
+        raise ModelError(
+            f"'{path}' has {len(given)} functions for {len(actuators)} actuators; give it one for each"
+        )
     for actuator, function in zip(actuators, given, strict=True):
         try:
             signal: Any = builder.function(actuator, function, f"control by {path}")
@@ -38,17 +40,22 @@ def drives(builder: ElementBuilder, controller: PrescribedController) -> Iterato
         yield from _from_file(builder, controller, actuators)
 
 
-def _from_file(builder: ElementBuilder, controller: PrescribedController, taken: list[Any]) -> Iterator[Drive]:
+def _from_file(
+    builder: ElementBuilder, controller: PrescribedController, taken: list[Any]
+) -> Iterator[Drive]:
     """The columns of the file, which are called by names or paths of actuators.
 
-    As in OpenSim, a column is passed over if the controller names an actuator by the same word, or if one before it has
-    the same label.
+    As in OpenSim, a column is passed over if the controller names an actuator by the same word, or
+    if one before it has the same label.
     """
     path = builder.path(controller)
     actuators = actuators_by_name(builder)
     actuators |= {builder.path(item): item for item in builder.components(Actuator)}
     table = read_controls(beside(builder.folder, str(controller.controls_file)))
-    known = {word if isinstance(word, str) else builder.path(word) for word in controller.socket_actuators}
+    known = {
+        word if isinstance(word, str) else builder.path(word)
+        for word in controller.socket_actuators
+    }
     if builder.model.document_version < LISTS_OF_PATHS:
         known |= {item.name for item in taken}
     taken = list(taken)
@@ -70,4 +77,6 @@ def _from_file(builder: ElementBuilder, controller: PrescribedController, taken:
         known.add(label)
         taken.append(actuator)
         degree = 1 if controller.interpolation_method is None else controller.interpolation_method
-        yield Drive(actuator, column_function(table, index, degree, f"the interpolation_method of '{path}'"))
+        yield Drive(
+            actuator, column_function(table, index, degree, f"the interpolation_method of '{path}'")
+        )

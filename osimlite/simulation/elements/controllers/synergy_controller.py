@@ -19,7 +19,9 @@ def drives(builder: ElementBuilder, controller: SynergyController) -> Iterator[D
         ModelError: there is not one signal for each vector, or not one weight for each control.
     """
     path, vectors = builder.path(controller), controller.synergy_vectors
-    counts = [(item, getattr(type(item), "control_count", 1)) for item in named(builder, controller)]
+    counts = [
+        (item, getattr(type(item), "control_count", 1)) for item in named(builder, controller)
+    ]
     targets = [(item, number) for item, count in counts for number in range(count)]
     for vector in vectors:
         if len(vector.synergy_weights) != len(targets):
@@ -29,13 +31,16 @@ def drives(builder: ElementBuilder, controller: SynergyController) -> Iterator[D
             )
     words = controller.input_controls
     if words and len(words) != len(vectors):
-        raise ModelError(f"'{path}' has {len(words)} inputs for {len(vectors)} synergy vectors; give it one for each")
+        raise ModelError(
+            f"'{path}' has {len(words)} inputs for {len(vectors)} synergy vectors; give it one for each"
+        )
     for vector, word in zip(vectors, words, strict=False):
         function = signal(builder, controller, word)
         for (actuator, number), weight in zip(targets, vector.synergy_weights, strict=True):
             if function is None:
                 refused: UnsupportedError = builder.unsupported(
-                    actuator, f" driven by '{path}', whose input '{word}' is no function of time that is known"
+                    actuator,
+                    f" driven by '{path}', whose input '{word}' is no function of time that is known",
                 )
                 yield Drive(actuator, refused)
             else:

@@ -42,7 +42,10 @@ def turn_bodies(model: Ints, data: Floats, g: Ints, gp: Floats, torque: float) -
 
 def turning_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
     """How fast a body turns against another about an axis (rad/s), which OpenSim takes for one of ground."""
-    return dot(vector(gp, 3), minus(angular_velocity(model, data, g[0]), angular_velocity(model, data, g[1])))
+    return dot(
+        vector(gp, 3),
+        minus(angular_velocity(model, data, g[0]), angular_velocity(model, data, g[1])),
+    )
 
 
 def push_along(model: Ints, data: Floats, g: Ints, gp: Floats, force: float) -> None:
@@ -74,19 +77,28 @@ def push_apart(model: Ints, data: Floats, g: Ints, gp: Floats, force: float) -> 
 def parting_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
     """How fast two points part, m/s."""
     one, two = station(model, data, g[2], vector(gp, 0)), station(model, data, g[3], vector(gp, 3))
-    between, parting = minus(one, two), minus(velocity(model, data, g[2], one), velocity(model, data, g[3], two))
+    between, parting = (
+        minus(one, two),
+        minus(velocity(model, data, g[2], one), velocity(model, data, g[3], two)),
+    )
     length = norm(between)
     return dot(parting, between) / length if length > 0.0 else 0.0
 
 
-def push_body(model: Ints, data: Floats, g: Ints, gp: Floats, torque: Vector, force: Vector) -> None:
+def push_body(
+    model: Ints, data: Floats, g: Ints, gp: Floats, torque: Vector, force: Vector
+) -> None:
     """Turn a body, and push it at a point; torque and force are along three axes, which are given by rows."""
     apply_torque(model, data, g[0], direction(model, data, g[2], turned_back(at(gp, 3), torque)))
     point = station(model, data, g[1], vector(gp, 0))
-    apply_force(model, data, g[0], point, direction(model, data, g[2], turned_back(at(gp, 3), force)))
+    apply_force(
+        model, data, g[0], point, direction(model, data, g[2], turned_back(at(gp, 3), force))
+    )
 
 
-def station_motion(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, float, float]:
+def station_motion(
+    model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats
+) -> tuple[float, float, float, float]:
     """Height of a station in ground, and its velocity; its place goes into the record."""
     point = station(model, data, g[0], vector(gp, 0))
     put(room, 0, point)
@@ -142,12 +154,15 @@ class AboutAxis(OnBodies):
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
         """The bodies and the axis of an actuator."""
         (one, placed), (two, _) = (
-            builder.placement(builder.target(force, field, getattr(force, field))) for field in ("bodyA", "bodyB")
+            builder.placement(builder.target(force, field, getattr(force, field)))
+            for field in ("bodyA", "bodyB")
         )
         axis = as_given = _unit(builder, force, force.axis)
         if not force.torque_is_global:
             axis = triple(placed[:3, :3] @ axis)
-        return Anchors((one, two), (), ((GROUND if force.torque_is_global else one, axis), (GROUND, as_given)))
+        return Anchors(
+            (one, two), (), ((GROUND if force.torque_is_global else one, axis), (GROUND, as_given))
+        )
 
 
 class AtPoint(OnBodies):
@@ -181,7 +196,8 @@ class ApartPoints(OnBodies):
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
         """The bodies and the points of an actuator, fixed in ground or in the bodies."""
         one, two = (
-            builder.placement(builder.target(force, field, getattr(force, field))).body for field in ("bodyA", "bodyB")
+            builder.placement(builder.target(force, field, getattr(force, field))).body
+            for field in ("bodyA", "bodyB")
         )
         builder.check(force, (*force.pointA, *force.pointB))
         first, second = (GROUND, GROUND) if force.points_are_global else (one, two)
@@ -222,7 +238,9 @@ class AtStation(Geometry):
     def read(self, builder: ElementBuilder, force: Any) -> NamedStation:
         """The station that a force names."""
         result = builder.target(force, "socket_station", force.socket_station)
-        body, placed = builder.placement(builder.target(result, "socket_parent_frame", result.socket_parent_frame))
+        body, placed = builder.placement(
+            builder.target(result, "socket_parent_frame", result.socket_parent_frame)
+        )
         point = triple(placed[:3, :3] @ result.location + placed[:3, 3])
         builder.check(force, point)
         return NamedStation(result.name, body, point)

@@ -35,15 +35,24 @@ def deviate(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats) -> Non
         put(room, AXES + 3 * k, direction(model, data, g[0], vector(gp, 3 * k)))
         put(room, AXES + 9 + 3 * k, direction(model, data, g[1], vector(gp, 12 + 3 * k)))
     one, two = at(room, AXES), at(room, AXES + 9)
-    start, end = station(model, data, g[0], vector(gp, 9)), station(model, data, g[1], vector(gp, 21))
+    start, end = (
+        station(model, data, g[0], vector(gp, 9)),
+        station(model, data, g[1], vector(gp, 21)),
+    )
     put(room, 6, start)
     put(room, 9, end)
     x, y, z = turned(one, vector(two, 0)), turned(one, vector(two, 3)), turned(one, vector(two, 6))
     put(d, 0, xyz_angles(x[0], y[0], z[0], x[1], y[1], z[1], z[2]))
     put(d, 3, turned(one, minus(end, start)))
     # The moving frame is carried around by the other.
-    put(rates, 3, turned(one, minus(velocity(model, data, g[1], end), velocity(model, data, g[0], end))))
-    wx, wy, wz = turned(two, minus(angular_velocity(model, data, g[1]), angular_velocity(model, data, g[0])))
+    put(
+        rates,
+        3,
+        turned(one, minus(velocity(model, data, g[1], end), velocity(model, data, g[0], end))),
+    )
+    wx, wy, wz = turned(
+        two, minus(angular_velocity(model, data, g[1]), angular_velocity(model, data, g[0]))
+    )
     put(rates, 0, xyz_rates(d[1], d[2], wx, wy, wz))
 
 
@@ -83,7 +92,8 @@ class Frame(NamedTuple):
 class BetweenFrames(Geometry):
     """Two frames: six deviations of the second from the first, angles (rad) before distances (m), and their rates.
 
-    The law fills `loads`: moments (N.m) of the angles and forces (N) of the distances on the second frame.
+    The law fills `loads`: moments (N.m) of the angles and forces (N) of the distances on the second
+    frame.
     """
 
     # whether the torques of the record are about the origins of the bodies instead of the frames
@@ -105,7 +115,9 @@ class BetweenFrames(Geometry):
             frames.append(Frame(frame.name, *builder.placement(frame)))
         return tuple(frames)
 
-    def pack(self, place: tuple[Frame, ...], places: Places) -> tuple[Sequence[int], Sequence[float]]:
+    def pack(
+        self, place: tuple[Frame, ...], places: Places
+    ) -> tuple[Sequence[int], Sequence[float]]:
         """Links; axes and origin of each frame in its link."""
         (one, first), (two, second) = (places.frame(frame.body, frame.placed) for frame in place)
         return (one, two), (*first, *second)
@@ -117,13 +129,22 @@ class BetweenFrames(Geometry):
     def columns(self, force: Any) -> tuple[str, ...]:
         """Force and torque on each of the frames."""
         labels = [f"{kind}.{axis}" for kind in ("force", "torque") for axis in "XYZ"]
-        return tuple(f"{force.name}.{frame.name}.{label}" for frame in force.place for label in labels)
+        return tuple(
+            f"{force.name}.{frame.name}.{label}" for frame in force.place for label in labels
+        )
 
-    def report(self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]) -> list[float]:
+    def report(
+        self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]
+    ) -> list[float]:
         """Forces and torques in ground, about the origins of the frames or of their bodies."""
         push, moment, start, end = np.array(record[:12], dtype=float).reshape(4, 3)
         first, second = start, end
         if self.about_bodies:
             first, second = (np.array(origins[frame.body]) for frame in force.place)
-        row: list[Array] = [-push, -moment - np.cross(end - first, push), push, moment + np.cross(end - second, push)]
+        row: list[Array] = [
+            -push,
+            -moment - np.cross(end - first, push),
+            push,
+            moment + np.cross(end - second, push),
+        ]
         return [float(number) for part in row for number in part]

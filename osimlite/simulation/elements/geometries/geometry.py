@@ -13,16 +13,20 @@ from osimlite.simulation.elements.items import Item
 class Geometry:
     """Where a force acts.
 
-    In the code of a kernel, `g` are the geometry's integers, `gp` its numbers and `room` its part of the record;
-    `model`, `reals`, `data`, `y`, `f` are as every kernel has them.
+    In the code of a kernel, `g` are the geometry's integers, `gp` its numbers and `room` its part
+    of the record; `model`, `reals`, `data`, `y`, `f` are as every kernel has them.
     """
 
-    inputs: ClassVar[tuple[str, ...]] = ()  # what it computes for a law, in the code before the law is called
-    speed: ClassVar[str] = ""  # name of the input with which an actuator's force, or its negative, makes a power
+    # what it computes for a law, in the code before the law is called
+    inputs: ClassVar[tuple[str, ...]] = ()
+    # name of the input with which an actuator's force, or its negative, makes a power
+    speed: ClassVar[str] = ""
     before: ClassVar[tuple[str, ...]] = ()  # that code
-    again: ClassVar[tuple[str, ...]] = ()  # the same after an evaluation of the moment, if that is less
-    # the output that pushes along one displacement, which is the first input, its speed the second; and 1 if it does
-    # so, -1 if it pulls. Empty if there is no such thing.
+    again: ClassVar[
+        tuple[str, ...]
+    ] = ()  # the same after an evaluation of the moment, if that is less
+    # the output that pushes along one displacement, which is the first input, its speed the second;
+    # and 1 if it does so, -1 if it pulls. Empty if there is no such thing.
     along: ClassVar[tuple[str, int]] = ("", 0)
     after: ClassVar[tuple[str, ...]] = ()  # the code that applies the outputs of the law
     calls: ClassVar[tuple[Callable[..., Any], ...]] = ()  # the functions that both call
@@ -55,7 +59,9 @@ class Geometry:
         """Labels of its record, where a kind has none of its own."""
         return ()
 
-    def report(self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]) -> list[float]:
+    def report(
+        self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]
+    ) -> list[float]:
         """One row of these columns, from its part of the record; all of that."""
         return list(record[: self.room(force.place)])
 

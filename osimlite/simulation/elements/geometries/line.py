@@ -23,7 +23,9 @@ def line(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[
     put(room, 0, ahead)
     put(room, 3, one)
     put(room, 6, two)
-    return length, dot(minus(velocity(model, data, g[1], two), velocity(model, data, g[0], one)), ahead)
+    return length, dot(
+        minus(velocity(model, data, g[1], two), velocity(model, data, g[0], one)), ahead
+    )
 
 
 def pull_ends(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats, tension: float) -> None:
@@ -40,8 +42,8 @@ def pull_ends(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats, tens
 class Ends(NamedTuple):
     """The ends of a line.
 
-    OpenSim takes the points as stations of the base bodies, also where a force names other frames; the points that it
-    records are those of the frames.
+    OpenSim takes the points as stations of the base bodies, also where a force names other frames;
+    the points that it records are those of the frames.
     """
 
     frames: tuple[str, str]  # names of the frames in the record
@@ -55,7 +57,8 @@ class BetweenPoints(Geometry):
     """A line: length (m) and rate (m/s); the output `tension` (N) pulls its ends together."""
 
     fields: tuple[str, str]  # that name the frames
-    as_written: bool = False  # whether the record names the frames as the force does, and not by their names
+    # whether the record names the frames as the force does, and not by their names
+    as_written: bool = False
 
     inputs = ("length", "rate")
     before = ("length, rate = line(model, data, g, gp, room)",)
@@ -66,7 +69,10 @@ class BetweenPoints(Geometry):
         """The ends of a force's line."""
         builder.check(force, (*force.point1, *force.point2))
         words = [getattr(force, field) for field in self.fields]
-        frames = [builder.target(force, field, word) for field, word in zip(self.fields, words, strict=True)]
+        frames = [
+            builder.target(force, field, word)
+            for field, word in zip(self.fields, words, strict=True)
+        ]
         points = triple(force.point1), triple(force.point2)
         (one, first), (two, second) = (builder.placement(frame) for frame in frames)
         names = [
@@ -74,7 +80,8 @@ class BetweenPoints(Geometry):
             for word, frame in zip(words, frames, strict=True)
         ]
         first_point, second_point = (
-            triple(frame[:3, :3] @ point + frame[:3, 3]) for frame, point in zip((first, second), points, strict=True)
+            triple(frame[:3, :3] @ point + frame[:3, 3])
+            for frame, point in zip((first, second), points, strict=True)
         )
         return Ends((names[0], names[1]), (one, two), points, (first_point, second_point))
 
@@ -94,4 +101,6 @@ class BetweenPoints(Geometry):
     def columns(self, force: Any) -> tuple[str, ...]:
         """Force and point in ground, for each of the frames."""
         labels = [f"{what}.{axis}" for what in ("force", "point") for axis in "XYZ"]
-        return tuple(f"{force.name}.{frame}.{label}" for frame in force.place.frames for label in labels)
+        return tuple(
+            f"{force.name}.{frame}.{label}" for frame in force.place.frames for label in labels
+        )

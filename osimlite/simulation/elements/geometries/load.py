@@ -22,8 +22,9 @@ FRAME = 12
 def apply_load(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats, t: float) -> None:
     """Apply force and torque; the record has the force, the point in the first frame, and the torque.
 
-    The integers are the links of three frames (where the force acts, along whose axes force and torque are, in which
-    the point is), whether there are a force, a point and a torque, and the places of nine tables.
+    The integers are the links of three frames (where the force acts, along whose axes force and
+    torque are, in which the point is), whether there are a force, a point and a torque, and the
+    places of nine tables.
     """
     find_load(g, gp, room, t)
     link = g[0]
@@ -59,10 +60,12 @@ class Load(NamedTuple):
     """What acts, and where."""
 
     labels: tuple[str, str, str]  # of force, point and torque in the record; without the axes
-    frame: FramePlacement  # where the force acts, if no point is given, and in which the point is recorded
+    # where the force acts, if no point is given, and in which the point is recorded
+    frame: FramePlacement
     force_frame: FramePlacement  # along whose axes force and torque are
     point_frame: FramePlacement  # in which the point is
-    force: Sequence[Function]  # three functions of time (N), or none; `point` (m) and `torque` (N.m) likewise
+    # three functions of time (N), or none; `point` (m) and `torque` (N.m) likewise
+    force: Sequence[Function]
     point: Sequence[Function]
     torque: Sequence[Function]
 
@@ -104,7 +107,11 @@ class GivenLoad(Geometry):
         given = zip(load.labels, load.groups, strict=True)
         return tuple(f"{label}{axis}" for label, functions in given if functions for axis in "xyz")
 
-    def report(self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]) -> list[float]:
+    def report(
+        self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]
+    ) -> list[float]:
         """They."""
         groups = force.place.groups
-        return [record[3 * number + axis] for number in range(3) if groups[number] for axis in range(3)]
+        return [
+            record[3 * number + axis] for number in range(3) if groups[number] for axis in range(3)
+        ]

@@ -14,7 +14,8 @@ from osimlite.simulation.elements.items import Item
 class Path(Protocol):
     """A path in terms of the mechanism."""
 
-    coupled: bool  # whether its moment arm about a coordinate takes in those that must move with that
+    # whether its moment arm about a coordinate takes in those that must move with that
+    coupled: bool
 
     def items(self, places: Places) -> list[Item]:
         """Parts, of which the last is the path's own; see :mod:`osimlite.mechanics.kernels.paths`."""
@@ -38,9 +39,8 @@ class AlongPath(Geometry):
     def read(self, builder: ElementBuilder, force: Any) -> Path:
         """The path of a force.
 
-        Raises:
-            UnsupportedError: it is of a class, or wraps around a surface, that osimlite cannot compute.
-            ModelError: it makes no sense.
+        Raises: UnsupportedError: it is of a class, or wraps around a surface, that osimlite cannot
+            compute. ModelError: it makes no sense.
         """
         module = module_of("geometries.paths", type(force.geometry_path))
         if module is None:

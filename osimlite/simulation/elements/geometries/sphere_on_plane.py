@@ -20,7 +20,9 @@ from osimlite.simulation.elements.geometries.geometry import Geometry
 NO_MATERIAL = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def sphere_depth(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, Vector]:
+def sphere_depth(
+    model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats
+) -> tuple[float, float, Vector]:
     """Depth, radius and normal; the point of contact goes into the record."""
     o, n = station(model, data, g[0], vector(gp, 0)), direction(model, data, g[0], vector(gp, 3))
     center = station(model, data, g[1], vector(gp, 6))
@@ -32,7 +34,9 @@ def sphere_depth(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats) -
 
 def approach(model: Ints, data: Floats, g: Ints, room: Floats) -> Vector:
     """Velocity of the half space relative to the sphere, at the point of contact."""
-    return minus(velocity(model, data, g[0], vector(room, 3)), velocity(model, data, g[1], vector(room, 3)))
+    return minus(
+        velocity(model, data, g[0], vector(room, 3)), velocity(model, data, g[1], vector(room, 3))
+    )
 
 
 def push_both(model: Ints, data: Floats, g: Ints, room: Floats, force: Vector) -> None:
@@ -49,14 +53,20 @@ class SphereOnPlane(Geometry):
     """
 
     inputs = ("d", "radius", "n", "v")
-    before = ("d, radius, n = sphere_depth(model, data, g, gp, room)", "v = approach(model, data, g, room)")
+    before = (
+        "d, radius, n = sphere_depth(model, data, g, gp, room)",
+        "v = approach(model, data, g, room)",
+    )
     after = ("push_both(model, data, g, room, (fx, fy, fz))",)
     calls = (sphere_depth, approach, push_both)
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[ContactSurface, ContactSurface]:
         """The half space and the sphere that a force names."""
         surfaces = []
-        for field, wanted in (("socket_half_space", ContactHalfSpace), ("socket_sphere", ContactSphere)):
+        for field, wanted in (
+            ("socket_half_space", ContactHalfSpace),
+            ("socket_sphere", ContactSphere),
+        ):
             geometry = builder.target(force, field, getattr(force, field))
             if not isinstance(geometry, wanted):
                 raise ModelError(
@@ -72,7 +82,12 @@ class SphereOnPlane(Geometry):
         one, two = place
         first, on_plane = places.station(one.body, one.center)
         second, center = places.station(two.body, two.center)
-        return (first, second), (*on_plane, *places.direction(one.body, one.normal), *center, two.radius)
+        return (first, second), (
+            *on_plane,
+            *places.direction(one.body, one.normal),
+            *center,
+            two.radius,
+        )
 
     def room(self, place: Any) -> int:
         """Force and point."""
@@ -81,15 +96,24 @@ class SphereOnPlane(Geometry):
     def columns(self, force: Any) -> tuple[str, ...]:
         """Force and torque on the body of the sphere, then on that of the half space."""
         labels = [f"{kind}.{axis}" for kind in ("force", "torque") for axis in "XYZ"]
-        return tuple(f"{force.name}.{surface}.{label}" for surface in ("Sphere", "HalfSpace") for label in labels)
+        return tuple(
+            f"{force.name}.{surface}.{label}"
+            for surface in ("Sphere", "HalfSpace")
+            for label in labels
+        )
 
-    def report(self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]) -> list[float]:
+    def report(
+        self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]
+    ) -> list[float]:
         """Forces, and torques about the origins of the bodies, in ground."""
         half_space, sphere = force.place
         pushed, point = np.array(record[:3], dtype=float), np.array(record[3:6], dtype=float)
         row: list[float] = []
         for sign, body in ((1.0, sphere.body), (-1.0, half_space.body)):
-            row += [*(sign * pushed).tolist(), *np.cross(point - np.array(origins[body]), sign * pushed).tolist()]
+            row += [
+                *(sign * pushed).tolist(),
+                *np.cross(point - np.array(origins[body]), sign * pushed).tolist(),
+            ]
         return row
 
 

@@ -6,7 +6,9 @@ from osimlite.simulation.elements.kind import Kind, State
 from osimlite.simulation.elements.parameters import positive
 
 
-def effort(control: float, activation: float, optimal_force: float, time: float) -> tuple[float, float]:
+def effort(
+    control: float, activation: float, optimal_force: float, time: float
+) -> tuple[float, float]:
     """The activation times the optimal force, and its rate: what it lacks of the control over a time constant (s)."""
     return optimal_force * activation, (control - activation) / time
 

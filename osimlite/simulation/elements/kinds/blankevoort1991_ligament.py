@@ -22,7 +22,12 @@ KIND = Kind(
     PATH,
     ligament,
     outputs=("tension", "elastic", "damping", "length", "rate", "strain", "strain_rate", "energy"),
-    parameters=(positive("slack_length"), "linear_stiffness", "transition_strain", "damping_coefficient"),
+    parameters=(
+        positive("slack_length"),
+        "linear_stiffness",
+        "transition_strain",
+        "damping_coefficient",
+    ),
     labels={
         "{name}.force_spring": "elastic",
         "{name}.force_damping": "damping",

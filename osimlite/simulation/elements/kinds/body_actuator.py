@@ -12,4 +12,11 @@ def wrench(
     return tx, ty, tz, fx, fy, fz
 
 
-KIND = Kind(BodyActuator, BODY, wrench, outputs=("tx", "ty", "tz", "fx", "fy", "fz"), controlled=True, labels={})
+KIND = Kind(
+    BodyActuator,
+    BODY,
+    wrench,
+    outputs=("tx", "ty", "tz", "fx", "fy", "fz"),
+    controlled=True,
+    labels={},
+)

@@ -28,7 +28,9 @@ KIND = Kind(
     bushing,
     outputs=("energy", "dissipated_energy_rate"),
     parameters=(
-        Vector(6, lambda builder, force: (*force.rotational_stiffness, *force.translational_stiffness)),
+        Vector(
+            6, lambda builder, force: (*force.rotational_stiffness, *force.translational_stiffness)
+        ),
         Vector(6, lambda builder, force: (*force.rotational_damping, *force.translational_damping)),
     ),
     states=(State("dissipated_energy", given=False, is_simbody=True),),

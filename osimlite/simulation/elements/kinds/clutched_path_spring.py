@@ -9,7 +9,9 @@ OPEN = 2.0 ** (-52.0 * 7.0 / 8.0)
 """A control that is no larger does not engage the spring: Simbody's SignificantReal."""
 
 
-def clutched(rate: float, control: float, stretch: float, k: float, d: float, relaxation: float) -> tuple[float, float]:
+def clutched(
+    rate: float, control: float, stretch: float, k: float, d: float, relaxation: float
+) -> tuple[float, float]:
     """Tension c k z (1 + d v), N, and rate of the stretch z, m/s: that of the path, -z / relaxation without control.
 
     Args:
@@ -34,7 +36,11 @@ KIND = Kind(
     clutched,
     inputs=("rate",),
     outputs=("tension", "stretch_rate"),
-    parameters=(_at_least_zero("stiffness"), _at_least_zero("dissipation"), positive("relaxation_time_constant")),
+    parameters=(
+        _at_least_zero("stiffness"),
+        _at_least_zero("dissipation"),
+        positive("relaxation_time_constant"),
+    ),
     controlled=True,
     states=(State("stretch", lambda spring: spring.initial_stretch),),
     labels={"{name}": "tension"},

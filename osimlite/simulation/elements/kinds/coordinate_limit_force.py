@@ -24,7 +24,9 @@ def limit(
     return force, limit_dissipation(q, u, qu, ql, D, t), limit_energy(q, Ku, qu, Kl, ql, t)
 
 
-def constants(force: CoordinateLimitForce, info: CoordinateInfo) -> tuple[float, float, float, float, float, float]:
+def constants(
+    force: CoordinateLimitForce, info: CoordinateInfo
+) -> tuple[float, float, float, float, float, float]:
     """What the law is given besides the state, from the properties of the force and what its coordinate is."""
     return limit_constants(
         force.upper_stiffness,

@@ -12,8 +12,8 @@ from osimlite.simulation.elements.kind import Kind
 def stop(q: float, u: float, k: float, d: float, upper: float, lower: float) -> tuple[float, float]:
     """Generalized force -k x (1 + d v), N.m (N for a translation), which never pulls, and energy k x^2 / 2, J.
 
-    x is how far the coordinate is beyond the limit, and v how fast it runs on. Source: Simbody's MobilityLinearStop,
-    as the documentation of OpenSim's class has it.
+    x is how far the coordinate is beyond the limit, and v how fast it runs on. Source: Simbody's
+    MobilityLinearStop, as the documentation of OpenSim's class has it.
 
     Args:
         q: coordinate, rad (m).

@@ -36,7 +36,9 @@ class Delp(NamedTuple):
     mass: float
 
 
-def forces(length: float, strain: float, own: Delp, curves: DelpCurves) -> tuple[float, float, float]:
+def forces(
+    length: float, strain: float, own: Delp, curves: DelpCurves
+) -> tuple[float, float, float]:
     """Active, passive and tendon force."""
     active, _, _ = value_at(curves.active, length)
     passive, _, _ = value_at(curves.passive, length)
@@ -47,23 +49,34 @@ def forces(length: float, strain: float, own: Delp, curves: DelpCurves) -> tuple
 def delp(now: MuscleInputs, m: OldMuscle, own: Delp, curves: DelpCurves) -> tuple[float, ...]:
     """The muscle at a moment; see Delp1990Muscle_Deprecated::computeActuation of OpenSim.
 
-    Its acceleration is no number while the fibers have no length, as before they are brought into equilibrium.
+    Its acceleration is no number while the fibers have no length, as before they are brought into
+    equilibrium.
     """
     fibers = fibers_at(now, m, forces, own, curves)
     cos, active, passive, tendon = fibers
     unit = m.optimal / own.time
     velocity = now.fiber_velocity / unit
     factor, _, _ = value_at(curves.velocity, velocity)
-    pulled = (tendon - (now.activation * active * factor + passive) * cos) * cos / (own.mass * unit * unit)
+    pulled = (
+        (tendon - (now.activation * active * factor + passive) * cos)
+        * cos
+        / (own.mass * unit * unit)
+    )
     turned = velocity * velocity * (1.0 - cos * cos) / (cos * cos) / (now.fiber_length / m.optimal)
-    activation_rate = scaled_activation_rate(now.excitation, now.activation, own.more, own.least, own.time)
+    activation_rate = scaled_activation_rate(
+        now.excitation, now.activation, own.more, own.least, own.time
+    )
     known = recorded(now, fibers, m)
     return *known, activation_rate, now.fiber_velocity, (pulled + turned) * unit / own.time
 
 
-def equilibrium(now: MuscleInputs, m: OldMuscle, own: Delp, curves: DelpCurves) -> tuple[bool, float]:
+def equilibrium(
+    now: MuscleInputs, m: OldMuscle, own: Delp, curves: DelpCurves
+) -> tuple[bool, float]:
     """The fiber length in equilibrium; the velocity stays as it is."""
-    return True, isometric_length(now.length, now.length - m.slack, now.activation, m, forces, own, curves)
+    return True, isometric_length(
+        now.length, now.length - m.slack, now.activation, m, forces, own, curves
+    )
 
 
 def rigid(now: MuscleInputs, m: OldMuscle, own: Delp, curves: DelpCurves) -> float:

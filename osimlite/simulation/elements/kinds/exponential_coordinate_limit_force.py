@@ -16,8 +16,8 @@ def limits(
 ) -> tuple[float, float]:
     """Generalized force a exp(-b (q - lower)) - c exp(d (q - upper)), N.m (N for a translation), and its energy, J.
 
-    Source: F. C. Anderson and M. G. Pandy, "A dynamic optimization solution for vertical jumping in three dimensions",
-    Computer Methods in Biomechanics and Biomedical Engineering 2 (1999) 201-231.
+    Source: F. C. Anderson and M. G. Pandy, "A dynamic optimization solution for vertical jumping in
+    three dimensions", Computer Methods in Biomechanics and Biomedical Engineering 2 (1999) 201-231.
 
     Args:
         q: coordinate, rad (m).
@@ -36,7 +36,9 @@ def limits(
 def _shapes(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
     shapes = *force.lower_shape_parameters, *force.upper_shape_parameters
     if not all(shape > 0.0 for shape in shapes):
-        raise ModelError(f"the shape parameters of '{builder.path(force)}' are not all positive; give such")
+        raise ModelError(
+            f"the shape parameters of '{builder.path(force)}' are not all positive; give such"
+        )
     return shapes
 
 

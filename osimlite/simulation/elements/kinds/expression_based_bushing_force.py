@@ -35,6 +35,8 @@ KIND = Kind(
     bushing,
     parameters=(
         Vector(6, lambda builder, force: (*force.rotational_damping, *force.translational_damping)),
-        Expressions(tuple(f"{load}_expression" for load in ("Mx", "My", "Mz", "Fx", "Fy", "Fz")), VARIABLES),
+        Expressions(
+            tuple(f"{load}_expression" for load in ("Mx", "My", "Mz", "Fx", "Fy", "Fz")), VARIABLES
+        ),
     ),
 )

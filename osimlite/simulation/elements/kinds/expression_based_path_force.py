@@ -10,7 +10,13 @@ from osimlite.simulation.elements.parameters import Expression
 
 
 def tension(
-    length: float, rate: float, l0: float, clamped: float, steps: Ints, constants: Floats, registers: Floats
+    length: float,
+    rate: float,
+    l0: float,
+    clamped: float,
+    steps: Ints,
+    constants: Floats,
+    registers: Floats,
 ) -> float:
     """Tension."""
     return of_two(stretch(length, l0, clamped > 0.0), rate, steps, constants, registers)

@@ -36,7 +36,10 @@ def bushing(
 def _energy(force: DeclaredForce, record: Sequence[float]) -> float:
     _, *functions = force.values
     deviations = record[DEVIATIONS : DEVIATIONS + 6]
-    return sum(integral(function, 0.0, value) for function, value in zip(functions, deviations, strict=True))
+    return sum(
+        integral(function, 0.0, value)
+        for function, value in zip(functions, deviations, strict=True)
+    )
 
 
 KIND = Kind(

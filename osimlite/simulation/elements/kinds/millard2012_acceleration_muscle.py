@@ -52,7 +52,9 @@ def _check(builder: ElementBuilder, force: Any) -> None:
 def _energy(force: DeclaredForce, record: Sequence[float]) -> float:
     _, m, curves = force.values
     known = force.known(record)
-    return millard2012_acceleration_energy(m, known["length"], known["fiber_length"], known["cos_pennation"], curves)
+    return millard2012_acceleration_energy(
+        m, known["length"], known["fiber_length"], known["cos_pennation"], curves
+    )
 
 
 KIND = muscle(
@@ -82,9 +84,15 @@ KIND = muscle(
             curve("force_velocity_curve", VELOCITY_SIZE, force_velocity),
             curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
             curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
-            curve("fiber_compressive_force_length_curve", COMPRESSIVE_SIZE, fiber_compressive_force_length),
             curve(
-                "fiber_compressive_force_cos_pennation_curve", COMPRESSIVE_SIZE, fiber_compressive_force_cos_pennation
+                "fiber_compressive_force_length_curve",
+                COMPRESSIVE_SIZE,
+                fiber_compressive_force_length,
+            ),
+            curve(
+                "fiber_compressive_force_cos_pennation_curve",
+                COMPRESSIVE_SIZE,
+                fiber_compressive_force_cos_pennation,
             ),
         ),
     ),

@@ -49,11 +49,15 @@ def _least_activation(force: Any) -> float:
 
 
 def _pennation(force: Any) -> tuple[float, ...]:
-    return pennation(force.optimal_fiber_length, force.pennation_angle_at_optimal, force.maximum_pennation_angle)
+    return pennation(
+        force.optimal_fiber_length, force.pennation_angle_at_optimal, force.maximum_pennation_angle
+    )
 
 
 def _smallest(force: Any) -> float:
-    by_curve: float = force.active_force_length_curve.min_norm_active_fiber_length * force.optimal_fiber_length
+    by_curve: float = (
+        force.active_force_length_curve.min_norm_active_fiber_length * force.optimal_fiber_length
+    )
     return max(SIGNIFICANT, by_curve, _pennation(force)[1])
 
 
@@ -98,7 +102,9 @@ def _check(builder: ElementBuilder, force: Any) -> None:
 def _energy(force: DeclaredForce, record: Sequence[float]) -> float:
     _, m, curves = force.values
     known = force.known(record)
-    return millard2012_energy(m, known["length"], known["fiber_length"], known["cos_pennation"], curves)
+    return millard2012_energy(
+        m, known["length"], known["fiber_length"], known["cos_pennation"], curves
+    )
 
 
 KIND = muscle(
@@ -124,7 +130,12 @@ KIND = muscle(
         (
             curve("active_force_length_curve", ACTIVE_SIZE, active_force_length, _active),
             curve("force_velocity_curve", VELOCITY_SIZE, force_velocity, _velocity),
-            curve("force_velocity_curve", VELOCITY_SIZE, partial(force_velocity, inverse=True), _inverse),
+            curve(
+                "force_velocity_curve",
+                VELOCITY_SIZE,
+                partial(force_velocity, inverse=True),
+                _inverse,
+            ),
             curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
             curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
         ),
@@ -152,7 +163,12 @@ KIND = muscle(
             fibers_loaded,
             ("velocity", "by_velocity", "by_length", "elastic", "tendon"),
         ),
-        Sought(("velocity", "inverse"), fibers_asking, fibers_moved, ("told_by", "velocity", "by_velocity")),
+        Sought(
+            ("velocity", "inverse"),
+            fibers_asking,
+            fibers_moved,
+            ("told_by", "velocity", "by_velocity"),
+        ),
         muscle_of,
     ),
     stored=_energy,

@@ -21,7 +21,11 @@ class Prescribed(GivenLoad):
         given = []
         for what in ("forceFunctions", "pointFunctions", "torqueFunctions"):
             functions = getattr(force, what).objects
-            given.append(tuple(builder.function(force, item, what) for item in functions if len(functions) == 3))
+            given.append(
+                tuple(
+                    builder.function(force, item, what) for item in functions if len(functions) == 3
+                )
+            )
         start = f"{'ground' if force.forceIsGlobal else frame.name}_{force.name}"
         return Load(
             (f"{start}_f", f"{start}_p", f"{start}_torque_"),

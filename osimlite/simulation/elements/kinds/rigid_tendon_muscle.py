@@ -37,9 +37,8 @@ def rigid_tendon(
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
     """The muscle at a moment; see RigidTendonMuscle of OpenSim, which takes the path's rate for the fibers' velocity.
 
-    Returns:
-        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
-        velocity, active and passive fiber force (N), fiber velocity (m/s).
+    Returns: Tension (N), activation, fiber length (m), cosine of pennation, factors of the active
+        force by length and by velocity, active and passive fiber force (N), fiber velocity (m/s).
     """
     along = max(now.length - m.slack, 0.0)
     fiber_length, cos = along, 1.0
@@ -52,7 +51,17 @@ def rigid_tendon(
     active_force = m.strength * now.excitation * active * factor
     passive_force = m.strength * min(max(passive, 0.0), 10.0)
     tension = (active_force + passive_force) * cos
-    return tension, now.excitation, fiber_length, cos, active, factor, active_force, passive_force, now.rate
+    return (
+        tension,
+        now.excitation,
+        fiber_length,
+        cos,
+        active,
+        factor,
+        active_force,
+        passive_force,
+        now.rate,
+    )
 
 
 def strongest(now: MuscleInputs, m: RigidTendon, curves: RigidTendonCurves) -> float:

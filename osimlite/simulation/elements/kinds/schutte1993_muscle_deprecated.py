@@ -43,28 +43,42 @@ class Schutte(NamedTuple):
     has_curve: float
 
 
-def forces(length: float, strain: float, own: Schutte, curves: SchutteCurves) -> tuple[float, float, float]:
+def forces(
+    length: float, strain: float, own: Schutte, curves: SchutteCurves
+) -> tuple[float, float, float]:
     """Active, passive and tendon force."""
     active, _, _ = value_at(curves.active, length)
     tendon, _, _ = value_at(curves.tendon, strain)
-    passive = value_at(curves.passive, length)[0] if own.has_curve else schutte_passive_force(length)
+    passive = (
+        value_at(curves.passive, length)[0] if own.has_curve else schutte_passive_force(length)
+    )
     return active, passive, tendon if strain >= 0.0 else 0.0
 
 
-def schutte(now: MuscleInputs, m: OldMuscle, own: Schutte, curves: SchutteCurves) -> tuple[float, ...]:
+def schutte(
+    now: MuscleInputs, m: OldMuscle, own: Schutte, curves: SchutteCurves
+) -> tuple[float, ...]:
     """The muscle at a moment; see Schutte1993Muscle_Deprecated::computeActuation of OpenSim."""
     fibers = fibers_at(now, m, forces, own, curves)
     cos, active, passive, tendon = fibers
     if cos > NOTHING:
         borne = max(tendon / cos - passive, 0.0)
-        velocity = schutte_velocity(now.activation, max(active, 0.0), borne, own.damping) * m.optimal / own.time
+        velocity = (
+            schutte_velocity(now.activation, max(active, 0.0), borne, own.damping)
+            * m.optimal
+            / own.time
+        )
     else:
         velocity = now.rate * rigid_cos(now.length, m) if abs(tendon) > NOTHING else 0.0
-    activation_rate = scaled_activation_rate(now.excitation, now.activation, own.more, own.least, own.time)
+    activation_rate = scaled_activation_rate(
+        now.excitation, now.activation, own.more, own.least, own.time
+    )
     return *recorded(now, fibers, m), activation_rate, velocity
 
 
-def equilibrium(now: MuscleInputs, m: OldMuscle, own: Schutte, curves: SchutteCurves) -> tuple[bool, float]:
+def equilibrium(
+    now: MuscleInputs, m: OldMuscle, own: Schutte, curves: SchutteCurves
+) -> tuple[bool, float]:
     """The fiber length in equilibrium."""
     return True, isometric_length(now.length, m.optimal, now.activation, m, forces, own, curves)
 
@@ -88,5 +102,7 @@ KIND = old_muscle(
         (positive("time_scale"), Number("activation1"), Number("activation2"), positive("damping")),
         _has_curve,
     ),
-    Together(SchutteCurves, tuple(Curve(f"{name}_force_length_curve") for name in SchutteCurves._fields)),
+    Together(
+        SchutteCurves, tuple(Curve(f"{name}_force_length_curve") for name in SchutteCurves._fields)
+    ),
 )

@@ -37,7 +37,11 @@ def contact(
 
 
 def _check(builder: ElementBuilder, force: Any) -> None:
-    if force.stiffness < 0.0 or force.constant_contact_force < 0.0 or force.transition_velocity <= 0.0:
+    if (
+        force.stiffness < 0.0
+        or force.constant_contact_force < 0.0
+        or force.transition_velocity <= 0.0
+    ):
         raise ModelError(
             f"'{builder.path(force)}' needs a stiffness and a constant_contact_force that are not negative, "
             "and a positive transition_velocity"

@@ -24,11 +24,16 @@ def _check(builder: ElementBuilder, force: Thelen2003Muscle) -> None:
     require(
         builder,
         force,
-        *(Number(flag, lambda x: x == 0.0, "is true, which a Thelen2003Muscle cannot do") for flag in flags),
+        *(
+            Number(flag, lambda x: x == 0.0, "is true, which a Thelen2003Muscle cannot do")
+            for flag in flags
+        ),
         Number("minimum_activation", lambda x: x >= 0.01, "is less than 0.01"),
         *map(positive, ("FmaxTendonStrain", "FmaxMuscleStrain")),
         Number("KshapePassive", lambda x: 1e-9 < x < 700.0, "is not between 1e-9 and 700"),
-        Number("fv_linear_extrap_threshold", lambda x: x * force.Flen > 1.0, "is not above 1 / Flen"),
+        Number(
+            "fv_linear_extrap_threshold", lambda x: x * force.Flen > 1.0, "is not above 1 / Flen"
+        ),
     )
 
 
@@ -45,7 +50,9 @@ def _others(builder: ElementBuilder, force: Thelen2003Muscle) -> tuple[float, ..
 
 def _energy(force: DeclaredForce, record: Sequence[float]) -> float:
     known = force.known(record)
-    return thelen2003_energy(force.values[1], known["length"], known["fiber_length"], known["cos_pennation"])
+    return thelen2003_energy(
+        force.values[1], known["length"], known["fiber_length"], known["cos_pennation"]
+    )
 
 
 KIND = muscle(

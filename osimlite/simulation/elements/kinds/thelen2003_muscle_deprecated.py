@@ -39,10 +39,16 @@ class FirstThelen(NamedTuple):
     most: float
 
 
-def forces(length: float, strain: float, own: FirstThelen, curves: tuple[()]) -> tuple[float, float, float]:
+def forces(
+    length: float, strain: float, own: FirstThelen, curves: tuple[()]
+) -> tuple[float, float, float]:
     """Active, passive and tendon force."""
     passive = thelen_passive_force(length, own.passive_strain, own.passive_shape)
-    return thelen_active_force(length, own.width), passive, thelen_tendon_force(strain, own.tendon_strain)
+    return (
+        thelen_active_force(length, own.width),
+        passive,
+        thelen_tendon_force(strain, own.tendon_strain),
+    )
 
 
 def thelen(now: MuscleInputs, m: OldMuscle, own: FirstThelen) -> tuple[float, ...]:
@@ -82,7 +88,9 @@ KIND = old_muscle(
             positive("deactivation_time_constant"),
             Number("Vmax"),
             Number("Vmax0"),
-            *map(positive, ("FmaxTendonStrain", "FmaxMuscleStrain", "KshapeActive", "KshapePassive")),
+            *map(
+                positive, ("FmaxTendonStrain", "FmaxMuscleStrain", "KshapeActive", "KshapePassive")
+            ),
             Number("damping"),
             positive("Af"),
             Number("Flen", lambda x: x > 1.0, "is not above 1"),

@@ -34,7 +34,9 @@ def actuator_force(actuation: float, n: Power) -> float:
 def _read(builder: ElementBuilder, probe: ActuatorForceProbe) -> Reading:
     actuators = members_of(builder, probe, probe.actuator_names, "/forceset", "Actuator")
     subjects = tuple(Subject(actuator, Power(1.0, probe.exponent)) for actuator in actuators)
-    return listed(probe.name, [item.name for item in actuators], subjects, is_sum=probe.sum_forces_together)
+    return listed(
+        probe.name, [item.name for item in actuators], subjects, is_sum=probe.sum_forces_together
+    )
 
 
 def listed(name: str, subjects: list[str], read: tuple[Subject, ...], *, is_sum: bool) -> Reading:

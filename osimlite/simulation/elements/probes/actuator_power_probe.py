@@ -19,9 +19,12 @@ def _read(builder: ElementBuilder, probe: ActuatorPowerProbe) -> Reading:
     # A tension pulls against the lengthening speed.
     factors = [-1.0 if isinstance(item, PathActuator) else 1.0 for item in actuators]
     subjects = tuple(
-        Subject(item, Power(factor, probe.exponent)) for item, factor in zip(actuators, factors, strict=True)
+        Subject(item, Power(factor, probe.exponent))
+        for item, factor in zip(actuators, factors, strict=True)
     )
-    return listed(probe.name, [item.name for item in actuators], subjects, is_sum=probe.sum_powers_together)
+    return listed(
+        probe.name, [item.name for item in actuators], subjects, is_sum=probe.sum_powers_together
+    )
 
 
 PROBE = ProbeKind(ActuatorPowerProbe, _read, actuator_power, ("actuation", "speed"), Power)

@@ -27,7 +27,14 @@ def _law(
 ) -> float:
     maintained, _, _ = value_at(curve, fiber_length / m.optimal_fiber_length)
     return bhargava2004(
-        activation, excitation, active_force, passive_force, fiber_velocity, force_length, maintained, m
+        activation,
+        excitation,
+        active_force,
+        passive_force,
+        fiber_velocity,
+        force_length,
+        maintained,
+        m,
     )
 
 
@@ -58,4 +65,6 @@ READS = (
     "active_force_length",
 )
 
-PROBE = ProbeKind(Bhargava2004MuscleMetabolicsProbe, _read, _law, READS, Bhargava2004, has_curve=True)
+PROBE = ProbeKind(
+    Bhargava2004MuscleMetabolicsProbe, _read, _law, READS, Bhargava2004, has_curve=True
+)

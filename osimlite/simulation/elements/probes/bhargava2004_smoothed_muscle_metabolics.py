@@ -41,10 +41,19 @@ def _measure(probe: DeclaredProbe, system: Any, t: float, y: Sequence[float]) ->
     """Sums of the rates of all muscles, the basal one added to the first, and the whole rate of each."""
     rates = []
     for places, numbers in zip(probe.places, probe.numbers, strict=True):
-        m, by = Bhargava2004(*numbers[: -len(Smoothed._fields)]), Smoothed(*numbers[-len(Smoothed._fields) :])
-        activation, control, active, passive, length, velocity, factor = (system.recorded(*place) for place in places)
+        m, by = (
+            Bhargava2004(*numbers[: -len(Smoothed._fields)]),
+            Smoothed(*numbers[-len(Smoothed._fields) :]),
+        )
+        activation, control, active, passive, length, velocity, factor = (
+            system.recorded(*place) for place in places
+        )
         maintained, _, _ = MAINTAINED.derivatives(length / m.optimal_fiber_length)
-        rates.append(bhargava2004_smoothed(activation, control, active, passive, velocity, factor, maintained, m, by))
+        rates.append(
+            bhargava2004_smoothed(
+                activation, control, active, passive, velocity, factor, maintained, m, by
+            )
+        )
     sums = [sum(column) for column in zip(*rates, strict=True)] or [0.0] * len(RATES)
     return [sums[0] + probe.reading.constant, *sums[1:], *(row[0] for row in rates)]
 

@@ -15,12 +15,25 @@ from osimlite.simulation.elements.probes.actuator_force_probe import listed, rai
 
 
 def _read(builder: ElementBuilder, probe: JointInternalPowerProbe) -> Reading:
-    mechanism, joints = builder.mechanism, members_of(builder, probe, probe.joint_names, "/jointset", "Joint")
-    infos = [(place, info) for place, info in enumerate(mechanism.coordinates) if info.prescribed is not None]
-    driven = [[place for place, info in infos if info.joint == builder.path(joint)] for joint in joints]
-    if any(driven) and not all(isinstance(item, Lock | Prescribed) for item in mechanism.constraints):
+    mechanism, joints = (
+        builder.mechanism,
+        members_of(builder, probe, probe.joint_names, "/jointset", "Joint"),
+    )
+    infos = [
+        (place, info)
+        for place, info in enumerate(mechanism.coordinates)
+        if info.prescribed is not None
+    ]
+    driven = [
+        [place for place, info in infos if info.joint == builder.path(joint)] for joint in joints
+    ]
+    if any(driven) and not all(
+        isinstance(item, Lock | Prescribed) for item in mechanism.constraints
+    ):
         raise builder.unsupported(probe, " of prescribed coordinates beside other constraints")
-    reading = listed(probe.name, [joint.name for joint in joints], (), is_sum=probe.sum_powers_together)
+    reading = listed(
+        probe.name, [joint.name for joint in joints], (), is_sum=probe.sum_powers_together
+    )
     return reading._replace(details=(driven, probe.exponent, probe.sum_powers_together))
 
 

@@ -28,6 +28,13 @@ PROBE = ProbeKind(
     Umberger2010MuscleMetabolicsProbe,
     _read,
     umberger2010,
-    ("activation", "control", "active_fiber_force", "fiber_length", "fiber_velocity", "active_force_length"),
+    (
+        "activation",
+        "control",
+        "active_fiber_force",
+        "fiber_length",
+        "fiber_velocity",
+        "active_force_length",
+    ),
     Umberger2010,
 )

@@ -1,9 +1,10 @@
 """The PyBullet engine: Bullet computes mass matrix and bias, the kernels all else; or Bullet takes the steps.
 
-Bullet carries the expanded chain: each axis of a joint is a joint of its own. Two routes lead to the accelerations.
-"mass-matrix" takes the matrix and the bias from Bullet's inverse dynamics. "articulated-body" lets Bullet take a step
-of one second from the state and reads the change of the speeds, which is exactly the acceleration, since Bullet's step
-is semi-implicit Euler; it is for models without constraints whose coordinates move one axis each.
+Bullet carries the expanded chain: each axis of a joint is a joint of its own. Two routes lead to
+the accelerations. "mass-matrix" takes the matrix and the bias from Bullet's inverse dynamics.
+"articulated-body" lets Bullet take a step of one second from the state and reads the change of the
+speeds, which is exactly the acceleration, since Bullet's step is semi-implicit Euler; it is for
+models without constraints whose coordinates move one axis each.
 """
 
 from __future__ import annotations
@@ -45,7 +46,9 @@ ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY)
 
 def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BulletEngine:
     """Make the engine."""
-    return BulletEngine(mechanism, forces, route=settings.route, show=settings.show, visuals=settings.visuals)
+    return BulletEngine(
+        mechanism, forces, route=settings.route, show=settings.show, visuals=settings.visuals
+    )
 
 
 class BulletEngine(KernelEngine):
@@ -58,9 +61,9 @@ class BulletEngine(KernelEngine):
         show: open Bullet's window.
         visuals: what the bodies look like.
 
-    Raises:
-        UnsupportedError: the joints or constraints of the mechanism rule out the route asked for.
-        SimulationError: a body at the end of a chain has no mass; or there is no screen to show the motion on.
+    Raises: UnsupportedError: the joints or constraints of the mechanism rule out the route asked
+        for. SimulationError: a body at the end of a chain has no mass; or there is no screen to
+        show the motion on.
     """
 
     name = "bullet"
@@ -80,7 +83,9 @@ class BulletEngine(KernelEngine):
         free = free_coordinates(mechanism)
         fixed = [place for place in range(len(mechanism.coordinates)) if place not in free]
         shapes = {} if visuals is None else visuals.by_body
-        robot = legal_names(merge_fixed(build_robot(mechanism, locked=fixed, body_frames=False, visuals=shapes)))
+        robot = legal_names(
+            merge_fixed(build_robot(mechanism, locked=fixed, body_frames=False, visuals=shapes))
+        )
         is_plain = _is_plain(mechanism, robot)
         # What is added to inertias that no body has, and taken off again, costs digits.
         is_exact = is_plain and any(excess(link) > 0.0 for link in robot.links)
@@ -104,24 +109,32 @@ class BulletEngine(KernelEngine):
         try:
             indices = {item.path: index for index, item in enumerate(mechanism.bodies)}
             added = [
-                (indices[next(iter(link.bodies))], excess(link)) for link in robot.links if link.name in body.impossible
+                (indices[next(iter(link.bodies))], excess(link))
+                for link in robot.links
+                if link.name in body.impossible
             ]
             supply = self._supply_by_step if is_exact else self._supply_matrix
-            super().__init__(mechanism, forces, Chain(body.joints, [] if is_exact else added, supply))
+            super().__init__(
+                mechanism, forces, Chain(body.joints, [] if is_exact else added, supply)
+            )
         except BaseException:
             self.close()
             raise
         # Bullet takes inertias that no body has, but not for mass matrices.
         self._steps_itself = is_plain and (is_exact or not added)
         count = len(body.joints)
-        self._moves = self.structure[self.structure[MODEL.CHAIN] + CHAIN.WORK_JOINTS] if count else 0
+        self._moves = (
+            self.structure[self.structure[MODEL.CHAIN] + CHAIN.WORK_JOINTS] if count else 0
+        )
         self._forces = self._moves + 3 * count
         self._pack_forces: Any = Struct(f"{count}d").pack_into
         self._pack_matrix: Any = Struct(f"{count * count}d").pack_into
         self.coordinates = [joint.coordinates[0] for joint in body.joints]
 
     # ---------------------------------------------------------------------------------------- accelerations
-    def _supply_matrix(self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int) -> None:
+    def _supply_matrix(
+        self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int
+    ) -> None:
         """Mass matrix and bias; see :class:`osimlite.simulation.pack_chain.Chain`."""
         robot, client, first = self.world.id, self.world.client, self._forces
         values, rates, accelerations = data[self._moves : first].reshape(3, -1).tolist()
@@ -137,7 +150,9 @@ class BulletEngine(KernelEngine):
         matrix = chain.from_iterable(bullet.calculateMassMatrix(robot, values, 0, client))
         self._pack_matrix(data, 8 * (first + len(forces)), *matrix)
 
-    def _supply_by_step(self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int) -> None:
+    def _supply_by_step(
+        self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int
+    ) -> None:
         """Accelerations a: a mass matrix of one, and b - a as what has to be overcome."""
         first, size = self._forces, len(self.order)
         values, rates, biases = data[self._moves : first].reshape(3, -1)
@@ -155,7 +170,9 @@ class BulletEngine(KernelEngine):
         return np.linalg.solve(rates.T, spread)[self.coordinates].tolist()
 
     # ---------------------------------------------------------------------------------------------- motion
-    def stepper(self, t: float, y: Sequence[float], settings: Settings, observe: Observer) -> Stepper:
+    def stepper(
+        self, t: float, y: Sequence[float], settings: Settings, observe: Observer
+    ) -> Stepper:
         """What integrates from a state on: Runge-Kutta-Merson, or fixed steps, which Bullet takes if it can."""
         window = self.window
         if window is not None:

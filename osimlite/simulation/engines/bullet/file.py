@@ -19,7 +19,9 @@ from osimlite.simulation.robot.urdf import urdf_text
 def robot_text(robot: Robot) -> str:
     """The robot as URDF, with inertias that Bullet does not set to zero."""
     links = [
-        replace(link, inertia=link.inertia + excess(link) * np.eye(3)) if excess(link) > 0.0 else link
+        replace(link, inertia=link.inertia + excess(link) * np.eye(3))
+        if excess(link) > 0.0
+        else link
         for link in robot.links
     ]
     return urdf_text(replace(robot, links=tuple(links)), visuals=True)

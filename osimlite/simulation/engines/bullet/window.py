@@ -55,7 +55,9 @@ class Window:
         with muted(1):
             self.client = int(bullet.connect(bullet.GUI))
         if self.client < 0:
-            raise SimulationError("Bullet opens no window here; leave out --gui, and take --animate for a film")
+            raise SimulationError(
+                "Bullet opens no window here; leave out --gui, and take --animate for a film"
+            )
         # Models without gravity have OpenSim's Y up too.
         y_is_up = abs(gravity[2]) <= max(abs(gravity[0]), abs(gravity[1]))
         switches = {
@@ -124,13 +126,17 @@ class Window:
         except bullet.error:
             if bullet.isConnected(self.client):
                 raise
-            raise SimulationError(f"the window was closed at t = {t:.3g} s, before the motion had ended") from None
+            raise SimulationError(
+                f"the window was closed at t = {t:.3g} s, before the motion had ended"
+            ) from None
 
     def draw(self, values: Sequence[float]) -> None:
         """Show the robot with these joint values."""
         client = self.client
         rest = [(0.0,)] * len(values)
-        bullet.resetJointStatesMultiDof(self._robot, self._joints, [(x,) for x in values], rest, client)
+        bullet.resetJointStatesMultiDof(
+            self._robot, self._joints, [(x,) for x in values], rest, client
+        )
         if not self._links:
             return
         states = bullet.getLinkStates(self._robot, self._links, physicsClientId=client)
@@ -140,7 +146,9 @@ class Window:
         elif asked := self._asked():
             self._view = asked
         yaw, pitch, distance = self._view
-        bullet.resetDebugVisualizerCamera(distance, yaw, pitch, places.mean(axis=0).tolist(), physicsClientId=client)
+        bullet.resetDebugVisualizerCamera(
+            distance, yaw, pitch, places.mean(axis=0).tolist(), physicsClientId=client
+        )
 
     def _asked(self) -> tuple[float, float, float] | None:
         """The view that somebody has turned to; None as long as it is that of the start."""

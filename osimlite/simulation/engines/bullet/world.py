@@ -1,6 +1,7 @@
 """A robot alone in a Bullet world of its own, set up so that it obeys mechanics and nothing else.
 
-Bullet is made for games; what has to be changed so that it computes mechanics is here, one method or constant for each.
+Bullet is made for games; what has to be changed so that it computes mechanics is here, one method
+or constant for each.
 """
 
 from __future__ import annotations
@@ -62,7 +63,8 @@ class World:
         impossible: names of links whose inertia no real body has.
     """
 
-    # Without this flag Bullet makes up inertias from collision shapes, of which there are none. Sleeping stays off.
+    # Without this flag Bullet makes up inertias from collision shapes, of which there are none.
+    # Sleeping stays off.
     FLAGS = bullet.URDF_USE_INERTIA_FROM_FILE
 
     DAMPING = 0.0
@@ -96,8 +98,13 @@ class World:
         bullet.setPhysicsEngineParameter(numSubSteps=0, physicsClientId=client)
         self.impossible = [link.name for link in robot.links if excess(link) > 0.0]
         with temporary_file(robot_text(robot), files) as path:
-            self.id = bullet.loadURDF(path, useFixedBase=1, flags=self.FLAGS, physicsClientId=client)
-        infos = [bullet.getJointInfo(self.id, index, client) for index in range(bullet.getNumJoints(self.id, client))]
+            self.id = bullet.loadURDF(
+                path, useFixedBase=1, flags=self.FLAGS, physicsClientId=client
+            )
+        infos = [
+            bullet.getJointInfo(self.id, index, client)
+            for index in range(bullet.getNumJoints(self.id, client))
+        ]
         self.joints = self.sort_joints(robot, infos)
         self._indices = [int(info[0]) for info in infos if info[3] >= 0]
         self._release(infos)
@@ -130,7 +137,11 @@ class World:
         if self._indices:
             none = [0.0] * len(self._indices)
             bullet.setJointMotorControlArray(
-                self.id, self._indices, bullet.VELOCITY_CONTROL, forces=none, physicsClientId=self.client
+                self.id,
+                self._indices,
+                bullet.VELOCITY_CONTROL,
+                forces=none,
+                physicsClientId=self.client,
             )
 
     def set_inertias(self, robot: Robot, infos: Sequence[Sequence[Any]]) -> None:
@@ -149,7 +160,9 @@ class World:
 
     def set_state(self, q: Sequence[float], rates: Sequence[float]) -> None:
         """Put the joints into a state, and all links where they then are."""
-        bullet.resetJointStatesMultiDof(self.id, self._indices, [(x,) for x in q], [(x,) for x in rates], self.client)
+        bullet.resetJointStatesMultiDof(
+            self.id, self._indices, [(x,) for x in q], [(x,) for x in rates], self.client
+        )
 
     def get_state(self) -> tuple[list[float], list[float]]:
         """Values and rates of the joints."""
@@ -167,7 +180,9 @@ class World:
         )
         bullet.stepSimulation(client)
 
-    def accelerations_by_step(self, q: list[float], rates: list[float], forces: Sequence[float]) -> list[float]:
+    def accelerations_by_step(
+        self, q: list[float], rates: list[float], forces: Sequence[float]
+    ) -> list[float]:
         """Second derivatives of the joint values: what one second changes the rates by."""
         self.set_state(q, rates)
         self.step(1.0, forces)
@@ -184,5 +199,7 @@ class World:
 def _connect() -> int:
     client = int(bullet.connect(bullet.DIRECT))
     if client < 0:
-        raise SimulationError("Bullet opens no more worlds; close the engines that are not needed any more")
+        raise SimulationError(
+            "Bullet opens no more worlds; close the engines that are not needed any more"
+        )
     return client

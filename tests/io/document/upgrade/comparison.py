@@ -42,7 +42,9 @@ def properties(ours: Object, theirs: Object) -> Iterator[tuple[Object, Object, F
             yield ours, theirs, spec
             continue
         mine, other = held(ours, spec), held(theirs, spec)
-        assert len(mine) == len(other), f"{ours!r} holds {len(mine)} in {spec.name}, {len(other)} for OpenSim"
+        assert len(mine) == len(other), (
+            f"{ours!r} holds {len(mine)} in {spec.name}, {len(other)} for OpenSim"
+        )
         for one, two in zip(mine, other, strict=True):
             yield from properties(one, two)
 
@@ -57,7 +59,9 @@ def equal(mine: Object, other: Object, spec: FieldSpec, ours: Tree, theirs: Tree
     if isinstance(spec.kind, Reference) and spec.name.startswith("socket_") and left != right:
         # OpenSim writes every path in one spelling; what counts is where it leads.
         return led(mine, spec, ours) == led(other, spec, theirs)
-    rounded = (type(mine).__name__, spec.name) in ROUNDED or (spec.legacy and isinstance(left, tuple))
+    rounded = (type(mine).__name__, spec.name) in ROUNDED or (
+        spec.legacy and isinstance(left, tuple)
+    )
     return same(left, right, SIX_DIGITS if rounded else 0.0)
 
 
@@ -68,7 +72,9 @@ def led(item: Object, spec: FieldSpec, tree: Tree) -> str | None:
 
 def same(left: Any, right: Any, tolerance: float) -> bool:
     if isinstance(left, tuple) and isinstance(right, tuple):
-        return len(left) == len(right) and all(same(a, b, tolerance) for a, b in zip(left, right, strict=True))
+        return len(left) == len(right) and all(
+            same(a, b, tolerance) for a, b in zip(left, right, strict=True)
+        )
     if isinstance(left, float) and isinstance(right, float):
         near = math.isclose(left, right, rel_tol=tolerance, abs_tol=1e-12 if tolerance else 0.0)
         return near or (left != left and right != right)
@@ -89,8 +95,13 @@ def excepted(mine: Object, other: Object, spec: FieldSpec, model: Model) -> bool
             # An equilibrium muscle with damping sets its own curve's floor.
             return (left, right) == (0.1, 0.0)
         case "Appearance", "color":
-            # OpenSim paints every ligament green, whatever colour the file gives it; we keep the file's.
-            paths = [force.geometry_path for force in model.components() if type(force).__name__ == "Ligament"]
+            # OpenSim paints every ligament green, whatever colour the file gives it; we keep the
+            # file's.
+            paths = [
+                force.geometry_path
+                for force in model.components()
+                if type(force).__name__ == "Ligament"
+            ]
             return right == (0.0, 1.0, 0.0) and any(mine is path.appearance for path in paths)
         case "PointActuator", "force_is_global":
             # OpenSim turns it on for a file from before 10905, and leaves it out when it prints.

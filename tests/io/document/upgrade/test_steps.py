@@ -117,9 +117,7 @@ def test_references_follow_a_name_that_loses_its_white_space() -> None:
 
 
 def test_a_name_without_its_white_space_may_be_taken() -> None:
-    second = (
-        '<Body name="thi gh"> <Joint> <PinJoint name="j"> <parent_body>thigh</parent_body> </PinJoint> </Joint> </Body>'
-    )
+    second = '<Body name="thi gh"> <Joint> <PinJoint name="j"> <parent_body>thigh</parent_body> </PinJoint> </Joint> </Body>'
     model = document(
         BODIES.replace("</objects> </BodySet>", second + "</objects> </BodySet>")
         + "<MarkerSet> <objects> <Marker name='m'> <body>thi gh</body> </Marker> </objects> </MarkerSet>"
@@ -152,9 +150,7 @@ def test_a_coordinate_is_found_though_something_else_has_its_name() -> None:
 
 
 def test_a_coordinate_of_a_joint_whose_name_is_there_twice() -> None:
-    shank = (
-        '<Body name="shank"> <Joint> <PinJoint name="hip"> <parent_body>thigh</parent_body> <CoordinateSet> <objects>'
-    )
+    shank = '<Body name="shank"> <Joint> <PinJoint name="hip"> <parent_body>thigh</parent_body> <CoordinateSet> <objects>'
     shank += ' <Coordinate name="knee" /> </objects> </CoordinateSet> </PinJoint> </Joint> </Body>'
     model = document(
         BODIES.replace("</objects> </BodySet>", shank + "</objects> </BodySet>")
@@ -189,7 +185,11 @@ def test_plug_in_forces_are_upgraded_by_where_they_stand() -> None:
 
 
 def test_comments_survive() -> None:
-    text = to_text(document(BODIES.replace("<Joint> <PinJoint", "<!--by hand--><Joint> <!--mine--> <PinJoint")).model)
+    text = to_text(
+        document(
+            BODIES.replace("<Joint> <PinJoint", "<!--by hand--><Joint> <!--mine--> <PinJoint")
+        ).model
+    )
     assert "<!--by hand-->" in text
 
 
@@ -209,7 +209,11 @@ def test_positions_are_those_of_the_old_text(fixtures: Path) -> None:
         "<location_in_parent>0.1234567891 0 0</location_in_parent>"
     )
     assert line_of("/bodyset/thigh", "inertia").startswith("<inertia_xx>")
-    assert all(source.spans[item.source_index].tag for item in model.walk() if item.source_index is not None)
+    assert all(
+        source.spans[item.source_index].tag
+        for item in model.walk()
+        if item.source_index is not None
+    )
 
 
 def test_notes_stand_where_they_stood_in_the_old_text() -> None:
@@ -230,7 +234,11 @@ def test_what_is_lost_is_said(fixtures: Path) -> None:
 
 
 def test_a_model_without_a_document_around_it() -> None:
-    old = read_document(Source(f'<?xml version="1.0"?>\n<!--from 2005-->\n<Model name="old">{BODIES}</Model>'.encode()))
+    old = read_document(
+        Source(
+            f'<?xml version="1.0"?>\n<!--from 2005-->\n<Model name="old">{BODIES}</Model>'.encode()
+        )
+    )
     assert old.version == 10500
     assert old.model["/jointset/hip/flexion"].name == "flexion"
     assert old.source.spans[old.model.source_index].tag == "Model"
@@ -248,7 +256,9 @@ def test_a_model_without_a_document_around_it() -> None:
         (9, "", ["version 9", "begin at 10500"]),
     ],
 )  # fmt: skip
-def test_a_document_too_old_is_refused_with_what_would_be_lost(version: int, inside: str, said: list[str]) -> None:
+def test_a_document_too_old_is_refused_with_what_would_be_lost(
+    version: int, inside: str, said: list[str]
+) -> None:
     with pytest.raises(VersionError) as caught:
         document(inside, version)
     assert caught.value.version == version
@@ -311,12 +321,19 @@ def test_a_connector_whose_name_makes_no_tag_stays_as_it_is() -> None:
 
 
 def test_an_empty_old_model() -> None:
-    assert read_text('<OpenSimDocument Version="20000"><Model name="a b"/></OpenSimDocument>').name == "ab"
+    assert (
+        read_text('<OpenSimDocument Version="20000"><Model name="a b"/></OpenSimDocument>').name
+        == "ab"
+    )
 
 
 def test_a_tool_cannot_name_all_actuators_of_its_model() -> None:
-    controller = "<PrescribedController name='c'><actuator_list>ALL</actuator_list></PrescribedController>"
-    tool = f"<ForwardTool><ControllerSet><objects>{controller}</objects></ControllerSet></ForwardTool>"
+    controller = (
+        "<PrescribedController name='c'><actuator_list>ALL</actuator_list></PrescribedController>"
+    )
+    tool = (
+        f"<ForwardTool><ControllerSet><objects>{controller}</objects></ControllerSet></ForwardTool>"
+    )
     text = f'<OpenSimDocument Version="40500">{tool}</OpenSimDocument>'
     (change,) = read_document(Source(text.encode()), of=Object).changes
     assert change.lost is not None and "all actuators" in change.lost
@@ -332,7 +349,11 @@ def test_actuators_without_a_version_push_backwards_as_in_opensim() -> None:
     top: Any = read_document(Source(text.encode()), of=Object).top
     given, bare, torque, about = top.objects
     assert (given.direction, given.force_is_global) == ((0.0, -2.0, 0.0), False)
-    assert (bare.direction, torque.axis, about.axis) == ((-1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, -1.0))
+    assert (bare.direction, torque.axis, about.axis) == (
+        (-1.0, 0.0, 0.0),
+        (-1.0, 0.0, 0.0),
+        (0.0, 0.0, -1.0),
+    )
 
 
 def test_modules_of_steps_are_looked_for_once(monkeypatch):

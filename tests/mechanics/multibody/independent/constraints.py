@@ -28,11 +28,17 @@ def bond(constraint: Constraint, state: Moved) -> Bond:
     mechanism, q, u = state.mechanism, state.q, state.u
     match constraint:
         case Lock(coordinate):
-            rows, drift = mechanism.rate_matrix(q)[[coordinate]], -mechanism.rate_bias(q, u)[[coordinate]]
+            rows, drift = (
+                mechanism.rate_matrix(q)[[coordinate]],
+                -mechanism.rate_bias(q, u)[[coordinate]],
+            )
             return Bond(np.zeros(0), rows, np.zeros(1), drift)
         case Prescribed(coordinate, function):
             value, first, second = function.evaluate(np.array((state.time,)))
-            rows, bias = mechanism.rate_matrix(q)[[coordinate]], mechanism.rate_bias(q, u)[[coordinate]]
+            rows, bias = (
+                mechanism.rate_matrix(q)[[coordinate]],
+                mechanism.rate_bias(q, u)[[coordinate]],
+            )
             return Bond(q[[coordinate]] - value, rows, np.array(first), second[0] - bias)
         case Coupler(dependent, independent, function):
             others, row = list(independent), np.zeros((1, len(q)))
@@ -43,7 +49,12 @@ def bond(constraint: Constraint, state: Moved) -> Bond:
             # Of a coupler without independent coordinates the Hessian is an empty list.
             bends = np.reshape(hessian, (len(others), len(others)))
             drift = -(row @ mechanism.rate_bias(q, u)) - rates @ bends @ rates
-            return Bond(np.array((value - q[dependent],)), row @ mechanism.rate_matrix(q), np.zeros(1), drift)
+            return Bond(
+                np.array((value - q[dependent],)),
+                row @ mechanism.rate_matrix(q),
+                np.zeros(1),
+                drift,
+            )
         case b.PointConstraint():
             return meeting(state, constraint.first, constraint.second).bond()
         case b.DistanceConstraint():
@@ -51,7 +62,10 @@ def bond(constraint: Constraint, state: Moved) -> Bond:
             length = float(np.linalg.norm(arm.value))
             along = arm.value / length
             stretch = float(arm.rate @ arm.rate - (along @ arm.rate) ** 2) / length
-            errors, drift = np.array((length - constraint.distance,)), -np.array((along @ arm.bias + stretch,))
+            errors, drift = (
+                np.array((length - constraint.distance,)),
+                -np.array((along @ arm.bias + stretch,)),
+            )
             return Bond(errors, (along @ arm.jacobian)[None], np.zeros(1), drift)
         case b.PointOnLineConstraint():
             arm = station(state, constraint.follower).minus(station(state, constraint.line))
@@ -59,9 +73,14 @@ def bond(constraint: Constraint, state: Moved) -> Bond:
             return joined(*(product(axis, arm) for axis in axes))
         case b.WeldConstraint():
             (one, inner), (two, outer) = constraint.first, constraint.second
-            arm = meeting(state, StationPlacement(one, inner[:3, 3]), StationPlacement(two, outer[:3, 3]))
+            arm = meeting(
+                state, StationPlacement(one, inner[:3, 3]), StationPlacement(two, outer[:3, 3])
+            )
             turns = [
-                product(direction(state, two, outer[:3, axis]), direction(state, one, inner[:3, (axis + 1) % 3]))
+                product(
+                    direction(state, two, outer[:3, axis]),
+                    direction(state, one, inner[:3, (axis + 1) % 3]),
+                )
                 for axis in range(3)
             ]
             return joined(*turns, arm.bond())
@@ -74,16 +93,22 @@ def bond(constraint: Constraint, state: Moved) -> Bond:
 def rolling(constraint: b.RollingConstraint, state: Moved) -> Bond:
     """The height, and the turn about the normal."""
     surface, roller = constraint.surface, constraint.roller
-    centre, foot = (station(state, StationPlacement(body, np.zeros(3))) for body in (roller, surface))
+    centre, foot = (
+        station(state, StationPlacement(body, np.zeros(3))) for body in (roller, surface)
+    )
     normal = direction(state, surface, constraint.normal / np.linalg.norm(constraint.normal))
-    square = product(direction(state, surface, np.eye(3)[0]), direction(state, roller, np.eye(3)[2]))
+    square = product(
+        direction(state, surface, np.eye(3)[0]), direction(state, roller, np.eye(3)[2])
+    )
     return joined(product(normal, centre.minus(foot), constraint.height), square)
 
 
 def slips(constraint: b.RollingConstraint, state: Moved) -> list[Bond]:
     """The roller's material point at the foot, whose place in the roller changes, moves along with the surface."""
     surface, roller = constraint.surface, constraint.roller
-    centre, foot = (station(state, StationPlacement(body, np.zeros(3))) for body in (roller, surface))
+    centre, foot = (
+        station(state, StationPlacement(body, np.zeros(3))) for body in (roller, surface)
+    )
     arm, w = foot.minus(centre), state.velocities[roller][:3]
     jacobian = centre.jacobian - skew(arm.value) @ state.jacobians[roller][:3] - foot.jacobian
     rate = centre.rate + cross(w, arm.value) - foot.rate
@@ -130,12 +155,14 @@ def station(state: Moved, place: StationPlacement) -> MovingVector:
 def meeting(state: Moved, first: StationPlacement, second: StationPlacement) -> MovingVector:
     """From one station to another, and how fast the second leaves the point of the first body that is there.
 
-    This is what Simbody holds still: as the first body sees it, the rate of the vector, and as the body sees it that
-    carries both, how that changes.
+    This is what Simbody holds still: as the first body sees it, the rate of the vector, and as the
+    body sees it that carries both, how that changes.
     """
     end = station(state, second)
     body = first.body
-    start = station(state, StationPlacement(body, state.rotations[body].T @ (end.value - state.origins[body])))
+    start = station(
+        state, StationPlacement(body, state.rotations[body].T @ (end.value - state.origins[body]))
+    )
     apart = end.minus(start)
     turning = state.velocities[carrier(state.mechanism, (body, second.body))][:3]
     bias = apart.bias - 2.0 * cross(turning, apart.rate)

@@ -35,7 +35,14 @@ class MassCentres:
         arms = (rotations @ centres[:, :, None])[:, :, 0]
         turning = jacobians[:, :3]
         moving = jacobians[:, 3:] - skews(arms) @ turning
-        return cls(state, masses, rotations @ inertias @ rotations.transpose(0, 2, 1), arms, turning, moving)
+        return cls(
+            state,
+            masses,
+            rotations @ inertias @ rotations.transpose(0, 2, 1),
+            arms,
+            turning,
+            moving,
+        )
 
     def mass_matrix(self) -> Array:
         """M (n, n) of the kinetic energy ½ uᵀ M u."""
@@ -49,7 +56,9 @@ class MassCentres:
         alpha, a = body_accelerations[:-1, :3], body_accelerations[:-1, 3:]
         a_centre = a + np.cross(alpha, self.arms) + np.cross(w, np.cross(w, self.arms))
         torques = _times(self.inertias, alpha) + np.cross(w, _times(self.inertias, w))
-        return _projected(self.turning, torques) + _projected(self.moving, self.masses[:, None] * a_centre)
+        return _projected(self.turning, torques) + _projected(
+            self.moving, self.masses[:, None] * a_centre
+        )
 
     def gravity_forces(self) -> Array:
         """Generalized forces of gravity (n,)."""
@@ -65,7 +74,10 @@ def acceleration(state: Moved, applied: Array) -> Array:
     if not constraints:
         return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
     bonds = [bond(item, state) for item in constraints]
-    rows, values = np.concatenate([each.rows for each in bonds]), np.concatenate([each.drifts for each in bonds])
+    rows, values = (
+        np.concatenate([each.rows for each in bonds]),
+        np.concatenate([each.drifts for each in bonds]),
+    )
     with suppress(np.linalg.LinAlgError):
         factor = np.linalg.cholesky(matrix)
         if np.min(factor.diagonal() ** 2 / matrix.diagonal()) > SAFE_MASS:

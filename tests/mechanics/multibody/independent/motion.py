@@ -85,7 +85,11 @@ def kinematics(mechanism: Mechanism, q: Array, u: Array, time: float = 0.0) -> M
 
 def carrying(mobilizer: Mobilizer, q: Array, u: Array) -> RelativeMotion:
     """Motion of the carried body in the carrying body, at the joint's own `q` and `u` (k,)."""
-    ends = (Fixed(mobilizer.parent_frame), *mobilizer.motions, Fixed(inverse(mobilizer.child_frame)))
+    ends = (
+        Fixed(mobilizer.parent_frame),
+        *mobilizer.motions,
+        Fixed(inverse(mobilizer.child_frame)),
+    )
     motion = reduce(RelativeMotion.then, (relative(part, q, u) for part in ends))
     return motion.inverse() if mobilizer.reversed else motion
 
@@ -100,7 +104,10 @@ def relative(motion: Motion, q: Array, u: Array) -> RelativeMotion:
             amount, gradient, hessian = function.evaluate(q[own])
             along = np.zeros(len(q) + 2)
             along[own] = gradient
-            along[-2:] = u[own] @ gradient, u[own] @ np.reshape(hessian, (len(own), len(own))) @ u[own]
+            along[-2:] = (
+                u[own] @ gradient,
+                u[own] @ np.reshape(hessian, (len(own), len(own))) @ u[own],
+            )
             block[slice(0, 3) if kind == "rotate" else slice(3, 6)] = np.outer(axis, along)
             if kind == "rotate":
                 return RelativeMotion(rotation_about(axis, amount), np.zeros(3), block)
@@ -132,7 +139,8 @@ def curvature(error: SimbodyAccelerationError, q: Array) -> Array:
         rotation = rotation @ rotation_about(turn.axis, amount)
     along, curvature = np.array(axes).T, np.zeros((3, count, count))
     for row in (1, 2):
-        # (3, k): the rate of this axis by what Simbody takes for the rates of the angles before it, less the true.
+        # (3, k): the rate of this axis by what Simbody takes for the rates of the angles before it,
+        # less the true.
         theirs = np.zeros((3, count))
         theirs[:, :row] = along @ shares[:, :row]
         wrong = -skew(axes[row]) @ (theirs - along[:, :row] @ shares[:row])
@@ -149,9 +157,9 @@ def turned(rotation: Array, block: Array) -> Array:
 class RelativeMotion:
     """Where frame B is in frame A, and how k generalized speeds move it there. Everything is expressed in A.
 
-    The columns of `block` (6, k + 2) are spatial vectors: the Jacobian of the k speeds, then the velocity, then the
-    part of the acceleration that does not depend on the derivatives of the speeds. They stand together because
-    composing motions does nearly the same to all of them.
+    The columns of `block` (6, k + 2) are spatial vectors: the Jacobian of the k speeds, then the
+    velocity, then the part of the acceleration that does not depend on the derivatives of the
+    speeds. They stand together because composing motions does nearly the same to all of them.
     """
 
     rotation: Array
@@ -204,10 +212,9 @@ class RelativeMotion:
 def carried(block: Array, arm: Array, relative_velocity: Array) -> Array:
     """What a frame C that moves in B has from the motion of B in A; add its own motion in B, turned into A.
 
-    Args:
-        block: columns of :class:`RelativeMotion` of B in A (6, c).
-        arm: from B's origin to C's origin, in A (3,).
-        relative_velocity: spatial velocity of C in B, in A (6,); it makes the Coriolis acceleration.
+    Args: block: columns of :class:`RelativeMotion` of B in A (6, c). arm: from B's origin to C's
+        origin, in A (3,). relative_velocity: spatial velocity of C in B, in A (6,); it makes the
+        Coriolis acceleration.
     """
     result = block.copy()
     result[3:] -= skew(arm) @ block[:3]

@@ -1,7 +1,7 @@
 """What Bullet does by default that is not mechanics, and that the engine mends it.
 
-Every test shows both: that the result is right, and that it is wrong once the mend is taken out. What is mended in
-the URDF file is tested with the URDF writer.
+Every test shows both: that the result is right, and that it is wrong once the mend is taken out.
+What is mended in the URDF file is tested with the URDF writer.
 """
 
 from __future__ import annotations
@@ -39,7 +39,10 @@ def error(mechanism, route="articulated-body", *, q=Q, u=U):
     """Largest error of an acceleration against our own recursion, relative to the largest acceleration."""
     expected = mechanism.acceleration(q, u)
     with BulletEngine(mechanism, Forces(()), route=route) as engine:
-        return np.abs(np.subtract(engine.acceleration(0.0, q, u), expected)).max() / np.abs(expected).max()
+        return (
+            np.abs(np.subtract(engine.acceleration(0.0, q, u), expected)).max()
+            / np.abs(expected).max()
+        )
 
 
 def test_nothing_is_damped(mechanism, monkeypatch):
@@ -65,24 +68,26 @@ def test_ranges_are_no_limits(walker):
     """The knee leaves its range in OpenSim, and here."""
     knee = next(item for item in walker.components(Coordinate) if item.name == "RKnee_rz")
     trajectory = osimlite.simulate(walker, fixed_step=1e-3)
-    assert trajectory.values[:, trajectory.coordinates.index("RKnee_rz")].min() < knee.range[0] - 0.1
+    assert (
+        trajectory.values[:, trajectory.coordinates.index("RKnee_rz")].min() < knee.range[0] - 0.1
+    )
 
 
 def spinning(speed):
     model = Model(name="wheel", gravity=(0.0, 0.0, 0.0))
     wheel = model.add(Body(name="wheel", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
     model.add(
-        osimlite.PinJoint(name="axle", coordinates=[Coordinate(name="turn", default_speed_value=speed)]).between(
-            model.ground, wheel
-        )
+        osimlite.PinJoint(
+            name="axle", coordinates=[Coordinate(name="turn", default_speed_value=speed)]
+        ).between(model.ground, wheel)
     )
     return model
 
 
 def test_fast_joints_are_not_clipped(monkeypatch):
-    assert osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01, engine="bullet").speeds[-1, 0] == pytest.approx(
-        150.0
-    )
+    assert osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01, engine="bullet").speeds[
+        -1, 0
+    ] == pytest.approx(150.0)
     monkeypatch.setattr(World, "FASTEST", 100.0)
     with pytest.raises(OsimliteError, match="bursts"):
         osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01, engine="bullet")
@@ -93,8 +98,12 @@ def impossible_inertia():
     model = Model(name="impossible")
     carrier = model.ground
     for number in range(2):
-        body = model.add(Body(name=f"b{number}", mass=2.0, inertia=(2.0, 0.5, 0.002, 0.1, 0.0, 0.05)))
-        joint = osimlite.GimbalJoint(name=f"j{number}", coordinates=[Coordinate(name=f"q{number}{x}") for x in "xyz"])
+        body = model.add(
+            Body(name=f"b{number}", mass=2.0, inertia=(2.0, 0.5, 0.002, 0.1, 0.0, 0.05))
+        )
+        joint = osimlite.GimbalJoint(
+            name=f"j{number}", coordinates=[Coordinate(name=f"q{number}{x}") for x in "xyz"]
+        )
         model.add(joint.between(carrier, body, child_at=(0.0, 0.3, 0.0)))
         carrier = body
     return build_mechanism(model)
@@ -171,7 +180,9 @@ def test_no_sub_steps(mechanism):
 
 def test_slow_motion_does_not_fall_asleep(monkeypatch):
     def far():
-        return osimlite.simulate(spinning(0.05), to=5.0, fixed_step=0.01, engine="bullet").values[-1, 0]
+        return osimlite.simulate(spinning(0.05), to=5.0, fixed_step=0.01, engine="bullet").values[
+            -1, 0
+        ]
 
     assert far() == pytest.approx(0.25)
     monkeypatch.setattr(World, "FLAGS", World.FLAGS | bullet.URDF_ENABLE_SLEEPING)
@@ -186,7 +197,10 @@ def test_joints_are_matched_by_name(mechanism, monkeypatch):
 
 
 def test_worlds_do_not_disturb_each_other(mechanism):
-    with BulletEngine(mechanism, Forces(())) as first, BulletEngine(mechanism, Forces(())) as second:
+    with (
+        BulletEngine(mechanism, Forces(())) as first,
+        BulletEngine(mechanism, Forces(())) as second,
+    ):
         assert first.world.client != second.world.client
         ours = first.acceleration(0.0, Q, U)
         second.acceleration(0.0, [0.0] * 8, [0.0] * 8)
@@ -215,4 +229,7 @@ def test_bodies_can_be_seen(walker, mechanism):
         shapes = bullet.getVisualShapeData(engine.world.id, physicsClientId=engine.world.client)
         # Platform, pelvis, two thighs and two shanks.
         assert len(shapes) == 6
-        assert np.abs(np.subtract(engine.acceleration(0.0, Q, U), mechanism.acceleration(Q, U))).max() < 1e-9
+        assert (
+            np.abs(np.subtract(engine.acceleration(0.0, Q, U), mechanism.acceleration(Q, U))).max()
+            < 1e-9
+        )

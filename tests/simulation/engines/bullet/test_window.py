@@ -40,7 +40,9 @@ def clock(monkeypatch):
 def keys(monkeypatch):
     """What is pressed at each look at the keyboard, the first first; then nothing."""
     pressed: list[set[int]] = []
-    monkeypatch.setattr(module.Window, "pressed_keys", lambda self: pressed.pop(0) if pressed else set())
+    monkeypatch.setattr(
+        module.Window, "pressed_keys", lambda self: pressed.pop(0) if pressed else set()
+    )
     return pressed
 
 
@@ -70,7 +72,10 @@ def test_the_motion_takes_its_time_in_sixty_pictures_a_second(clock, keys, drawn
         keys += [set(), {module.ESCAPE}]
         simulation.hold()
     assert drawn[-1][1] == pytest.approx(
-        [trajectory.values[-1][list(trajectory.coordinates).index(name)] for name in _moving(simulation)]
+        [
+            trajectory.values[-1][list(trajectory.coordinates).index(name)]
+            for name in _moving(simulation)
+        ]
     )
 
 
@@ -100,11 +105,15 @@ def test_a_slow_screen_leaves_time_for_the_motion(clock, keys, drawn, monkeypatc
     assert len(drawn) < 10
 
 
-@pytest.mark.parametrize(("gravity", "y_is_up"), [((0, -9.8, 0), 1), ((0, 0, -9.8), 0), ((0, 0, 0), 1)])
+@pytest.mark.parametrize(
+    ("gravity", "y_is_up"), [((0, -9.8, 0), 1), ((0, 0, -9.8), 0), ((0, 0, 0), 1)]
+)
 def test_what_is_up_and_that_there_are_no_panels(clock, monkeypatch, gravity, y_is_up):
     switches: dict[int, int] = {}
     monkeypatch.setattr(
-        bullet, "configureDebugVisualizer", lambda switch, state, physicsClientId: switches.update({switch: state})
+        bullet,
+        "configureDebugVisualizer",
+        lambda switch, state, physicsClientId: switches.update({switch: state}),
     )
     model = dynamic_walker()
     model.gravity = gravity
@@ -124,7 +133,9 @@ def test_the_camera_follows_and_stays_as_it_was_turned(clock, keys, monkeypatch)
     monkeypatch.setattr(bullet, "resetDebugVisualizerCamera", aim)
     answers = [module.BULLETS_VIEW] * 5
     monkeypatch.setattr(
-        bullet, "getDebugVisualizerCamera", lambda _: (0,) * 8 + (tuple(answers.pop()) if answers else tuple(turned))
+        bullet,
+        "getDebugVisualizerCamera",
+        lambda _: (0,) * 8 + (tuple(answers.pop()) if answers else tuple(turned)),
     )
     simulation, _ = _shown()
     is_first = simulation.engine.window.client == 0

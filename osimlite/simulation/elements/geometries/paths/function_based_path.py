@@ -33,7 +33,8 @@ class OfCoordinates:
     length: Function | Formula  # of the path, as a function of them
     # moment arms, as functions of them; the derivatives of the length times -1 if there are none
     arms: tuple[Function | Formula, ...] = ()
-    # as a function of their values and then their speeds; the rate that follows from the arms if None
+    # as a function of their values and then their speeds; the rate that follows from the arms if
+    # None
     speed: Function | Formula | None = None
 
     coupled: ClassVar[bool] = False
@@ -44,14 +45,22 @@ class OfCoordinates:
         freedoms = [places.freedom(coordinate) for coordinate in self.coordinates]
         speeds = [freedom + len(places.freedoms) if freedom >= 0 else -1 for freedom in freedoms]
         of_values = [self._item(item, freedoms, values) for item in (self.length, *self.arms)]
-        of_speeds = [self._item(self.speed, freedoms + speeds, values + [0.0] * len(values))] if self.speed else []
+        of_speeds = (
+            [self._item(self.speed, freedoms + speeds, values + [0.0] * len(values))]
+            if self.speed
+            else []
+        )
         parts = [Item("pull_coordinates", is_part=True), *of_values, *of_speeds]
-        backs = [sum(ITEM.OWN + len(item.ints) for item in parts[index:]) for index in range(len(parts))]
+        backs = [
+            sum(ITEM.OWN + len(item.ints) for item in parts[index:]) for index in range(len(parts))
+        ]
         arms = backs[2 : 2 + len(self.arms)] or [0] * len(values)
         ints = backs[0], len(values), backs[1], backs[-1] if of_speeds else 0, *freedoms, *arms
         return [*parts, Item("function_path", ints, room=ARMS + len(values), is_part=True)]
 
-    def _item(self, function: Function | Formula, arguments: Sequence[int], values: Sequence[float]) -> Item:
+    def _item(
+        self, function: Function | Formula, arguments: Sequence[int], values: Sequence[float]
+    ) -> Item:
         """A function of places in a state; where one is negative, of a value in its place."""
         size, room = len(arguments), DERIVATIVES + len(arguments)
         if isinstance(function, Formula):
@@ -64,7 +73,9 @@ class OfCoordinates:
             return Item("formula", tuple(ints), tuple(numbers), room=room + registers, is_part=True)
         if size == 1:
             table = table_of_one(function, f"a function of the path of '{self.path}'")
-            return Item("function_of_one", (1, 0, *arguments), (*values, *table), room=room, is_part=True)
+            return Item(
+                "function_of_one", (1, 0, *arguments), (*values, *table), room=room, is_part=True
+            )
         factor = 1.0
         while isinstance(function, Scaled):
             factor, function = factor * function.scale, function.function
@@ -75,7 +86,9 @@ class OfCoordinates:
             order, coefficients = max(map(sum, function.powers)), function.coefficients
         numbers = [*values, *(factor * coefficient for coefficient in coefficients)]
         room += size * (order + 1) + 2 * size
-        return Item("polynomial", (size, order, *arguments), tuple(numbers), room=room, is_part=True)
+        return Item(
+            "polynomial", (size, order, *arguments), tuple(numbers), room=room, is_part=True
+        )
 
 
 def read(builder: ElementBuilder, owner: Any) -> OfCoordinates:
@@ -89,21 +102,28 @@ def read(builder: ElementBuilder, owner: Any) -> OfCoordinates:
     where = builder.path(path)
     named = path.coordinate_paths
     if not named:
-        raise ModelError(f"the 'coordinate_paths' of '{where}' are empty; name at least one coordinate")
+        raise ModelError(
+            f"the 'coordinate_paths' of '{where}' are empty; name at least one coordinate"
+        )
     coordinates = tuple(
-        builder.mechanism.coordinate_index(builder.path(builder.target(path, "coordinate_paths", name)))
+        builder.mechanism.coordinate_index(
+            builder.path(builder.target(path, "coordinate_paths", name))
+        )
         for name in named
     )
     count = len(set(coordinates))
     if count < len(coordinates):
-        raise ModelError(f"the 'coordinate_paths' of '{where}' name a coordinate twice; name each once")
+        raise ModelError(
+            f"the 'coordinate_paths' of '{where}' name a coordinate twice; name each once"
+        )
     given = path.moment_arm_functions
     if given and len(given) != count:
         raise ModelError(
             f"'{where}' has {len(given)} moment_arm_functions for {count} coordinates; give each one, or none"
         )
     arms = tuple(
-        _function(item, count, f"'moment_arm_functions[{number}]' of '{where}'") for number, item in enumerate(given)
+        _function(item, count, f"'moment_arm_functions[{number}]' of '{where}'")
+        for number, item in enumerate(given)
     )
     speed = path.lengthening_speed_function
     return OfCoordinates(
@@ -111,7 +131,9 @@ def read(builder: ElementBuilder, owner: Any) -> OfCoordinates:
         coordinates,
         _function(path.length_function, count, f"'length_function' of '{where}'"),
         arms,
-        _function(speed, 2 * count, f"'lengthening_speed_function' of '{where}'") if speed is not None else None,
+        _function(speed, 2 * count, f"'lengthening_speed_function' of '{where}'")
+        if speed is not None
+        else None,
     )
 
 
@@ -120,9 +142,13 @@ def _function(function: Any, arguments: int, where: str) -> Function | Formula:
     while isinstance(inner, MultiplierFunction):
         inner = inner.function
     if isinstance(inner, Constant):
-        raise ModelError(f"{where} is a Constant, which has no arguments in OpenSim; take a LinearFunction")
+        raise ModelError(
+            f"{where} is a Constant, which has no arguments in OpenSim; take a LinearFunction"
+        )
     if isinstance(function, ExpressionBasedFunction):
         if len(function.variables) != arguments:
-            raise ModelError(f"{where} has {len(function.variables)} variables and gets {arguments}; name as many")
+            raise ModelError(
+                f"{where} has {len(function.variables)} variables and gets {arguments}; name as many"
+            )
         return Formula.parse(function.expression, function.variables, where)
     return numeric(function, arguments, where)

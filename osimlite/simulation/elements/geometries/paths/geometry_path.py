@@ -61,7 +61,9 @@ class Node:
     functions: tuple[Function, ...] = ()  # of it, that give the place
     name: str = ""  # of the point, or of the surface that it is on
 
-    def packed(self, places: Places, of: int, first: int, path: str, piece: int) -> tuple[list[int], list[float]]:
+    def packed(
+        self, places: Places, of: int, first: int, path: str, piece: int
+    ) -> tuple[list[int], list[float]]:
         """Its integers and numbers; these begin at `first`, and `of` is what the node belongs to.
 
         Between two nodes in a row that are of one piece there is no line that pulls.
@@ -98,7 +100,8 @@ class ThroughPoints:
 
     path: str  # of its owner
     points: tuple[Node, ...]  # that it runs through
-    # that it wraps around; along geodesics a surface for each point that a piece around it may begin at
+    # that it wraps around; along geodesics a surface for each point that a piece around it may
+    # begin at
     surfaces: tuple[Surface, ...] = ()
     geodesic: bool = False  # whether it does so along geodesics
 
@@ -132,7 +135,9 @@ class ThroughPoints:
         behind = sum(bool(surface.law) for surface in self.surfaces)
         for surface in () if self.geodesic else self.surfaces:
             if surface.law:
-                parts.append(Item(surface.law, (), surface.numbers, room=SURFACE_WORK, is_part=True))
+                parts.append(
+                    Item(surface.law, (), surface.numbers, room=SURFACE_WORK, is_part=True)
+                )
                 wraps.append(ITEM.OWN * (behind + 2 - len(parts)))
             else:
                 wraps.append(0)
@@ -141,12 +146,18 @@ class ThroughPoints:
         nodes += [(surface.tangent, surface.number) for surface in self.surfaces for _ in range(2)]
         ints, numbers = [ITEM.OWN * len(parts), len(self.points), len(self.surfaces)], list[float]()
         for number, (node, of) in enumerate(nodes):
-            # A geodesic path pulls along all lines, since a point may move in its body, but for chords of surfaces.
-            piece = node.body if not self.geodesic else (-1 - of if node.kind == TANGENT else number)
+            # A geodesic path pulls along all lines, since a point may move in its body, but for
+            # chords of surfaces.
+            piece = (
+                node.body if not self.geodesic else (-1 - of if node.kind == TANGENT else number)
+            )
             own, more = node.packed(places, of, len(numbers), self.path, piece)
             ints += own
             numbers += more
-        kernel, room = "wrapped_path" if self.surfaces else "straight_path", ORDER + len(nodes) * (1 + NODE_WORK)
+        kernel, room = (
+            "wrapped_path" if self.surfaces else "straight_path",
+            ORDER + len(nodes) * (1 + NODE_WORK),
+        )
         if self.geodesic and self.surfaces:
             for surface in self.surfaces:
                 wraps += len(numbers), surface.first, surface.last, surface.begin
@@ -169,16 +180,21 @@ def read(builder: ElementBuilder, owner: Any) -> ThroughPoints:
     for point in path.path_point_set.objects:
         if type(point) not in READERS:
             raise builder.unsupported(owner, f" with the {kind_of(point)} '{point.name}'")
-        body, frame = builder.placement(builder.target(point, "socket_parent_frame", point.socket_parent_frame))
+        body, frame = builder.placement(
+            builder.target(point, "socket_parent_frame", point.socket_parent_frame)
+        )
         points.append(READERS[type(point)](builder, point, body, frame))
     if len(points) < 2:
-        raise ModelError(f"the path of '{builder.path(owner)}' has {len(points)} points; give it at least two")
+        raise ModelError(
+            f"the path of '{builder.path(owner)}' has {len(points)} points; give it at least two"
+        )
     wraps = path.path_wrap_set.objects
     result = [builder.target(wrap, "wrap_object", wrap.wrap_object) for wrap in wraps]
     numbers = {id(surface): number for number, surface in enumerate(result)}
     alone = float(len(wraps) == 1)
     surfaces = []
-    # Where a path runs through no point of a range, OpenSim does not look at the wraps that follow in that pose either.
+    # Where a path runs through no point of a range, OpenSim does not look at the wraps that follow
+    # in that pose either.
     may_leave = False
     for wrap, surface in zip(wraps, result, strict=True):
         if type(surface) not in LAWS:
@@ -192,29 +208,50 @@ def read(builder: ElementBuilder, owner: Any) -> ThroughPoints:
             raise ModelError(
                 f"the range of '{builder.path(wrap)}' ends at point {last + 1}; the path has {len(points)}"
             )
-        may_leave |= surface.active and all(point.kind == CONDITIONAL for point in points[first : last + 1])
+        may_leave |= surface.active and all(
+            point.kind == CONDITIONAL for point in points[first : last + 1]
+        )
     if builder.geodesic:
-        points = [replace(point, kind=CLAMPED) if point.kind == MOVING else point for point in points]
+        points = [
+            replace(point, kind=CLAMPED) if point.kind == MOVING else point for point in points
+        ]
         end = len(points) - 1
-        pieces = [(each, k) for each in surfaces if each.law for k in range(each.first, min(each.last, end))]
+        pieces = [
+            (each, k)
+            for each in surfaces
+            if each.law
+            for k in range(each.first, min(each.last, end))
+        ]
         surfaces = [
-            replace(surface, number=number, first=k, begin=surface.first) for number, (surface, k) in enumerate(pieces)
+            replace(surface, number=number, first=k, begin=surface.first)
+            for number, (surface, k) in enumerate(pieces)
         ]
     return ThroughPoints(builder.path(owner), tuple(points), tuple(surfaces), builder.geodesic)
 
 
-def _surface(builder: ElementBuilder, wrap: Any, surface: Any, number: int, alone: float, points: int) -> Surface:
+def _surface(
+    builder: ElementBuilder, wrap: Any, surface: Any, number: int, alone: float, points: int
+) -> Surface:
     law, curve, fields = LAWS[type(surface)]
     sizes = [float(size) for name in fields for size in np.atleast_1d(getattr(surface, name))]
     builder.check(surface, (*sizes, *surface.translation, *surface.xyz_body_rotation))
     side, method = SIDES.get(surface.quadrant.lower()), METHODS.get(wrap.method.lower())
     if side is None:
-        raise ModelError(f"the quadrant of '{builder.path(surface)}' is '{surface.quadrant}'; take x, -y, all or such")
+        raise ModelError(
+            f"the quadrant of '{builder.path(surface)}' is '{surface.quadrant}'; take x, -y, all or such"
+        )
     if method is None:
-        raise ModelError(f"the method of '{builder.path(wrap)}' is '{wrap.method}'; take hybrid, midpoint or axial")
+        raise ModelError(
+            f"the method of '{builder.path(wrap)}' is '{wrap.method}'; take hybrid, midpoint or axial"
+        )
     if min(sizes) < 0.0 or (min(sizes) == 0.0 and isinstance(surface, WrapEllipsoid | WrapTorus)):
-        raise ModelError(f"'{builder.path(surface)}' has a size that is not positive; give it a positive one")
-    first, last = (end - 1 if end >= 1 else other for end, other in zip(wrap.range, (0, points - 1), strict=True))
+        raise ModelError(
+            f"'{builder.path(surface)}' has a size that is not positive; give it a positive one"
+        )
+    first, last = (
+        end - 1 if end >= 1 else other
+        for end, other in zip(wrap.range, (0, points - 1), strict=True)
+    )
     frame = surface
     while not isinstance(frame, PhysicalFrame):
         frame = builder.tree.parent_of(frame)
@@ -251,14 +288,21 @@ def _conditional(builder: ElementBuilder, point: Any, body: int, frame: Array) -
     low, high = point.range
     coordinate = builder.coordinate(point, "socket_coordinate")
     within = low - TOLERANCE, high + TOLERANCE
-    return Node(body, frame, np.array(point.location), CONDITIONAL, coordinate, within, name=point.name)
+    return Node(
+        body, frame, np.array(point.location), CONDITIONAL, coordinate, within, name=point.name
+    )
 
 
 def _moving(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:
-    functions = [builder.function(point, getattr(point, f"{axis}_location"), f"{axis}_location") for axis in "xyz"]
+    functions = [
+        builder.function(point, getattr(point, f"{axis}_location"), f"{axis}_location")
+        for axis in "xyz"
+    ]
     coordinate, *others = (builder.coordinate(point, f"socket_{axis}_coordinate") for axis in "xyz")
     if others != [coordinate, coordinate]:
-        raise ModelError(f"the three coordinates of '{builder.path(point)}' differ; name the same one in all sockets")
+        raise ModelError(
+            f"the three coordinates of '{builder.path(point)}' differ; name the same one in all sockets"
+        )
     within = builder.mechanism.coordinates[coordinate].range
     return Node(body, frame, np.zeros(3), MOVING, coordinate, within, tuple(functions), point.name)
 
@@ -278,7 +322,11 @@ LAWS: dict[type[WrapObject], tuple[str, str, tuple[str, ...]]] = {
 """The law of each surface, that which traces a path on it, and the properties that are its sizes."""
 
 SIGNS = {"": 1.0, "+": 1.0, "-": -1.0}
-SIDES = {sign + name: (float(axis), side) for axis, name in enumerate("xyz") for sign, side in SIGNS.items()}
+SIDES = {
+    sign + name: (float(axis), side)
+    for axis, name in enumerate("xyz")
+    for sign, side in SIGNS.items()
+}
 SIDES |= {"all": (0.0, 0.0), "unassigned": (0.0, 0.0)}
 """Axis and sign of a quadrant."""
 

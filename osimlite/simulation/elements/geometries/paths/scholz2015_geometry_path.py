@@ -1,7 +1,7 @@
 """A cable: a path through points and over obstacles that it may touch.
 
-OpenSim hands over the places of points and surfaces as if the frames that they are in were those of the bodies; only
-forces at points are applied where they belong. So it is here.
+OpenSim hands over the places of points and surfaces as if the frames that they are in were those of
+the bodies; only forces at points are applied where they belong. So it is here.
 """
 
 from __future__ import annotations
@@ -96,14 +96,20 @@ class Obstacle:
         """Its link and numbers."""
         link, placed = places.placement(self.body)
         frame = placed @ self.frame
-        return link, [*frame[:3, :3].ravel().tolist(), *frame[:3, 3].tolist(), *self.begin.tolist(), *self.surface]
+        return link, [
+            *frame[:3, :3].ravel().tolist(),
+            *frame[:3, 3].tolist(),
+            *self.begin.tolist(),
+            *self.surface,
+        ]
 
 
 @dataclass(frozen=True)
 class Cable:
     """A path over obstacles."""
 
-    elements: tuple[Point | Obstacle, ...]  # points and obstacles in the order in which it passes them
+    # points and obstacles in the order in which it passes them
+    elements: tuple[Point | Obstacle, ...]
 
     coupled: ClassVar[bool] = True
     trace: ClassVar[str] = "trace_cable"
@@ -133,13 +139,21 @@ class Cable:
             numbers += own
             work += element.work
         head = ITEM.OWN, len(self.elements), work
-        path = Item("cable_path", (*head, *ints), tuple(numbers), room=work + solver_room(most), is_part=True)
+        path = Item(
+            "cable_path",
+            (*head, *ints),
+            tuple(numbers),
+            room=work + solver_room(most),
+            is_part=True,
+        )
         return [Item("pull_cable", is_part=True), path]
 
     def found(self, mechanism: Mechanism, q: Array) -> Cable | None:
         """The same, which begins with what it is at a pose; None if it is none there."""
         state = mechanism.at(q)
-        placements = [Placement(GROUND, state.transform(body)) for body in range(len(mechanism.bodies))]
+        placements = [
+            Placement(GROUND, state.transform(body)) for body in range(len(mechanism.bodies))
+        ]
         _, path = self.items(Places(mechanism, {}, placements))
         ints, work = np.array([0] * ITEM.OWN + list(path.ints)), np.zeros(path.room)
         cable_path(ints, np.array(path.numbers), work, np.zeros(1), np.zeros(1), 0)
@@ -164,11 +178,15 @@ def read(builder: ElementBuilder, owner: Any) -> Cable:
         ModelError: the path does not begin and end with a point, or something makes no sense.
     """
     elements = tuple(
-        _point(builder, item) if isinstance(item, Scholz2015GeometryPathPoint) else _obstacle(builder, owner, item)
+        _point(builder, item)
+        if isinstance(item, Scholz2015GeometryPathPoint)
+        else _obstacle(builder, owner, item)
         for item in owner.geometry_path.path_elements
     )
     if len(elements) < 2 or elements[0].is_obstacle or elements[-1].is_obstacle:
-        raise ModelError(f"the path of '{builder.path(owner)}' does not begin and end with a point; let it")
+        raise ModelError(
+            f"the path of '{builder.path(owner)}' does not begin and end with a point; let it"
+        )
     # OpenSim finds it where the model is as it is written, and then assembled.
     written, assembled = builder.mechanism.values({}), builder.mechanism.default_state()[0]
     cable = Cable(elements).found(builder.mechanism, written)
@@ -185,19 +203,21 @@ def read(builder: ElementBuilder, owner: Any) -> Cable:
 def check(builder: ElementBuilder, owner: Any) -> None:
     """Check whether OpenSim can lay a path over its obstacles, and name the point where one is inside.
 
-    Raises:
-        UnsupportedError: there is an obstacle of a kind that a cable cannot run over, and OpenSim may.
-        ModelError: a point is inside an obstacle, a contact hint is where no point of the surface is
-            nearest, or the search fails.
+    Raises: UnsupportedError: there is an obstacle of a kind that a cable cannot run over, and
+        OpenSim may. ModelError: a point is inside an obstacle, a contact hint is where no point of
+        the surface is nearest, or the search fails.
     """
     items = list(owner.geometry_path.path_elements)
     for index, item in enumerate(items):
         if isinstance(item, Scholz2015GeometryPathPoint):
             continue
         geometry = builder.target(item, "socket_contact_geometry", item.socket_contact_geometry)
-        # OpenSim compares an obstacle with its neighbours, and with points beyond only if it touches none between.
+        # OpenSim compares an obstacle with its neighbours, and with points beyond only if it
+        # touches none between.
         for other in items[max(index - 1, 0) : index + 2]:
-            if isinstance(other, Scholz2015GeometryPathPoint) and _is_enclosed(builder, other, geometry):
+            if isinstance(other, Scholz2015GeometryPathPoint) and _is_enclosed(
+                builder, other, geometry
+            ):
                 name = other.name or other.path_point.name
                 raise ModelError(
                     f"the point '{name}' of the path of '{builder.path(owner)}' is inside the "
@@ -233,7 +253,9 @@ def _is_enclosed(builder: ElementBuilder, point_item: Any, geometry: ContactGeom
 def _point(builder: ElementBuilder, item: Any) -> Point:
     point = item.path_point
     builder.check(point, point.location)
-    body, frame = builder.placement(builder.target(point, "socket_parent_frame", point.socket_parent_frame))
+    body, frame = builder.placement(
+        builder.target(point, "socket_parent_frame", point.socket_parent_frame)
+    )
     runs = np.array(point.location)
     return Point(body, runs, frame[:3, :3] @ runs + frame[:3, 3])
 
@@ -245,7 +267,9 @@ def _obstacle(builder: ElementBuilder, owner: Any, item: Any) -> Obstacle:
         raise builder.unsupported(owner, f" over the {kind_of(geometry)} '{geometry.name}'")
     builder.check(geometry, (*surface, *geometry.location, *geometry.orientation))
     if min(surface[1:3]) <= 0.0 or min(surface) < 0.0:
-        raise ModelError(f"'{builder.path(geometry)}' has a size that is not positive; give it a positive one")
+        raise ModelError(
+            f"'{builder.path(geometry)}' has a size that is not positive; give it a positive one"
+        )
     hint = np.array(item.contact_hint)
     has_hint = not np.isnan(hint).all()
     if has_hint:
@@ -275,7 +299,12 @@ def _surface(geometry: ContactGeometry) -> tuple[float, ...] | None:
     if isinstance(geometry, ContactCylinder):
         return CYLINDER, geometry.radius, geometry.radius**2, 1.0, 1.0, 0.0
     if isinstance(geometry, ContactEllipsoid):
-        return ELLIPSOID, 1.0, 1.0, *(radius**-2 if radius > 0.0 else -1.0 for radius in geometry.radii)
+        return (
+            ELLIPSOID,
+            1.0,
+            1.0,
+            *(radius**-2 if radius > 0.0 else -1.0 for radius in geometry.radii),
+        )
     if isinstance(geometry, ContactTorus):
         return TORUS, geometry.torus_radius, geometry.tube_radius, 0.0, 0.0, 0.0
     return None
