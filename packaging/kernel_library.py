@@ -276,7 +276,7 @@ def main() -> None:
     library.add_argument("--target", default=toolchain.NATIVE)
     options = parser.parse_args()
     if options.command == "library":
-        print(build_in_place(options.target))  # noqa: T201 - a script
+        print(build_in_place(options.target))
     elif options.part is None:
         write_texts(options.folder)
     else:

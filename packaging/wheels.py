@@ -145,7 +145,7 @@ def main() -> None:
         wheel = build_wheel(Path(source).resolve(), Path(folder).resolve(), platform)
         problems = check_wheel(wheel)
         size = wheel.stat().st_size / 1e6
-        print(f"{wheel.name}: {size:.1f} MB", *problems, sep="\n  ")  # noqa: T201 - a script
+        print(f"{wheel.name}: {size:.1f} MB", *problems, sep="\n  ")
         failed = failed or bool(problems)
     sys.exit(failed)
 

@@ -1,1 +1,1 @@
-"""The kernels in other languages: one reader of the Python that they are written in, a writer for each language."""
+"""Exact derivatives of models: CasADi functions, tangents, linearization, sensitivities."""

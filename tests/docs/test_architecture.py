@@ -1,0 +1,70 @@
+"""The page on the architecture names files and classes that exist, and its picture shows the imports of today."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+PATH = re.compile(
+    r"`((?:osimlite|docs|tests|packaging|schemas|fixtures|benchmarks|editors)/[\w/.-]*)`"
+)
+
+
+def read_text(name: str) -> str:
+    """Return the text of a file of the repository."""
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def list_rooms() -> set[str]:
+    """Return the names of the packages at the top level."""
+    return {path.parent.name for path in (ROOT / "osimlite").glob("*/__init__.py")}
+
+
+@pytest.mark.parametrize("page", ["docs/architecture.md", "CONTRIBUTING.md", "README.md"])
+def test_every_path_of_a_page_exists(page: str) -> None:
+    # A guide writes NAME and CODE for what its reader chooses.
+    paths = [path for path in PATH.findall(read_text(page)) if not re.search("NAME|CODE", path)]
+    assert paths
+    assert not [path for path in paths if not (ROOT / path).exists()]
+
+
+def test_the_tables_of_forms_name_classes_of_these_files() -> None:
+    rows = re.findall(r"^\| [^|]+ \| `(\w+)` \| `([\w/]+\.py)` \|", PAGE, re.M)
+    assert len(rows) > 10
+    for name, path in rows:
+        tree = ast.parse(read_text(path))
+        assert name in {node.name for node in tree.body if isinstance(node, ast.ClassDef)}, (
+            f"{path} has no class {name}"
+        )
+
+
+def test_the_table_of_rooms_is_complete() -> None:
+    assert set(re.findall(r"^\| `osimlite/(\w+)/` \|", PAGE, re.M)) == list_rooms()
+
+
+def test_the_readme_has_a_line_for_every_room() -> None:
+    listed = read_text("README.md").split("## Where things are", 1)[1]
+    assert set(re.findall(r"^osimlite/(\w+)/ ", listed, re.M)) == list_rooms()
+
+
+def test_the_picture_is_current() -> None:
+    pytest.importorskip("grimp", reason="needs import-linter (extra 'dev')")
+    from docs import _architecture as architecture
+
+    picture = architecture.PICTURE.read_text(encoding="utf-8")
+    assert picture == architecture.make_picture(), "run: python packaging/regenerate.py"
+
+
+def test_arrows_that_follow_from_others_are_left_out() -> None:
+    grimp = pytest.importorskip("grimp", reason="needs import-linter (extra 'dev')")
+    from docs import _architecture as architecture
+
+    graph = grimp.ImportGraph()
+    for importer, imported in (("a", "b"), ("b", "c"), ("a", "c")):
+        graph.add_import(importer=f"osimlite.{importer}.x", imported=f"osimlite.{imported}.x")
+    assert architecture.find_arrows(graph, ["a", "b", "c"]) == {("a", "b"), ("b", "c")}
