@@ -34,7 +34,7 @@ def main(core: Path, picture: str) -> None:
         folder = Path(place)
         sources(core, TESTS, GAIT, folder)
         tool = gait_tool()
-        found = osimlite.moco.inverse(tool, folder=folder)
+        found = osimlite.moco.solve_inverse(tool, folder=folder)
         print(
             f"MocoInverse: {found.status}, {found.iterations} iterations, objective {found.objective:.6g}"
         )

@@ -54,9 +54,9 @@ if os.path.exists("study.omoco"):
     more(study)
     found = moco.solve(study)
 elif os.path.exists("track.xml"):
-    found = moco.track(osimlite.read_document("track.xml"), more=more)
+    found = moco.solve_track(osimlite.read_document("track.xml"), more=more)
 else:
-    found = moco.inverse(osimlite.read_document("inverse.xml"), more=more)
+    found = moco.solve_inverse(osimlite.read_document("inverse.xml"), more=more)
 spent = time.process_time() - before
 found.write("ours.sto")
 print(json.dumps([found.success, found.iterations, found.objective, spent, time.process_time()]))

@@ -31,13 +31,13 @@ import json, sys, time
 from pathlib import Path
 import osimlite
 from osimlite.optimal.program import Program
-from osimlite.optimal.refinement import errors
-from osimlite.optimal.solution import problem_of, solved
+from osimlite.optimal.refinement import estimate_errors
+from osimlite.optimal.solution import build_problem, solve_program
 name, intervals, refine = sys.argv[1], int(sys.argv[2]), sys.argv[3] or None
 file = Path(sys.argv[4])
 study, guess = osimlite.read_document(file), None
 if name == "walking":
-    from osimlite.moco import problem_of_track
+    from osimlite.moco import build_track_problem
     lowpass = osimlite.TabOpLowPassFilter(cutoff_frequency=6.0)
     tool = osimlite.MocoTrack(
         name="gait", model=osimlite.ModelProcessor(filepath="2D_gait.osim"),
@@ -52,19 +52,19 @@ if name == "walking":
         phase.state_infos += [info.copy_deep() for info in study.problem.phases.state_infos]
         made.solver.optim_convergence_tolerance = made.solver.optim_constraint_tolerance = 1e-4
         made.solver.optim_max_iterations = 1000
-    problem, guess = problem_of_track(tool, folder=Path(sys.argv[5]), more=more)
+    problem, guess = build_track_problem(tool, folder=Path(sys.argv[5]), more=more)
 else:
     study.solver.num_mesh_intervals = intervals
-    problem = problem_of(study, file.parent)
+    problem = build_problem(study, file.parent)
 program = Program(problem)
 before = time.process_time()
-found = solved(program, guess, None, refine)
+found = solve_program(program, guess, None, refine)
 search = time.process_time() - before
 if found.rounds:
     last = found.rounds[-1]
     error, many = last.error, "-".join(str(each.intervals) for each in found.rounds)
 else:
-    error, many = float(errors(program, program.layout.taken(found.trajectory)).max()), str(intervals)
+    error, many = float(estimate_errors(program, program.layout.guess_from_trajectory(found.trajectory)).max()), str(intervals)
 print(json.dumps([found.success, many, error, found.iterations, found.objective, search]))
 """
 

@@ -1,44 +1,72 @@
-"""Studies of OpenSim's Moco, solved: ``osimlite.moco.solve("study.omoco")``; docs/optimal-control.md.
+"""Solve studies of OpenSim's Moco: ``osimlite.moco.solve("study.omoco")``; docs/optimal-control.md.
 
-Studies from Python are made of the classes that files are (``osimlite.MocoStudy`` and so on), with
-OpenSim's names. CasADi is loaded with the first name that is asked for.
+Studies in Python are made of the same classes as study files (``osimlite.MocoStudy`` and so on), with OpenSim's names.
+CasADi is imported when one of the names below is used for the first time.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import warnings
+from typing import TYPE_CHECKING, Any
 
 from osimlite.base.lazy import imported_when_used
+from osimlite.errors import DeprecatedWarning
 
 if TYPE_CHECKING:
-    from osimlite.optimal.inverse import inverse as inverse
-    from osimlite.optimal.inverse import problem_of_inverse as problem_of_inverse
+    from osimlite.optimal.inverse import build_inverse_problem as build_inverse_problem
+    from osimlite.optimal.inverse import solve_inverse as solve_inverse
     from osimlite.optimal.ipopt import Progress as Progress
     from osimlite.optimal.ipopt import Violation as Violation
     from osimlite.optimal.refinement import Refinement as Refinement
+    from osimlite.optimal.solution import Evaluation as Evaluation
     from osimlite.optimal.solution import MocoSolution as MocoSolution
-    from osimlite.optimal.solution import evaluated as evaluated
-    from osimlite.optimal.solution import problem_of as problem_of
+    from osimlite.optimal.solution import build_problem as build_problem
+    from osimlite.optimal.solution import evaluate as evaluate
     from osimlite.optimal.solution import solve as solve
-    from osimlite.optimal.track import problem_of_track as problem_of_track
-    from osimlite.optimal.track import track as track
+    from osimlite.optimal.track import build_track_problem as build_track_problem
+    from osimlite.optimal.track import solve_track as solve_track
     from osimlite.optimal.trajectory import MocoTrajectory as MocoTrajectory
 
 _MODULES = {
+    "Evaluation": "osimlite.optimal.solution",
     "MocoSolution": "osimlite.optimal.solution",
     "MocoTrajectory": "osimlite.optimal.trajectory",
     "Progress": "osimlite.optimal.ipopt",
     "Refinement": "osimlite.optimal.refinement",
     "Violation": "osimlite.optimal.ipopt",
-    "inverse": "osimlite.optimal.inverse",
-    "problem_of_inverse": "osimlite.optimal.inverse",
-    "evaluated": "osimlite.optimal.solution",
-    "problem_of": "osimlite.optimal.solution",
-    "problem_of_track": "osimlite.optimal.track",
+    "build_inverse_problem": "osimlite.optimal.inverse",
+    "build_problem": "osimlite.optimal.solution",
+    "build_track_problem": "osimlite.optimal.track",
+    "evaluate": "osimlite.optimal.solution",
     "solve": "osimlite.optimal.solution",
-    "track": "osimlite.optimal.track",
+    "solve_inverse": "osimlite.optimal.inverse",
+    "solve_track": "osimlite.optimal.track",
 }
+"""Module that defines each public name."""
+
+_DEPRECATED = {
+    "evaluated": "evaluate",
+    "inverse": "solve_inverse",
+    "problem_of": "build_problem",
+    "problem_of_inverse": "build_inverse_problem",
+    "problem_of_track": "build_track_problem",
+    "track": "solve_track",
+}
+"""Names before release 0.1.0, with the public names that replace them."""
 
 __all__ = [*_MODULES]
 
-__getattr__ = imported_when_used(__name__, _MODULES)
+_import_name = imported_when_used(__name__, _MODULES)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used; warn if the name is deprecated."""
+    current = _DEPRECATED.get(name)
+    if current is None:
+        return _import_name(name)
+    warnings.warn(
+        f"osimlite.moco.{name} is deprecated; use osimlite.moco.{current}",
+        DeprecatedWarning,
+        stacklevel=2,
+    )
+    return _import_name(current)

@@ -21,7 +21,7 @@ from osimlite.schema.specs import FieldSpec, value_specs
 
 
 @contextmanager
-def in_file(file: object) -> Iterator[None]:
+def name_file_in_errors(file: object) -> Iterator[None]:
     """Errors that name no file are about this one, if it is one."""
     try:
         yield
@@ -38,7 +38,7 @@ MAX_MESH_VALUES = 2_000_000
 """Intervals of a mesh times states of the model."""
 
 
-class Asked:
+class StudyContext:
     """A study or a tool of Moco, by the file that it stands in.
 
     Args:
@@ -50,15 +50,15 @@ class Asked:
         self.file = None if file is None else Path(file)
         self.folder = self.file.parent if self.file is not None else folder or Path(".")
 
-    def place(self, name: str) -> Path:
+    def locate_file(self, name: str) -> Path:
         """Where a file is that the study names: looked for from its folder, then from the current one."""
         return beside(self.folder, name.strip())
 
-    def _placed(self, part: Object) -> dict[str, Any]:
+    def _locate_part(self, part: Object) -> dict[str, Any]:
         """Where a part of the study stands: objects know no lines, but their tags and names are in the text."""
         if self.file is None:
             return {}
-        tags = re.compile(rf"<{re.escape(_tag(part))}(\s[^>]*)?/?>")
+        tags = re.compile(rf"<{re.escape(_get_tag(part))}(\s[^>]*)?/?>")
         named = re.compile(rf'name="{re.escape(part.name)}"')
         try:
             lines = read_file(self.file).decode("utf-8", "replace").splitlines()
@@ -68,17 +68,17 @@ class Asked:
         found = [pair for pair in found if named.search(pair[1])] or found
         return {"file": str(self.file), "line": found[0][0] if found else 1}
 
-    def refused(self, part: Object, reason: str) -> UnsupportedError:
+    def unsupported_error(self, part: Object, reason: str) -> UnsupportedError:
         """The error of what is not solved here."""
         name = f" '{part.name}'" if part.name else ""
-        return UnsupportedError(f"{_tag(part)}{name}: {reason}", **self._placed(part))
+        return UnsupportedError(f"{_get_tag(part)}{name}: {reason}", **self._locate_part(part))
 
-    def wrong(self, part: Object, reason: str) -> DocumentError:
+    def invalid_error(self, part: Object, reason: str) -> DocumentError:
         """The error of what cannot be."""
         name = f" '{part.name}'" if part.name else ""
-        return DocumentError(f"{_tag(part)}{name}: {reason}", **self._placed(part))
+        return DocumentError(f"{_get_tag(part)}{name}: {reason}", **self._locate_part(part))
 
-    def expect(
+    def check_name(
         self, part: Object, name: str, known: Iterable[str], what: str, whose: str = "the model"
     ) -> None:
         """Refuse a name that is none, with the nearest one that is.
@@ -88,9 +88,11 @@ class Asked:
         """
         known = [*known]
         if name not in known:
-            raise self.wrong(part, f"{whose} has no {what} '{name}'{did_you_mean(name, known)}")
+            raise self.invalid_error(
+                part, f"{whose} has no {what} '{name}'{did_you_mean(name, known)}"
+            )
 
-    def expect_sound(self, whole: Object) -> None:
+    def check_values(self, whole: Object) -> None:
         """Refuse what has a part that is none, or a value that cannot be; its model is left aside.
 
         Raises:
@@ -103,28 +105,30 @@ class Asked:
                 near = (
                     did_you_mean(part.class_name, MODULES) if part.class_name not in MODULES else ""
                 )
-                raise self.wrong(part, f"no object of this class has its place here{near}")
+                raise self.invalid_error(part, f"no object of this class has its place here{near}")
             for spec in value_specs(type(part)):
                 value = getattr(part, spec.name)
                 for word in value if isinstance(value, tuple) else (value,):
-                    if spec.name in part.model_fields_set and (fault := _fault(spec, word)):
-                        raise self.wrong(part, f"{spec.tag} is {word!r}{fault}")
+                    if spec.name in part.model_fields_set and (
+                        fault := _describe_invalid_value(spec, word)
+                    ):
+                        raise self.invalid_error(part, f"{spec.tag} is {word!r}{fault}")
                 if (
                     spec.name in ("bounds", "initial_bounds", "final_bounds")
                     and len(value)
                     and (value[0] == math.inf or value[-1] == -math.inf)
                 ):
-                    raise self.wrong(part, f"{spec.name} leave no finite value")
+                    raise self.invalid_error(part, f"{spec.name} leave no finite value")
                 if (
                     spec.name in ("bounds", "initial_bounds", "final_bounds")
                     and len(value) == 2
                     and value[0] > value[1]
                 ):
-                    raise self.wrong(
+                    raise self.invalid_error(
                         part, f"{spec.name} from {value[0]:g} to {value[1]:g} leave no value"
                     )
 
-    def pattern(self, part: Object, text: str) -> Callable[[str], Any]:
+    def compile_pattern(self, part: Object, text: str) -> Callable[[str], Any]:
         """What tells whether a name matches a pattern.
 
         Raises:
@@ -133,12 +137,14 @@ class Asked:
         try:
             return Pattern(text).fullmatch
         except UnsupportedPatternError as error:
-            raise self.refused(part, f"the pattern '{text}' is not supported: {error}") from None
+            raise self.unsupported_error(
+                part, f"the pattern '{text}' is not supported: {error}"
+            ) from None
         except PatternError as error:
-            raise self.wrong(part, f"'{text}' is no pattern: {error}") from None
+            raise self.invalid_error(part, f"'{text}' is no pattern: {error}") from None
 
 
-def _fault(spec: FieldSpec, word: Any) -> str:
+def _describe_invalid_value(spec: FieldSpec, word: Any) -> str:
     """What is wrong with a number or a word of a property; nothing if all is right."""
     kind = spec.kind
     if not isinstance(kind, Value) or word is None:
@@ -152,5 +158,5 @@ def _fault(spec: FieldSpec, word: Any) -> str:
     return ""
 
 
-def _tag(part: Object) -> str:
+def _get_tag(part: Object) -> str:
     return part.class_name if isinstance(part, Unknown) else type(part).tag

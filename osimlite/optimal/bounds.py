@@ -19,7 +19,7 @@ from osimlite.schema.patterns import Pattern
 
 Range = tuple[float, float]
 FREE: Range = (-math.inf, math.inf)
-LEAST_TENDON_FORCE, MOST_TENDON_FORCE = 0.0, 5.0
+MIN_TENDON_FORCE, MAX_TENDON_FORCE = 0.0, 5.0
 """Of a normalized tendon force, by ``statebounds_normalized_tendon_force``."""
 
 
@@ -38,22 +38,22 @@ class Bounds:
     last: Range
 
     @classmethod
-    def of(cls, within: Range, first: Range = FREE, last: Range = FREE) -> Bounds:
+    def from_ranges(cls, within: Range, first: Range = FREE, last: Range = FREE) -> Bounds:
         """Those at the ends are never wider than the others, as in Moco."""
-        return cls(within, _clipped(first, within), _clipped(last, within))
+        return cls(within, _intersect(first, within), _intersect(last, within))
 
 
-def _clipped(inner: Range, outer: Range) -> Range:
+def _intersect(inner: Range, outer: Range) -> Range:
     return max(inner[0], outer[0]), min(inner[1], outer[1])
 
 
-def range_of(bounds: Any) -> Range | None:
+def read_range(bounds: Any) -> Range | None:
     """What a ``MocoBounds`` or a list of one or two numbers says; None if it says nothing."""
     given = tuple(getattr(bounds, "bounds", bounds))
     return None if not given else (float(given[0]), float(given[-1]))
 
 
-class _Infos:
+class _VariableInfos:
     """What the study says of each of some variables."""
 
     def __init__(
@@ -62,28 +62,28 @@ class _Infos:
         infos: Iterable[MocoVariableInfo],
         names: Sequence[str],
     ) -> None:
-        self.said: dict[str, MocoVariableInfo] = {}
+        self.infos: dict[str, MocoVariableInfo] = {}
         for info in patterns:
             matches = Pattern(info.name).fullmatch
-            self.said |= {name: info for name in names if matches(name)}
-        self.said |= {info.name: info for info in infos}
+            self.infos |= {name: info for name in names if matches(name)}
+        self.infos |= {info.name: info for info in infos}
 
     def bounds(self, name: str, otherwise: Range) -> Bounds:
-        info = self.said.get(name)
+        info = self.infos.get(name)
         if info is None:
-            return Bounds.of(otherwise)
-        return Bounds.of(
-            range_of(info.bounds) or otherwise,
-            range_of(info.initial_bounds) or FREE,
-            range_of(info.final_bounds) or FREE,
+            return Bounds.from_ranges(otherwise)
+        return Bounds.from_ranges(
+            read_range(info.bounds) or otherwise,
+            read_range(info.initial_bounds) or FREE,
+            read_range(info.final_bounds) or FREE,
         )
 
 
-def control_bounds(
+def find_control_bounds(
     phase: MocoPhase, names: Sequence[str], components: Mapping[str, Component]
 ) -> dict[str, Bounds]:
     """Of controls; without any word of the study those of the actuator."""
-    infos = _Infos(phase.control_infos_pattern, phase.control_infos, names)
+    infos = _VariableInfos(phase.control_infos_pattern, phase.control_infos, names)
     result = {}
     for name in names:
         actuator = components.get(name)
@@ -96,15 +96,15 @@ def control_bounds(
     return result
 
 
-def state_bounds(
+def find_state_bounds(
     phase: MocoPhase,
     names: Sequence[str],
     components: Mapping[str, Component],
     controls: Mapping[str, Bounds],
 ) -> dict[str, Bounds]:
     """Of states; values without a word have the range of the coordinate, activations that of the excitation."""
-    infos = _Infos(phase.state_infos_pattern, phase.state_infos, names)
-    speeds = range_of(phase.default_speed_bounds) or FREE
+    infos = _VariableInfos(phase.state_infos_pattern, phase.state_infos, names)
+    speeds = read_range(phase.default_speed_bounds) or FREE
     result = {}
     for name in names:
         path, _, what = name.rpartition("/")
@@ -115,7 +115,7 @@ def state_bounds(
         elif what == "speed":
             otherwise = speeds
         elif what == "normalized_tendon_force" and isinstance(owner, DeGrooteFregly2016Muscle):
-            otherwise = LEAST_TENDON_FORCE, MOST_TENDON_FORCE
+            otherwise = MIN_TENDON_FORCE, MAX_TENDON_FORCE
         elif what == "activation" and isinstance(owner, ActivationCoordinateActuator):
             otherwise = owner.min_control, owner.max_control
         elif (
@@ -132,7 +132,7 @@ def state_bounds(
     return result
 
 
-def scaling(low: float, high: float) -> tuple[float, float]:
+def compute_scaling(low: float, high: float) -> tuple[float, float]:
     """Factor and offset that a variable has by its scaled self, as Moco makes them: the width of
     its bounds, and the middle between them with the other sign.
     """
@@ -142,7 +142,7 @@ def scaling(low: float, high: float) -> tuple[float, float]:
     return (width, -0.5 * (high + low)) if width else (1.0, high)
 
 
-def middle(low: Array, high: Array) -> Array:
+def compute_midpoint(low: Array, high: Array) -> Array:
     """Where a search begins: between the bounds, at the only one, or at zero."""
     has_low, has_high = np.isfinite(low), np.isfinite(high)
     ends = np.where(has_low, low, 0.0), np.where(has_high, high, 0.0)

@@ -20,8 +20,8 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.schema_functions import numeric
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.dynamics import Dynamics
-from osimlite.optimal.point import Formula, Point, Series
-from osimlite.optimal.tables import over_time
+from osimlite.optimal.point import Formula, Point, TimeFunction
+from osimlite.optimal.tables import sample_function
 from osimlite.schema.actuators import (
     ActivationCoordinateActuator,
     Actuator,
@@ -43,11 +43,11 @@ if TYPE_CHECKING:
 
 Motion = Callable[[Array], Array]
 """At times (n,) values, rates and their rates (3, n, coordinates) of all coordinates of a mechanism."""
-NOTHING = 1e-13
+RELATIVE_ZERO = 1e-13
 """Part of the largest number that is none."""
 
 
-def motion_of(part: PositionMotion, model: Model) -> Motion | str:
+def read_position_motion(part: PositionMotion, model: Model) -> Motion | str:
     """The motion of all coordinates of a model; the path of the first one without a function if there is one."""
     functions: dict[str, Any] = {item.name: item for item in part.functions.objects}
     paths = [info.path for info in build_mechanism(model).coordinates]
@@ -57,12 +57,12 @@ def motion_of(part: PositionMotion, model: Model) -> Motion | str:
     own = [numeric(functions[path], 1, f"the function of '{path}'") for path in paths]
 
     def motion(times: Array) -> Array:
-        return np.stack([over_time(item, times) for item in own], axis=2)
+        return np.stack([sample_function(item, times) for item in own], axis=2)
 
     return motion
 
 
-class GivenMotion:
+class PrescribedMotion:
     """What :class:`~osimlite.derivatives.functions.CasadiModel` is for a model that moves by itself, along a given motion.
 
     Args:
@@ -88,14 +88,14 @@ class GivenMotion:
         tree = model.tree()
         actuators = [item for item in model.components(Actuator) if item.appliesForce]
         self._paths = [tree.path_of(item) or "" for item in actuators]
-        own = [_name(k) for k in range(len(actuators))]
-        self.bench = functions_of(bench_of(actuators, own))
+        own = [_name_on_bench(k) for k in range(len(actuators))]
+        self.bench = functions_of(build_test_bench(actuators, own))
         size = len(self.bench.coordinates)
         known = dict(zip(own, self._paths, strict=True))
         self.states = self.in_system = tuple(
-            _renamed(name, known) for name in self.bench.states[2 * size :]
+            _rename_to_model(name, known) for name in self.bench.states[2 * size :]
         )
-        self.controls = tuple(_renamed(name, known) for name in self.bench.controls)
+        self.controls = tuple(_rename_to_model(name, known) for name in self.bench.controls)
         # The carriages have an order of their own.
         names = [path.rpartition("/")[2] for path in self.bench.coordinates]
         self.carriages = [names.index(name) for name in own]
@@ -103,12 +103,14 @@ class GivenMotion:
         self.is_muscle = [isinstance(item, Muscle) for item in actuators]
         self.moving = self._pushing.moving
         self.constraints_kept = self._pushing.equation_count
-        self.numbers = _once(self._numbers)
+        self.numbers = _cache_last(self._numbers)
         self._known, self._model, self._folder = known, model, folder
 
-    def elements(self) -> list[tuple[str, Any]]:
+    def list_forces(self) -> list[tuple[str, Any]]:
         """The forces on the bench, by the paths of the model."""
-        return [(_renamed(item.path, self._known), item) for item in self.bench.forces.elements]
+        return [
+            (_rename_to_model(item.path, self._known), item) for item in self.bench.forces.elements
+        ]
 
     @property
     def outputs(self) -> Any:
@@ -145,7 +147,7 @@ class GivenMotion:
                 forces[place] = ideal(item, 1.0) or item
         return functions_of(model, folder=self._folder)
 
-    def linear(self, function: Callable[..., Any], times: Array) -> Array:
+    def compute_linear_response(self, function: Callable[..., Any], times: Array) -> Array:
         """What depends on forces in a motion, at times (t,).
 
         Args: function: ``function(t, x, xdot, u, p, multipliers) -> (k, t)`` of `whole`, that has
@@ -170,7 +172,7 @@ class GivenMotion:
         found[1:] = [item - found[0] for item in found[1:]]
         return np.vstack(found).T
 
-    def inserted(self, times: Array) -> dict[str, Array]:
+    def tabulate_states(self, times: Array) -> dict[str, Array]:
         """Values and speeds of all coordinates over time, by paths of states."""
         values, speeds, _ = self._motion(times)
         infos = self.mechanism.coordinates
@@ -182,7 +184,7 @@ class GivenMotion:
         return dict(own)
 
 
-class GivenDynamics(Dynamics):
+class PrescribedDynamics(Dynamics):
     """The equations at a point of a motion that is given."""
 
     functions: Any
@@ -191,39 +193,39 @@ class GivenDynamics(Dynamics):
         super().__init__(problem)
         self.is_implicit, self._first_rate = False, 0
         if any(low != high for low, high in problem.times):
-            raise problem.refused(
+            raise problem.unsupported_error(
                 problem.phase, "where the motion is given, initial and final time must be fixed"
             )
-        given: GivenMotion = self.functions
+        given: PrescribedMotion = self.functions
         start, end = problem.times[0][0], problem.times[1][0]
-        self._times = start + problem.grid.places * (end - start)
+        self._times = start + problem.grid.fractions * (end - start)
         self._entries = self._series(given.numbers)
 
-    def _series(self, numbers: Callable[[Array], Array]) -> list[Series | None]:
+    def _series(self, numbers: Callable[[Array], Array]) -> list[TimeFunction | None]:
         """Of numbers (t, m) at times (t,) those that are not zero: most actuators push few coordinates."""
         found = numbers(self._times)
-        matters = np.abs(found).max(axis=0) > NOTHING * np.abs(found).max()
+        matters = np.abs(found).max(axis=0) > RELATIVE_ZERO * np.abs(found).max()
         return [
-            self.problem.given(partial(_column, numbers, k)) if own else None
+            self.problem.add_time_function(partial(_sample_column, numbers, k)) if own else None
             for k, own in enumerate(matters)
         ]
 
-    def elements(self) -> list[tuple[str, Any]]:
+    def list_forces(self) -> list[tuple[str, Any]]:
         """The actuators, by their paths in the model."""
-        return self.functions.elements()
+        return self.functions.list_forces()
 
-    def path_lengths(self, point: Point) -> tuple[Formula, Formula]:
+    def compute_path_lengths(self, point: Point) -> tuple[Formula, Formula]:
         """As given."""
         count = len(self.functions.path_names)
         return self._known(point, 0, count), self._known(point, count, count)
 
     def _known(self, point: Point, first: int, count: int) -> Formula:
-        return _at(point, self._entries[first : first + count])
+        return _stack_series(point, self._entries[first : first + count])
 
     def _residual(self, point: Point) -> Formula:
         """Of the bench, at rest but for its auxiliary states: what pulls its carriages, and the rates of the states."""
         bench = self.functions.bench
-        lengths, speeds = self.path_lengths(point)
+        lengths, speeds = self.compute_path_lengths(point)
         places = np.argsort(self.functions.carriages)
         x = casadi.vertcat(lengths[places.tolist()], speeds[places.tolist()], point.x)
         return bench.residual(
@@ -235,14 +237,14 @@ class GivenDynamics(Dynamics):
             casadi.SX(0, 1),
         )
 
-    def rates(self, point: Point) -> Formula:
+    def compute_rates(self, point: Point) -> Formula:
         """Of the auxiliary states."""
         count = len(self.functions.path_names)
-        return self._with_rates(point, -self._residual(point)[2 * count :])
+        return self._insert_tendon_rates(point, -self._residual(point)[2 * count :])
 
-    def residuals(self, point: Point) -> tuple[list[str], Formula]:
+    def compute_residuals(self, point: Point) -> tuple[list[str], Formula]:
         """What the motion takes and actuators and constraints do not give, and what tendons and fibers do not share."""
-        names, errors = self.tendons.residuals(point, point.derivatives)
+        names, errors = self.tendons.compute_residuals(point, point.derivatives)
         count, moving = len(self.functions.path_names), self.functions.moving
         first, size = 2 * count + len(moving), count * len(moving)
         needed = self._known(point, 2 * count, len(moving))
@@ -255,7 +257,7 @@ class GivenDynamics(Dynamics):
         rows = needed - pushes @ self._forces(point) + bound @ point.multipliers
         return [*(f"{name} residual" for name in moving), *names], casadi.vertcat(rows, errors)
 
-    def joint_load(self, path: str, side: str, frame: str) -> Callable[[Point], Formula]:
+    def make_joint_load(self, path: str, side: str, frame: str) -> Callable[[Point], Formula]:
         """As the motion, the actuators and the constraints make it."""
         load = self.functions.whole.joint_load(path, side)
         turned = self.functions.whole.frames([frame])
@@ -268,7 +270,7 @@ class GivenDynamics(Dynamics):
 
         return self._linear(function, 6)
 
-    def generalized_forces(
+    def make_generalized_forces(
         self, pushing: Sequence[str], coordinates: Sequence[str]
     ) -> Callable[[Point], Formula]:
         """As the motion and the actuators make them."""
@@ -278,11 +280,13 @@ class GivenDynamics(Dynamics):
 
     def _linear(self, function: Callable[..., Array], size: int) -> Callable[[Point], Formula]:
         """Formulas (size, 1) of what forces make in the motion."""
-        entries = self._series(_once(partial(self.functions.linear, function)))
+        entries = self._series(
+            _cache_last(partial(self.functions.compute_linear_response, function))
+        )
 
         def formula(point: Point) -> Formula:
             given = casadi.vertcat(1.0, self._forces(point), point.multipliers)
-            return casadi.reshape(_at(point, entries), size, -1) @ given
+            return casadi.reshape(_stack_series(point, entries), size, -1) @ given
 
         return formula
 
@@ -296,14 +300,14 @@ class GivenDynamics(Dynamics):
         )
 
 
-def _at(point: Point, entries: Sequence[Series | None]) -> Formula:
+def _stack_series(point: Point, entries: Sequence[TimeFunction | None]) -> Formula:
     """The numbers of series, of which those that are None are zero."""
     return casadi.vertcat(
-        *(casadi.SX(1, 1) if entry is None else point.at(entry) for entry in entries)
+        *(casadi.SX(1, 1) if entry is None else point.evaluate(entry) for entry in entries)
     )
 
 
-def _once(numbers: Callable[[Array], Array]) -> Callable[[Array], Array]:
+def _cache_last(numbers: Callable[[Array], Array]) -> Callable[[Array], Array]:
     """The same function of times, which keeps what it found last."""
     kept: list[Array] = []
 
@@ -315,13 +319,13 @@ def _once(numbers: Callable[[Array], Array]) -> Callable[[Array], Array]:
     return known
 
 
-def _column(numbers: Callable[[Array], Array], number: int, times: Array) -> Array:
+def _sample_column(numbers: Callable[[Array], Array], number: int, times: Array) -> Array:
     """One of the numbers of a motion, which is not asked for at other times than these."""
     found = numbers(times)[:, number]
     return np.stack([found, np.zeros_like(found), np.zeros_like(found)])
 
 
-def bench_of(actuators: Sequence[Any], names: Sequence[str]) -> Model:
+def build_test_bench(actuators: Sequence[Any], names: Sequence[str]) -> Model:
     """A model without gravity in which each actuator pulls at a carriage of its own.
 
     Args: actuators: muscles, and others whose force is proportional to their control or their
@@ -355,11 +359,11 @@ def bench_of(actuators: Sequence[Any], names: Sequence[str]) -> Model:
     return model
 
 
-def _name(number: int) -> str:
+def _name_on_bench(number: int) -> str:
     return f"bench{number}"
 
 
-def _renamed(path: str, known: Mapping[str, str]) -> str:
+def _rename_to_model(path: str, known: Mapping[str, str]) -> str:
     """A path on the bench as one of the model."""
     _, _, name, *rest = path.split("/")
     return "/".join([known[name], *rest])

@@ -20,12 +20,12 @@ class Hessian:
     def __init__(self, program: Program) -> None:
         self.program = program
         width = len(program.layout.lower)
-        for sort in program.sorts:
-            sort.make_hessian()
+        for group in program.groups:
+            group.make_hessian()
         rows, columns = program._entries("hessian_rows", "hessian_columns")
         direct, pattern = len(program.end_columns), program._end_hessian_pattern
         if pattern[direct:, direct:].any():
-            raise program.problem.refused(
+            raise program.problem.unsupported_error(
                 program.problem.solver,
                 "a goal is not linear in its integral; take optim_hessian_approximation limited-memory",
             )
@@ -35,7 +35,7 @@ class Hessian:
         # What depends on an end and on an integral together couples that end with all points.
         self._mixed = [tuple(pair) for pair in np.argwhere(pattern[:direct, direct:])]
         far = [
-            np.unique(program._jacobian_columns[program._jacobian_rows == program._rows + k])
+            np.unique(program._jacobian_columns[program._jacobian_rows == program._row_count + k])
             for _, k in self._mixed
         ]
         self._far = far
@@ -53,26 +53,28 @@ class Hessian:
             width, width, (unique % width).tolist(), (unique // width).tolist()
         )
 
-    def numbers(self, w: Array, factor: float, multipliers: Array) -> Array:
+    def compute_entries(self, w: Array, factor: float, multipliers: Array) -> Array:
         """In the order of `sparsity`."""
         program, direct = self.program, len(self.program.end_columns)
-        totals = program._rows_of(w)[program._rows :]
-        given = program._end_given(w, totals)
-        own, at_ends = multipliers[: program._rows], multipliers[program._rows :]
+        totals = program._compute_rows(w)[program._row_count :]
+        given = program._end_arguments(w, totals)
+        own, at_ends = multipliers[: program._row_count], multipliers[program._row_count :]
         cost, wanted = (part.T for part in program._end_slope(*given))
         of_integrals = factor * cost.ravel()[direct:] + at_ends @ wanted[:, direct:]
         push = program._b.multiply_transpose(np.concatenate([own, of_integrals]))
         parts = []
-        for sort, first in zip(program.sorts, program._offsets, strict=False):
-            count = sort.rows * len(sort.numbers)
+        for group, first in zip(program.groups, program._offsets, strict=False):
+            count = group.rows * len(group.numbers)
             parts.append(
-                sort.curvature(*program._given(sort, w), push[first : first + count])[0].ravel()
+                group.curvature(*program._point_arguments(group, w), push[first : first + count])[
+                    0
+                ].ravel()
             )
         # It is symmetric.
         (ends,) = program._end_curvature(*given, np.array(factor), at_ends)
         parts.append(ends[self._ends])
         if self._mixed:
-            integrals = program._slopes(w)[3]
+            integrals = program._compute_slopes(w)[3]
             for (i, k), far in zip(self._mixed, self._far, strict=True):
                 twice = np.where(far == program.end_columns[i], 2.0, 1.0)
                 parts.append(ends[i, direct + k] * integrals[k, far] * twice)

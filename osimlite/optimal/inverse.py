@@ -13,15 +13,15 @@ from osimlite.fitting.modifying.processing import processed
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.optimal.asked import Asked
-from osimlite.optimal.given_motion import GivenMotion
+from osimlite.optimal.asked import StudyContext
+from osimlite.optimal.given_motion import PrescribedMotion
 from osimlite.optimal.ipopt import Progress
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
 from osimlite.optimal.refinement import Refinement
-from osimlite.optimal.solution import MocoSolution, solved
-from osimlite.optimal.tables import Curves, expect_columns, processed_table
-from osimlite.optimal.tool_study import set_times, study_of
+from osimlite.optimal.solution import MocoSolution, solve_program
+from osimlite.optimal.tables import SplineCurves, check_columns, process_table
+from osimlite.optimal.tool_study import make_study, set_time_range
 from osimlite.schema.moco.goals import (
     MocoControlGoal,
     MocoInitialActivationGoal,
@@ -32,11 +32,11 @@ from osimlite.schema.moco.studies import MocoCasADiSolver, MocoInverse, MocoStud
 from osimlite.schema.model import Model
 from osimlite.schema.tools.processors import TabOpUseAbsoluteStateNames
 
-AUXILIARY_WEIGHT = 0.01
+TENDON_RATE_WEIGHT = 0.01
 """Of the squares of rates of tendon forces."""
 
 
-def problem_of_inverse(
+def build_inverse_problem(
     tool: MocoInverse,
     file: Path | None = None,
     folder: Path | None = None,
@@ -55,14 +55,14 @@ def problem_of_inverse(
     Raises:
         OsimliteError: the settings or their files are not as they have to be.
     """
-    asked = Asked(file, folder)
+    asked = StudyContext(file, folder)
     model = processed(tool.model, asked.folder)
     solver = MocoCasADiSolver(
         name="solver",
         multibody_dynamics_mode="implicit",
         interpolate_control_mesh_interior_points=False,
         minimize_implicit_auxiliary_derivatives=True,
-        implicit_auxiliary_derivatives_weight=AUXILIARY_WEIGHT,
+        implicit_auxiliary_derivatives_weight=TENDON_RATE_WEIGHT,
         optim_convergence_tolerance=tool.convergence_tolerance,
         optim_constraint_tolerance=tool.constraint_tolerance,
         # Moco has no such differences; without them a search ends up to 1e-3 above the least cost.
@@ -72,7 +72,7 @@ def problem_of_inverse(
     )
     if tool.max_iterations is not None:
         solver.optim_max_iterations = tool.max_iterations
-    study = study_of(tool, model, solver)
+    study = make_study(tool, model, solver)
     phase = study.problem.phases
     reserves = MocoWeight(name=".*/reserve_.*", weight=tool.reserves_weight)
     effort = MocoControlGoal(name="excitation_effort")
@@ -84,24 +84,24 @@ def problem_of_inverse(
         phase.goals.append(
             MocoSumSquaredStateGoal(name="activation_effort", pattern=".*activation$")
         )
-    table, motion = _kinematics(asked, tool, model)
-    set_times(asked, tool, [table], study)
+    table, motion = _read_kinematics(asked, tool, model)
+    set_time_range(asked, tool, [table], study)
     if more is not None:
         more(study)
     problem = Problem(study, file, folder, motion=motion, scaled=scaled)
     if not tool.kinematics_allow_extra_columns:
-        known = (*problem.functions.inserted(table.times[:1]), *problem.functions.states)
+        known = (*problem.functions.tabulate_states(table.times[:1]), *problem.functions.states)
         for label in table.columns:
             if label not in known:
                 near = did_you_mean(label, known)
-                raise asked.wrong(
+                raise asked.invalid_error(
                     tool,
                     f"'{label}' is no state{near}; set kinematics_allow_extra_columns to leave it out",
                 )
     return problem
 
 
-def inverse(
+def solve_inverse(
     tool: MocoInverse,
     *,
     folder: str | Path | None = None,
@@ -121,30 +121,32 @@ def inverse(
         scaled: likewise.
 
     Raises:
-        OsimliteError: as of :func:`problem_of_inverse`.
+        OsimliteError: as of :func:`build_inverse_problem`.
     """
-    problem = problem_of_inverse(tool, None, None if folder is None else Path(folder), more, scaled)
-    return solved_inverse(problem, tell, refine)
+    problem = build_inverse_problem(
+        tool, None, None if folder is None else Path(folder), more, scaled
+    )
+    return solve_inverse_problem(problem, tell, refine)
 
 
-def solved_inverse(
+def solve_inverse_problem(
     problem: Problem,
     tell: Callable[[Progress], None] | None,
     refine: float | str | Refinement | None = None,
 ) -> MocoSolution:
     """The solution of the problem of the tool, with the values and speeds of the motion that was given."""
-    given: GivenMotion = problem.functions
-    solution = solved(Program(problem), None, tell, refine)
+    given: PrescribedMotion = problem.functions
+    solution = solve_program(Program(problem), None, tell, refine)
     trajectory = solution.trajectory
-    states = given.inserted(trajectory.times)
+    states = given.tabulate_states(trajectory.times)
     names = trajectory.names | {"states": (*trajectory.names["states"], *states)}
     return replace(
         solution, trajectory=replace(trajectory, columns=states | trajectory.columns, names=names)
     )
 
 
-def _kinematics(
-    asked: Asked, tool: MocoInverse, model: Model
+def _read_kinematics(
+    asked: StudyContext, tool: MocoInverse, model: Model
 ) -> tuple[StoTable, Callable[[Array], Array]]:
     """The table of a tool, and the motion of all coordinates through its poses, which fulfil the constraints."""
     mechanism = build_mechanism(model)
@@ -154,16 +156,16 @@ def _kinematics(
     # OpenSim takes names of coordinates, and of states as they once were, for what they mean.
     processor = tool.kinematics.copy_deep()
     processor.operators.append(TabOpUseAbsoluteStateNames())
-    table = processed_table(asked, tool.kinematics, processor, states, mechanism)
+    table = process_table(asked, tool.kinematics, processor, states, mechanism)
     own = [name for name in names if name in table.columns]
     if not own:
-        raise asked.wrong(
+        raise asked.invalid_error(
             tool, "its kinematics have no column such as " + (names[0] if names else "a coordinate")
         )
-    expect_columns(table, own)
+    check_columns(table, own)
     values = np.tile([info.default_value for info in infos], (len(table.times), 1))
     values[:, [names.index(name) for name in own]] = np.column_stack([table[name] for name in own])
     poses = np.array(
         [mechanism.assemble(q, t) for t, q in zip(table.times.tolist(), values, strict=True)]
     )
-    return table, Curves(table.times, poses).at
+    return table, SplineCurves(table.times, poses).evaluate

@@ -18,18 +18,18 @@ from osimlite.derivatives.symbols import casadi
 from osimlite.errors import SimulationError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.hessian import Hessian
-from osimlite.optimal.program import Program, once
+from osimlite.optimal.program import Program, cache_last
 
-MANY = 1500
+METIS_MIN_VARIABLES = 1500
 """Of fewer variables METIS takes longer than its order saves."""
-CLOSER, LEAST = 1e-2, 1e-8
+EXACT_TOLERANCE_FACTOR, MIN_TOLERANCE = 1e-2, 1e-8
 """Part of a study's tolerance to which exact second derivatives go on, which takes a few steps, and Ipopt's own."""
-NEAR = 1e-4
+FEASIBILITY_TOLERANCE = 1e-4
 """Of two iterates that violate nothing by more than this the cheaper one is the better."""
 
 
-THREADS = "OPENBLAS_NUM_THREADS"
-NEARLY = {"mu_init": 1e-7, "bound_push": 1e-8, "bound_frac": 1e-8}
+THREADS_VARIABLE = "OPENBLAS_NUM_THREADS"
+WARM_START_OPTIONS = {"mu_init": 1e-7, "bound_push": 1e-8, "bound_frac": 1e-8}
 """Of a search that starts near its end: what its barrier costs is no more than the barrier times the bounds."""
 
 
@@ -72,7 +72,7 @@ class Progress:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class SolverResult:
     """What came out.
 
     Attributes:
@@ -90,7 +90,7 @@ class Found:
     duration: float
 
 
-def violations(
+def find_violations(
     program: Program, w: Array, rows: Array | None = None, most: int = 10
 ) -> list[Violation]:
     """The largest ones, the largest first.
@@ -101,7 +101,7 @@ def violations(
         rows: the values of g at w, if they are known.
         most: how many at most.
     """
-    rows = program.values(w)[1] if rows is None else rows
+    rows = program.compute_values(w)[1] if rows is None else rows
     size = np.maximum(np.maximum(program.lower - rows, rows - program.upper), 0.0)
     size = np.where(np.isfinite(size), size, np.inf)
     result = []
@@ -113,13 +113,13 @@ def violations(
     return result
 
 
-def solve(
+def run_ipopt(
     program: Program,
     guess: Array,
     tell: Callable[[Progress], None] | None = None,
     *,
     near: bool = False,
-) -> Found:
+) -> SolverResult:
     """Look for the least objective from a guess.
 
     An interrupt (Ctrl-C) ends the search, and the best that was found is what comes out.
@@ -130,72 +130,72 @@ def solve(
         tell: is told of each iteration.
         near: whether the guess is nearly a solution, so that it is not moved away from its bounds.
     """
-    search = _Search(program, tell)
+    search = _SearchCallbacks(program, tell)
     # Without a name Ipopt reads no file of options. By default it reads `ipopt.opt` in the current
     # folder, which may name a file to write to and a library to load.
     options = {
-        "ipopt": _options(program)
-        | (NEARLY if near else {})
+        "ipopt": _make_options(program)
+        | (WARM_START_OPTIONS if near else {})
         | {"print_level": 0, "sb": "yes", "option_file_name": ""},
         "print_time": False,
         "show_eval_warnings": False,
         "no_nlp_grad": True,
         "calc_lam_p": False,
         "calc_lam_x": False,
-        "iteration_callback": search.told,
+        "iteration_callback": search.record_iteration,
         "grad_f": search.gradient,
         "jac_g": search.jacobian,
     }
-    if _is_exact(program):
-        options["hess_lag"] = _curved(program, search)
+    if _uses_exact_hessian(program):
+        options["hess_lag"] = _make_hessian_callback(program, search)
     before = time.perf_counter()
-    _load()
-    solver = casadi.nlpsol("moco", "ipopt", search.program_itself, options)
+    _load_ipopt()
+    solver = casadi.nlpsol("moco", "ipopt", search.objective, options)
     lower, upper = program.layout.lower, program.layout.upper
-    with search.interruptible():
+    with search.stop_on_interrupt():
         found = solver(
-            x0=search.scaled(np.clip(guess, lower, upper)),
-            lbx=search.scaled(lower),
-            ubx=search.scaled(upper),
+            x0=search.scale(np.clip(guess, lower, upper)),
+            lbx=search.scale(lower),
+            ubx=search.scale(upper),
             lbg=program.lower,
             ubg=program.upper,
         )
     took, stats = time.perf_counter() - before, solver.stats()
     status = stats["return_status"]
     if not np.isfinite(np.array(found["f"])).all() or status == "Invalid_Number_Detected":
-        raise SimulationError(_no_number(program, guess))
-    w = search.real(np.array(found["x"]).ravel())
+        raise SimulationError(_describe_invalid_number(program, guess))
+    w = search.unscale(np.array(found["x"]).ravel())
     if not stats["success"] and search.best is not None:
         w = search.best
-    return Found(w, status, bool(stats["success"]), int(stats["iter_count"]), took)
+    return SolverResult(w, status, bool(stats["success"]), int(stats["iter_count"]), took)
 
 
 @cache
-def _load() -> None:
+def _load_ipopt() -> None:
     """Ipopt, whose BLAS asks when it is loaded how many threads it may have: matrices are small,
     and sums of as many parts as there are cores would be others on each machine.
     """
-    before = os.environ.get(THREADS)
-    os.environ[THREADS] = before or "1"
+    before = os.environ.get(THREADS_VARIABLE)
+    os.environ[THREADS_VARIABLE] = before or "1"
     casadi.load_nlpsol("ipopt")
     if before is None:
-        del os.environ[THREADS]
+        del os.environ[THREADS_VARIABLE]
 
 
-def _is_exact(program: Program) -> bool:
+def _uses_exact_hessian(program: Program) -> bool:
     """Where nothing is made small, all multipliers vanish in the end, and second derivatives lead astray until then."""
     return program.problem.solver.optim_hessian_approximation == "exact" and bool(program.costs)
 
 
-def _options(program: Program) -> dict[str, Any]:
+def _make_options(program: Program) -> dict[str, Any]:
     """As Moco sets them."""
     settings, options = program.problem.solver, dict[str, Any]()
-    is_exact = _is_exact(program)
+    is_exact = _uses_exact_hessian(program)
     options["hessian_approximation"] = "exact" if is_exact else "limited-memory"
     # The same steps; what the update adds is a part of the one matrix, in the place of a dozen of
     # solutions for each.
     options["limited_memory_aug_solver"] = "extended"
-    if len(program.layout.lower) > MANY:
+    if len(program.layout.lower) > METIS_MIN_VARIABLES:
         # METIS orders what hangs together over time in half of what MUMPS takes by its own choice.
         options["mumps_pivot_order"] = 5
     if settings.optim_max_iterations != -1:
@@ -204,24 +204,28 @@ def _options(program: Program) -> dict[str, Any]:
         both = ("", "dual_inf_", "compl_inf_")
         # Newton's last steps are so few that they end where the barrier still costs up to 1e-2 of
         # the objective.
-        wanted = min(tolerance, max(CLOSER * tolerance, LEAST)) if is_exact else tolerance
+        wanted = (
+            min(tolerance, max(EXACT_TOLERANCE_FACTOR * tolerance, MIN_TOLERANCE))
+            if is_exact
+            else tolerance
+        )
         options |= {f"{each}tol": wanted for each in both} | {
             f"acceptable_{each}tol": tolerance for each in both
         }
     if (tolerance := settings.optim_constraint_tolerance) != -1.0:
-        options |= {f"{sort}constr_viol_tol": tolerance for sort in ("", "acceptable_")}
+        options |= {f"{prefix}constr_viol_tol": tolerance for prefix in ("", "acceptable_")}
     return options
 
 
-def _no_number(program: Program, guess: Array) -> str:
-    costs, rows = program.values(guess)
+def _describe_invalid_number(program: Program, guess: Array) -> str:
+    costs, rows = program.compute_values(guess)
     bad = [program.labels[row] for row in np.flatnonzero(~np.isfinite(rows))[:1]]
     bad += [name for name, cost in zip(program.costs, costs, strict=True) if not np.isfinite(cost)]
     what = f"'{bad[0]}' is no number at the guess" if bad else "something is no number on the way"
     return f"{what}; give a guess_file from which the model can move, or closer bounds"
 
 
-class _Function(casadi.Callback):  # type: ignore[misc]
+class _ArrayCallback(casadi.Callback):  # type: ignore[misc]
     """A function of CasADi that computes with arrays."""
 
     def __init__(
@@ -263,76 +267,78 @@ class _Function(casadi.Callback):  # type: ignore[misc]
         return 0
 
 
-def _column(size: int) -> Any:
+def _make_dense_column(size: int) -> Any:
     return casadi.Sparsity.dense(size, 1)
 
 
-class _Search:
+class _SearchCallbacks:
     """The functions that Ipopt asks, and what it tells after each iteration."""
 
     def __init__(self, program: Program, tell: Callable[[Progress], None] | None) -> None:
         self.program, self.tell, self.stops, self.count = program, tell, False, 0
         self.best: Array | None = None
         self._best = (np.inf, np.inf)
-        self.scale, self.shift = program.layout.scaling
+        self.factors, self.offsets = program.layout.scaling
         columns = np.array(program.jacobian_sparsity.get_triplet()[1], dtype=int)
-        self._of_columns = self.scale[columns]
+        self._column_factors = self.factors[columns]
         width, rows = len(program.layout.lower), len(program.labels)
-        given = {"x": _column(width), "p": casadi.Sparsity(0, 0)}
+        given = {"x": _make_dense_column(width), "p": casadi.Sparsity(0, 0)}
         sizes = {"f": 1, "x": width, "lam_x": width, "g": rows, "lam_g": rows}
         scalar, across = casadi.Sparsity.scalar(), casadi.Sparsity.dense(width, 1)
         # Ipopt asks for what belongs to one x in parts.
-        self._values_at = once(lambda x: program.values(self.real(x)))
-        self._slopes_at = once(lambda x: program.slopes(self.real(x)))
-        self.program_itself = _Function(
-            "nlp", given, {"f": scalar, "g": _column(rows)}, self._values
+        self._values_at = cache_last(lambda x: program.compute_values(self.unscale(x)))
+        self._slopes_at = cache_last(lambda x: program.compute_slopes(self.unscale(x)))
+        self.objective = _ArrayCallback(
+            "nlp", given, {"f": scalar, "g": _make_dense_column(rows)}, self._values
         )
-        self.gradient = _Function(
+        self.gradient = _ArrayCallback(
             "nlp_grad_f", given, {"f": scalar, "grad_f_x": across}, self._gradient
         )
-        self.jacobian = _Function(
+        self.jacobian = _ArrayCallback(
             "nlp_jac_g",
             given,
-            {"g": _column(rows), "jac_g_x": program.jacobian_sparsity},
+            {"g": _make_dense_column(rows), "jac_g_x": program.jacobian_sparsity},
             self._jacobian,
         )
         found = [casadi.nlpsol_out(place) for place in range(casadi.nlpsol_n_out())]
-        outputs = {name: _column(sizes.get(name, 0)) for name in found}
-        self.told = _Function("told", outputs, {"stops": scalar}, self._told)
+        outputs = {name: _make_dense_column(sizes.get(name, 0)) for name in found}
+        self.record_iteration = _ArrayCallback(
+            "record_iteration", outputs, {"stops": scalar}, self._record_iteration
+        )
 
-    def real(self, x: Array) -> Array:
+    def unscale(self, x: Array) -> Array:
         """The variables, of those that Ipopt has."""
-        return self.scale * x + self.shift
+        return self.factors * x + self.offsets
 
-    def scaled(self, w: Array) -> Array:
+    def scale(self, w: Array) -> Array:
         """The reverse of `real`."""
-        return (w - self.shift) / self.scale
+        return (w - self.offsets) / self.factors
 
     def _values(self, x: Array, *_: Array) -> tuple[Any, ...]:
         costs, rows = self._values_at(x)
         return costs.sum(), rows
 
     def _gradient(self, x: Array, *_: Array) -> tuple[Any, ...]:
-        return 0.0, self._slopes_at(x)[0] * self.scale
+        return 0.0, self._slopes_at(x)[0] * self.factors
 
     def _jacobian(self, x: Array, *_: Array) -> tuple[Any, ...]:
-        return 0.0, self._slopes_at(x)[1] * self._of_columns
+        return 0.0, self._slopes_at(x)[1] * self._column_factors
 
     # ---------------------------------------------------------------------------------------- after an iteration
-    def _told(self, x: Array, f: Array, rows: Array, *_: Array) -> tuple[Any, ...]:
+    def _record_iteration(self, x: Array, f: Array, rows: Array, *_: Array) -> tuple[Any, ...]:
         objective = float(f[0])
-        found = violations(self.program, self.real(x), rows, most=1)
+        found = find_violations(self.program, self.unscale(x), rows, most=1)
         size = found[0].size if found else 0.0
-        rank = (size, np.inf) if size > NEAR else (0.0, objective)
+        rank = (size, np.inf) if size > FEASIBILITY_TOLERANCE else (0.0, objective)
         if rank < self._best:
-            self.best, self._best = self.real(x), rank
+            self.best, self._best = self.unscale(x), rank
         if self.tell is not None:
             self.tell(Progress(self.count, objective, found[0] if found else None))
         self.count += 1
         return (1.0 if self.stops else 0.0,)
 
     @contextmanager
-    def interruptible(self) -> Iterator[None]:
+    def stop_on_interrupt(self) -> Iterator[None]:
         """The first Ctrl-C ends the search after the iteration, the second at once."""
         if threading.current_thread() is not threading.main_thread():
             yield
@@ -350,19 +356,23 @@ class _Search:
             signal.signal(signal.SIGINT, before)
 
 
-def _curved(program: Program, search: _Search) -> Any:
+def _make_hessian_callback(program: Program, search: _SearchCallbacks) -> Any:
     hessian = Hessian(program)
     first, second = (
-        search.scale[np.array(places, dtype=int)] for places in hessian.sparsity.get_triplet()
+        search.factors[np.array(places, dtype=int)] for places in hessian.sparsity.get_triplet()
     )
     given = {
-        "x": _column(len(program.layout.lower)),
+        "x": _make_dense_column(len(program.layout.lower)),
         "p": casadi.Sparsity(0, 0),
         "lam_f": casadi.Sparsity.scalar(),
-        "lam_g": _column(len(program.labels)),
+        "lam_g": _make_dense_column(len(program.labels)),
     }
 
     def law(x: Array, *rest: Array) -> tuple[Any, ...]:
-        return (hessian.numbers(search.real(x), float(rest[-2][0]), rest[-1]) * first * second,)
+        return (
+            hessian.compute_entries(search.unscale(x), float(rest[-2][0]), rest[-1])
+            * first
+            * second,
+        )
 
-    return _Function("nlp_hess_l", given, {"hess_gamma_x_x": hessian.sparsity}, law)
+    return _ArrayCallback("nlp_hess_l", given, {"hess_gamma_x_x": hessian.sparsity}, law)

@@ -9,16 +9,16 @@ import numpy as np
 
 from osimlite.mechanics.multibody.smoothing_spline import SampledCurves
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.optimal.bounds import Bounds, middle, range_of, scaling
+from osimlite.optimal.bounds import Bounds, compute_midpoint, compute_scaling, read_range
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
 
-FEWEST = 6
+MIN_SPLINE_TIMES = 6
 """Times that splines of fifth degree need."""
-KINDS = "states", "controls", "multipliers", "derivatives", "slacks", "projections"
+VARIABLE_KINDS = "states", "controls", "multipliers", "derivatives", "slacks", "projections"
 """What a point may have variables of, in this order."""
-PROJECTED = "/projection"
+PROJECTION_SUFFIX = "/projection"
 """Ending of the names of states where an interval leads to, before they are moved onto the constraints."""
 
 
@@ -51,60 +51,66 @@ class Layout:
             "slacks": problem.slack_names,
             "projections": problem.projected_names,
         }
-        force = range_of(problem.phase.multiplier_bounds) or (-np.inf, np.inf)
-        acceleration = range_of(solver.implicit_multibody_acceleration_bounds) or (-np.inf, np.inf)
-        rate = range_of(solver.implicit_auxiliary_derivative_bounds) or (-np.inf, np.inf)
+        force = read_range(problem.phase.multiplier_bounds) or (-np.inf, np.inf)
+        acceleration = read_range(solver.implicit_multibody_acceleration_bounds) or (
+            -np.inf,
+            np.inf,
+        )
+        rate = read_range(solver.implicit_auxiliary_derivative_bounds) or (-np.inf, np.inf)
         of_slacks = (
             solver.projection_slack_variable_bounds
-            if problem.projects
+            if problem.uses_projection
             else solver.velocity_correction_bounds
         )
-        correction = range_of(of_slacks) or (-np.inf, np.inf)
+        correction = read_range(of_slacks) or (-np.inf, np.inf)
         self.bounds: dict[str, list[Bounds]] = {
             "states": [*problem.states.values()],
             "controls": [*problem.controls.values()],
-            "multipliers": [Bounds.of(force)] * len(multipliers),
+            "multipliers": [Bounds.from_ranges(force)] * len(multipliers),
             "derivatives": [
-                *[Bounds.of(acceleration)] * len(accelerations),
-                *[Bounds.of(rate)] * len(problem.dynamics.tendons.names),
+                *[Bounds.from_ranges(acceleration)] * len(accelerations),
+                *[Bounds.from_ranges(rate)] * len(problem.dynamics.tendons.names),
             ],
-            "slacks": [Bounds.of(correction)] * len(problem.slack_names),
+            "slacks": [Bounds.from_ranges(correction)] * len(problem.slack_names),
             "projections": [*problem.states.values()][: len(problem.projected_names)],
         }
         self.shared = 2 + len(problem.parameters)
         ranges = [*problem.times, *problem.parameters.values()]
         lower, upper = ([each[k] for each in ranges] for k in range(2))
-        self.places: list[Any] = []
-        self.places_of = {
-            kind: np.full((len(grid.places), len(self.names[kind])), -1) for kind in KINDS
+        self.point_indices: list[Any] = []
+        self.indices = {
+            kind: np.full((len(grid.fractions), len(self.names[kind])), -1)
+            for kind in VARIABLE_KINDS
         }
-        size, end = self.shared, len(grid.places) - 1
+        size, end = self.shared, len(grid.fractions) - 1
         lows, highs = [np.array(lower)], [np.array(upper)]
         limits = {
             kind: np.array([[b.within, b.first, b.last] for b in own])
             for kind, own in self.bounds.items()
         }
-        for point in range(len(grid.places)):
+        for point in range(len(grid.fractions)):
             first = size
             for kind, own in limits.items():
-                if len(own) and self.has(kind, point):
+                if len(own) and self.has_kind(kind, point):
                     ends = own[:, 1 if point == 0 else 2 if point == end else 0]
                     lows.append(ends[:, 0])
                     highs.append(ends[:, 1])
-                    self.places_of[kind][point] = np.arange(size, size + len(own))
+                    self.indices[kind][point] = np.arange(size, size + len(own))
                     size += len(own)
-            self.places.append(np.arange(first, size))
+            self.point_indices.append(np.arange(first, size))
         self.lower, self.upper = np.concatenate(lows), np.concatenate(highs)
         for place in np.flatnonzero(~(self.lower <= self.upper))[:1]:
             span = f"from {self.lower[place]:g} to {self.upper[place]:g}"
-            message = f"all bounds of '{self.name_at(place)}' together leave no value ({span})"
-            raise problem.wrong(problem.phase, message)
+            message = (
+                f"all bounds of '{self.describe_variable(place)}' together leave no value ({span})"
+            )
+            raise problem.invalid_error(problem.phase, message)
 
-    def has(self, kind: str, point: int) -> bool:
+    def has_kind(self, kind: str, point: int) -> bool:
         """Whether a point has variables of a kind: corrections of velocities are between nodes,
         projections at the ends of intervals.
         """
-        if kind == "slacks" and not self.problem.projects:
+        if kind == "slacks" and not self.problem.uses_projection:
             return not self.problem.grid.is_mesh[point]
         return kind not in ("slacks", "projections") or bool(
             point and self.problem.grid.is_mesh[point]
@@ -119,49 +125,49 @@ class Layout:
         if not self.problem.solver.scale_variables_using_bounds:
             return scale, shift
         pairs: list[Any] = [*enumerate([*self.problem.times, *self.problem.parameters.values()])]
-        for kind in KINDS:
-            for column, item in zip(self.places_of[kind].T, self.bounds[kind], strict=True):
+        for kind in VARIABLE_KINDS:
+            for column, item in zip(self.indices[kind].T, self.bounds[kind], strict=True):
                 pairs.append((column[column >= 0], item.within))
         for places, (low, high) in pairs:
-            scale[places], shift[places] = scaling(low, high)
+            scale[places], shift[places] = compute_scaling(low, high)
         return scale, shift
 
-    def guess(self) -> Array:
+    def make_guess(self) -> Array:
         """The middle between the bounds of each, as Moco begins."""
-        return middle(self.lower, self.upper)
+        return compute_midpoint(self.lower, self.upper)
 
-    def taken(self, trajectory: Any) -> Array:
+    def guess_from_trajectory(self, trajectory: Any) -> Array:
         """A guess from a trajectory, by splines between its times; what it has not is in the middle of its bounds."""
-        result, times = self.guess(), trajectory.times
+        result, times = self.make_guess(), trajectory.times
         result[:2] = times[0], times[-1]
-        at = times[0] + self.problem.grid.places * (times[-1] - times[0])
-        for kind in KINDS:
+        at = times[0] + self.problem.grid.fractions * (times[-1] - times[0])
+        for kind in VARIABLE_KINDS:
             for number, name in enumerate(self.names[kind]):
-                column = trajectory.columns.get(name.removesuffix(PROJECTED))
+                column = trajectory.columns.get(name.removesuffix(PROJECTION_SUFFIX))
                 if column is not None:
-                    places = self.places_of[kind][:, number]
-                    result[places[places >= 0]] = _resampled(times, column, at)[places >= 0]
+                    places = self.indices[kind][:, number]
+                    result[places[places >= 0]] = _resample(times, column, at)[places >= 0]
         for number, name in enumerate(self.problem.parameters):
             if name in trajectory.parameters:
                 result[2 + number] = trajectory.parameters[name]
         return result
 
-    def name_at(self, place: int) -> str:
+    def describe_variable(self, place: int) -> str:
         """What a variable is, and where."""
         if place < self.shared:
             return ["initial time", "final time", *self.problem.parameters][place]
-        for kind in KINDS:
-            found = np.argwhere(self.places_of[kind] == place)
+        for kind in VARIABLE_KINDS:
+            found = np.argwhere(self.indices[kind] == place)
             if len(found):
                 return self.names[kind][found[0][1]]
         return ""
 
 
-def _resampled(times: Array, column: Array, at: Array) -> Array:
+def _resample(times: Array, column: Array, at: Array) -> Array:
     """A column at other times: by a natural spline of fifth degree as Moco does, of few times on lines."""
     if len(times) == len(at) and np.allclose(times, at, rtol=0.0, atol=1e-12):
         return column
     known = np.isfinite(column)
-    if known.sum() < FEWEST:
+    if known.sum() < MIN_SPLINE_TIMES:
         return np.interp(at, times[known], column[known])
     return SampledCurves(times[known], column[known][:, None]).derivatives(at, (0,))[0][:, 0]

@@ -18,7 +18,7 @@ Formula = Any
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class TimeFunction:
     """A function of time that is given, such as a measured angle.
 
     Attributes: number: among those of the problem. values: at times (n,) the value and both of its
@@ -30,7 +30,7 @@ class Series:
     values: Callable[[Array], Array]
     factor: int | None = None
 
-    def at(self, t: Formula, known: Formula) -> Formula:
+    def expand(self, t: Formula, known: Formula) -> Formula:
         """The value; exact to the second derivative, as what is known is renewed for each time."""
         first, since = 1 + 3 * self.number, t - known[0]
         return known[first] + since * (known[first + 1] + 0.5 * since * known[first + 2])
@@ -73,11 +73,11 @@ class Point:
     parameters: Formula
     known: Formula
     projections: Formula = field(default_factory=lambda: casadi.SX(0, 1))
-    solved: list[tuple[Formula, Formula]] = field(default_factory=list)
+    linear_systems: list[tuple[Formula, Formula]] = field(default_factory=list)
     _kept: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
-    def reached(self) -> Point:
+    def before_projection(self) -> Point:
         """The same with the values and speeds that the interval leads to."""
         size = self.projections.numel()
         x = casadi.vertcat(self.projections, self.x[size:])
@@ -91,15 +91,15 @@ class Point:
         """The control of a path."""
         return self.u[self.problem.functions.controls.index(path)]
 
-    def at(self, series: Series) -> Formula:
+    def evaluate(self, series: TimeFunction) -> Formula:
         """What a series is at this time."""
-        value = series.at(self.t[0], self.known)
+        value = series.expand(self.t[0], self.known)
         return value if series.factor is None else self.parameters[series.factor] * value
 
     @cached_property
     def rates(self) -> Formula:
         """The derivative of the whole state, of which speeds and accelerations are those of the dynamics mode."""
-        return self.problem.dynamics.rates(self)
+        return self.problem.dynamics.compute_rates(self)
 
     @property
     def accelerations(self) -> Formula:
@@ -132,7 +132,7 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Ends:
+class Endpoints:
     """What the value of a goal is made of.
 
     Attributes:
@@ -151,13 +151,13 @@ class Ends:
         return self.end.t[0] - self.start.t[0]
 
 
-COST = ("cost",)
-BOTH = "cost", "endpoint_constraint"
-CONSTRAINT = "endpoint_constraint", "cost"
+COST_ONLY = ("cost",)
+COST_FIRST = "cost", "endpoint_constraint"
+CONSTRAINT_FIRST = "endpoint_constraint", "cost"
 
 
 @dataclass(frozen=True, eq=False)
-class Terms:
+class GoalTerms:
     """What a goal consists of.
 
     Attributes: value: from both ends, and from the integral over time, the value or the column of
@@ -168,14 +168,14 @@ class Terms:
         place of being integrated.
     """
 
-    value: Callable[[Ends], Formula]
+    value: Callable[[Endpoints], Formula]
     integrand: Callable[[Point], Formula] | None = None
-    modes: tuple[str, ...] = COST
+    modes: tuple[str, ...] = COST_ONLY
     is_sum: bool = False
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class ConstraintRows:
     """What a path constraint consists of.
 
     Attributes:
@@ -189,6 +189,8 @@ class Rows:
     limits: list[tuple[float, float]]
 
 
-def integral(integrand: Callable[[Point], Formula], modes: tuple[str, ...] = COST) -> Terms:
+def make_integral_terms(
+    integrand: Callable[[Point], Formula], modes: tuple[str, ...] = COST_ONLY
+) -> GoalTerms:
     """The terms of a goal that is the integral of something over time."""
-    return Terms(lambda ends: ends.integral, integrand, modes)
+    return GoalTerms(lambda ends: ends.integral, integrand, modes)

@@ -19,14 +19,33 @@ from osimlite.errors import SettingError
 from osimlite.fitting.modifying.processing import processed
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.optimal.asked import MAX_MESH_INTERVALS, MAX_MESH_VALUES, Asked
-from osimlite.optimal.bounds import FREE, Range, control_bounds, range_of, scaling, state_bounds
+from osimlite.optimal.asked import MAX_MESH_INTERVALS, MAX_MESH_VALUES, StudyContext
+from osimlite.optimal.bounds import (
+    FREE,
+    Range,
+    compute_scaling,
+    find_control_bounds,
+    find_state_bounds,
+    read_range,
+)
 from osimlite.optimal.dynamics import Dynamics
-from osimlite.optimal.given_motion import GivenDynamics, GivenMotion, Motion, motion_of
-from osimlite.optimal.layout import PROJECTED
-from osimlite.optimal.point import Formula, Point, Rows, Series, Terms, integral
-from osimlite.optimal.schemes import Grid, scheme_named
-from osimlite.optimal.tables import over_time
+from osimlite.optimal.given_motion import (
+    Motion,
+    PrescribedDynamics,
+    PrescribedMotion,
+    read_position_motion,
+)
+from osimlite.optimal.layout import PROJECTION_SUFFIX
+from osimlite.optimal.point import (
+    ConstraintRows,
+    Formula,
+    GoalTerms,
+    Point,
+    TimeFunction,
+    make_integral_terms,
+)
+from osimlite.optimal.schemes import Grid, make_scheme
+from osimlite.optimal.tables import sample_function
 from osimlite.schema.base import Component, Object
 from osimlite.schema.controllers import Controller
 from osimlite.schema.coordinates import Coordinate
@@ -36,11 +55,11 @@ from osimlite.schema.moco.studies import MocoCasADiSolver, MocoStudy
 from osimlite.schema.model import Model
 from osimlite.schema.motions import PositionMotion
 
-NO_RATES = "BallJoint", "EllipsoidJoint", "FreeJoint", "ScapulothoracicJoint"
+JOINTS_WITHOUT_RATES = "BallJoint", "EllipsoidJoint", "FreeJoint", "ScapulothoracicJoint"
 """Joints whose speeds are not the rates of their values: Moco refuses them."""
 
 
-class Problem(Asked):
+class Problem(StudyContext):
     """What varies, between which bounds, and what is asked of it.
 
     Args:
@@ -78,68 +97,69 @@ class Problem(Asked):
         self.tables, self._scaled = tables or {}, scaled or {}
         self._factors: dict[str, str] = {}
         self.study = study
-        self.expect_sound(study)
+        self.check_values(study)
         self.phase = study.problem.phases
-        self.series: list[Series] = []
+        self.time_functions: list[TimeFunction] = []
         # What programs on other meshes share, by whether it is of points of the mesh, and of such
         # that are moved.
         self.formulas: dict[tuple[bool, bool], Any] = {}
         if not isinstance(study.solver, MocoCasADiSolver):
-            raise self.refused(study.solver, "of solvers only MocoCasADiSolver is known")
+            raise self.unsupported_error(study.solver, "of solvers only MocoCasADiSolver is known")
         self.solver: MocoCasADiSolver = study.solver
-        self.model = self._model()
-        motion = motion or self._motion()
+        self.model = self._process_model()
+        motion = motion or self._remove_motion()
         self.components = {
             part.path: part for part in self.model.walk() if isinstance(part, Component)
         }
-        self._refuse_parts()
-        self.loads: list[Series] = []
+        self._check_components()
+        self.loads: list[TimeFunction] = []
         paths = {
-            parameter.name: self.parameter_paths(parameter) for parameter in self.phase.parameters
+            parameter.name: self.list_parameter_paths(parameter)
+            for parameter in self.phase.parameters
         }
-        self.functions: Any = self._functions(
+        self.functions: Any = self._make_functions(
             [path for own in paths.values() for path in own], motion
         )
         if not self.functions.states:
-            raise self.wrong(self.phase, "its model has no states: nothing moves in it")
+            raise self.invalid_error(self.phase, "its model has no states: nothing moves in it")
         self.parameters: dict[str, Range] = {
-            parameter.name: range_of(parameter.moco_bounds) or FREE
+            parameter.name: read_range(parameter.moco_bounds) or FREE
             for parameter in self.phase.parameters
         }
         self.parameter_owners = [place for place, own in enumerate(paths.values()) for _ in own]
-        self._add_factors()
+        self._add_scale_factors()
         # OpenSim has no controls of actuators that do not act.
-        acting = [name for name in self.functions.controls if self._acts(name)]
-        self._expect_infos(acting)
-        self.controls = control_bounds(self.phase, acting, self.components)
-        self.states = state_bounds(
+        acting = [name for name in self.functions.controls if self._is_acting(name)]
+        self._check_infos(acting)
+        self.controls = find_control_bounds(self.phase, acting, self.components)
+        self.states = find_state_bounds(
             self.phase, self.functions.states, self.components, self.controls
         )
         self.times: tuple[Range, Range] = (
-            range_of(self.phase.time_initial_bounds) or FREE,
-            range_of(self.phase.time_final_bounds) or FREE,
+            read_range(self.phase.time_initial_bounds) or FREE,
+            read_range(self.phase.time_final_bounds) or FREE,
         )
         if self.times[1][1] <= self.times[0][0]:
             ends = self.times[1][1], self.times[0][0]
             message = "the phase ends at {:g} s at the latest, and begins at {:g} s at the earliest".format(
                 *ends
             )
-            raise self.wrong(self.phase.time_final_bounds, message)
-        self.constraint_names = self._constraint_names()
-        self.grid = Grid.of(scheme_named(self.solver.transcription_scheme), self._mesh())
-        self.dynamics = Dynamics(self) if motion is None else GivenDynamics(self)
-        self._refuse_settings()
-        self.goals: list[tuple[MocoGoal, Terms]] = [
+            raise self.invalid_error(self.phase.time_final_bounds, message)
+        self.constraint_names = self._name_constraints()
+        self.grid = Grid.from_mesh(make_scheme(self.solver.transcription_scheme), self._make_mesh())
+        self.dynamics = Dynamics(self) if motion is None else PrescribedDynamics(self)
+        self._check_settings()
+        self.goals: list[tuple[MocoGoal, GoalTerms]] = [
             *((goal, self._terms(goal)) for goal in self.phase.goals if goal.enabled),
-            *self._costs_of_solver(),
+            *self._make_solver_costs(),
         ]
-        self.path_rows: list[Rows] = [
+        self.path_rows: list[ConstraintRows] = [
             self._found(constraint, "constraints", "path constraints").rows(constraint, self)
             for constraint in self.phase.path_constraints
         ]
 
     # --------------------------------------------------------------------------------------- for goals and tools
-    def weights(
+    def find_weights(
         self,
         part: Object,
         by_name: MocoWeightSet,
@@ -150,31 +170,33 @@ class Problem(Asked):
         """How much each of some names counts: by its name, else by the last pattern that matches, else one."""
         own = {weight.name: weight.weight for weight in by_name.objects}
         for name in own:
-            self.expect(part, name, names, what)
+            self.check_name(part, name, names, what)
         found = dict.fromkeys(names, 1.0)
         for weight in by_pattern.objects if by_pattern is not None else ():
-            matches = self.pattern(weight, weight.name)
+            matches = self.compile_pattern(weight, weight.name)
             found |= {name: weight.weight for name in names if matches(name)}
         return [*(found | own).values()]
 
-    def given(self, values: Callable[[Array], Array], label: str = "") -> Series:
-        """A function of time that is given, for formulas at points (``point.at(series)``).
+    def add_time_function(self, values: Callable[[Array], Array], label: str = "") -> TimeFunction:
+        """A function of time that is given, for formulas at points (``point.evaluate(series)``).
 
         Args:
             values: at times (n,) the value and both of its derivatives by time (3, n).
             label: of the column that it is, which a scale factor of the goal may multiply.
         """
         factor = self._factors.get(label)
-        series = Series(
-            len(self.series), values, None if factor is None else [*self.parameters].index(factor)
+        series = TimeFunction(
+            len(self.time_functions),
+            values,
+            None if factor is None else [*self.parameters].index(factor),
         )
-        self.series.append(series)
+        self.time_functions.append(series)
         return series
 
-    def parameter_paths(self, parameter: MocoParameter) -> list[str]:
+    def list_parameter_paths(self, parameter: MocoParameter) -> list[str]:
         """Paths of the numbers that a parameter stands for, one at least."""
         if not parameter.component_paths:
-            raise self.wrong(parameter, "it names no component")
+            raise self.invalid_error(parameter, "it names no component")
         element = parameter.property_element
         behind = "" if element is None else f"/{element}"
         return [
@@ -183,27 +205,27 @@ class Problem(Asked):
         ]
 
     # ------------------------------------------------------------------------------------------------- parts
-    def _model(self) -> Model:
+    def _process_model(self) -> Model:
         processor = self.phase.model
         if not processor.filepath.strip() and processor.model is None:
-            raise self.wrong(processor, "it has no model and names none")
+            raise self.invalid_error(processor, "it has no model and names none")
         return processed(processor, self.folder)
 
-    def _motion(self) -> Motion | None:
+    def _remove_motion(self) -> Motion | None:
         """That of a PositionMotion, which is taken out of the model."""
         for part in list(self.model.components(PositionMotion)):
             if part.default_enabled:
                 place = part.path
-                motion = motion_of(part, self.model)
+                motion = read_position_motion(part, self.model)
                 self.model.remove(part)
                 if isinstance(motion, str):
-                    raise self.wrong(
+                    raise self.invalid_error(
                         self.phase, f"PositionMotion '{place}' has no function for '{motion}'"
                     )
                 return motion
         return None
 
-    def _functions(self, parameters: list[str], motion: Motion | None) -> Any:
+    def _make_functions(self, parameters: list[str], motion: Motion | None) -> Any:
         if motion is None:
             try:
                 functions = CasadiModel(self.model, parameters, self.folder, loads_given=True)
@@ -211,21 +233,23 @@ class Problem(Asked):
                 owners = (
                     part
                     for part in self.phase.parameters
-                    if any(f"'{path}'" in error.message for path in self.parameter_paths(part))
+                    if any(f"'{path}'" in error.message for path in self.list_parameter_paths(part))
                 )
-                raise self.wrong(next(owners, self.phase), error.message) from None
-            self.loads = [self.given(partial(over_time, load)) for load in functions.loads]
+                raise self.invalid_error(next(owners, self.phase), error.message) from None
+            self.loads = [
+                self.add_time_function(partial(sample_function, load)) for load in functions.loads
+            ]
             return functions
         if parameters:
-            raise self.refused(
+            raise self.unsupported_error(
                 self.phase, f"parameters ({parameters[0]}) where the motion is given"
             )
-        return GivenMotion(self.model, motion, self.folder)
+        return PrescribedMotion(self.model, motion, self.folder)
 
-    def _refuse_parts(self) -> None:
+    def _check_components(self) -> None:
         for part in self.components.values():
             if isinstance(part, Coordinate) and part.locked:
-                raise self.wrong(
+                raise self.invalid_error(
                     self.phase,
                     f"{part.path} is locked, which Moco refuses; take a WeldJoint instead",
                 )
@@ -233,25 +257,25 @@ class Problem(Asked):
                 message = (
                     f"the model's {type(part).tag} '{part.path}' would set controls; leave it out"
                 )
-                raise self.refused(self.phase, message)
-            if type(part).tag in NO_RATES:
+                raise self.unsupported_error(self.phase, message)
+            if type(part).tag in JOINTS_WITHOUT_RATES:
                 message = f"{type(part).tag} '{part.path}' has speeds that are no rates, which Moco refuses, too"
-                raise self.wrong(self.phase, f"{message}; take a CustomJoint")
+                raise self.invalid_error(self.phase, f"{message}; take a CustomJoint")
 
-    def _refuse_settings(self) -> None:
+    def _check_settings(self) -> None:
         if self.solver.optim_solver != "ipopt":
-            raise self.refused(
+            raise self.unsupported_error(
                 self.solver, f"of optimizers only ipopt is known, not {self.solver.optim_solver}"
             )
 
-    def _costs_of_solver(self) -> Iterator[tuple[MocoGoal, Terms]]:
+    def _make_solver_costs(self) -> Iterator[tuple[MocoGoal, GoalTerms]]:
         """Squares of variables that the solver's own settings make a cost, named as in Moco."""
         solver, first = (
             self.solver,
             len(self.functions.coordinates) if self.dynamics.is_implicit else 0,
         )
         if solver.minimize_lagrange_multipliers and not self.constraint_names:
-            raise self.wrong(
+            raise self.invalid_error(
                 solver, "minimize_lagrange_multipliers needs constraints, and the model has none"
             )
         for name, wanted, weight, part, bounds in (
@@ -281,53 +305,55 @@ class Problem(Asked):
             if wanted:
                 # What Moco makes a cost are the variables as they are scaled.
                 by = (
-                    scaling(*(range_of(bounds) or FREE))
+                    compute_scaling(*(read_range(bounds) or FREE))
                     if solver.scale_variables_using_bounds
                     else (1.0, 0.0)
                 )
                 yield (
                     MocoControlGoal(name=name, weight=weight),
-                    integral(partial(_squares, part, by)),
+                    make_integral_terms(partial(_sum_scaled_squares, part, by)),
                 )
-        if solver.minimize_state_projection_distance and self.projects:
+        if solver.minimize_state_projection_distance and self.uses_projection:
             goal = MocoControlGoal(
                 name="state_projection", weight=solver.state_projection_distance_weight
             )
-            yield goal, replace(integral(_way), is_sum=True)
+            yield goal, replace(make_integral_terms(_squared_projection_distance), is_sum=True)
 
-    def _acts(self, control: str) -> bool:
+    def _is_acting(self, control: str) -> bool:
         owner: Any = self.components.get(control) or self.components[control.rpartition("_")[0]]
         return bool(owner.appliesForce)
 
-    def _expect_infos(self, controls: Sequence[str]) -> None:
+    def _check_infos(self, controls: Sequence[str]) -> None:
         for pattern in (*self.phase.state_infos_pattern, *self.phase.control_infos_pattern):
-            self.pattern(pattern, pattern.name)
+            self.compile_pattern(pattern, pattern.name)
         for infos, known, what in (
             (self.phase.state_infos, self.functions.states, "state"),
             (self.phase.control_infos, controls, "control"),
         ):
             for info in infos:
-                self.expect(info, info.name, known, what)
+                self.check_name(info, info.name, known, what)
         for info in (*self.phase.input_control_infos, *self.phase.input_control_infos_pattern):
-            raise self.refused(info, "inputs of controllers are not solved here")
+            raise self.unsupported_error(info, "inputs of controllers are not solved here")
 
-    def _constraint_names(self) -> list[str]:
+    def _name_constraints(self) -> list[str]:
         count = self.functions.constraints_kept
         if not count:
             return []
-        if not isinstance(self.functions, GivenMotion):
-            self._expect_method(count)
+        if not isinstance(self.functions, PrescribedMotion):
+            self._check_constraint_method(count)
         # OpenSim numbers constraints behind those that lock coordinates.
         coordinates = [part for part in self.components.values() if isinstance(part, Coordinate)]
         first = sum(1 + (part.prescribed_function is not None) for part in coordinates)
-        return [f"cid{first + number}_p{row}" for number, row in _by_constraint(self.model, count)]
+        return [
+            f"cid{first + number}_p{row}" for number, row in _number_equations(self.model, count)
+        ]
 
-    def _expect_method(self, count: int) -> None:
+    def _check_constraint_method(self, count: int) -> None:
         """Refuse settings by which states are not kept on so many equations of constraints."""
         solver = self.solver
         if solver.kinematic_constraint_method == "Bordalba2023":
             if not solver.enforce_constraint_derivatives:
-                raise self.wrong(
+                raise self.invalid_error(
                     solver, "Bordalba2023 needs enforce_constraint_derivatives, as in Moco"
                 )
         elif (
@@ -335,53 +361,53 @@ class Problem(Asked):
             and solver.enforce_constraint_derivatives
         ):
             message = "constraints of the model with Posa2016 need transcription_scheme hermite-simpson, as in Moco"
-            raise self.wrong(solver, message)
+            raise self.invalid_error(solver, message)
         if self.functions.constraints.size1_out(0) != count:
-            raise self.refused(
+            raise self.unsupported_error(
                 self.phase,
                 "the model has constraints that bind speeds alone, which is not solved here",
             )
 
-    def _mesh(self) -> Array:
+    def _make_mesh(self) -> Array:
         solver = self.solver
         intervals = len(solver.mesh) or solver.num_mesh_intervals
         most = min(MAX_MESH_INTERVALS, MAX_MESH_VALUES // max(1, len(self.functions.states)))
         if intervals > most:
             message = f"the mesh has {intervals} intervals; at most {most} are solved of this model"
-            raise self.wrong(solver, message)
+            raise self.invalid_error(solver, message)
         if not solver.mesh:
             return np.linspace(0.0, 1.0, solver.num_mesh_intervals + 1)
         mesh = np.array(solver.mesh)
         if mesh[0] != 0.0 or mesh[-1] != 1.0 or np.any(np.diff(mesh) <= 0.0):
-            raise self.wrong(solver, "the mesh has to rise from 0 to 1")
+            raise self.invalid_error(solver, "the mesh has to rise from 0 to 1")
         return mesh
 
     def _found(self, part: Object, package: str, what: str) -> Any:
         """The module of a class of goals or constraints."""
         place = f"{__package__}.{package}.{module_name(type(part).tag)}"
         if find_spec(place) is None:
-            raise self.refused(part, f"{what} of this class are not solved here yet")
+            raise self.unsupported_error(part, f"{what} of this class are not solved here yet")
         return import_module(place)
 
-    def _terms(self, goal: MocoGoal) -> Terms:
+    def _terms(self, goal: MocoGoal) -> GoalTerms:
         module = self._found(goal, "goals", "goals")
         self._factors = {self._scaled[factor.name]: factor.name for factor in goal.scale_factors}
-        first = len(self.series)
-        terms: Terms = module.terms(goal, self)
-        used = [item.factor for item in self.series[first:]]
+        first = len(self.time_functions)
+        terms: GoalTerms = module.terms(goal, self)
+        used = [item.factor for item in self.time_functions[first:]]
         for factor in goal.scale_factors:
             if [*self.parameters].index(factor.name) not in used:
-                raise self.wrong(
+                raise self.invalid_error(
                     factor, f"the goal follows no column '{self._scaled[factor.name]}'"
                 )
         self._factors = {}
         if goal.mode is not None and goal.mode not in terms.modes:
-            raise self.wrong(
+            raise self.invalid_error(
                 goal, f"it cannot be of mode '{goal.mode}', as in Moco; it is a {terms.modes[0]}"
             )
         return terms
 
-    def _add_factors(self) -> None:
+    def _add_scale_factors(self) -> None:
         """The scale factors of goals, which are parameters, too."""
         for factor in [factor for goal in self.phase.goals for factor in goal.scale_factors]:
             if factor.name not in self._scaled:
@@ -389,48 +415,50 @@ class Problem(Asked):
                 message = (
                     "no file says which column it is for, and OpenSim applies none that it reads"
                 )
-                raise self.refused(factor, f"{message}; osimlite.moco is told by `scaled`")
+                raise self.unsupported_error(
+                    factor, f"{message}; osimlite.moco is told by `scaled`"
+                )
             if factor.name in self.parameters:
-                raise self.wrong(factor, "there is another parameter of its name")
-            self.parameters[factor.name] = range_of(factor) or FREE
+                raise self.invalid_error(factor, "there is another parameter of its name")
+            self.parameters[factor.name] = read_range(factor) or FREE
 
     @property
-    def binds(self) -> bool:
+    def has_constraints(self) -> bool:
         """Whether states have to be kept on constraints."""
-        return bool(self.constraint_names) and not isinstance(self.functions, GivenMotion)
+        return bool(self.constraint_names) and not isinstance(self.functions, PrescribedMotion)
 
     @property
-    def projects(self) -> bool:
+    def uses_projection(self) -> bool:
         """Whether intervals lead to states that are moved onto the constraints."""
-        return self.binds and self.solver.kinematic_constraint_method == "Bordalba2023"
+        return self.has_constraints and self.solver.kinematic_constraint_method == "Bordalba2023"
 
     @property
     def projected_names(self) -> list[str]:
         """Of values and speeds before they are moved."""
-        count = 2 * len(self.functions.coordinates) if self.projects else 0
-        return [f"{name}{PROJECTED}" for name in self.functions.states[:count]]
+        count = 2 * len(self.functions.coordinates) if self.uses_projection else 0
+        return [f"{name}{PROJECTION_SUFFIX}" for name in self.functions.states[:count]]
 
     @cached_property
     def slack_names(self) -> list[str]:
         """Of the corrections of velocities, or of those of values and of speeds, which Moco names by turns."""
-        if self.projects:
+        if self.uses_projection:
             return [f"mu_{name}{end}" for name in self.constraint_names for end in ("", "_dot")]
-        wanted = self.binds and self.solver.enforce_constraint_derivatives
+        wanted = self.has_constraints and self.solver.enforce_constraint_derivatives
         return [f"gamma_{name}" for name in self.constraint_names] if wanted else []
 
 
-def _way(point: Point) -> Formula:
+def _squared_projection_distance(point: Point) -> Formula:
     """The square of how far states are moved at a point."""
     return casadi.sumsqr(point.projections - point.x[: point.projections.numel()])
 
 
-def _squares(part: str | slice, by: tuple[float, float], point: Point) -> Formula:
+def _sum_scaled_squares(part: str | slice, by: tuple[float, float], point: Point) -> Formula:
     """Of the multipliers, or of some of the derivatives that are variables, as they are scaled."""
     column = point.multipliers if isinstance(part, str) else point.derivatives[part]
     return casadi.sumsqr((column - by[1]) / by[0])
 
 
-def _by_constraint(model: Model, count: int) -> Iterable[tuple[int, int]]:
+def _number_equations(model: Model, count: int) -> Iterable[tuple[int, int]]:
     """For each equation the number of its constraint and its own."""
     sizes = {"WeldConstraint": 6, "PointConstraint": 3}
     rows: list[tuple[int, int]] = []

@@ -18,16 +18,16 @@ import numpy as np
 
 from osimlite.derivatives.symbols import casadi
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.optimal.bounds import range_of
-from osimlite.optimal.layout import KINDS, Layout
-from osimlite.optimal.point import Ends, Point
+from osimlite.optimal.bounds import read_range
+from osimlite.optimal.layout import VARIABLE_KINDS, Layout
+from osimlite.optimal.point import Endpoints, Point
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.sparse import SparseMatrix
 
 SX: Any = casadi.SX
 
 
-class Buffered:
+class BufferedFunction:
     """A function of CasADi on arrays, without what its own call takes to convert them.
 
     Args:
@@ -52,7 +52,7 @@ class Buffered:
         return [array.copy() for array in self._results]
 
 
-def once(law: Callable[[Array], Any]) -> Callable[[Array], Any]:
+def cache_last(law: Callable[[Array], Any]) -> Callable[[Array], Any]:
     """The law, that keeps its result for the array that it was last asked for."""
     kept: Any = None
 
@@ -66,33 +66,33 @@ def once(law: Callable[[Array], Any]) -> Callable[[Array], Any]:
 
 
 class PointFormula:
-    """F and its derivatives at a point of one sort, whatever the mesh: those of the mesh, or those between."""
+    """F and its derivatives at a point of one group, whatever the mesh: those of the mesh, or those between."""
 
     def __init__(self, program: Program, number: int, size: int) -> None:
         problem, layout = program.problem, program.layout
         is_mesh = bool(problem.grid.is_mesh[number])
         self.projected = (
-            len(layout.names["projections"]) if layout.has("projections", number) else 0
+            len(layout.names["projections"]) if layout.has_kind("projections", number) else 0
         )
         s, z = SX.sym("s", layout.shared), SX.sym("z", size)
         place, known = SX.sym("place"), SX.sym("known", program.known_size)
         point = program.point(s, z, place, known, number)
         duration = s[1] - s[0]
-        names, residuals = problem.dynamics.residuals(point)
+        names, residuals = problem.dynamics.compute_residuals(point)
         rows, labels, limits = [residuals], [*names], [(0.0, 0.0)] * len(names)
         if is_mesh or problem.solver.enforce_path_constraint_mesh_interior_points:
             for own in problem.path_rows:
                 rows.append(own.formula(point))
                 labels += own.labels
                 limits += own.limits
-        names, errors = problem.dynamics.constraint_errors(point, is_mesh)
+        names, errors = problem.dynamics.compute_constraint_errors(point, is_mesh)
         rows.append(errors)
         labels += names
-        limits += [range_of(problem.phase.kinematic_constraint_bounds) or (0.0, 0.0)] * len(names)
-        rates = [problem.dynamics.corrected(point)]
+        limits += [read_range(problem.phase.kinematic_constraint_bounds) or (0.0, 0.0)] * len(names)
+        rates = [problem.dynamics.correct_rates(point)]
         if self.projected:
-            rates.append(point.reached.rates[: self.projected])
-            names, errors = problem.dynamics.projection_errors(point)
+            rates.append(point.before_projection.rates[: self.projected])
+            names, errors = problem.dynamics.compute_projection_errors(point)
             rows.append(errors)
             labels += names
             limits += [(0.0, 0.0)] * len(names)
@@ -104,7 +104,7 @@ class PointFormula:
         # What is common is found before anything is differentiated: later that takes ten times as
         # long, and finds less.
         solved, equations = (
-            casadi.vertcat(SX(0, 1), *(pair[k] for pair in point.solved)) for k in range(2)
+            casadi.vertcat(SX(0, 1), *(pair[k] for pair in point.linear_systems)) for k in range(2)
         )
         self.labels, self.limits, self.rows = labels, limits, column.numel()
         parts = casadi.cse(casadi.densify(casadi.vertcat(column, equations)))
@@ -155,14 +155,14 @@ class PointFormula:
         return function, [*map(np.array, hessian.sparsity().get_triplet())]
 
 
-class PointFunction:
-    """F and its derivatives for the points of one sort."""
+class PointGroup:
+    """F and its derivatives for the points of one group."""
 
     def __init__(self, program: Program, numbers: list[int]) -> None:
         problem, layout = program.problem, program.layout
         self.numbers = np.array(numbers, dtype=int)
-        self.columns = np.array([layout.places[number] for number in numbers])
-        sort = bool(problem.grid.is_mesh[numbers[0]]), layout.has("projections", numbers[0])
+        self.columns = np.array([layout.point_indices[number] for number in numbers])
+        sort = bool(problem.grid.is_mesh[numbers[0]]), layout.has_kind("projections", numbers[0])
         if sort not in problem.formulas:
             problem.formulas[sort] = PointFormula(program, numbers[0], self.columns.shape[1])
         self.formula = formula = problem.formulas[sort]
@@ -170,18 +170,18 @@ class PointFunction:
         self.labels, self.limits, self.rows = formula.labels, formula.limits, formula.rows
         self.jacobian_rows, self.jacobian_columns = formula.jacobian_entries
         self.value, self.slope = (
-            Buffered(each.map(len(numbers))) for each in (formula.value, formula.slope)
+            BufferedFunction(each.map(len(numbers))) for each in (formula.value, formula.slope)
         )
 
-    def at(self, program: Program, w: Array, places: Array, z: Array) -> Array:
+    def evaluate(self, program: Program, w: Array, places: Array, z: Array) -> Array:
         """F (n, rows) at other places (n,), from 0 to 1, with these variables (n, ...)."""
-        given = program._given_at(w, places, z)
-        return Buffered(self.formula.value.map(len(places)))(*given)[0]
+        given = program._arguments_at(w, places, z)
+        return BufferedFunction(self.formula.value.map(len(places)))(*given)[0]
 
     def make_hessian(self) -> None:
         """The second derivatives are only made if they are asked for."""
         function, (self.hessian_rows, self.hessian_columns) = self.formula.curvature
-        self.curvature = Buffered(function.map(len(self.numbers)))
+        self.curvature = BufferedFunction(function.map(len(self.numbers)))
 
 
 class Program:
@@ -195,27 +195,29 @@ class Program:
     def __init__(self, problem: Problem) -> None:
         self.problem, self.layout = problem, Layout(problem)
         self._found: dict[bytes, Array] = {}
-        self._rows_of = once(lambda w: self._a @ w + self._b @ self._all("value", w))
+        self._compute_rows = cache_last(
+            lambda w: self._a @ w + self._b @ self._evaluate_groups("value", w)
+        )
         self.labels: list[str] = []
         self.times: Array = np.zeros(0)
         self.lower: Array = np.zeros(0)
         self.upper: Array = np.zeros(0)
-        self.known_size = 1 + 3 * len(problem.series)
+        self.known_size = 1 + 3 * len(problem.time_functions)
         self.integrals: list[Any] = [
             (goal, terms) for goal, terms in problem.goals if terms.integrand is not None
         ]
-        points, is_mesh = range(len(problem.grid.places)), problem.grid.is_mesh
-        sorts = [[k for k in points if is_mesh[k]], [k for k in points if not is_mesh[k]]]
+        points, is_mesh = range(len(problem.grid.fractions)), problem.grid.is_mesh
+        groups = [[k for k in points if is_mesh[k]], [k for k in points if not is_mesh[k]]]
         inside = (
             problem.solver.enforce_path_constraint_mesh_interior_points or not problem.path_rows
         )
-        if inside and not problem.binds:
-            sorts = [[*points]]
-        if problem.projects:
+        if inside and not problem.has_constraints:
+            groups = [[*points]]
+        if problem.uses_projection:
             # Nothing leads to the first point.
-            sorts = [[0], sorts[0][1:], sorts[1]]
-        self.sorts = [PointFunction(self, numbers) for numbers in sorts if numbers]
-        self._offsets = np.cumsum([0, *(sort.rows * len(sort.numbers) for sort in self.sorts)])
+            groups = [[0], groups[0][1:], groups[1]]
+        self.groups = [PointGroup(self, numbers) for numbers in groups if numbers]
+        self._offsets = np.cumsum([0, *(group.rows * len(group.numbers) for group in self.groups)])
         self._assemble()
         self._make_ends()
         self._map_jacobian()
@@ -225,8 +227,8 @@ class Program:
     def point(self, s: Any, z: Any, place: Any, known: Any, number: int) -> Point:
         """The formulas at a point of the grid, for all that have the same variables as one of them."""
         parts, first = {}, 0
-        for kind in KINDS:
-            count = len(self.layout.names[kind]) if self.layout.has(kind, number) else 0
+        for kind in VARIABLE_KINDS:
+            count = len(self.layout.names[kind]) if self.layout.has_kind(kind, number) else 0
             parts[kind] = z[first : first + count]
             first += count
         parameters = [s[2 + owner] for owner in self.problem.parameter_owners]
@@ -235,7 +237,7 @@ class Program:
         t = s[0] + place * (s[1] - s[0])
         return Point(
             problem=self.problem,
-            t=casadi.vertcat(t, *(series.at(t, known) for series in self.problem.loads)),
+            t=casadi.vertcat(t, *(series.expand(t, known) for series in self.problem.loads)),
             x=parts["states"],
             u=u,
             multipliers=parts["multipliers"],
@@ -250,9 +252,12 @@ class Program:
     def _make_ends(self) -> None:
         """E: the parts of the cost, and what goals want to be zero at the ends."""
         problem, layout = self.problem, self.layout
-        size, last = layout.shared, len(layout.places) - 1
+        size, last = layout.shared, len(layout.point_indices) - 1
         s = SX.sym("s", size)
-        z0, z1 = SX.sym("z0", len(layout.places[0])), SX.sym("z1", len(layout.places[last]))
+        z0, z1 = (
+            SX.sym("z0", len(layout.point_indices[0])),
+            SX.sym("z1", len(layout.point_indices[last])),
+        )
         totals = SX.sym("integrals", len(self.integrals))
         known = [SX.sym(f"known{k}", self.known_size) for k in range(2)]
         start = self.point(s, z0, SX(0.0), known[0], 0)
@@ -263,7 +268,7 @@ class Program:
         limits: list[tuple[float, float]] = []
         for goal, terms in problem.goals:
             has = [k for k, pair in enumerate(self.integrals) if pair[0] is goal]
-            ends = Ends(start, end, totals[has[0]] if has else None)
+            ends = Endpoints(start, end, totals[has[0]] if has else None)
             value = SX(terms.value(ends))
             if (goal.mode or terms.modes[0]) == "cost":
                 value = value**2 if terms.modes[0] != "cost" else value
@@ -271,10 +276,12 @@ class Program:
                 self.costs.append(goal.name)
                 continue
             rows.append(self._divided(goal, value, ends))
-            bounds = [range_of(each) or (0.0, 0.0) for each in goal.moco_constraint_info.bounds]
+            bounds = [read_range(each) or (0.0, 0.0) for each in goal.moco_constraint_info.bounds]
             count = rows[-1].numel()
             if bounds and len(bounds) != count:
-                raise problem.wrong(goal, f"it has {count} values and bounds for {len(bounds)}")
+                raise problem.invalid_error(
+                    goal, f"it has {count} values and bounds for {len(bounds)}"
+                )
             limits += bounds or [(0.0, 0.0)] * count
             self.end_labels += [
                 goal.name if count == 1 else f"{goal.name} {k}" for k in range(count)
@@ -282,24 +289,26 @@ class Program:
         given = [s, z0, z1, totals, *known]
         cost = casadi.densify(casadi.vertcat(*costs)) if costs else SX.zeros(0, 1)
         wanted = casadi.densify(casadi.vertcat(*rows)) if rows else SX.zeros(0, 1)
-        for symbol, equations in start.solved + end.solved:
+        for symbol, equations in start.linear_systems + end.linear_systems:
             factors = casadi.ldl(casadi.jacobian(equations, symbol))
             solution = casadi.ldl_solve(-casadi.substitute(equations, symbol, 0), *factors)
             cost, wanted = casadi.substitute([cost, wanted], [symbol], [solution])
         both = casadi.vertcat(s, z0, z1, totals)
         total, multipliers = casadi.sum1(cost), SX.sym("multipliers", wanted.numel())
         factor = SX.sym("factor")
-        self.end_columns = np.concatenate([np.arange(size), layout.places[0], layout.places[last]])
+        self.end_columns = np.concatenate(
+            [np.arange(size), layout.point_indices[0], layout.point_indices[last]]
+        )
         lagrangian = factor * total + casadi.dot(multipliers, wanted)
-        self._end_value = Buffered(casadi.Function("E", given, [cost, wanted]))
+        self._end_value = BufferedFunction(casadi.Function("E", given, [cost, wanted]))
         slopes = [casadi.densify(casadi.jacobian(each, both)) for each in (total, wanted)]
-        self._end_slope = Buffered(casadi.Function("dE", given, slopes))
+        self._end_slope = BufferedFunction(casadi.Function("dE", given, slopes))
         self._end_pattern = np.array(
             casadi.DM(casadi.jacobian(wanted, both).sparsity(), 1.0).full(), dtype=bool
         )
         hessian = casadi.hessian(lagrangian, both)[0]
         self._end_hessian_pattern = np.array(casadi.DM(hessian.sparsity(), 1.0).full(), dtype=bool)
-        self._end_curvature = Buffered(
+        self._end_curvature = BufferedFunction(
             casadi.Function("HE", [*given, factor, multipliers], [casadi.densify(hessian)])
         )
         self.labels += self.end_labels
@@ -307,7 +316,7 @@ class Program:
         self.lower = np.append(self.lower, [low for low, _ in limits])
         self.upper = np.append(self.upper, [high for _, high in limits])
 
-    def _divided(self, goal: Any, value: Any, ends: Ends) -> Any:
+    def _divided(self, goal: Any, value: Any, ends: Endpoints) -> Any:
         if goal.divide_by_displacement:
             value = value / casadi.norm_2(ends.end.mass_center() - ends.start.mass_center())
         if goal.divide_by_duration:
@@ -320,26 +329,26 @@ class Program:
         grid, layout = self.problem.grid, self.layout
         states, controls = layout.names["states"], layout.names["controls"]
         scheme, count = grid.scheme, len(layout.names["states"])
-        start_of = np.zeros(len(grid.places), dtype=int)
-        for sort, offset in zip(self.sorts, self._offsets, strict=False):
-            start_of[sort.numbers] = offset + sort.rows * np.arange(len(sort.numbers))
+        start_of = np.zeros(len(grid.fractions), dtype=int)
+        for group, offset in zip(self.groups, self._offsets, strict=False):
+            start_of[group.numbers] = offset + group.rows * np.arange(len(group.numbers))
         a: list[tuple[Any, Any, Any]] = []
         b: list[tuple[Any, Any, Any]] = []
         lines = (
             scheme.controls if self.problem.solver.interpolate_control_mesh_interior_points else ()
         )
         many, moved = len(grid.lengths), len(layout.names["projections"])
-        points = np.array([grid.points_of(interval) for interval in range(many)])
+        points = np.array([grid.get_points(interval) for interval in range(many)])
         labels = [f"{name} defect" for name in states] * len(scheme.states)
         labels += [f"{name} between nodes" for name in controls] * len(lines)
         first = len(labels) * np.arange(many)[:, None]
         for number, pair in enumerate(zip(scheme.states, scheme.rates, strict=True)):
             rows, at = first + number * count + np.arange(count), np.arange(count)
             for k, (own, rate) in enumerate(zip(*pair, strict=True)):
-                places, of = layout.places_of["states"][points[:, k]], at
+                places, of = layout.indices["states"][points[:, k]], at
                 if moved and k == len(points[0]) - 1:
                     # What the interval leads to is moved onto the constraints afterwards.
-                    ends = layout.places_of["projections"][points[:, k]]
+                    ends = layout.indices["projections"][points[:, k]]
                     places, of = (
                         np.hstack([ends, places[:, moved:]]),
                         np.concatenate([count + at[:moved], at[moved:]]),
@@ -358,25 +367,25 @@ class Program:
             )
             for k in np.flatnonzero(line).tolist():
                 a.append(
-                    (rows, layout.places_of["controls"][points[:, k]], np.full(rows.shape, line[k]))
+                    (rows, layout.indices["controls"][points[:, k]], np.full(rows.shape, line[k]))
                 )
         self.labels += labels * many
-        middles = 0.5 * (grid.places[points[:, 0]] + grid.places[points[:, -1]])
+        middles = 0.5 * (grid.fractions[points[:, 0]] + grid.fractions[points[:, -1]])
         times, row = [np.repeat(middles, len(labels))], len(labels) * many
         limits: list[tuple[float, float]] = [(0.0, 0.0)] * row
-        for sort in self.sorts:
-            each, size = np.arange(len(sort.labels)), len(sort.labels) * len(sort.numbers)
-            of = start_of[sort.numbers][:, None] + count + sort.projected + each
+        for group in self.groups:
+            each, size = np.arange(len(group.labels)), len(group.labels) * len(group.numbers)
+            of = start_of[group.numbers][:, None] + count + group.projected + each
             b.append((row + np.arange(size), of, np.ones(size)))
-            self.labels += sort.labels * len(sort.numbers)
-            times.append(np.repeat(grid.places[sort.numbers], len(sort.labels)))
-            limits += sort.limits * len(sort.numbers)
+            self.labels += group.labels * len(group.numbers)
+            times.append(np.repeat(grid.fractions[group.numbers], len(group.labels)))
+            limits += group.limits * len(group.numbers)
             row += size
-        self._rows = row
+        self._row_count = row
         for k, (_, terms) in enumerate(self.integrals):
-            for sort in self.sorts:
-                at = start_of[sort.numbers] + sort.rows - len(self.integrals) + k
-                weights = np.ones(len(at)) if terms.is_sum else grid.weights[sort.numbers]
+            for group in self.groups:
+                at = start_of[group.numbers] + group.rows - len(self.integrals) + k
+                weights = np.ones(len(at)) if terms.is_sum else grid.weights[group.numbers]
                 b.append((np.full(len(at), row + k), at, weights))
         size = row + len(self.integrals)
 
@@ -394,11 +403,11 @@ class Program:
     def _entries(self, rows: str, columns: str) -> tuple[Array, Array]:
         """Of the derivatives of all points: which rows and columns their numbers belong to."""
         first, second = [], []
-        for sort, start in zip(self.sorts, self._offsets, strict=False):
-            r, c, count = getattr(sort, rows), getattr(sort, columns), len(sort.numbers)
-            places = np.hstack([np.tile(np.arange(self.layout.shared), (count, 1)), sort.columns])
+        for group, start in zip(self.groups, self._offsets, strict=False):
+            r, c, count = getattr(group, rows), getattr(group, columns), len(group.numbers)
+            places = np.hstack([np.tile(np.arange(self.layout.shared), (count, 1)), group.columns])
             own = (
-                start + sort.rows * np.arange(count)[:, None] + r
+                start + group.rows * np.arange(count)[:, None] + r
                 if rows == "jacobian_rows"
                 else places[:, r]
             )
@@ -426,7 +435,7 @@ class Program:
             inverse[count:], weights=own.values, minlength=len(unique)
         )
         self._jacobian_rows, self._jacobian_columns = unique // width, unique % width
-        self._of_g = self._jacobian_rows < self._rows
+        self._of_g = self._jacobian_rows < self._row_count
 
     def _map_ends(self) -> None:
         """The pattern of the rows at the ends, behind the others."""
@@ -434,11 +443,13 @@ class Program:
         pattern = np.zeros((len(self.end_labels), width), dtype=bool)
         pattern[:, self.end_columns] |= self._end_pattern[:, :direct]
         for k in range(len(self.integrals)):
-            columns = self._jacobian_columns[self._jacobian_rows == self._rows + k]
+            columns = self._jacobian_columns[self._jacobian_rows == self._row_count + k]
             for row in np.flatnonzero(self._end_pattern[:, direct + k]):
                 pattern[row, columns] = True
         self._end_entries = np.nonzero(pattern)
-        rows = np.concatenate([self._jacobian_rows[self._of_g], self._end_entries[0] + self._rows])
+        rows = np.concatenate(
+            [self._jacobian_rows[self._of_g], self._end_entries[0] + self._row_count]
+        )
         columns = np.concatenate([self._jacobian_columns[self._of_g], self._end_entries[1]])
         # CasADi's columns come one after the other.
         self._jacobian_order = np.lexsort((rows, columns))
@@ -456,49 +467,54 @@ class Program:
         if key not in self._found:
             if len(self._found) >= 8:
                 self._found.clear()
-            values = (np.asarray(series.values(times)) for series in self.problem.series)
+            values = (np.asarray(series.values(times)) for series in self.problem.time_functions)
             self._found[key] = np.vstack([times[None], *values]).T
         return self._found[key]
 
-    def _given(self, sort: PointFunction, w: Array) -> list[Array]:
-        return self._given_at(w, self.problem.grid.places[sort.numbers], w[sort.columns])
+    def _point_arguments(self, group: PointGroup, w: Array) -> list[Array]:
+        return self._arguments_at(w, self.problem.grid.fractions[group.numbers], w[group.columns])
 
-    def _given_at(self, w: Array, places: Array, z: Array) -> list[Array]:
+    def _arguments_at(self, w: Array, places: Array, z: Array) -> list[Array]:
         """What the function of a point is given at places (n,) with variables z (n, ...)."""
         s = w[: self.layout.shared]
         times = w[0] + places * (w[1] - w[0])
         return [np.tile(s, len(places)), z, places, self._known(times)]
 
-    def _all(self, name: str, w: Array) -> Array:
+    def _evaluate_groups(self, name: str, w: Array) -> Array:
         return np.concatenate(
-            [getattr(sort, name)(*self._given(sort, w))[0].ravel() for sort in self.sorts]
+            [
+                getattr(group, name)(*self._point_arguments(group, w))[0].ravel()
+                for group in self.groups
+            ]
         )
 
-    def _end_given(self, w: Array, totals: Array) -> list[Array]:
+    def _end_arguments(self, w: Array, totals: Array) -> list[Array]:
         known = self._known(w[:2])
-        first, last = self.layout.places[0], self.layout.places[-1]
+        first, last = self.layout.point_indices[0], self.layout.point_indices[-1]
         return [w[: self.layout.shared], w[first], w[last], totals, known[0], known[1]]
 
-    def values(self, w: Array) -> tuple[Array, Array]:
+    def compute_values(self, w: Array) -> tuple[Array, Array]:
         """The parts of f, and g."""
-        rows = self._rows_of(w)
-        costs, wanted = self._end_value(*self._end_given(w, rows[self._rows :]))
-        return costs.ravel(), np.concatenate([rows[: self._rows], wanted.ravel()])
+        rows = self._compute_rows(w)
+        costs, wanted = self._end_value(*self._end_arguments(w, rows[self._row_count :]))
+        return costs.ravel(), np.concatenate([rows[: self._row_count], wanted.ravel()])
 
-    def slopes(self, w: Array) -> tuple[Array, Array]:
+    def compute_slopes(self, w: Array) -> tuple[Array, Array]:
         """The gradient of f, and the numbers of the Jacobian of g in the order of `jacobian_sparsity`."""
-        gradient, ends, numbers, _ = self._slopes(w)
+        gradient, ends, numbers, _ = self._compute_slopes(w)
         entries = np.concatenate([numbers[self._of_g], ends[self._end_entries]])
         return gradient, entries[self._jacobian_order]
 
-    def _slopes(self, w: Array) -> tuple[Array, Array, Array, Array]:
+    def _compute_slopes(self, w: Array) -> tuple[Array, Array, Array, Array]:
         width, direct = len(w), len(self.end_columns)
-        numbers = self._jacobian_constant + self._jacobian_map @ self._all("slope", w)
+        numbers = self._jacobian_constant + self._jacobian_map @ self._evaluate_groups("slope", w)
         integrals = np.zeros((len(self.integrals), width))
         of = ~self._of_g
-        integrals[self._jacobian_rows[of] - self._rows, self._jacobian_columns[of]] = numbers[of]
-        totals = self._rows_of(w)[self._rows :]
-        cost, wanted = (part.T for part in self._end_slope(*self._end_given(w, totals)))
+        integrals[self._jacobian_rows[of] - self._row_count, self._jacobian_columns[of]] = numbers[
+            of
+        ]
+        totals = self._compute_rows(w)[self._row_count :]
+        cost, wanted = (part.T for part in self._end_slope(*self._end_arguments(w, totals)))
         gradient = cost.ravel()[direct:] @ integrals
         gradient[self.end_columns] += cost.ravel()[:direct]
         ends = wanted[:, direct:] @ integrals

@@ -13,7 +13,7 @@ from osimlite.schema.moco.path_constraints import MocoFrameDistanceConstraint
 from osimlite.schema.moco.tracking import MocoContactTrackingGoal
 
 
-def projected(
+def make_projection(
     part: MocoContactTrackingGoal | MocoFrameDistanceConstraint, problem: Problem
 ) -> Callable[[Formula], Formula]:
     """What takes of a vector in ground (3, 1) the part that a ``projection`` asks for.
@@ -24,7 +24,7 @@ def projected(
     if part.projection == "none":
         return lambda vector: vector
     if part.projection_vector is None or not any(part.projection_vector):
-        raise problem.wrong(part, "a projection needs a projection_vector")
+        raise problem.invalid_error(part, "a projection needs a projection_vector")
     direction = casadi.DM(np.array(part.projection_vector) / np.linalg.norm(part.projection_vector))
 
     def along(vector: Formula) -> Formula:

@@ -18,21 +18,21 @@ from osimlite.base.records import dataclass
 from osimlite.base.text import or_known
 from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.optimal.ipopt import Found, Progress
-from osimlite.optimal.ipopt import solve as search
-from osimlite.optimal.layout import KINDS
+from osimlite.optimal.ipopt import Progress, SolverResult
+from osimlite.optimal.ipopt import run_ipopt as search
+from osimlite.optimal.layout import VARIABLE_KINDS
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
 from osimlite.optimal.schemes import Grid
 
-SAMPLES, WEIGHTS = (0.5 * part for part in np.polynomial.legendre.leggauss(4))
-SAMPLES = SAMPLES + 0.5
+SAMPLE_FRACTIONS, SAMPLE_WEIGHTS = (0.5 * part for part in np.polynomial.legendre.leggauss(4))
+SAMPLE_FRACTIONS = SAMPLE_FRACTIONS + 0.5
 """Where in an interval (0 to 1) the error is looked at, and how much each counts in the mean."""
-MOST_PARTS = 4
+MAX_PARTS = 4
 """So many an interval becomes at most at once."""
-MOST_ROUNDS, MOST_INTERVALS = 10, 2000
+MAX_ROUNDS, MAX_INTERVALS = 10, 2000
 """Of meshes, and of intervals of one, more are not tried."""
-HESSIANS = "exact", "limited-memory"
+HESSIAN_METHODS = "exact", "limited-memory"
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Refinement:
     hessian: str = "exact"
 
     @classmethod
-    def of(cls, given: float | str | Refinement) -> Refinement:
+    def parse(cls, given: float | str | Refinement) -> Refinement:
         """Of a tolerance, or of words such as ``1e-3`` and ``1e-3:limited-memory``.
 
         Raises:
@@ -65,9 +65,9 @@ class Refinement:
             ) from None
         if not 0.0 < result.tolerance < inf:
             raise SettingError(f"a mesh is refined to a tolerance above 0, not {text}")
-        if result.hessian not in HESSIANS:
+        if result.hessian not in HESSIAN_METHODS:
             raise SettingError(
-                f"meshes are not refined with '{hessian}'{or_known(hessian, HESSIANS)}"
+                f"meshes are not refined with '{hessian}'{or_known(hessian, HESSIAN_METHODS)}"
             )
         return result
 
@@ -86,12 +86,12 @@ class Round(NamedTuple):
         return f"{self.intervals} intervals, error {self.error:.2g}, objective {self.objective:.8g}; {steps}"
 
 
-def refined(
+def solve_with_refinement(
     program: Program,
     guess: Array,
     refinement: Refinement,
     tell: Callable[[Progress], None] | None = None,
-) -> tuple[Program, Found, list[Round]]:
+) -> tuple[Program, SolverResult, list[Round]]:
     """Solve on finer and finer meshes, each from the solution before, until no interval's error is above the tolerance.
 
     A mesh that cannot be solved ends it, and so do too many intervals or meshes.
@@ -108,101 +108,101 @@ def refined(
     Raises:
         UnsupportedError: rates are variables, of which no error is known; or a setting is not done.
     """
-    refuse(program.problem)
+    check_refinable(program.problem)
     found = search(program, guess, tell)
     rounds: list[Round] = []
     while True:
-        error = errors(program, found.w)
-        cost = float(program.values(found.w)[0].sum())
+        error = estimate_errors(program, found.w)
+        cost = float(program.compute_values(found.w)[0].sum())
         rounds.append(Round(len(error), float(error.max()), cost, found.iterations, found.duration))
-        mesh = split(program.problem.grid, error, refinement.tolerance)
+        mesh = split_intervals(program.problem.grid, error, refinement.tolerance)
         is_good, is_enough = (
             len(mesh) == len(error) + 1,
-            len(rounds) > MOST_ROUNDS or len(mesh) > MOST_INTERVALS,
+            len(rounds) > MAX_ROUNDS or len(mesh) > MAX_INTERVALS,
         )
         if not found.success or is_good or is_enough:
             return program, found, rounds
-        finer = _on(program.problem, mesh, refinement.hessian)
-        guess, program = carried(program, found.w, finer), finer
+        finer = _rebuild_program(program.problem, mesh, refinement.hessian)
+        guess, program = interpolate_solution(program, found.w, finer), finer
         found = search(program, guess, tell, near=True)
 
 
-def refuse(problem: Problem) -> None:
+def check_refinable(problem: Problem) -> None:
     """Refuse what has no error here.
 
     Raises:
         UnsupportedError: there is such a thing.
     """
     if problem.dynamics.tendons.names:
-        raise problem.refused(
+        raise problem.unsupported_error(
             problem.solver, "meshes are not refined where tendons are implicit; take explicit ones"
         )
-    if problem.projects:
+    if problem.uses_projection:
         message = "meshes are refined with kinematic_constraint_method Posa2016 only, which leaves no steps in states"
-        raise problem.refused(problem.solver, message)
+        raise problem.unsupported_error(problem.solver, message)
     if problem.dynamics.is_implicit:
-        raise problem.refused(
+        raise problem.unsupported_error(
             problem.solver, "meshes are refined with multibody_dynamics_mode explicit only"
         )
 
 
-def errors(program: Program, w: Array) -> Array:
+def estimate_errors(program: Program, w: Array) -> Array:
     """Of each interval (m,) the largest error of a state over one more than the largest size of that state."""
     grid, layout = program.problem.grid, program.layout
-    polynomial = _Polynomial(program, w)
+    polynomial = _SolutionPolynomials(program, w)
     count = len(layout.names["states"])
-    sort = program.sorts[0]
-    rates, sizes = polynomial.rates, 1.0 + np.abs(w[layout.places_of["states"]]).max(axis=0)
+    group = program.groups[0]
+    rates, sizes = polynomial.rates, 1.0 + np.abs(w[layout.indices["states"]]).max(axis=0)
     result = np.zeros(len(grid.lengths))
-    of_rates = _basis(polynomial.nodes, SAMPLES)
+    of_rates = _evaluate_basis(polynomial.nodes, SAMPLE_FRACTIONS)
     starts = np.concatenate([[0.0], np.cumsum(grid.lengths)[:-1]])
-    for place, weight, row in zip(SAMPLES, WEIGHTS, of_rates, strict=True):
-        values = polynomial.at(np.full(len(starts), place), np.arange(len(starts)))
-        z = np.hstack([values[kind] for kind in KINDS if kind != "slacks"])
-        actual = np.array(sort.at(program, w, starts + place * grid.lengths, z))[:, :count]
+    for place, weight, row in zip(SAMPLE_FRACTIONS, SAMPLE_WEIGHTS, of_rates, strict=True):
+        values = polynomial.evaluate(np.full(len(starts), place), np.arange(len(starts)))
+        z = np.hstack([values[kind] for kind in VARIABLE_KINDS if kind != "slacks"])
+        actual = np.array(group.evaluate(program, w, starts + place * grid.lengths, z))[:, :count]
         missing = np.abs(np.einsum("j,kji->ki", row, rates) - actual)
         result += weight * grid.lengths * (missing / sizes).max(axis=1)
     return result
 
 
-def split(grid: Grid, error: Array, tolerance: float) -> Array:
+def split_intervals(grid: Grid, error: Array, tolerance: float) -> Array:
     """The mesh in which intervals of too large errors are so many equal ones as the order of the scheme asks for."""
     order = 1 + int(grid.scheme.rates.any(axis=0).sum())
     parts = np.ones(len(error), dtype=int)
     large = error > tolerance
-    parts[large] = np.clip(np.ceil((error[large] / tolerance) ** (1.0 / order)), 2, MOST_PARTS)
+    parts[large] = np.clip(np.ceil((error[large] / tolerance) ** (1.0 / order)), 2, MAX_PARTS)
     lengths = np.repeat(grid.lengths / parts, parts)
     return np.concatenate([[0.0], np.cumsum(lengths)[:-1], [1.0]])
 
 
-def carried(program: Program, w: Array, finer: Program) -> Array:
+def interpolate_solution(program: Program, w: Array, finer: Program) -> Array:
     """What was found, on another mesh, by the polynomials of its intervals."""
     grid, layout = program.problem.grid, finer.layout
     starts = np.concatenate([[0.0], np.cumsum(grid.lengths)[:-1]])
-    places = finer.problem.grid.places
+    places = finer.problem.grid.fractions
     interval = np.clip(np.searchsorted(starts, places, side="right") - 1, 0, len(starts) - 1)
-    values = _Polynomial(program, w).at(
+    values = _SolutionPolynomials(program, w).evaluate(
         (places - starts[interval]) / grid.lengths[interval], interval
     )
-    result = layout.guess()
+    result = layout.make_guess()
     result[: layout.shared] = w[: layout.shared]
-    for kind in KINDS:
-        own = layout.places_of[kind]
+    for kind in VARIABLE_KINDS:
+        own = layout.indices[kind]
         has = own >= 0
         result[own[has]] = values[kind][has] if kind != "slacks" else 0.0
     return result
 
 
-def _on(problem: Problem, mesh: Array, hessian: str) -> Program:
+def _rebuild_program(problem: Problem, mesh: Array, hessian: str) -> Program:
     """The program of the same problem on another mesh."""
     other = copy(problem)
-    other.grid = Grid.of(problem.grid.scheme, mesh)
+    other.grid = Grid.from_mesh(problem.grid.scheme, mesh)
     other.solver = problem.solver.copy_deep()
     other.solver.optim_hessian_approximation = hessian
     return Program(other)
 
 
-class _Polynomial:
+class _SolutionPolynomials:
     """What a solution is between its points: states the integral of the polynomial through the rates at these.
 
     Attributes:
@@ -214,47 +214,51 @@ class _Polynomial:
         grid, layout, scheme = program.problem.grid, program.layout, program.problem.grid.scheme
         self.grid, self.scheme = grid, scheme
         used = np.flatnonzero(scheme.rates.any(axis=0))
-        self.nodes = scheme.places[used]
-        points = np.array([grid.points_of(k) for k in range(len(grid.lengths))])
+        self.nodes = scheme.fractions[used]
+        points = np.array([grid.get_points(k) for k in range(len(grid.lengths))])
         count = len(layout.names["states"])
-        rates = np.zeros((len(grid.places), count))
-        for sort in program.sorts:
-            rates[sort.numbers] = sort.value(*program._given(sort, w))[0][:, :count]
+        rates = np.zeros((len(grid.fractions), count))
+        for group in program.groups:
+            rates[group.numbers] = group.value(*program._point_arguments(group, w))[0][:, :count]
         self.rates = rates[points[:, used]]
         self._lines = program.problem.solver.interpolate_control_mesh_interior_points
         self._values = {
-            kind: w[layout.places_of[kind]][points] for kind in KINDS if kind != "slacks"
+            kind: w[layout.indices[kind]][points] for kind in VARIABLE_KINDS if kind != "slacks"
         }
 
-    def at(self, places: Array, intervals: Any) -> dict[str, Array]:
+    def evaluate(self, places: Array, intervals: Any) -> dict[str, Array]:
         """By kind the variables (n, of that kind) at places (n,), from 0 to 1, of intervals (n,)."""
         result = {}
         for kind, values in self._values.items():
             own = values[intervals]
             if kind == "states":
-                through = _integrals(self.nodes, places)
+                through = _integrate_basis(self.nodes, places)
                 way = np.einsum("nj,njs->ns", through, self.rates[intervals])
                 result[kind] = own[:, 0] + self.grid.lengths[intervals, None] * way
             elif kind == "controls" and self._lines:
                 result[kind] = own[:, 0] + places[:, None] * (own[:, -1] - own[:, 0])
             else:
-                result[kind] = np.einsum("nj,njs->ns", _basis(self.scheme.places, places), own)
+                result[kind] = np.einsum(
+                    "nj,njs->ns", _evaluate_basis(self.scheme.fractions, places), own
+                )
         return result
 
 
-def _basis(nodes: Array, places: Array) -> Array:
+def _evaluate_basis(nodes: Array, places: Array) -> Array:
     """Lagrange's polynomials of the nodes (j,) at places (n,): (n, j)."""
-    return np.polynomial.polynomial.polyvander(places, len(nodes) - 1) @ _coefficients(nodes)
+    return np.polynomial.polynomial.polyvander(places, len(nodes) - 1) @ _compute_coefficients(
+        nodes
+    )
 
 
-def _integrals(nodes: Array, places: Array) -> Array:
+def _integrate_basis(nodes: Array, places: Array) -> Array:
     """Their integrals from 0 to each place."""
     powers = np.polynomial.polynomial.polyvander(places, len(nodes))[:, 1:] / np.arange(
         1, len(nodes) + 1
     )
-    return powers @ _coefficients(nodes)
+    return powers @ _compute_coefficients(nodes)
 
 
-def _coefficients(nodes: Array) -> Array:
+def _compute_coefficients(nodes: Array) -> Array:
     result: Any = np.linalg.inv(np.vander(nodes, increasing=True))
     return result

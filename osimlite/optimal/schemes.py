@@ -19,7 +19,7 @@ class Scheme:
 
     Attributes:
         name: as in ``transcription_scheme``.
-        places: of the points (n,), from 0 to 1.
+        fractions: of the points (n,), from 0 to 1.
         weights: (n,) with which values at the points make up the mean over the interval.
         states: (k, n) of k equations that are zero, each for every state.
         rates: (k, n) likewise, of the rates times the duration of the interval.
@@ -27,14 +27,14 @@ class Scheme:
     """
 
     name: str
-    places: Array
+    fractions: Array
     weights: Array
     states: Array
     rates: Array
     controls: Array
 
 
-def scheme_named(name: str) -> Scheme:
+def make_scheme(name: str) -> Scheme:
     """The scheme of a name that the schema allows."""
     if name == "trapezoidal":
         half = np.array([0.5, 0.5])
@@ -48,15 +48,15 @@ def scheme_named(name: str) -> Scheme:
         rates = np.array([[-0.125, 0.0, 0.125], -simpson])
         return Scheme(name, np.array([0.0, 0.5, 1.0]), simpson, states, rates, np.array([between]))
     family, _, degree = name.rpartition("-")
-    return _legendre(name, int(degree), is_radau=family == "legendre-gauss-radau")
+    return _make_legendre_scheme(name, int(degree), is_radau=family == "legendre-gauss-radau")
 
 
-def _legendre(name: str, degree: int, is_radau: bool) -> Scheme:
+def _make_legendre_scheme(name: str, degree: int, is_radau: bool) -> Scheme:
     """Collocation at the roots of a polynomial of Legendre; Radau's has the end of the interval among them."""
     roots = casadi.collocation_points(degree, "radau" if is_radau else "legendre")
     slopes, end, weights = (np.array(part) for part in casadi.collocation_coeff(roots))
     count = degree + (1 if is_radau else 2)
-    places = np.array([0.0, *roots] if is_radau else [0.0, *roots, 1.0])
+    fractions = np.array([0.0, *roots] if is_radau else [0.0, *roots, 1.0])
     states, rates = np.zeros((degree, count)), np.zeros((degree, count))
     states[:, : degree + 1] = -slopes.T
     rates[:, 1 : degree + 1] = np.eye(degree)
@@ -66,11 +66,11 @@ def _legendre(name: str, degree: int, is_radau: bool) -> Scheme:
         states, rates = np.vstack([states, last]), np.vstack([rates, np.zeros((1, count))])
     mean = np.zeros(count)
     mean[1 : degree + 1] = weights.ravel()
-    inner = places[1:-1]
+    inner = fractions[1:-1]
     controls = np.zeros((len(inner), count))
     controls[:, 0], controls[:, -1] = inner - 1.0, -inner
     controls[:, 1:-1] += np.eye(len(inner))
-    return Scheme(name, places, mean, states, rates, controls)
+    return Scheme(name, fractions, mean, states, rates, controls)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,29 +79,31 @@ class Grid:
 
     Attributes:
         scheme: of each interval.
-        places: of the points (n,), from 0 at the start to 1 at the end.
+        fractions: of the points (n,), from 0 at the start to 1 at the end.
         lengths: of the intervals (m,), which are one together.
         is_mesh: (n,) whether a point is an end of an interval.
         weights: (n,) with which values at the points make up the mean over the motion.
     """
 
     scheme: Scheme
-    places: Array
+    fractions: Array
     lengths: Array
     is_mesh: Array
     weights: Array
 
     @classmethod
-    def of(cls, scheme: Scheme, mesh: Array) -> Grid:
+    def from_mesh(cls, scheme: Scheme, mesh: Array) -> Grid:
         """The grid of a mesh, which begins with 0 and ends with 1."""
-        lengths, steps = np.diff(mesh), len(scheme.places) - 1
-        places = np.append((mesh[:-1, None] + lengths[:, None] * scheme.places[:-1]).ravel(), 1.0)
-        weights = np.zeros(len(places))
+        lengths, steps = np.diff(mesh), len(scheme.fractions) - 1
+        fractions = np.append(
+            (mesh[:-1, None] + lengths[:, None] * scheme.fractions[:-1]).ravel(), 1.0
+        )
+        weights = np.zeros(len(fractions))
         for number, length in enumerate(lengths):
             weights[number * steps : (number + 1) * steps + 1] += length * scheme.weights
-        return cls(scheme, places, lengths, np.arange(len(places)) % steps == 0, weights)
+        return cls(scheme, fractions, lengths, np.arange(len(fractions)) % steps == 0, weights)
 
-    def points_of(self, interval: int) -> range:
+    def get_points(self, interval: int) -> range:
         """Numbers of the points of an interval."""
-        steps = len(self.scheme.places) - 1
+        steps = len(self.scheme.fractions) - 1
         return range(interval * steps, (interval + 1) * steps + 1)

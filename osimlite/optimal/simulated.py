@@ -7,21 +7,21 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.optimal.given_motion import GivenMotion
+from osimlite.optimal.given_motion import PrescribedMotion
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.trajectory import MocoTrajectory
 from osimlite.simulation.run import simulate
 
-ACCURACY = 1e-7
+INTEGRATION_ACCURACY = 1e-7
 """Of the integration."""
-ROWS = 1000
+RECORDED_STEPS = 1000
 """So many moments of it are recorded, between which lines are close enough."""
-NEAR = 0.01
+MATCH_TOLERANCE = 0.01
 """Of a coordinate (rad or m) that is as good as found."""
 
 
 @dataclass(frozen=True, eq=False)
-class Simulated:
+class SimulationCheck:
     """How far a simulation is from what was found.
 
     Attributes:
@@ -39,21 +39,21 @@ class Simulated:
         return result
 
     @property
-    def near_until(self) -> float:
-        """The last time, s, up to which no coordinate is off by more than `NEAR`."""
-        far = np.flatnonzero(self.largest > NEAR)
+    def matches_until(self) -> float:
+        """The last time, s, up to which no coordinate is off by more than `MATCH_TOLERANCE`."""
+        far = np.flatnonzero(self.largest > MATCH_TOLERANCE)
         return float(self.times[-1] if not len(far) else self.times[max(far[0] - 1, 0)])
 
     def __str__(self) -> str:
         at_end = {path: float(column[-1]) for path, column in self.apart.items()}
         worst = max(at_end, key=lambda path: at_end[path])
         return (
-            f"within {NEAR:g} rad or m of it up to {self.near_until:.4g} s of {self.times[-1]:.4g} s, "
+            f"within {MATCH_TOLERANCE:g} rad or m of it up to {self.matches_until:.4g} s of {self.times[-1]:.4g} s, "
             f"{at_end[worst]:.2g} off at the end ({worst.rpartition('/')[2]})"
         )
 
 
-def simulated(problem: Problem, trajectory: MocoTrajectory) -> Simulated:
+def check_by_simulation(problem: Problem, trajectory: MocoTrajectory) -> SimulationCheck:
     """Simulate the model from the first state of a motion, with its controls, which are lines between their nodes.
 
     Args:
@@ -63,7 +63,7 @@ def simulated(problem: Problem, trajectory: MocoTrajectory) -> Simulated:
     Raises: OsimliteError: the motion is given, begins later than at 0 s, or has parameters; the
         model cannot be simulated.
     """
-    if isinstance(problem.functions, GivenMotion):
+    if isinstance(problem.functions, PrescribedMotion):
         raise OsimliteError("the motion was given")
     if trajectory.times[0] != 0.0 or trajectory.parameters:
         what = (
@@ -77,8 +77,8 @@ def simulated(problem: Problem, trajectory: MocoTrajectory) -> Simulated:
     found = simulate(
         problem.model,
         end,
-        accuracy=ACCURACY,
-        report_interval=end / ROWS,
+        accuracy=INTEGRATION_ACCURACY,
+        report_interval=end / RECORDED_STEPS,
         initial=start,
         controls=trajectory.table("controls"),
         folder=problem.folder,
@@ -91,4 +91,4 @@ def simulated(problem: Problem, trajectory: MocoTrajectory) -> Simulated:
         )
         for path in problem.functions.coordinates
     }
-    return Simulated(trajectory.times, apart)
+    return SimulationCheck(trajectory.times, apart)

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.io.tables.storage import StoTable
-from osimlite.optimal.asked import in_file
-from osimlite.optimal.ipopt import Progress, Violation, violations
-from osimlite.optimal.ipopt import solve as search
+from osimlite.optimal.asked import name_file_in_errors
+from osimlite.optimal.ipopt import Progress, Violation, find_violations
+from osimlite.optimal.ipopt import run_ipopt as search
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
-from osimlite.optimal.refinement import Refinement, Round, refined
-from osimlite.optimal.stride import stride
+from osimlite.optimal.refinement import Refinement, Round, solve_with_refinement
+from osimlite.optimal.stride import append_next_period
 from osimlite.optimal.trajectory import MocoTrajectory
 from osimlite.schema.moco.studies import MocoStudy
 
@@ -96,11 +96,11 @@ def solve(
         UnsupportedError: there is something in it that is not solved here; it says what and where.
         OsimliteError: the study cannot be read, or is none.
     """
-    with in_file(study):
-        return solved(Program(problem_of(study, folder, scaled)), guess, tell, refine)
+    with name_file_in_errors(study):
+        return solve_program(Program(build_problem(study, folder, scaled)), guess, tell, refine)
 
 
-def problem_of(
+def build_problem(
     study: str | Path | MocoStudy,
     folder: str | Path | None = None,
     scaled: Mapping[str, str] | None = None,
@@ -117,12 +117,12 @@ def problem_of(
     """
     if isinstance(study, MocoStudy):
         return Problem(study, folder=None if folder is None else Path(folder), scaled=scaled)
-    with in_file(study):
+    with name_file_in_errors(study):
         top: Any = read_document(Source.of_file(Path(study)), of=MocoStudy).top
         return Problem(top, Path(study), scaled=scaled)
 
 
-def solved(
+def solve_program(
     program: Program,
     guess: str | Path | MocoTrajectory | None,
     tell: Callable[[Progress], None] | None,
@@ -131,17 +131,23 @@ def solved(
     """The solution of a nonlinear program; as :func:`solve`."""
     problem, rounds = program.problem, list[Round]()
     if guess is None and problem.solver.guess_file.strip():
-        guess = problem.place(problem.solver.guess_file)
+        guess = problem.locate_file(problem.solver.guess_file)
     if isinstance(guess, str | Path):
         guess = MocoTrajectory.read(guess)
-    start = program.layout.guess() if guess is None else program.layout.taken(guess)
+    start = (
+        program.layout.make_guess()
+        if guess is None
+        else program.layout.guess_from_trajectory(guess)
+    )
     if refine is None:
         found = search(program, start, tell)
     else:
-        program, found, rounds = refined(program, start, Refinement.of(refine), tell)
+        program, found, rounds = solve_with_refinement(
+            program, start, Refinement.parse(refine), tell
+        )
     iterations = sum(each.iterations for each in rounds) or found.iterations
     duration = sum(each.duration for each in rounds) or found.duration
-    costs, rows = program.values(found.w)
+    costs, rows = program.compute_values(found.w)
     terms = dict(zip(program.costs, costs.tolist(), strict=True))
     header = {
         "num_iterations": str(iterations),
@@ -151,37 +157,72 @@ def solved(
         "status": found.status,
         "success": "true" if found.success else "false",
     }
-    trajectory = MocoTrajectory.of(program.layout, found.w, header)
+    trajectory = MocoTrajectory.from_variables(program.layout, found.w, header)
     return MocoSolution(
         trajectory=trajectory,
         success=found.success,
         status=found.status,
         objective=float(costs.sum()),
         terms=terms,
-        violations=violations(program, found.w, rows),
+        violations=find_violations(program, found.w, rows),
         iterations=iterations,
         duration=duration,
         rounds=tuple(rounds),
-        stride=stride(problem, trajectory),
+        stride=append_next_period(problem, trajectory),
     )
 
 
-def evaluated(
-    program: Program, trajectory: MocoTrajectory
-) -> tuple[dict[str, float], list[Violation]]:
-    """The parts of the objective of a trajectory, and the largest violations of what the problem demands.
+class Evaluation(NamedTuple):
+    """Objective and violations of a trajectory that was not searched for."""
+
+    terms: dict[str, float]
+    """Weighted part of the objective of each goal, by the goal's name."""
+    violations: list[Violation]
+    """Largest violations of the constraints, the largest first."""
+
+    @property
+    def objective(self) -> float:
+        """Sum of the parts of the objective."""
+        return sum(self.terms.values())
+
+
+def evaluate(
+    study: str | Path | MocoStudy | Problem | Program,
+    trajectory: str | Path | MocoTrajectory,
+    *,
+    folder: str | Path | None = None,
+    scaled: Mapping[str, str] | None = None,
+) -> Evaluation:
+    """Evaluate the objective and the constraints of a study for a trajectory, without a search.
 
     Args:
-        program: of the problem.
-        trajectory: with values at the points of its grid; between its times are splines.
+        study: study file or study; also a problem of :func:`build_problem` or its nonlinear program.
+        trajectory: trajectory, or a file that Moco or :func:`solve` wrote. Its columns are
+            interpolated by splines where its times differ from those of the study's grid.
+        folder: as for :func:`solve`.
+        scaled: as for :func:`solve`.
+
+    Returns:
+        Parts of the objective by goal, and the largest violations.
 
     Raises:
-        OsimliteError: the trajectory has no column for one of the variables.
+        UnsupportedError: the study contains something that is not supported here.
+        OsimliteError: a file cannot be read, or the trajectory lacks the column of a variable.
     """
+    if isinstance(study, Program):
+        program = study
+    elif isinstance(study, Problem):
+        program = Program(study)
+    else:
+        with name_file_in_errors(study):
+            program = Program(build_problem(study, folder, scaled))
+    if not isinstance(trajectory, MocoTrajectory):
+        trajectory = MocoTrajectory.read(trajectory)
     layout = program.layout
     for name in (*layout.names["states"], *layout.names["controls"], *layout.names["multipliers"]):
         if name not in trajectory.columns:
             raise OsimliteError(f"the trajectory has no column '{name}'")
-    w = layout.taken(trajectory)
-    costs, rows = program.values(w)
-    return dict(zip(program.costs, costs.tolist(), strict=True)), violations(program, w, rows)
+    w = layout.guess_from_trajectory(trajectory)
+    costs, rows = program.compute_values(w)
+    terms = dict(zip(program.costs, costs.tolist(), strict=True))
+    return Evaluation(terms, find_violations(program, w, rows))

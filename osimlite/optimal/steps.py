@@ -14,18 +14,18 @@ from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.moco.goals import MocoGoal
 
 
-def along(direction: str, vector: Sequence[Formula] | Formula) -> Formula:
+def get_component(direction: str, vector: Sequence[Formula] | Formula) -> Formula:
     """The part of a vector in ground along a direction such as ``negative-x``."""
     sign, _, axis = direction.partition("-")
     return vector["xyz".index(axis)] * (1.0 if sign == "positive" else -1.0)
 
 
-def smooth(value: Formula, middle: float, half: float, sharpness: float) -> Formula:
+def smooth_step(value: Formula, middle: float, half: float, sharpness: float) -> Formula:
     """A step at zero between two numbers, as smooth as a hyperbolic tangent."""
     return middle + half * casadi.tanh(sharpness * value)
 
 
-def contact_at(goal: MocoGoal, problem: Problem, name: str) -> tuple[str, ContactSphere]:
+def find_contact(goal: MocoGoal, problem: Problem, name: str) -> tuple[str, ContactSphere]:
     """The path of a contact force, and its sphere.
 
     Raises:
@@ -39,7 +39,7 @@ def contact_at(goal: MocoGoal, problem: Problem, name: str) -> tuple[str, Contac
             for key, part in problem.components.items()
             if isinstance(part, SmoothSphereHalfSpaceForce)
         ]
-        raise problem.wrong(
+        raise problem.invalid_error(
             goal, f"the model has no SmoothSphereHalfSpaceForce '{path}'{did_you_mean(path, known)}"
         )
     sphere = problem.model.tree().target(contact, "socket_sphere", contact.socket_sphere)

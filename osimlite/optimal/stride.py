@@ -9,7 +9,7 @@ from osimlite.optimal.trajectory import MocoTrajectory
 from osimlite.schema.moco.goals import MocoPeriodicityGoal
 
 
-def stride(problem: Problem, trajectory: MocoTrajectory) -> MocoTrajectory | None:
+def append_next_period(problem: Problem, trajectory: MocoTrajectory) -> MocoTrajectory | None:
     """The motion and what follows it; None unless a goal says that it ends as it began, or as its mirror image.
 
     The variable that at the end is what another was at the start goes on as that did. What no goal

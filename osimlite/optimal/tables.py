@@ -19,9 +19,9 @@ from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import SampledCurves
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.optimal.asked import Asked
-from osimlite.optimal.layout import FEWEST
-from osimlite.optimal.point import Series
+from osimlite.optimal.asked import StudyContext
+from osimlite.optimal.layout import MIN_SPLINE_TIMES
+from osimlite.optimal.point import TimeFunction
 from osimlite.schema.base import Object
 from osimlite.schema.tools.processors import (
     TableProcessor,
@@ -34,11 +34,11 @@ from osimlite.simulation.lowpass import lowpassed
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
 
-SLACK = 1e-6
+TIME_TOLERANCE_S = 1e-6
 """By how much a motion may be longer than the data that it follows, s."""
 
 
-def table_of(problem: Problem, part: Object, processor: TableProcessor) -> StoTable:
+def read_reference(problem: Problem, part: Object, processor: TableProcessor) -> StoTable:
     """The table of a processor, in rad.
 
     Args:
@@ -53,35 +53,37 @@ def table_of(problem: Problem, part: Object, processor: TableProcessor) -> StoTa
     given = problem.tables.get(part.name)
     if given is not None:
         return given
-    return processed_table(
+    return process_table(
         problem, part, processor, problem.functions.states, problem.functions.mechanism
     )
 
 
-def processed_table(
-    problem: Asked,
+def process_table(
+    problem: StudyContext,
     part: Object,
     processor: TableProcessor,
     states: Sequence[str],
     mechanism: Mechanism,
 ) -> StoTable:
-    """The table as its processor makes it, given the paths of states; errors as of :func:`table_of`."""
+    """The table as its processor makes it, given the paths of states; errors as of :func:`read_reference`."""
     if not processor.filepath.strip():
-        raise problem.wrong(part, "it names no table")
-    table = read_table(problem.place(processor.filepath))
+        raise problem.invalid_error(part, "it names no table")
+    table = read_table(problem.locate_file(processor.filepath))
     for operator in processor.operators:
         if isinstance(operator, TabOpLowPassFilter):
-            table = _filtered(table, operator)
+            table = _filter_lowpass(table, operator)
         elif isinstance(operator, TabOpUseAbsoluteStateNames):
-            table = replace(table, columns=tuple(_absolute(name, states) for name in table.columns))
+            table = replace(
+                table, columns=tuple(_resolve_state_path(name, states) for name in table.columns)
+            )
         elif isinstance(operator, TabOpAppendCoupledCoordinateValues):
             if table.in_degrees:
                 message = "the table is in degrees, of which OpenSim takes functions as if they were radians"
-                raise problem.refused(operator, message)
-            table = _with_coupled(problem, operator, table, mechanism)
+                raise problem.unsupported_error(operator, message)
+            table = _append_coupled_values(problem, operator, table, mechanism)
         else:
-            raise problem.refused(operator, "this operator on tables is not applied here")
-    return replace(_in_radians(table, mechanism), header={"inDegrees": "no"})
+            raise problem.unsupported_error(operator, "this operator on tables is not applied here")
+    return replace(_convert_to_radians(table, mechanism), header={"inDegrees": "no"})
 
 
 def read_table(path: Path) -> StoTable:
@@ -95,7 +97,7 @@ def read_table(path: Path) -> StoTable:
     )
 
 
-def _filtered(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
+def _filter_lowpass(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
     if operator.cutoff_frequency < 0.0:
         return table
     times, rows = table.times, table.rows
@@ -114,8 +116,8 @@ def _filtered(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
     return replace(table, times=times, rows=rows)
 
 
-def _with_coupled(
-    problem: Asked,
+def _append_coupled_values(
+    problem: StudyContext,
     operator: TabOpAppendCoupledCoordinateValues,
     table: StoTable,
     mechanism: Mechanism,
@@ -129,7 +131,7 @@ def _with_coupled(
             continue
         own = [paths[place] for place in item.independent]
         for name in own:
-            problem.expect(operator, name, table.columns, "column", whose="the table")
+            problem.check_name(operator, name, table.columns, "column", whose="the table")
         given = np.column_stack([table[name] for name in own])
         kept = [k for k, name in enumerate(table.columns) if name != paths[item.dependent]]
         values = [item.function.evaluate(row)[0] for row in given]
@@ -138,7 +140,7 @@ def _with_coupled(
     return table
 
 
-def _absolute(label: str, states: Sequence[str]) -> str:
+def _resolve_state_path(label: str, states: Sequence[str]) -> str:
     """The path of the state that an old label means; the label itself if it means none."""
     ending = f"{label[:-2]}/speed" if label.endswith("_u") else label.replace(".", "/")
     for end in (label, ending, f"{ending}/value", re.sub(r"^.*/(?=[^/]+/[^/]+$)", "", label)):
@@ -148,7 +150,7 @@ def _absolute(label: str, states: Sequence[str]) -> str:
     return label
 
 
-def _in_radians(table: StoTable, mechanism: Mechanism) -> StoTable:
+def _convert_to_radians(table: StoTable, mechanism: Mechanism) -> StoTable:
     if not table.in_degrees:
         return table
     angles = {info.path for info in mechanism.coordinates if info.unit == "rad"}
@@ -156,38 +158,41 @@ def _in_radians(table: StoTable, mechanism: Mechanism) -> StoTable:
     return replace(table, rows=table.rows * np.where(turns, np.pi / 180.0, 1.0), in_degrees=False)
 
 
-def splines(problem: Problem, table: StoTable, columns: list[str]) -> list[Series]:
+def fit_splines(problem: Problem, table: StoTable, columns: list[str]) -> list[TimeFunction]:
     """Splines of fifth degree through columns of a table, as OpenSim's GCVSplineSet.
 
     Raises:
         DocumentError: a column is not there, has gaps, or is too short for the motion.
     """
-    expect_columns(table, columns)
+    check_columns(table, columns)
     first, last = float(table.times[0]), float(table.times[-1])
     start, end = problem.times[0][1], problem.times[1][0]
-    if start < first - SLACK or end > last + SLACK:
+    if start < first - TIME_TOLERANCE_S or end > last + TIME_TOLERANCE_S:
         message = f"it has data from {first:g} s to {last:g} s, and the motion is at least from {start:g} s to {end:g} s"
         raise DocumentError(message, file=table.file)
-    curves = Curves(
+    curves = SplineCurves(
         table.times, np.column_stack([table.times, *(table[name] for name in columns)])[:, 1:]
     )
-    return [problem.given(partial(_column, curves, k), name) for k, name in enumerate(columns)]
+    return [
+        problem.add_time_function(partial(_sample_column, curves, k), name)
+        for k, name in enumerate(columns)
+    ]
 
 
-def over_time(function: Function, times: Array) -> Array:
+def sample_function(function: Function, times: Array) -> Array:
     """A function of time at times (n,): its value and both derivatives (3, n)."""
     found = (function.evaluate((t,)) for t in times.tolist())
     return np.array([(value, slope[0], curve[0][0]) for value, slope, curve in found]).T
 
 
-def expect_columns(table: StoTable, columns: Sequence[str]) -> None:
+def check_columns(table: StoTable, columns: Sequence[str]) -> None:
     """Refuse a table through whose columns no splines can go.
 
     Raises:
-        DocumentError: as of :func:`splines`.
+        DocumentError: as of :func:`fit_splines`.
     """
-    if len(table.times) < FEWEST:
-        message = f"it has {len(table.times)} times; splines of fifth degree take {FEWEST} at least"
+    if len(table.times) < MIN_SPLINE_TIMES:
+        message = f"it has {len(table.times)} times; splines of fifth degree take {MIN_SPLINE_TIMES} at least"
         raise DocumentError(message, file=table.file)
     if not (np.diff(table.times) > 0.0).all():
         raise DocumentError("its times do not rise", file=table.file)
@@ -198,12 +203,12 @@ def expect_columns(table: StoTable, columns: Sequence[str]) -> None:
             raise DocumentError(f"column '{name}' has gaps; fill them", file=table.file)
 
 
-def _column(curves: Curves, number: int, times: Array) -> Array:
-    found: Array = curves.at(times)[:, :, number]
+def _sample_column(curves: SplineCurves, number: int, times: Array) -> Array:
+    found: Array = curves.evaluate(times)[:, :, number]
     return found
 
 
-class Curves:
+class SplineCurves:
     """Splines through columns, asked for all at once."""
 
     def __init__(self, times: Array, rows: Array) -> None:
@@ -211,7 +216,7 @@ class Curves:
         self._times: Array | None = None
         self._values = np.zeros(0)
 
-    def at(self, times: Array) -> Array:
+    def evaluate(self, times: Array) -> Array:
         """Value and two derivatives (3, n, m) at n times of m columns."""
         if self._times is None or not np.array_equal(self._times, times):
             self._times, self._values = (

@@ -29,7 +29,7 @@ IMPLICIT, EXPLICIT = "implicit", "explicit"
 """What ``tendon_compliance_dynamics_mode`` may be."""
 
 
-class Tendons:
+class TendonEquations:
     """The muscles of De Groote and Fregly with elastic tendons of one ``tendon_compliance_dynamics_mode``.
 
     Args:
@@ -59,7 +59,7 @@ class Tendons:
         self.paths = [path for path, _, _ in self.muscles]
         self.names = [f"{path}/implicitderiv_normalized_tendon_force" for path in self.paths]
 
-    def residuals(self, point: Point, rates: Formula) -> tuple[list[str], Formula]:
+    def compute_residuals(self, point: Point, rates: Formula) -> tuple[list[str], Formula]:
         """By how much each tendon's force exceeds what the fibers bear, over the muscle's strength.
 
         The tendon lengthens by what its force's rate asks for, and the fibers by the rest of what
@@ -68,7 +68,7 @@ class Tendons:
         if not self.muscles:
             return [], casadi.SX(0, 1)
         functions, rows = self.problem.functions, []
-        lengths, speeds = self.problem.dynamics.path_lengths(point)
+        lengths, speeds = self.problem.dynamics.compute_path_lengths(point)
         residual = on_symbols(degroote_residual)
         for number, (path, muscle, tendon) in enumerate(self.muscles):
             place = functions.path_names.index(path)
@@ -89,14 +89,14 @@ class Tendons:
             rows.append(residual(force, MuscleInputs(*given), muscle, tendon))
         return [f"{path} equilibrium" for path in self.paths], casadi.vertcat(*rows)
 
-    def drifts(self, point: Point) -> Formula:
+    def compute_rate_errors(self, point: Point) -> Formula:
         """By how much the rate of the force of the fibers along each tendon exceeds that of the tendon, N/s.
 
         Fibers are springs there: neither the activation nor the force's factor by the velocity
         changes (M. Millard et al., Journal of Biomechanical Engineering 135, 2013, A6).
         """
         functions, rows = self.problem.functions, [casadi.SX(0, 1)]
-        lengths, speeds = self.problem.dynamics.path_lengths(point)
+        lengths, speeds = self.problem.dynamics.compute_path_lengths(point)
         for path, muscle, tendon in self.muscles:
             place, state = functions.path_names.index(path), f"{path}/normalized_tendon_force"
             force, rate = point.state(state), point.rates[functions.states.index(state)]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from osimlite.io.tables.storage import StoTable
-from osimlite.optimal.asked import MAX_MESH_INTERVALS, Asked
+from osimlite.optimal.asked import MAX_MESH_INTERVALS, StudyContext
 from osimlite.schema.moco.parts import MocoFinalBounds, MocoInitialBounds
 from osimlite.schema.moco.studies import (
     MocoCasADiSolver,
@@ -22,7 +22,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.tools.processors import ModelProcessor
 
 
-def study_of(tool: MocoInverse | MocoTrack, model: Model, solver: MocoCasADiSolver) -> MocoStudy:
+def make_study(tool: MocoInverse | MocoTrack, model: Model, solver: MocoCasADiSolver) -> MocoStudy:
     """A study of a model that is processed, without goals."""
     phase = MocoPhase(name="phases", model=ModelProcessor(name="model", model=model))
     return MocoStudy(
@@ -30,8 +30,8 @@ def study_of(tool: MocoInverse | MocoTrack, model: Model, solver: MocoCasADiSolv
     )
 
 
-def set_times(
-    asked: Asked, tool: MocoInverse | MocoTrack, tables: Sequence[StoTable], study: MocoStudy
+def set_time_range(
+    asked: StudyContext, tool: MocoInverse | MocoTrack, tables: Sequence[StoTable], study: MocoStudy
 ) -> tuple[float, float]:
     """Set bounds of time and the mesh by the settings of a tool, and return the first and the last time, s.
 
@@ -44,7 +44,7 @@ def set_times(
     end = last if tool.final_time is None else tool.final_time
     if not first <= start < end <= last:
         message = f"from {start:g} s to {end:g} s there are no data; they are from {first:g} s to {last:g} s"
-        raise asked.wrong(tool, message)
+        raise asked.invalid_error(tool, message)
     assert isinstance(study.solver, MocoCasADiSolver)
     # The quotient of a tiny interval is no integer any more, or infinite.
     if (
@@ -52,7 +52,7 @@ def set_times(
         or (end - start) / MAX_MESH_INTERVALS > tool.mesh_interval
     ):
         message = f"mesh_interval is {tool.mesh_interval:g} s; at most {MAX_MESH_INTERVALS} intervals are solved"
-        raise asked.wrong(tool, message)
+        raise asked.invalid_error(tool, message)
     study.solver.num_mesh_intervals = math.ceil((end - start) / tool.mesh_interval)
     if tool.clip_time_range:
         start, end = start + 1e-3, end - 1e-3

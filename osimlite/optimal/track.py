@@ -15,9 +15,9 @@ from osimlite.optimal.ipopt import Progress
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
 from osimlite.optimal.refinement import Refinement
-from osimlite.optimal.solution import MocoSolution, solved
-from osimlite.optimal.tables import processed_table
-from osimlite.optimal.tool_study import set_times, study_of
+from osimlite.optimal.solution import MocoSolution, solve_program
+from osimlite.optimal.tables import process_table
+from osimlite.optimal.tool_study import make_study, set_time_range
 from osimlite.optimal.trajectory import MocoTrajectory
 from osimlite.schema.moco.goals import MocoControlGoal
 from osimlite.schema.moco.parts import MocoWeight, MocoWeightSet
@@ -25,11 +25,11 @@ from osimlite.schema.moco.studies import MocoCasADiSolver, MocoStudy, MocoTrack
 from osimlite.schema.moco.tracking import MocoMarkerTrackingGoal, MocoStateTrackingGoal
 from osimlite.schema.tools.inverse_kinematics import MarkersReference, MarkerWeight, MarkerWeightSet
 
-HALF_ORDER = 3
+SPLINE_HALF_ORDER = 3
 """Of the splines whose derivatives are followed; they are of fifth degree."""
 
 
-def problem_of_track(
+def build_track_problem(
     tool: MocoTrack,
     file: Path | None = None,
     folder: Path | None = None,
@@ -56,18 +56,16 @@ def problem_of_track(
         optim_constraint_tolerance=1e-2,
         optim_finite_difference_scheme="forward",
     )
-    study = study_of(tool, processed(tool.model, place), solver)
+    study = make_study(tool, processed(tool.model, place), solver)
     phase = study.problem.phases
     # The names of states and where errors are told of are those of a problem that has no goals yet.
     bare = Problem(study, file, place)
     tables: dict[str, StoTable] = {}
     states, mechanism = bare.functions.states, bare.functions.mechanism
     if tool.states_reference.filepath.strip():
-        table = processed_table(
-            bare, tool.states_reference, tool.states_reference, states, mechanism
-        )
+        table = process_table(bare, tool.states_reference, tool.states_reference, states, mechanism)
         if tool.track_reference_position_derivatives:
-            table = _with_speeds(table)
+            table = _append_speeds(table)
         tables["state_tracking"] = table
         phase.goals.append(
             MocoStateTrackingGoal(
@@ -76,17 +74,17 @@ def problem_of_track(
                 allow_unused_references=tool.allow_unused_references,
                 scale_weights_with_range=tool.scale_state_weights_with_range,
                 state_weights=MocoWeightSet(
-                    name="state_weights", objects=_weights(bare, tool, table)
+                    name="state_weights", objects=_find_state_weights(bare, tool, table)
                 ),
             )
         )
     if tool.markers_reference.filepath.strip():
-        tables["marker_tracking"] = processed_table(
+        tables["marker_tracking"] = process_table(
             bare, tool.markers_reference, tool.markers_reference, (), mechanism
         )
-        phase.goals.append(_marker_goal(tool))
+        phase.goals.append(_make_marker_goal(tool))
     if not tables:
-        raise bare.wrong(
+        raise bare.invalid_error(
             tool, "it has nothing to follow; give it a states_reference or a markers_reference"
         )
     if tool.minimize_control_effort:
@@ -98,12 +96,12 @@ def problem_of_track(
                 control_weights=MocoWeightSet(name="control_weights", objects=weights),
             )
         )
-    first, last = set_times(bare, tool, [*tables.values()], study)
+    first, last = set_time_range(bare, tool, [*tables.values()], study)
     if more is not None:
         more(study)
     guess = None
     if tool.guess_file.strip():
-        guess = MocoTrajectory.read(bare.place(tool.guess_file))
+        guess = MocoTrajectory.read(bare.locate_file(tool.guess_file))
     problem = Problem(study, file, place, tables, scaled=scaled)
     if tool.apply_tracked_states_to_guess and "state_tracking" in tables:
         table = tables["state_tracking"]
@@ -112,12 +110,14 @@ def problem_of_track(
         times = np.linspace(first, last, len(table.times))
         states = {name: table[name] for name in table.columns if name in problem.states}
         if guess is not None:
-            raise bare.refused(tool, "a guess_file and apply_tracked_states_to_guess together")
+            raise bare.unsupported_error(
+                tool, "a guess_file and apply_tracked_states_to_guess together"
+            )
         guess = MocoTrajectory(times, states, {"states": tuple(states)})
     return problem, guess
 
 
-def track(
+def solve_track(
     tool: MocoTrack,
     *,
     folder: str | Path | None = None,
@@ -137,15 +137,15 @@ def track(
         scaled: likewise.
 
     Raises:
-        OsimliteError: as of :func:`problem_of_track`.
+        OsimliteError: as of :func:`build_track_problem`.
     """
-    problem, guess = problem_of_track(
+    problem, guess = build_track_problem(
         tool, None, None if folder is None else Path(folder), more, scaled
     )
-    return solved(Program(problem), guess, tell, refine)
+    return solve_program(Program(problem), guess, tell, refine)
 
 
-def _marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
+def _make_marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
     """What follows markers; one without a weight counts 1."""
     weights = [
         MarkerWeight(name=item.name, weight=item.weight) for item in tool.markers_weight_set.objects
@@ -162,7 +162,7 @@ def _marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
     )
 
 
-def _with_speeds(table: StoTable) -> StoTable:
+def _append_speeds(table: StoTable) -> StoTable:
     """With the derivatives of those values that have no speeds."""
     ends = [
         (name, f"{name.removesuffix('/value')}/speed")
@@ -173,12 +173,12 @@ def _with_speeds(table: StoTable) -> StoTable:
     if not missing:
         return table
     values = np.column_stack([table[value] for value, _ in missing])
-    (speeds,) = derivatives_of_samples(table.times, values, table.times, (1,), HALF_ORDER)
+    (speeds,) = derivatives_of_samples(table.times, values, table.times, (1,), SPLINE_HALF_ORDER)
     columns = (*table.columns, *(speed for _, speed in missing))
     return replace(table, columns=columns, rows=np.hstack([table.rows, speeds]))
 
 
-def _weights(problem: Problem, tool: MocoTrack, table: StoTable) -> list[MocoWeight]:
+def _find_state_weights(problem: Problem, tool: MocoTrack, table: StoTable) -> list[MocoWeight]:
     """Those of the tool; none for what the model's constraints determine."""
     own = {weight.name: weight.weight for weight in tool.states_weight_set.objects}
     result = {}

@@ -15,7 +15,7 @@ from osimlite.io.tables.storage import StoTable, adapter_lines, read_sto
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.layout import Layout
 
-COUNTS = (
+COLUMN_KINDS = (
     "states",
     "controls",
     "input_controls",
@@ -46,18 +46,20 @@ class MocoTrajectory:
     header: dict[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, layout: Layout, w: Array, header: dict[str, str] | None = None) -> MocoTrajectory:
+    def from_variables(
+        cls, layout: Layout, w: Array, header: dict[str, str] | None = None
+    ) -> MocoTrajectory:
         """Of the variables of a nonlinear program.
 
         What only points between nodes have, corrections of velocities, is spread over all times as
         Moco does.
         """
-        times = w[0] + layout.problem.grid.places * (w[1] - w[0])
+        times = w[0] + layout.problem.grid.fractions * (w[1] - w[0])
         columns: dict[str, Array] = {}
         # Files of Moco do not have where intervals lead to before states are moved.
-        for kind in (kind for kind in COUNTS if kind in layout.names):
+        for kind in (kind for kind in COLUMN_KINDS if kind in layout.names):
             for number, name in enumerate(layout.names[kind]):
-                places = layout.places_of[kind][:, number]
+                places = layout.indices[kind][:, number]
                 own = w[places[places >= 0]]
                 if len(own) < len(times):
                     own = np.interp(times, np.linspace(times[0], times[-1], len(own)), own)
@@ -74,7 +76,7 @@ class MocoTrajectory:
                 )
             )
             for kind, own in layout.names.items()
-            if kind in COUNTS
+            if kind in COLUMN_KINDS
         }
         parameters = dict(
             zip(layout.problem.parameters, w[2 : layout.shared].tolist(), strict=True)
@@ -92,7 +94,7 @@ class MocoTrajectory:
         table = read_sto(path)
         if not len(table.times):
             raise DocumentError("the file has no times", file=str(path))
-        said = {f"num_{kind}": table.header.get(f"num_{kind}", "0") for kind in COUNTS}
+        said = {f"num_{kind}": table.header.get(f"num_{kind}", "0") for kind in COLUMN_KINDS}
         for name, word in said.items():
             if not word.isdecimal():
                 raise DocumentError(
@@ -105,7 +107,7 @@ class MocoTrajectory:
             message = f"the header counts {sum(counts)} columns besides the time, and there are {len(table.columns)}"
             raise DocumentError(message, file=str(path))
         names, first = dict[str, tuple[str, ...]](), 0
-        for kind, count in zip(COUNTS, counts, strict=True):
+        for kind, count in zip(COLUMN_KINDS, counts, strict=True):
             names[kind] = table.columns[first : first + count]
             first += count
         of = {name: table.rows[:, place] for place, name in enumerate(table.columns)}
@@ -114,7 +116,7 @@ class MocoTrajectory:
 
     def table(self, kind: str = "") -> StoTable:
         """The columns of one kind, or of all."""
-        kinds: Iterable[str] = [kind] if kind else COUNTS[:-1]
+        kinds: Iterable[str] = [kind] if kind else COLUMN_KINDS[:-1]
         names = [name for each in kinds for name in self.names.get(each, ())]
         rows = (
             np.column_stack([self.columns[name] for name in names])
@@ -131,7 +133,9 @@ class MocoTrajectory:
                 self.names | {"parameters": tuple(self.parameters)},
             )
             names += self.parameters
-            said = self.header | {f"num_{each}": str(len(counted.get(each, ()))) for each in COUNTS}
+            said = self.header | {
+                f"num_{each}": str(len(counted.get(each, ()))) for each in COLUMN_KINDS
+            }
             header = {"inDegrees": "no", **dict(sorted(said.items()))}
         return StoTable("", self.times, tuple(names), rows, header=header)
 

@@ -28,12 +28,12 @@ def run(job: Job, outcome: Outcome) -> None:
     # CasADi is loaded with it.
     from osimlite.optimal.problem import Problem
     from osimlite.optimal.program import Program
-    from osimlite.optimal.solution import solved
+    from osimlite.optimal.solution import solve_program
 
     study = job.setup
     tell = telling(outcome) if study.solver.verbosity > 0 else None
     problem = Problem(study, job.file)
-    solution = solved(Program(problem), None, tell, job.refine)
+    solution = solve_program(Program(problem), None, tell, job.refine)
     name = study.name or "MocoStudy"
     outcome.new_table(job.in_results(f"{name}_solution.sto"), solution.trajectory.table())
     if solution.stride is not None:
@@ -71,10 +71,10 @@ def report(job: Job, problem: Problem, solution: MocoSolution, outcome: Outcome)
         outcome.tell("largest violation" if solution.success else "not fulfilled", str(violation))
     outcome.evidence = _evidence(job, problem, solution)
     if job.simulates:
-        from osimlite.optimal.simulated import simulated
+        from osimlite.optimal.simulated import check_by_simulation
 
         try:
-            outcome.tell("simulated", str(simulated(problem, solution.trajectory)))
+            outcome.tell("simulated", str(check_by_simulation(problem, solution.trajectory)))
         except OsimliteError as error:
             outcome.tell("not simulated", error.message)
 
@@ -90,7 +90,7 @@ def _evidence(job: Job, problem: Problem, solution: MocoSolution) -> Evidence:
     named = problem.phase.model.filepath.strip()
     return Evidence.of(
         problem.model,
-        problem.place(named) if named else job.file,
+        problem.locate_file(named) if named else job.file,
         mechanism,
         trajectory.times,
         values,

@@ -11,11 +11,11 @@ def run(job: Job, outcome: Outcome) -> None:
     """Find the motion, and write it beside the setup."""
     # CasADi is loaded with it.
     from osimlite.optimal.program import Program
-    from osimlite.optimal.solution import solved
-    from osimlite.optimal.track import problem_of_track
+    from osimlite.optimal.solution import solve_program
+    from osimlite.optimal.track import build_track_problem
 
-    problem, guess = problem_of_track(job.setup, job.file)
-    solution = solved(Program(problem), guess, telling(outcome), job.refine)
+    problem, guess = build_track_problem(job.setup, job.file)
+    solution = solve_program(Program(problem), guess, telling(outcome), job.refine)
     name = job.setup.name or "MocoTrack"
     for goal, what in (("state_tracking", "states"), ("marker_tracking", "markers")):
         if goal in problem.tables:

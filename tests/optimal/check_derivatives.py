@@ -10,7 +10,7 @@ import pytest
 import osimlite
 from osimlite import optimal
 from osimlite.base.load import module_name
-from osimlite.moco import problem_of, problem_of_inverse, problem_of_track
+from osimlite.moco import build_inverse_problem, build_problem, build_track_problem
 from osimlite.optimal.hessian import Hessian
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
@@ -60,7 +60,7 @@ def worst(found, wanted, name):
 
 
 def check(study, folder, *, tolerance=1e-7, curved=True):
-    program = Program(study if isinstance(study, Problem) else problem_of(study, folder))
+    program = Program(study if isinstance(study, Problem) else build_problem(study, folder))
     layout, rng = program.layout, np.random.default_rng(3)
     low, high = np.maximum(layout.lower, -1.0), np.minimum(layout.upper, 1.0)
     w = np.clip(low + (high - low) * rng.uniform(0.2, 0.8, len(low)), layout.lower, layout.upper)
@@ -69,15 +69,15 @@ def check(study, folder, *, tolerance=1e-7, curved=True):
     push = rng.normal(size=len(program.labels))
 
     def parts(at):
-        costs, rows = program.values(at)
+        costs, rows = program.compute_values(at)
         return np.concatenate([[costs.sum()], rows])
 
     def combined(at):
-        gradient, numbers = program.slopes(at)
+        gradient, numbers = program.compute_slopes(at)
         return 0.7 * gradient + push @ matrix(program.jacobian_sparsity, numbers)
 
     assert np.isfinite(parts(w)).all()
-    gradient, numbers = program.slopes(w)
+    gradient, numbers = program.compute_slopes(w)
     slopes = np.vstack([gradient, matrix(program.jacobian_sparsity, numbers).toarray()])
     first = differences(parts, w, moving)
     off, where = worst(slopes @ moving, first, ["cost", *program.labels].__getitem__)
@@ -88,11 +88,13 @@ def check(study, folder, *, tolerance=1e-7, curved=True):
             Hessian(program)
         return
     hessian = Hessian(program)
-    half = matrix(hessian.sparsity, hessian.numbers(w, 0.7, push)).toarray()
+    half = matrix(hessian.sparsity, hessian.compute_entries(w, 0.7, push)).toarray()
     # What one set of columns is not said to have, and has, is an error as well.
     curves = (half + np.triu(half, 1).T) @ moving
     ways = apart(curves != 0.0)
-    off, where = worst(curves @ ways, differences(combined, w, moving @ ways), layout.name_at)
+    off, where = worst(
+        curves @ ways, differences(combined, w, moving @ ways), layout.describe_variable
+    )
     assert off < tolerance, where
 
 
@@ -295,17 +297,17 @@ def test_loads_over_time(mode, tmp_path):
     push = osimlite.PrescribedForce(name="push", socket_frame=BODIES[0])
     push.torqueFunctions.objects = [sine.copy_deep() for _ in range(3)]
     model.add(push)
-    problem = problem_of(
+    problem = build_problem(
         study_of(model, osimlite.MocoControlGoal(name="effort"), multibody_dynamics_mode=mode)
     )
     check(problem, tmp_path)
     assert len(problem.loads) == 9
     program = Program(problem)
     w = np.random.default_rng(0).uniform(0.1, 0.9, len(program.layout.lower))
-    points, count = program.sorts[0], len(problem.functions.states)
-    found = points.at(program, w, problem.grid.places, w[points.columns])
+    points, count = program.groups[0], len(problem.functions.states)
+    found = points.evaluate(program, w, problem.grid.fractions, w[points.columns])
     f = osimlite.casadi(model)
-    for place, z, values in zip(problem.grid.places, w[points.columns], found, strict=True):
+    for place, z, values in zip(problem.grid.fractions, w[points.columns], found, strict=True):
         t, x, u = w[0] + place * (w[1] - w[0]), z[:count], z[count : count + len(f.controls)]
         rates = values[:count] / (w[1] - w[0])
         wanted = np.array(f.dynamics(t, x, u, [])).ravel()
@@ -327,7 +329,7 @@ def test_motions_that_are_given(tmp_path):
         final_time=0.9,
         mesh_interval=0.4,
     )
-    check(problem_of_inverse(tool, folder=tmp_path), tmp_path)
+    check(build_inverse_problem(tool, folder=tmp_path), tmp_path)
 
 
 def test_motions_that_are_followed(tmp_path):
@@ -343,7 +345,7 @@ def test_motions_that_are_followed(tmp_path):
         final_time=0.9,
         mesh_interval=0.4,
     )
-    check(problem_of_track(tool, folder=tmp_path)[0], tmp_path)
+    check(build_track_problem(tool, folder=tmp_path)[0], tmp_path)
 
 
 def test_a_knee_of_splines_with_muscles(tmp_path):

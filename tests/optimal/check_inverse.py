@@ -8,7 +8,7 @@ import pytest
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.io.tables.storage import read_sto, write_sto
-from osimlite.moco import MocoTrajectory, evaluated, inverse, problem_of_inverse, solve
+from osimlite.moco import MocoTrajectory, build_inverse_problem, evaluate, solve, solve_inverse
 from osimlite.optimal.program import Program
 from tests.optimal.studies import moco_found, moco_said, study, study_file
 
@@ -43,15 +43,15 @@ def squat(folder, **choices):
 
 
 def test_moco_s_solution_is_one_here(tmp_path):
-    program = Program(problem_of_inverse(squat(tmp_path), folder=tmp_path))
-    terms, missed = evaluated(program, MocoTrajectory.read(moco_found(tmp_path, NAME)))
+    program = Program(build_inverse_problem(squat(tmp_path), folder=tmp_path))
+    terms, missed = evaluate(program, MocoTrajectory.read(moco_found(tmp_path, NAME)))
     assert terms == pytest.approx(moco_said(NAME)["terms"], rel=1e-9)
     # N m, of some hundreds: OpenSim's poses fulfil the constraint of the patella to 1e-9 or so.
     assert missed[0].size < 1e-3
 
 
 def test_ours_costs_no_more(tmp_path):
-    found = inverse(squat(tmp_path), folder=tmp_path)
+    found = solve_inverse(squat(tmp_path), folder=tmp_path)
     assert found.success
     assert found.objective <= moco_said(NAME)["objective"] * (1.0 + 1e-4)
     for kind, names in MocoTrajectory.read(moco_found(tmp_path, NAME)).names.items():
@@ -62,10 +62,10 @@ def test_ours_costs_no_more(tmp_path):
 def test_meshes_of_given_motions_are_refined(tmp_path):
     """With rigid tendons; where they are implicit it is refused."""
     with pytest.raises(OsimliteError, match="not refined where tendons are implicit"):
-        inverse(squat(tmp_path), folder=tmp_path, refine=1e-3)
+        solve_inverse(squat(tmp_path), folder=tmp_path, refine=1e-3)
     rigid = squat(tmp_path, mesh_interval=0.2)
     rigid.model.operators.append(osimlite.ModOpIgnoreTendonCompliance())
-    found = inverse(rigid, folder=tmp_path, refine=1e-3)
+    found = solve_inverse(rigid, folder=tmp_path, refine=1e-3)
     assert found.success
     assert found.rounds[0].error > 1e-3 >= found.rounds[-1].error
     assert found.states.times[-1] == pytest.approx(1.0)
@@ -73,18 +73,20 @@ def test_meshes_of_given_motions_are_refined(tmp_path):
 
 def test_columns_that_are_no_states_must_be_allowed(tmp_path):
     with pytest.raises(OsimliteError, match=r"is no state.*set kinematics_allow_extra_columns"):
-        problem_of_inverse(squat(tmp_path, kinematics_allow_extra_columns=False), folder=tmp_path)
+        build_inverse_problem(
+            squat(tmp_path, kinematics_allow_extra_columns=False), folder=tmp_path
+        )
 
 
 def test_names_of_coordinates_will_do(tmp_path):
     """As in motions of other tools, in degrees."""
-    made = problem_of_inverse(squat(tmp_path), folder=tmp_path)
+    made = build_inverse_problem(squat(tmp_path), folder=tmp_path)
     table = read_sto(tmp_path / "squat-25.sto")
     names = [name for name in table.columns if name.endswith("/value")]
     rows = np.rad2deg(np.column_stack([table[name] for name in names]))
     short = [name.split("/")[-2] for name in names]
     write_sto(tmp_path / "squat-25.sto", "", table.times, short, rows, in_degrees=True)
-    again = problem_of_inverse(squat(tmp_path), folder=tmp_path)
+    again = build_inverse_problem(squat(tmp_path), folder=tmp_path)
     times = np.linspace(0.0, 1.0, 5)
     assert again.functions.numbers(times) == pytest.approx(
         made.functions.numbers(times), rel=1e-9, abs=1e-9
@@ -144,7 +146,7 @@ def test_what_a_given_motion_excludes(change, words, tmp_path):
     made = study(tmp_path, NAME)
     change(made.problem.phases)
     with pytest.raises(OsimliteError, match=words):
-        Program(osimlite.moco.problem_of(made, tmp_path))
+        Program(osimlite.moco.build_problem(made, tmp_path))
 
 
 def test_a_motion_without_a_coordinate(tmp_path):
@@ -152,4 +154,4 @@ def test_a_motion_without_a_coordinate(tmp_path):
     (motion,) = made.problem.phases.model.model.components(osimlite.PositionMotion)
     motion.functions.objects.pop()
     with pytest.raises(OsimliteError, match="has no function for '/jointset/"):
-        osimlite.moco.problem_of(made, tmp_path)
+        osimlite.moco.build_problem(made, tmp_path)

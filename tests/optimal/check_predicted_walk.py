@@ -11,7 +11,7 @@ import pytest
 import osimlite
 from osimlite.base.records import replace
 from osimlite.cli import main
-from osimlite.optimal.simulated import simulated
+from osimlite.optimal.simulated import check_by_simulation
 from osimlite.tools import moco_study
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
@@ -110,7 +110,7 @@ def test_a_report_shows_what_was_found(walk):
     """Goals, controls, the ground's forces, and how far a simulation stays with it."""
     folder, found = walk
     file = folder / "human-walks.omoco"
-    outcome, problem = Outcome(), osimlite.moco.problem_of(file)
+    outcome, problem = Outcome(), osimlite.moco.build_problem(file)
     moco_study.report(Job(problem.study, file, simulates=True), problem, found, outcome)
     told = dict(outcome.told)
     assert {"effort", "roughness", "objective"} <= {*told}
@@ -150,7 +150,7 @@ def test_a_report_shows_what_was_found(walk):
 def test_what_is_not_simulated(change, said, walk):
     folder, found = walk
     with pytest.raises(osimlite.OsimliteError, match=said):
-        simulated(
-            osimlite.moco.problem_of(folder / "human-walks.omoco"),
+        check_by_simulation(
+            osimlite.moco.build_problem(folder / "human-walks.omoco"),
             replace(found.trajectory, **change),
         )

@@ -7,9 +7,9 @@ import pytest
 
 import osimlite
 from osimlite.cli import main
-from osimlite.moco import Refinement, problem_of, solve
+from osimlite.moco import Refinement, build_problem, solve
 from osimlite.optimal.program import Program
-from osimlite.optimal.refinement import carried, errors
+from osimlite.optimal.refinement import estimate_errors, interpolate_solution
 from tests.optimal.studies import study, study_file
 
 integrate = pytest.importorskip("scipy.integrate")
@@ -34,15 +34,15 @@ def found_on(folder, intervals, **choices):
         1e-10,
         "exact",
     )
-    program, found = Program(problem_of(given)), solve(given)
+    program, found = Program(build_problem(given)), solve(given)
     assert found.success
-    return program, found, program.layout.taken(found.trajectory)
+    return program, found, program.layout.guess_from_trajectory(found.trajectory)
 
 
 @pytest.mark.parametrize("scheme", ORDERS)
 def test_errors_fall_with_the_order_of_the_scheme(scheme, tmp_path):
     coarse, fine = (found_on(tmp_path, count, transcription_scheme=scheme) for count in (60, 120))
-    means = [errors(program, w).mean() for program, _, w in (coarse, fine)]
+    means = [estimate_errors(program, w).mean() for program, _, w in (coarse, fine)]
     assert np.log2(means[0] / means[1]) == pytest.approx(ORDERS[scheme], abs=0.25)
 
 
@@ -52,7 +52,7 @@ def test_errors_bound_those_of_an_integration(tmp_path):
     functions, times = program.problem.functions, found.states.times
     x = np.column_stack([found.states[name] for name in functions.states])
     u = np.column_stack([found.controls[name] for name in functions.controls])
-    estimated, sizes = errors(program, w), 1.0 + np.abs(x).max(axis=0)
+    estimated, sizes = estimate_errors(program, w), 1.0 + np.abs(x).max(axis=0)
     for k, error in enumerate(estimated):
         first, last = 2 * k, 2 * k + 2
 
@@ -71,7 +71,7 @@ def test_errors_bound_those_of_an_integration(tmp_path):
 
 def test_the_same_mesh_takes_over_what_was_found(tmp_path):
     program, _, w = found_on(tmp_path, 20)
-    np.testing.assert_allclose(carried(program, w, program), w, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(interpolate_solution(program, w, program), w, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("hessian", ["exact", "limited-memory"])
@@ -100,10 +100,10 @@ def test_intervals_split_where_it_is_needed(hessian, tmp_path):
     assert found.rounds[-1].iterations < found.rounds[0].iterations
     # A new search starts where this one ends, on the mesh that it has.
     given.solver.mesh = tuple((found.states.times[::2] / found.states.times[-1]).tolist())
-    program = Program(problem_of(given))
-    assert errors(program, program.layout.taken(found.trajectory)).max() == pytest.approx(
-        found.rounds[-1].error
-    )
+    program = Program(build_problem(given))
+    assert estimate_errors(
+        program, program.layout.guess_from_trajectory(found.trajectory)
+    ).max() == pytest.approx(found.rounds[-1].error)
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_intervals_split_where_it_is_needed(hessian, tmp_path):
 )
 def test_words_that_are_no_refinement(words, said):
     with pytest.raises(osimlite.OsimliteError, match=said):
-        Refinement.of(words)
+        Refinement.parse(words)
 
 
 def test_what_has_no_error_here_is_refused(tmp_path):

@@ -11,7 +11,7 @@ import pytest
 
 import osimlite
 from osimlite.io.tables.storage import read_sto, write_sto
-from osimlite.moco import MocoTrajectory, evaluated, problem_of, solve
+from osimlite.moco import MocoTrajectory, build_problem, evaluate, solve
 from osimlite.optimal.program import Program
 from tests.optimal import small
 from tests.optimal.studies import moco_found, moco_said, study, study_file
@@ -29,8 +29,8 @@ def solved(tmp_path_factory):
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_moco_s_solution_is_one_here(name, tmp_path):
-    program = Program(problem_of(study_file(tmp_path, name)))
-    terms, missed = evaluated(program, MocoTrajectory.read(moco_found(tmp_path, name)))
+    program = Program(build_problem(study_file(tmp_path, name)))
+    terms, missed = evaluate(program, MocoTrajectory.read(moco_found(tmp_path, name)))
     said = moco_said(name)
     assert terms == pytest.approx(said["terms"], rel=1e-9)
     # Moco stops at 1e-4 of the rows as they are, and its files have 16 digits.
@@ -139,8 +139,8 @@ def test_implicit_tendons(tmp_path):
         return given
 
     said = moco_said("hanging-25")
-    program = Program(problem_of(hanging()))
-    terms, missed = evaluated(program, MocoTrajectory.read(moco_found(tmp_path, "hanging-25")))
+    program = Program(build_problem(hanging()))
+    terms, missed = evaluate(program, MocoTrajectory.read(moco_found(tmp_path, "hanging-25")))
     assert terms == {"goal": pytest.approx(said["terms"]["goal"], rel=1e-9)}
     assert missed[0].size < said["ctol"]
     found = solve(hanging())
@@ -222,8 +222,8 @@ def test_frames_follow_their_own_motion(kind, tmp_path):
     states = [column for column in table.columns if column.startswith("/jointset")]
     write_sto(reference, "", table.times, states, np.column_stack([table[name] for name in states]))
     changed.problem.phases.goals[0].states_reference.filepath = str(reference)
-    program = Program(problem_of(changed))
-    terms, _ = evaluated(program, MocoTrajectory.read(found))
+    program = Program(build_problem(changed))
+    terms, _ = evaluate(program, MocoTrajectory.read(found))
     assert terms["follow"] < 1e-12
     changed.solver.optim_max_iterations = 1
     assert np.isfinite(solve(changed, guess=found).objective)
@@ -249,7 +249,7 @@ def test_frames_follow_their_own_motion(kind, tmp_path):
 )
 def test_frames_that_are_not_told(kind, given, said, tmp_path):
     with pytest.raises(osimlite.OsimliteError, match=said):
-        problem_of(_frames(tmp_path, kind, **given)[0])
+        build_problem(_frames(tmp_path, kind, **given)[0])
 
 
 @pytest.mark.parametrize(
@@ -268,7 +268,7 @@ def test_expressions_that_are_none(expression, variables, said, tmp_path):
     )
     changed.problem.phases.goals = [goal]
     with pytest.raises(osimlite.OsimliteError, match=said):
-        problem_of(changed)
+        build_problem(changed)
 
 
 ONE = osimlite.MocoContactImpulseTrackingGoalGroup(external_force_name="foot")
@@ -316,7 +316,7 @@ def test_loads_that_are_none(kind, given, said, tmp_path):
     changed = study(tmp_path, "pendulum-50")
     changed.problem.phases.goals = [kind(name="load", **given)]
     with pytest.raises(osimlite.OsimliteError, match=said):
-        problem_of(changed)
+        build_problem(changed)
 
 
 @pytest.mark.parametrize(
@@ -355,7 +355,7 @@ def test_outputs_that_are_none(given, said, tmp_path):
     changed = study(tmp_path, "pendulum-50")
     changed.problem.phases.goals = [osimlite.MocoOutputGoal(name="output", **given)]
     with pytest.raises(osimlite.OsimliteError, match=said):
-        problem_of(changed)
+        build_problem(changed)
 
 
 def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
@@ -382,9 +382,9 @@ def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
 
 def test_settings_without_effect_are_refused(tmp_path):
     with pytest.raises(osimlite.OsimliteError, match="of optimizers only ipopt is known"):
-        problem_of(study(tmp_path, "sliding-100", optim_solver="snopt"))
+        build_problem(study(tmp_path, "sliding-100", optim_solver="snopt"))
     with pytest.raises(osimlite.OsimliteError, match="needs constraints, and the model has none"):
-        problem_of(study(tmp_path, "sliding-100", minimize_lagrange_multipliers=True))
+        build_problem(study(tmp_path, "sliding-100", minimize_lagrange_multipliers=True))
 
 
 def test_what_the_solver_makes_a_cost(tmp_path):
@@ -411,3 +411,22 @@ def test_what_the_solver_makes_a_cost(tmp_path):
         )
     )
     assert found.success and held.success and 0.0 < held.terms["multipliers"] < 1e-3
+
+
+def test_evaluate_takes_files_and_objects(tmp_path):
+    file = study_file(tmp_path, "sliding-100")
+    theirs = moco_found(tmp_path, "sliding-100")
+    result = osimlite.moco.evaluate(file, theirs)
+    problem = build_problem(file)
+    assert evaluate(problem, MocoTrajectory.read(theirs)) == result
+    assert evaluate(Program(problem), theirs).terms == result.terms
+    assert result.objective == sum(result.terms.values())
+    with pytest.raises(osimlite.OsimliteError, match="has no column"):
+        evaluate(file, MocoTrajectory(np.linspace(0.0, 1.0, 5), {}, {}))
+
+
+def test_names_of_older_releases_warn():
+    with pytest.warns(DeprecationWarning, match=r"use osimlite\.moco\.evaluate$"):
+        assert osimlite.moco.evaluated is osimlite.moco.evaluate
+    with pytest.raises(AttributeError):
+        osimlite.moco.nothing  # noqa: B018

@@ -10,7 +10,7 @@ import pytest
 
 import osimlite
 from osimlite.io.tables.storage import read_sto
-from osimlite.moco import MocoTrajectory, evaluated, problem_of_track
+from osimlite.moco import MocoTrajectory, build_track_problem, evaluate
 from osimlite.optimal.program import Program
 from tests.conftest import ROOT
 from tests.optimal.studies import moco_found, moco_said, study
@@ -53,20 +53,21 @@ def test_moco_s_walk_is_one_here(example, tmp_path):
         phase.goals += [of_moco.goals[2].copy_deep(), of_moco.goals[3].copy_deep()]
         phase.state_infos += [info.copy_deep() for info in of_moco.state_infos]
 
-    problem, guess = problem_of_track(gait(10), folder=Path(example), more=more)
+    problem, guess = build_track_problem(gait(10), folder=Path(example), more=more)
     assert problem.solver.num_mesh_intervals == 10
     assert guess is not None and len(guess.times) == 50
     program = Program(problem)
-    terms, missed = evaluated(program, MocoTrajectory.read(moco_found(tmp_path, "walk-10t4")))
+    terms, missed = evaluate(program, MocoTrajectory.read(moco_found(tmp_path, "walk-10t4")))
     assert terms == pytest.approx(moco_said("walk-10t4")["terms"], rel=1e-10)
     assert missed[0].size < 3e-6
     # What both follow over time is exact where times are variables, too.
-    w = program.layout.guess()
+    w = program.layout.make_guess()
     way = np.random.default_rng(0).normal(size=len(w)) * 1e-2
     way[:2] = 0.01, -0.02
-    gradient, numbers = program.slopes(w)
+    gradient, numbers = program.compute_slopes(w)
     change = (
-        program.values(w + 1e-5 * way)[0].sum() - program.values(w - 1e-5 * way)[0].sum()
+        program.compute_values(w + 1e-5 * way)[0].sum()
+        - program.compute_values(w - 1e-5 * way)[0].sum()
     ) / 2e-5
     assert gradient @ way == pytest.approx(change, rel=1e-6)
     assert np.isfinite(numbers).all()
@@ -79,12 +80,12 @@ def test_what_tools_do_not_do_is_refused(example):
         osimlite.OsimliteError,
         match=r"from 0 s to 3 s there are no data; they are from 0 s to 0.47",
     ):
-        problem_of_track(tool, folder=Path(example))
+        build_track_problem(tool, folder=Path(example))
     tool.states_reference.filepath = ""
     with pytest.raises(
         osimlite.OsimliteError, match="give it a states_reference or a markers_reference"
     ):
-        problem_of_track(tool, folder=Path(example))
+        build_track_problem(tool, folder=Path(example))
 
 
 def test_a_setup_is_run(example, tmp_path):

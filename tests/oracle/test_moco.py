@@ -46,11 +46,11 @@ import osimlite
 from osimlite import moco
 from osimlite.optimal.program import Program
 scaled = {"of_tau1": "/tau1", "of_tip": "tip_2"}
-program = Program(moco.problem_of("study.omoco", scaled=scaled))
+program = Program(moco.build_problem("study.omoco", scaled=scaled))
 theirs = moco.MocoTrajectory.read("theirs.sto")
 # OpenSim loses those of markers and contacts as it copies its pointers to them.
 theirs.parameters["of_tip"] = 1.0
-terms, missed = moco.evaluated(program, theirs)
+terms, missed = moco.evaluate(program, theirs)
 # Limited memory ends within rounding of such a tolerance, or not.
 study = osimlite.read_document("study.omoco")
 study.solver.optim_hessian_approximation = "exact"
@@ -111,7 +111,7 @@ from osimlite import moco
 from osimlite.optimal.program import Program
 study = osimlite.read_document("study.omoco")
 next(goal for goal in study.problem.phases.goals if goal.name == "turns").rotation_reference_file = "turns.sto"
-terms, _ = moco.evaluated(Program(moco.problem_of(study)), moco.MocoTrajectory.read("theirs.sto"))
+terms, _ = moco.evaluate(Program(moco.build_problem(study)), moco.MocoTrajectory.read("theirs.sto"))
 for goal in study.problem.phases.goals:
     goal.enabled = goal.name in ("places", "turns", "heavy")
 study.problem.phases.path_constraints[0].frame_pairs[0].maximum_distance = 1.2
@@ -205,7 +205,7 @@ import osimlite
 from osimlite import moco
 from osimlite.optimal.program import Program
 study = osimlite.read_document("study.omoco")
-terms, _ = moco.evaluated(Program(moco.problem_of(study)), moco.MocoTrajectory.read("theirs.sto"))
+terms, _ = moco.evaluate(Program(moco.build_problem(study)), moco.MocoTrajectory.read("theirs.sto"))
 study.problem.phases.goals = [osimlite.MocoControlGoal(name="effort")]
 study.solver.optim_max_iterations = 200
 found = moco.solve(study)
@@ -267,7 +267,7 @@ OUR_LOADS = """
 import json
 from osimlite import moco
 from osimlite.optimal.program import Program
-terms, _ = moco.evaluated(Program(moco.problem_of("study.omoco")), moco.MocoTrajectory.read("theirs.sto"))
+terms, _ = moco.evaluate(Program(moco.build_problem("study.omoco")), moco.MocoTrajectory.read("theirs.sto"))
 print(json.dumps(terms))
 """
 
@@ -394,30 +394,30 @@ import numpy as np
 import osimlite
 from osimlite import moco
 from osimlite.optimal.program import Program
-from osimlite.optimal.ipopt import violations
-program = Program(moco.problem_of("study.omoco"))
+from osimlite.optimal.ipopt import find_violations
+program = Program(moco.build_problem("study.omoco"))
 layout, theirs = program.layout, moco.MocoTrajectory.read("theirs.sto")
-w, times = layout.taken(theirs), theirs.times
+w, times = layout.guess_from_trajectory(theirs), theirs.times
 # The file has neither where intervals lead to, nor what moves states but as lines over other times than theirs.
-places = layout.places_of["slacks"]
+places = layout.indices["slacks"]
 moved = np.flatnonzero(places[:, 0] >= 0)
 knots = np.linspace(times[0], times[-1], len(moved))
 lines = np.stack([np.interp(times, knots, unit) for unit in np.eye(len(moved))], axis=1)
 for number, name in enumerate(layout.names["slacks"]):
     w[places[moved, number]] = np.linalg.lstsq(lines, theirs.columns[name], rcond=None)[0]
 count = len(layout.names["projections"])
-of = layout.places_of["projections"][moved]
+of = layout.indices["projections"][moved]
 for row in range(len(moved)):
-    x = w[layout.places_of["states"][moved[row]]]
+    x = w[layout.indices["states"][moved[row]]]
     g = np.array(program.problem.functions.constraints(times[moved[row]], x, 0 * x, [])[3])
     mu = w[places[moved[row]]].reshape(2, -1)
     w[of[row]] = x[:count] - (mu @ g).ravel()
-costs, rows = program.values(w)
+costs, rows = program.compute_values(w)
 study = osimlite.read_document("study.omoco")
 study.solver.optim_hessian_approximation = "exact"
 found = moco.solve(study, guess="theirs.sto")
 terms, slack = dict(zip(program.costs, costs)), float(np.abs(w[places[moved]]).max())
-print(json.dumps([terms, violations(program, w, rows)[0].size, found.violations[0].size, found.objective, slack]))
+print(json.dumps([terms, find_violations(program, w, rows)[0].size, found.violations[0].size, found.objective, slack]))
 """
 
 
@@ -549,8 +549,8 @@ tool = osimlite.MocoTrack(
     mesh_interval=0.1,
 )
 tool.markers_weight_set.objects.append(osimlite.MocoWeight(name="tip", weight=2.0))
-problem, _ = moco.problem_of_track(tool)
-print(json.dumps(moco.evaluated(Program(problem), moco.MocoTrajectory.read("theirs.sto"))[0]))
+problem, _ = moco.build_track_problem(tool)
+print(json.dumps(moco.evaluate(Program(problem), moco.MocoTrajectory.read("theirs.sto"))[0]))
 """
 
 
@@ -575,7 +575,7 @@ import json, sys
 import numpy as np
 import osimlite
 from osimlite import moco
-from osimlite.optimal.ipopt import violations
+from osimlite.optimal.ipopt import find_violations
 from osimlite.optimal.program import Program
 # One that does not act has states and no control; MocoControlGoal takes wrong ones for those behind it.
 model = osimlite.read("model.osim")
@@ -594,13 +594,13 @@ phase.goals.append(osimlite.MocoControlGoal(name="effort"))
 solver = osimlite.MocoCasADiSolver(multibody_dynamics_mode=sys.argv[1], num_mesh_intervals=2, optim_max_iterations=0)
 study = osimlite.MocoStudy(problem=osimlite.MocoProblem(name="problem", phases=phase), solver=solver)
 osimlite.write(study, "study.omoco")
-program = Program(moco.problem_of("study.omoco"))
+program = Program(moco.build_problem("study.omoco"))
 layout = program.layout
 lower, upper = (np.where(np.isfinite(x), x, end) for x, end in ((layout.lower, -1.0), (layout.upper, 1.0)))
 w = np.random.default_rng(0).uniform(lower, upper)
-moco.MocoTrajectory.of(layout, w).write("ours.sto")
-costs, rows = program.values(w)
-print(json.dumps([costs.sum(), violations(program, w, rows)[0].size]))
+moco.MocoTrajectory.from_variables(layout, w).write("ours.sto")
+costs, rows = program.compute_values(w)
+print(json.dumps([costs.sum(), find_violations(program, w, rows)[0].size]))
 """
 BEGUN = """
 import json
@@ -649,14 +649,14 @@ OUR_COUPLED = """
 import json
 import osimlite
 from osimlite import moco
-from osimlite.optimal.tables import table_of
+from osimlite.optimal.tables import read_reference
 operators = [
     osimlite.TabOpUseAbsoluteStateNames(),
     osimlite.TabOpAppendCoupledCoordinateValues(overwrite_existing_columns=OVERWRITE),
 ]
 processor = osimlite.TableProcessor(filepath="motion.sto", operators=operators)
 phase = osimlite.MocoPhase(model=osimlite.ModelProcessor(filepath="model.osim"))
-table = table_of(moco.problem_of(osimlite.MocoStudy(problem=osimlite.MocoProblem(phases=phase))), phase, processor)
+table = read_reference(moco.build_problem(osimlite.MocoStudy(problem=osimlite.MocoProblem(phases=phase))), phase, processor)
 print(json.dumps([table.columns, table.rows.tolist()]))
 """
 

@@ -35,8 +35,8 @@ OURS = """
 import json
 from osimlite import moco
 from osimlite.optimal.program import Program
-program = Program(moco.problem_of("human-walks.omoco"))
-print(json.dumps(moco.evaluated(program, moco.MocoTrajectory.read("theirs.sto"))[0]))
+program = Program(moco.build_problem("human-walks.omoco"))
+print(json.dumps(moco.evaluate(program, moco.MocoTrajectory.read("theirs.sto"))[0]))
 """
 
 

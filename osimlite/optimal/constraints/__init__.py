@@ -2,5 +2,5 @@
 
 A module has one function, ``rows(constraint, problem)``: it takes the constraint as the schema has
 it and the :class:`~osimlite.optimal.problem.Problem`, and gives the
-:class:`~osimlite.optimal.point.Rows` of it.
+:class:`~osimlite.optimal.point.ConstraintRows` of it.
 """

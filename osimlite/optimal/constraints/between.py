@@ -9,9 +9,9 @@ from functools import partial
 from osimlite.derivatives.symbols import casadi
 from osimlite.mechanics.multibody.schema_functions import numeric
 from osimlite.optimal.bounds import Range
-from osimlite.optimal.point import Formula, Point, Rows
+from osimlite.optimal.point import ConstraintRows, Formula, Point
 from osimlite.optimal.problem import Problem
-from osimlite.optimal.tables import over_time
+from osimlite.optimal.tables import sample_function
 from osimlite.schema.moco.path_constraints import (
     MocoControlBoundConstraint,
     MocoOutputBoundConstraint,
@@ -24,7 +24,7 @@ def rows_between(
     problem: Problem,
     paths: Sequence[str],
     variable: Callable[[Point, str], Formula],
-) -> Rows:
+) -> ConstraintRows:
     """For each of some variables how far it is above each of the functions.
 
     Args:
@@ -37,24 +37,26 @@ def rows_between(
     functions = [(getattr(constraint, name), limits) for name, limits in ends]
     functions = [pair for pair in functions if pair[0] is not None]
     if not functions:
-        raise problem.wrong(constraint, "it has neither a lower_bound nor an upper_bound")
+        raise problem.invalid_error(constraint, "it has neither a lower_bound nor an upper_bound")
     if constraint.equality_with_lower:
         if constraint.lower_bound is None or constraint.upper_bound is not None:
-            raise problem.wrong(
+            raise problem.invalid_error(
                 constraint, "equality_with_lower needs a lower_bound and no upper_bound"
             )
         functions = [(constraint.lower_bound, (0.0, 0.0))]
     series = [
-        problem.given(partial(over_time, numeric(function, 1, f"a bound of '{constraint.name}'")))
+        problem.add_time_function(
+            partial(sample_function, numeric(function, 1, f"a bound of '{constraint.name}'"))
+        )
         for function, _ in functions
     ]
     limits: list[Range] = [limit for _ in paths for _, limit in functions]
 
     def formula(point: Point) -> Formula:
         return casadi.vertcat(
-            *(variable(point, path) - point.at(own) for path in paths for own in series)
+            *(variable(point, path) - point.evaluate(own) for path in paths for own in series)
         )
 
-    return Rows(
+    return ConstraintRows(
         [f"{constraint.name} of {path}" for path in paths for _ in functions], formula, limits
     )

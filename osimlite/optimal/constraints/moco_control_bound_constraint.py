@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from osimlite.optimal.constraints.between import rows_between
-from osimlite.optimal.point import Point, Rows
+from osimlite.optimal.point import ConstraintRows, Point
 from osimlite.optimal.problem import Problem
 from osimlite.schema.moco.path_constraints import MocoControlBoundConstraint
 
 
-def rows(constraint: MocoControlBoundConstraint, problem: Problem) -> Rows:
+def rows(constraint: MocoControlBoundConstraint, problem: Problem) -> ConstraintRows:
     """How far each control is above the functions."""
     paths = [str(path) for path in constraint.control_paths]
     for path in paths:
-        problem.expect(constraint, path, problem.controls, "control")
+        problem.check_name(constraint, path, problem.controls, "control")
     return rows_between(constraint, problem, paths, Point.control)

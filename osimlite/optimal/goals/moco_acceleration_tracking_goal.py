@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from osimlite.derivatives.symbols import casadi
-from osimlite.optimal.frames import Followed
-from osimlite.optimal.point import Formula, Frame, Point, Terms
+from osimlite.optimal.frames import FrameReference
+from osimlite.optimal.point import Formula, Frame, GoalTerms, Point
 from osimlite.optimal.problem import Problem
 from osimlite.schema.moco.tracking import MocoAccelerationTrackingGoal
 
 
-def terms(goal: MocoAccelerationTrackingGoal, problem: Problem) -> Terms:
+def terms(goal: MocoAccelerationTrackingGoal, problem: Problem) -> GoalTerms:
     """The integral of the weighted sum of the squares of what is missing, m²/s³."""
     gravity = casadi.DM(problem.functions.mechanism.gravity)
 
@@ -21,7 +21,7 @@ def terms(goal: MocoAccelerationTrackingGoal, problem: Problem) -> Terms:
             found = frame.rotation.T @ found
         return casadi.sumsqr(found - given)
 
-    followed = Followed(
+    followed = FrameReference(
         goal,
         goal.acceleration_reference_file,
         None,

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from osimlite.optimal.point import Formula, Point, Terms, integral
+from osimlite.optimal.point import Formula, GoalTerms, Point, make_integral_terms
 from osimlite.optimal.problem import Problem
-from osimlite.optimal.tables import splines, table_of
+from osimlite.optimal.tables import fit_splines, read_reference
 from osimlite.schema.moco.tracking import MocoControlTrackingGoal
 
 
-def terms(goal: MocoControlTrackingGoal, problem: Problem) -> Terms:
+def terms(goal: MocoControlTrackingGoal, problem: Problem) -> GoalTerms:
     """The integral of the weighted sum of squares of the controls' distances from splines through the table."""
-    controls, table = [*problem.controls], table_of(problem, goal, goal.reference)
+    controls, table = [*problem.controls], read_reference(problem, goal, goal.reference)
     columns = {item.name: item.reference for item in goal.reference_labels}
     if not columns:
         columns = {
@@ -19,23 +19,24 @@ def terms(goal: MocoControlTrackingGoal, problem: Problem) -> Terms:
             if name in controls or not goal.allow_unused_references
         }
     for name, label in columns.items():
-        problem.expect(goal, name, controls, "control")
+        problem.check_name(goal, name, controls, "control")
         if label not in table.columns:
-            raise problem.wrong(
+            raise problem.invalid_error(
                 goal, f"its reference has no column '{label}', which '{name}' is to follow"
             )
     weights = dict(
         zip(
             controls,
-            problem.weights(goal, goal.control_weights, None, controls, "control"),
+            problem.find_weights(goal, goal.control_weights, None, controls, "control"),
             strict=True,
         )
     )
-    pairs = [*zip(columns, splines(problem, table, [*columns.values()]), strict=True)]
+    pairs = [*zip(columns, fit_splines(problem, table, [*columns.values()]), strict=True)]
 
     def integrand(point: Point) -> Formula:
         return sum(
-            weights[name] * (point.control(name) - point.at(series)) ** 2 for name, series in pairs
+            weights[name] * (point.control(name) - point.evaluate(series)) ** 2
+            for name, series in pairs
         )
 
-    return integral(integrand)
+    return make_integral_terms(integrand)

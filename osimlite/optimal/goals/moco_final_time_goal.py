@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from osimlite.optimal.point import Terms
+from osimlite.optimal.point import GoalTerms
 from osimlite.optimal.problem import Problem
 from osimlite.schema.moco.goals import MocoFinalTimeGoal
 
 
-def terms(goal: MocoFinalTimeGoal, problem: Problem) -> Terms:
+def terms(goal: MocoFinalTimeGoal, problem: Problem) -> GoalTerms:
     """The final time, s."""
-    return Terms(lambda ends: ends.end.t[0])
+    return GoalTerms(lambda ends: ends.end.t[0])

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from osimlite.derivatives.symbols import casadi
-from osimlite.optimal.point import CONSTRAINT, Ends, Formula, Terms
+from osimlite.optimal.point import CONSTRAINT_FIRST, Endpoints, Formula, GoalTerms
 from osimlite.optimal.problem import Problem
-from osimlite.optimal.tendons import EXPLICIT, Tendons
+from osimlite.optimal.tendons import EXPLICIT, TendonEquations
 from osimlite.schema.moco.goals import MocoInitialForceEquilibriumDGFGoal
 
 
-def terms(goal: MocoInitialForceEquilibriumDGFGoal, problem: Problem) -> Terms:
+def terms(goal: MocoInitialForceEquilibriumDGFGoal, problem: Problem) -> GoalTerms:
     """By how much the force of each tendon of the explicit kind exceeds what the fibers bear, if it does not change."""
 
-    def value(ends: Ends) -> Formula:
-        tendons = Tendons(problem, problem.dynamics.elements(), EXPLICIT)
-        return tendons.residuals(ends.start, casadi.SX.zeros(len(tendons.paths)))[1]
+    def value(ends: Endpoints) -> Formula:
+        tendons = TendonEquations(problem, problem.dynamics.list_forces(), EXPLICIT)
+        return tendons.compute_residuals(ends.start, casadi.SX.zeros(len(tendons.paths)))[1]
 
-    return Terms(value, modes=CONSTRAINT)
+    return GoalTerms(value, modes=CONSTRAINT_FIRST)

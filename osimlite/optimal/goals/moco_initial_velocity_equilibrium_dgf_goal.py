@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from osimlite.derivatives.symbols import casadi
-from osimlite.optimal.point import CONSTRAINT, Ends, Formula, Terms
+from osimlite.optimal.point import CONSTRAINT_FIRST, Endpoints, Formula, GoalTerms
 from osimlite.optimal.problem import Problem
-from osimlite.optimal.tendons import EXPLICIT, IMPLICIT, Tendons
+from osimlite.optimal.tendons import EXPLICIT, IMPLICIT, TendonEquations
 from osimlite.schema.moco.goals import MocoInitialVelocityEquilibriumDGFGoal
 
 
-def terms(goal: MocoInitialVelocityEquilibriumDGFGoal, problem: Problem) -> Terms:
+def terms(goal: MocoInitialVelocityEquilibriumDGFGoal, problem: Problem) -> GoalTerms:
     """By how much the rate (N/s) of the force of the fibers of each muscle exceeds that of its tendon."""
-    both = [Tendons(problem, problem.dynamics.elements(), mode) for mode in (IMPLICIT, EXPLICIT)]
+    both = [
+        TendonEquations(problem, problem.dynamics.list_forces(), mode)
+        for mode in (IMPLICIT, EXPLICIT)
+    ]
 
-    def value(ends: Ends) -> Formula:
-        return casadi.vertcat(*(tendons.drifts(ends.start) for tendons in both))
+    def value(ends: Endpoints) -> Formula:
+        return casadi.vertcat(*(tendons.compute_rate_errors(ends.start) for tendons in both))
 
-    return Terms(value, modes=CONSTRAINT)
+    return GoalTerms(value, modes=CONSTRAINT_FIRST)

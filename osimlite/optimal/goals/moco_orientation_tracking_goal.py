@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from osimlite.derivatives.symbols import casadi
-from osimlite.optimal.frames import Followed
-from osimlite.optimal.point import Formula, Frame, Point, Terms
+from osimlite.optimal.frames import FrameReference
+from osimlite.optimal.point import Formula, Frame, GoalTerms, Point
 from osimlite.optimal.problem import Problem
 from osimlite.schema.moco.tracking import MocoOrientationTrackingGoal
 
@@ -12,9 +12,9 @@ SMALL = 1e-8
 """Squares of sines below which that of the angle is taken from its series, as a root has no slope at zero."""
 
 
-def terms(goal: MocoOrientationTrackingGoal, problem: Problem) -> Terms:
+def terms(goal: MocoOrientationTrackingGoal, problem: Problem) -> GoalTerms:
     """The integral of the weighted sum of the squares of the angles that are missing, rad² s."""
-    followed = Followed(
+    followed = FrameReference(
         goal,
         goal.rotation_reference_file,
         goal.states_reference,

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from osimlite.derivatives.symbols import casadi
-from osimlite.optimal.frames import Followed
-from osimlite.optimal.point import Terms
+from osimlite.optimal.frames import FrameReference
+from osimlite.optimal.point import GoalTerms
 from osimlite.optimal.problem import Problem
 from osimlite.schema.moco.tracking import MocoTranslationTrackingGoal
 
 
-def terms(goal: MocoTranslationTrackingGoal, problem: Problem) -> Terms:
+def terms(goal: MocoTranslationTrackingGoal, problem: Problem) -> GoalTerms:
     """The integral of the weighted sum of the squares of distances, m² s."""
-    followed = Followed(
+    followed = FrameReference(
         goal,
         goal.translation_reference_file,
         goal.states_reference,
