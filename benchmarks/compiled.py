@@ -26,7 +26,7 @@ from rich.table import Table
 
 import osimlite
 from osimlite.simulation import Simulation
-from osimlite.simulation.many import run_many
+from osimlite.simulation.batches import run_many
 from simulate import MODEL, TO
 
 ACCURACIES = (1e-3, 1e-5, 1e-6)

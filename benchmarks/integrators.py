@@ -33,7 +33,7 @@ import osimlite
 from _corpus import CORPUS
 from osimlite.simulation import Simulation
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.integrators import INTEGRATORS
+from osimlite.simulation.options import INTEGRATORS
 
 REAL = {
     "gait10dof18musc": "m0005",

@@ -24,7 +24,7 @@ from osimlite.schema.frames import Body
 from osimlite.schema.joints import PinJoint, PlanarJoint
 from osimlite.schema.model import Model
 from osimlite.simulation import Simulation
-from osimlite.simulation.many import Watch, run_many
+from osimlite.simulation.batches import Watch, run_many
 
 GRAVITY = 9.81
 FOOT = 2e-4

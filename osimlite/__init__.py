@@ -37,11 +37,11 @@ if TYPE_CHECKING:
     from osimlite.mechanics.multibody import build_mechanism as mechanism
     from osimlite.schema.model import Model as Model
     from osimlite.simulation import simulate as simulate
+    from osimlite.simulation.inverse_dynamics import inverse_dynamics as inverse_dynamics
+    from osimlite.simulation.inverse_dynamics import kinematics as kinematics
     from osimlite.simulation.muscle_curves import muscle_curves as muscle_curves
+    from osimlite.simulation.muscle_forces import static_optimization as static_optimization
     from osimlite.simulation.paths import paths as paths
-    from osimlite.simulation.recorded import inverse_dynamics as inverse_dynamics
-    from osimlite.simulation.recorded import kinematics as kinematics
-    from osimlite.simulation.shared_forces import static_optimization as static_optimization
     from osimlite.studies.reflexes.feedback import Feedback as Feedback
     from osimlite.tools.report import report as report
     from osimlite.tools.running import run as run
@@ -110,10 +110,10 @@ FUNCTIONS = {
     "report": "osimlite.tools.report",
     "run": "osimlite.tools.running",
     "check_trial": "osimlite.tools.trials.check",
-    "inverse_dynamics": "osimlite.simulation.recorded",
-    "kinematics": "osimlite.simulation.recorded",
+    "inverse_dynamics": "osimlite.simulation.inverse_dynamics",
+    "kinematics": "osimlite.simulation.inverse_dynamics",
     "simulate": "osimlite.simulation",
-    "static_optimization": "osimlite.simulation.shared_forces",
+    "static_optimization": "osimlite.simulation.muscle_forces",
     "OsimliteError": "osimlite.errors",
 }
 

@@ -297,7 +297,7 @@ def quantities(
     """
     from osimlite.base.text import did_you_mean
     from osimlite.errors import ModelError, OsimliteError, SettingError
-    from osimlite.simulation.start import in_units_of, suspect_value
+    from osimlite.simulation.initial_state import in_units_of, suspect_value
 
     result = {}
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"

@@ -99,7 +99,7 @@ def make_plan(
     import warnings
 
     from osimlite.errors import SettingError, UnitWarning
-    from osimlite.simulation.given_controls import words_to_controls
+    from osimlite.simulation.run_controls import words_to_controls
     from osimlite.studies.sweep.variables import parse
 
     ranges = parse(vary or [])

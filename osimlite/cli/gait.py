@@ -15,7 +15,7 @@ from osimlite.cli._progress import progress_bar
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from osimlite.simulation.many import BatchEngine
+    from osimlite.simulation.batches import BatchEngine
     from osimlite.studies.gait.basin import Basin
     from osimlite.studies.gait.cycle import Cycle
     from osimlite.studies.gait.stepmap import StepMap

@@ -39,7 +39,7 @@ def inverse_dynamics(
     """
     from osimlite.cli._recorded import written
     from osimlite.io.document.reader import read
-    from osimlite.simulation.recorded import inverse_dynamics as forces_of
+    from osimlite.simulation.inverse_dynamics import inverse_dynamics as forces_of
 
     table = forces_of(
         read(file),

@@ -34,7 +34,7 @@ def kinematics(
     """
     from osimlite.cli._recorded import written
     from osimlite.io.document.reader import read
-    from osimlite.simulation.recorded import kinematics as followed
+    from osimlite.simulation.inverse_dynamics import kinematics as followed
 
     recorded = followed(
         read(file), motion, assemble=assemble, lowpass=lowpass, start=first, end=last

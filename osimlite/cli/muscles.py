@@ -138,7 +138,7 @@ def _swept(mechanism: Mechanism, words: Sequence[str], points: int) -> dict[str,
     from math import isfinite
 
     from osimlite.errors import ModelError, SettingError
-    from osimlite.simulation.start import in_units_of, suspect_value
+    from osimlite.simulation.initial_state import in_units_of, suspect_value
 
     result = {}
     for word in words:

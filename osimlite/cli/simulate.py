@@ -72,7 +72,7 @@ def simulate(
         raise SettingError(f"'{results}' has what went before; name another folder with -o")
     model, feedback = read(file), options.feedback(controller, par)
     if controls:
-        from osimlite.simulation.given_controls import words_to_controls
+        from osimlite.simulation.run_controls import words_to_controls
     from osimlite.simulation.run import Simulation
     from osimlite.simulation.trajectory import Interrupted
 

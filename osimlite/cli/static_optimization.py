@@ -58,7 +58,7 @@ def static_optimization(
     from osimlite.cli._console import complain
     from osimlite.cli._recorded import say_motion
     from osimlite.io.document.reader import read
-    from osimlite.simulation.shared_forces import static_optimization as shared_forces
+    from osimlite.simulation.muscle_forces import static_optimization as shared_forces
 
     found = shared_forces(
         read(file),

@@ -21,7 +21,7 @@ from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PLANE
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.elements.probe import DeclaredProbe
-from osimlite.simulation.engines.carrying import Carrying
+from osimlite.simulation.engines.dual_numbers import Carrying
 from osimlite.simulation.pack import Packed
 
 if TYPE_CHECKING:

@@ -26,10 +26,10 @@ from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model, expect_model
 from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.initial_state import starting
 from osimlite.simulation.options import PER_RUN
 from osimlite.simulation.properties import places
 from osimlite.simulation.run import Simulation
-from osimlite.simulation.start import starting
 from osimlite.simulation.trajectory import Trajectory
 
 CHOICES = {*PER_RUN, "folder"} - {"fixed_step", "integrator", "controller", "resume"}

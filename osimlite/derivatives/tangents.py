@@ -29,9 +29,9 @@ from osimlite.schema.model import Model, expect_model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.laws import DIRECTIONS
-from osimlite.simulation.engines.carrying import Carrying, DualVector, carried_by
+from osimlite.simulation.engines.dual_numbers import Carrying, DualVector, carried_by
 from osimlite.simulation.engines.linking import Program, Tangents
-from osimlite.simulation.integrators import MERSON
+from osimlite.simulation.options import MERSON
 from osimlite.simulation.pack import Packed, pack
 
 

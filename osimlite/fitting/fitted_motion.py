@@ -10,7 +10,7 @@ from osimlite.base.records import dataclass, field
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.simulation.movement import Movement
+from osimlite.simulation.trajectory import Movement
 
 ADVICE = 0.02, 0.04
 """What OpenSim's documentation calls good: a root mean square of the marker errors of less than 2

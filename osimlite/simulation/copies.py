@@ -15,10 +15,10 @@ from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.multibody.functions import Constant
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
+from osimlite.simulation.batches import BatchOptions
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.given_controls import places_of
-from osimlite.simulation.many import BatchOptions
 from osimlite.simulation.run import Simulation
+from osimlite.simulation.run_controls import places_of
 
 AT_ONCE = 4
 """So many copies a thread takes at a time."""

@@ -19,7 +19,7 @@ from osimlite.mechanics.kernels.layout import (
 )
 from osimlite.mechanics.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
 from osimlite.mechanics.multibody.parts import GROUND
-from osimlite.simulation.robot.lines import as_line
+from osimlite.simulation.robot.couplings import as_line
 from osimlite.simulation.robot.robot import RobotJoint
 
 if TYPE_CHECKING:

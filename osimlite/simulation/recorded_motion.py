@@ -26,10 +26,10 @@ from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
 from osimlite.schema.tree import is_a
 from osimlite.simulation.elements import Forces
+from osimlite.simulation.initial_state import columns_of_states
 from osimlite.simulation.lowpass import lowpassed
-from osimlite.simulation.movement import Movement
-from osimlite.simulation.start import columns_of_states
 from osimlite.simulation.system import System
+from osimlite.simulation.trajectory import Movement
 
 if TYPE_CHECKING:
     from osimlite.simulation.trajectory import Trajectory

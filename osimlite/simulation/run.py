@@ -26,13 +26,7 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import engine_factory, engine_name
 from osimlite.simulation.engines.protocol import Engine, Settings
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, LOOSE, MERSON, check_integrator
-from osimlite.simulation.options import PER_RUN, Options
-from osimlite.simulation.probed import probe_labels, probe_rows
-from osimlite.simulation.recorder import Recorder
-from osimlite.simulation.run_times import check_step
-from osimlite.simulation.run_times import report_times as report_times
-from osimlite.simulation.start import (
+from osimlite.simulation.initial_state import (
     ended,
     in_units_of,
     starting,
@@ -40,9 +34,26 @@ from osimlite.simulation.start import (
     state_in,
     suspect_value,
 )
+from osimlite.simulation.options import (
+    DEFAULT_ACCURACY,
+    LOOSE,
+    MERSON,
+    PER_RUN,
+    Options,
+    check_integrator,
+    check_step,
+)
+from osimlite.simulation.options import report_times as report_times
+from osimlite.simulation.run_report import (
+    Recorder,
+    integration_summary,
+    probe_labels,
+    probe_rows,
+    result_summary,
+    versions,
+)
 from osimlite.simulation.states import in_model_order
 from osimlite.simulation.stepper import Observer, Progress, Stepper
-from osimlite.simulation.summary import integration_summary, result_summary, versions
 from osimlite.simulation.trajectory import Interrupted, Report, Trajectory
 
 if TYPE_CHECKING:
@@ -287,7 +298,7 @@ class Simulation:
         )
         controls, given = self.forces.controls, {}
         if chosen.controls is not None or any(controls.functions):
-            from osimlite.simulation.given_controls import driven, told
+            from osimlite.simulation.run_controls import driven, told
 
             controls = driven(controls, chosen.controls, to)
             given = {} if chosen.controls is None else {"controls": told(chosen.controls)}
@@ -360,7 +371,7 @@ class Simulation:
         Raises:
             SimulationError: it cannot begin.
         """
-        from osimlite.simulation.given_controls import require_tables
+        from osimlite.simulation.run_controls import require_tables
 
         times, states = [start], [list(y)]
 

@@ -40,8 +40,8 @@ from osimlite.schema.path_actuators import PathActuator
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines.linking import best
-from osimlite.simulation.force_labels import label_as_opensim
 from osimlite.simulation.system import System
+from osimlite.simulation.trajectory import label_as_opensim
 
 if TYPE_CHECKING:
     from osimlite.schema.prescribed import ExternalLoads

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -21,7 +21,6 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.snapshot import Snapshot
-from osimlite.simulation.force_labels import label_as_opensim
 
 
 class Trajectory(Tabular):
@@ -267,3 +266,52 @@ class Report(NamedTuple):
     # labels, and one row for each moment
     probes: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]
     summary: Callable[[], dict[str, Any]]  # what goes into summary.json
+
+
+class Movement(Tabular):
+    """A motion of a mechanism."""
+
+    mechanism: Mechanism  # what moves
+    times: Array  # (t,), s
+    values: Array  # of all n coordinates (t, n), in the mechanism's order, rad and m
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates, in the mechanism's order."""
+        return self.mechanism.coordinate_names
+
+    @property
+    def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
+        """The coordinates over ``time``, rad and m."""
+        return {"time": self.times}, dict(zip(self.coordinates, self.values.T, strict=True))
+
+    @property
+    def in_degrees(self) -> Array:
+        """The values (t, n) with rotational coordinates in degrees, as OpenSim's files have them."""
+        turning = [info.motion_type == "rotational" for info in self.mechanism.coordinates]
+        return np.where(turning, np.rad2deg(self.values), self.values)
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset: ``value`` over ``time`` and ``coordinate``, rad and m.
+
+        Raises:
+            MissingDependency: xarray is not installed.
+        """
+        xarray = require("xarray", extra="frame", purpose="a data set of xarray")
+        over = {"time": self.times, "coordinate": list(self.coordinates)}
+        return xarray.Dataset(
+            {"value": (("time", "coordinate"), self.values)}, over, {"model": self.mechanism.name}
+        )
+
+
+ENERGY = "PotentialEnergy"
+"""The label of the energy of every CoordinateLimitForce, however many there are in one file."""
+
+
+def label_as_opensim(labels: Iterable[str]) -> list[str]:
+    """Return labels of force records as OpenSim's ForceReporter and StaticOptimization write them.
+
+    Args: labels: of the force elements, in which the energy of a limit force carries the name of
+        that force.
+    """
+    return [ENERGY if label.endswith(f".{ENERGY}") else label for label in labels]

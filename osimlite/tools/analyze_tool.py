@@ -12,9 +12,9 @@ from osimlite.io.tables.storage import read_sto
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.tools.dynamics import AnalyzeTool
+from osimlite.simulation.initial_state import columns_of_states
 from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.simulation.run import Simulation
-from osimlite.simulation.start import columns_of_states
 from osimlite.simulation.system import System
 from osimlite.tools.job import Job
 from osimlite.tools.motion import BoolArray, Motion, Record

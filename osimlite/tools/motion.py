@@ -22,8 +22,8 @@ from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.link_motion import LinkMotion
 from osimlite.simulation.paths import Paths
-from osimlite.simulation.probed import Moment
 from osimlite.simulation.run import Simulation
+from osimlite.simulation.run_report import Moment
 from osimlite.simulation.system import System
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome

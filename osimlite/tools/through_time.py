@@ -21,10 +21,10 @@ from osimlite.schema.controller_types import CorrectionController, PrescribedCon
 from osimlite.schema.model import Model
 from osimlite.schema.specs import file_specs
 from osimlite.schema.tools.dynamics import AbstractTool
-from osimlite.simulation.recorded import add_forces
+from osimlite.simulation.initial_state import columns_of_states, starting
+from osimlite.simulation.inverse_dynamics import add_forces
 from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.simulation.run import Simulation
-from osimlite.simulation.start import columns_of_states, starting
 from osimlite.simulation.static_optimization import StaticOptimization
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import Job

@@ -17,7 +17,7 @@ from osimlite.schema.contact import (
 )
 from osimlite.schema.model import Model
 from osimlite.simulation.robot.mesh_files import MeshFiles
-from osimlite.simulation.robot.shapes import Ball, Box, MeshFile, Shape, Visual
+from osimlite.simulation.robot.robot import Ball, Box, MeshFile, Shape, Visual
 from osimlite.simulation.robot.visuals import mesh_shape
 from osimlite.translate.fidelity import Fidelity
 

@@ -14,10 +14,10 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.schema.model import Model
 from osimlite.simulation.robot.build import build_robot
+from osimlite.simulation.robot.couplings import range_limits
 from osimlite.simulation.robot.merge_fixed import merge_fixed
 from osimlite.simulation.robot.mesh_files import MeshFiles
 from osimlite.simulation.robot.names import legal, legal_names
-from osimlite.simulation.robot.range_limits import range_limits
 from osimlite.simulation.robot.robot import Robot
 from osimlite.simulation.robot.urdf import urdf_text
 from osimlite.simulation.robot.visuals import Visuals, collect_visuals

@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 from osimlite.mechanics.multibody.functions import IDENTITY
-from osimlite.simulation.robot.mimics import couplers, mimics
+from osimlite.simulation.robot.couplings import couplers, mimics
 from osimlite.simulation.robot.robot import Robot
 from osimlite.translate.function_data import as_data
 

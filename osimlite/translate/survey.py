@@ -20,9 +20,8 @@ from osimlite.schema.probes import Probe
 from osimlite.schema.sets import ModelComponentSet
 from osimlite.schema.tree import Tree
 from osimlite.schema.wrapping import WrapObject, WrapObjectSet
-from osimlite.simulation.robot.mimics import Mimic, couplers, mimics
-from osimlite.simulation.robot.principal_axes import breaks_triangle_rule, principal_axes
-from osimlite.simulation.robot.robot import Robot, RobotJoint
+from osimlite.simulation.robot.couplings import Mimic, couplers, mimics
+from osimlite.simulation.robot.robot import Robot, RobotJoint, breaks_triangle_rule, principal_axes
 from osimlite.translate.fidelity import LEFT_OUT, Fidelity
 
 COMPUTE = "compute its value by the file of coordinates"

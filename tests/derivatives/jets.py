@@ -158,7 +158,7 @@ def _angle(y: Any, x: Any) -> Any:
 
 
 def _copy_sign(x: Any, y: float) -> Any:
-    """Return x with the sign of y; at x = 0 its slope is the one that `SLOPES` of `carrying.py` has there."""
+    """Return x with the sign of y; at x = 0 its slope is the one that `SLOPES` of `dual_numbers.py` has there."""
     if not isinstance(x, Jet):
         return math.copysign(x, y)
     value = math.copysign(x.v, y)

@@ -34,7 +34,7 @@ from osimlite.schema.probe_types import (
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.probed import probe_labels, probe_rows
+from osimlite.simulation.run_report import probe_labels, probe_rows
 from osimlite.simulation.system import System
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

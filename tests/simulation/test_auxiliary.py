@@ -60,7 +60,7 @@ def test_files_and_fixed_steps(engine, tmp_path):
 
 
 def test_many_runs_equal_single_ones():
-    from osimlite.simulation.many import run_many
+    from osimlite.simulation.batches import run_many
 
     times = [0.0, 0.07, 0.2, 0.3]
     with Simulation(damped(), "compiled") as simulation:

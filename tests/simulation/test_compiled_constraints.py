@@ -20,12 +20,12 @@ from osimlite.mechanics.multibody.constraints import Coupler, Prescribed
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.functions import Sine
 from osimlite.simulation import Simulation, simulate
+from osimlite.simulation.batches import ENDINGS, Watch, run_many
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.many import ENDINGS, Watch, run_many
 from osimlite.simulation.system import System
 from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_of
 from tests.simulation.test_constrained import MODELS, four_bars, knee, patella, pins

@@ -25,10 +25,10 @@ from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE
 from osimlite.mechanics.kernels.rosenbrock import ALPHA, EMBEDDED, GAMMA, WEIGHTS
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation import Simulation
+from osimlite.simulation.batches import run_many
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.linking import PYTHON
-from osimlite.simulation.many import run_many
 from osimlite.simulation.system import System
 from tests.simulation.elements.muscle_rows import hung, muscle
 from tests.simulation.equations import Equations, last, oscillator

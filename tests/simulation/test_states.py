@@ -65,7 +65,7 @@ def test_nothing_of_the_call_before_is_left(simulations):
 @settings(max_examples=30, deadline=None)
 @given(rows=st.integers(0, 3), columns=st.integers(0, 20))
 def test_a_batch_refuses_states_of_another_length(simulations, rows, columns):
-    from osimlite.simulation.many import run_many
+    from osimlite.simulation.batches import run_many
 
     engine = simulations["compiled"].engine
     states = np.zeros((rows, columns))
@@ -122,7 +122,7 @@ def with_states(seed):
 @given(seed=st.integers(0, 10**6))
 def test_random_models_keep_their_states(seed, tmp_path_factory):
     """Through both engines, with both kinds of steps, in a batch, and through a file."""
-    from osimlite.simulation.many import run_many
+    from osimlite.simulation.batches import run_many
 
     model, z = with_states(seed)
     file = tmp_path_factory.mktemp("random") / "states.sto"

@@ -12,7 +12,7 @@ import pytest
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.io.tables.storage import read_sto
-from osimlite.simulation.start import columns_of_states
+from osimlite.simulation.initial_state import columns_of_states
 
 SETUP = """<OpenSimDocument Version="40600">
     <ForwardTool name="fall">

@@ -41,8 +41,8 @@ from osimlite.schema.functions import (
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
 from osimlite.simulation.robot.build import build_robot
+from osimlite.simulation.robot.couplings import mimics
 from osimlite.simulation.robot.merge_fixed import merge_fixed
-from osimlite.simulation.robot.mimics import mimics
 from osimlite.simulation.robot.names import legal_names
 from osimlite.simulation.robot.urdf import urdf_text
 from osimlite.translate import to_urdf

@@ -10,7 +10,7 @@ from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
-from osimlite.simulation.integrators import MERSON
+from osimlite.simulation.options import MERSON
 from osimlite.simulation.stepper import Observer, Stepper
 from osimlite.simulation.system import System
 

@@ -15,12 +15,12 @@ from osimlite.mechanics.kernels.layout import MODEL
 from osimlite.mechanics.kernels.method import ERRORS
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.table import LAW_MODULES
-from osimlite.simulation.integrators import INITIAL_STEP
-from osimlite.simulation.many import BatchOptions
+from osimlite.simulation.batches import BatchOptions
+from osimlite.simulation.options import INITIAL_STEP
 
 if TYPE_CHECKING:
+    from osimlite.simulation.control_steps import HeldRuns
     from osimlite.simulation.engines.base import KernelEngine
-    from osimlite.simulation.held import HeldRuns
 
 NO_KINDS, NO_LEVELS = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 7))
 

@@ -6,22 +6,32 @@ step control that they call. The code serves every model: models and parameters 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from osimlite.base.cores import cores
+from osimlite.base.text import did_you_mean
 from osimlite.errors import OsimliteError, SimulationError
+from osimlite.mechanics.kernels import record
+from osimlite.mechanics.kernels.contacts import RADIUS
+from osimlite.mechanics.kernels.layout import ITEM, MODEL
+from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
+from osimlite.simulation.batches import BatchEngine, BatchOptions, Runs, Watch
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.gather import OPENSIM
-from osimlite.simulation.engines import many
 from osimlite.simulation.engines.base import KernelEngine
+from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.engines.linking import version
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.many import BatchEngine
 
 if TYPE_CHECKING:
-    from osimlite.simulation.engines.renewal import NumbersOnly
+    from osimlite.simulation.engines.model_update import NumbersOnly
 
 
 def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BatchEngine:
@@ -36,6 +46,122 @@ def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BatchEngin
             "engine 'bullet'"
         )
     return CompiledEngine(mechanism, forces)
+
+
+AT_ONCE = 8
+"""So many runs a thread takes at a time."""
+
+
+def run_many(
+    engine: CompiledEngine,
+    states: ArrayLike,
+    options: BatchOptions,
+    numbers: ArrayLike | None = None,
+) -> Runs:
+    """Compute a batch."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    starts = engine.state.table(states)
+    options.check()
+    vectors, count = _rows(engine, numbers), len(starts)
+    if vectors.shape not in ((1, len(engine.numbers)), (count, len(engine.numbers))):
+        raise OsimliteError(
+            f"the numbers are one row of {len(engine.numbers)} for each of the {count} runs; got {vectors.shape}"
+        )
+    kinds, levels = _watches(engine, options.watches)
+    held = None
+    if options.held:
+        if len(options.held) != count:
+            raise OsimliteError(f"{len(options.held)} controllers are given for {count} runs")
+        first, *others = options.held
+        held = first.runs(engine, engine.forces.controls, others=others)
+        # Each run holds controls of its own among its numbers.
+        vectors = vectors if len(vectors) == count else np.tile(vectors, (count, 1))
+    batch = Batch(engine, starts, options, vectors=vectors, kinds=kinds, levels=levels, held=held)
+
+    def work(first: int) -> None:
+        batch.run(batch.room(), first, min(first + AT_ONCE, count))
+
+    with ThreadPoolExecutor(options.threads or cores()) as pool:
+        list(pool.map(work, range(0, count, AT_ONCE)))
+    names = [*engine.contacts, *(watch.name for watch in options.watches)]
+    kept = [
+        rows[:total]
+        for rows, total in zip(batch.events, batch.counts[:, record.EVENTS], strict=True)
+    ]
+    named = [
+        [(t, names[int(number)], begins > 0.0) for t, number, begins in rows[:, :3].tolist()]
+        for rows in kept
+    ]
+    at_events = [rows[:, 3:] for rows in kept] if options.event_states else []
+    return Runs(
+        batch.clocks[:, 0].copy(),
+        batch.states,
+        batch.endings,
+        batch.counts[:, :3].copy(),
+        batch.reports,
+        named,
+        batch.peaks,
+        at_events,
+    )
+
+
+def contact_places(
+    engine: CompiledEngine,
+    states: ArrayLike,
+    numbers: ArrayLike | None = None,
+    rows: ArrayLike | None = None,
+) -> Floats:
+    """Where the surfaces of all contacts are (k, P, 9)."""
+    vectors, given = _rows(engine, numbers), engine.state.table(states)
+    which = np.zeros(len(given), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
+    places = np.zeros((len(given), len(engine.contacts), 9))
+    w, derivative = np.zeros(engine.structure[MODEL.WORK_SIZE]), np.zeros(engine.state.size)
+    arrays = vectors, w, vectors.shape[1], which, given, derivative, places
+    engine.program.code.entry("contact_places")(engine.program.ints, *arrays, len(given))
+    return places
+
+
+def contact_radii(engine: CompiledEngine, numbers: ArrayLike | None = None) -> Floats:
+    """Radii of the second surfaces (v, P)."""
+    s = engine.structure
+    records = s[s[MODEL.CONTACT_AT] : s[MODEL.CONTACT_AT] + len(engine.contacts)]
+    return _rows(engine, numbers)[:, s[records + ITEM.NUMBERS] + RADIUS]
+
+
+def _rows(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:
+    vectors = np.array(engine.numbers if numbers is None else numbers, dtype=np.float64, order="C")
+    return vectors.reshape(-1, vectors.shape[-1])
+
+
+def _watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[Ints, Floats]:
+    kinds, levels = np.zeros((len(watches), 3), dtype=np.int64), np.zeros((len(watches), 7))
+    mechanism = engine.mechanism
+    for row, watch in enumerate(watches):
+        if bool(watch.coordinate) + bool(watch.body) + bool(watch.contact) != 1:
+            raise OsimliteError(
+                f"the watch '{watch.name}' is on a coordinate, a body or a contact; name one of them"
+            )
+        if watch.coordinate:
+            place = mechanism.coordinate_index(watch.coordinate)
+            if place not in engine.order:
+                raise OsimliteError(
+                    f"the watch '{watch.name}' looks at '{watch.coordinate}', which is locked"
+                )
+            kinds[row] = record.COORDINATE, engine.order.index(place), watch.stops
+            levels[row, 6] = watch.level
+        elif watch.contact:
+            if watch.contact not in engine.contacts:
+                near = did_you_mean(watch.contact, engine.contacts)
+                raise OsimliteError(f"the model has no contact '{watch.contact}'{near}")
+            kinds[row] = record.TOUCH, engine.contacts.index(watch.contact), watch.stops
+        else:
+            body, frame = mechanism.placement(watch.body)
+            link, placed = (-1, np.eye(4)) if body < 0 else engine.placements[body]
+            station = (placed @ frame @ np.array((*watch.station, 1.0)))[:3]
+            kinds[row] = record.HEIGHT, link, watch.stops
+            levels[row] = (*station, *watch.direction, watch.level)
+    return kinds, levels
 
 
 class CompiledEngine(KernelEngine):
@@ -57,10 +183,12 @@ class CompiledEngine(KernelEngine):
         # Addresses mean nothing in another process.
         return CompiledEngine, (self.mechanism, self.forces)
 
-    run_many, contact_places, contact_radii = many.run_many, many.contact_places, many.contact_radii
+    run_many = run_many
+    contact_places = contact_places
+    contact_radii = contact_radii
 
     def renewal(self, model: Model, folder: Path, wrapping: str = OPENSIM) -> NumbersOnly:
         """What makes parts of the model anew."""
-        from osimlite.simulation.engines.renewal import NumbersOnly
+        from osimlite.simulation.engines.model_update import NumbersOnly
 
         return NumbersOnly(model, self, folder, wrapping)

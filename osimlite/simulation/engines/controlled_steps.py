@@ -15,20 +15,20 @@ from osimlite.mechanics.kernels.layout import MODEL
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.kernels.states import cubic
 from osimlite.mechanics.kernels.step_sizes import shortest_step, weight
+from osimlite.simulation.batches import BatchOptions
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.integrators import (
+from osimlite.simulation.options import (
     DEFAULT_ACCURACY,
     INITIAL_STEP,
     INTEGRATORS,
     MERSON,
     NO_BOUNDS,
 )
-from osimlite.simulation.many import BatchOptions
 from osimlite.simulation.stepper import IntegrationError, Observer, Progress, Stepper
 
 if TYPE_CHECKING:
+    from osimlite.simulation.control_steps import HeldRuns
     from osimlite.simulation.engines.base import KernelEngine
-    from osimlite.simulation.held import HeldRuns
 
 FIRST_STEPS, LOGGED_STEPS = 8, 512
 """So many steps are taken in the first call of an engine's first motion, and in any other at most."""

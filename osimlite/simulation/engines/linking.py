@@ -18,7 +18,7 @@ from osimlite.mechanics.kernels.pointers import Ints
 from osimlite.mechanics.kernels.table import LAW_NUMBERS
 from osimlite.simulation.elements.laws import ALONG, RESPONSE, law_function
 from osimlite.simulation.engines import machine_code
-from osimlite.simulation.engines.carrying import DualVector, carried_by
+from osimlite.simulation.engines.dual_numbers import DualVector, carried_by
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.simulation.pack import Packed
 

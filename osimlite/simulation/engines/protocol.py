@@ -15,12 +15,12 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.probe import DeclaredProbe
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, NO_BOUNDS
+from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, NO_BOUNDS
 from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import Observer, Stepper
 
 if TYPE_CHECKING:
-    from osimlite.simulation.held import HeldRuns
+    from osimlite.simulation.control_steps import HeldRuns
     from osimlite.simulation.robot.visuals import Visuals
 
 
@@ -99,7 +99,7 @@ class Engine(Protocol):
     def probe_results(self, t: float, y: Sequence[float]) -> list[list[float]]:
         """What each probe gives at a state, before its operation. Works when the engine is closed."""
 
-    def energies(self, t: float, y: list[float]) -> tuple[float, float, float]:
+    def energies(self, t: float, y: Sequence[float]) -> tuple[float, float, float]:
         """Kinetic energy, potential energy of gravity, energy stored in forces, J. Works when the engine is closed."""
 
     def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:

@@ -14,9 +14,8 @@ from osimlite.mechanics.multibody.joints import Mobilizer
 from osimlite.mechanics.multibody.mechanism import Mechanism, Values
 from osimlite.mechanics.multibody.motions import AxisMotion, Fixed
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.robot.lines import as_line
-from osimlite.simulation.robot.robot import WORLD, Link, Robot, RobotJoint
-from osimlite.simulation.robot.shapes import Visual
+from osimlite.simulation.robot.couplings import as_line
+from osimlite.simulation.robot.robot import WORLD, Link, Robot, RobotJoint, Visual
 
 _ALONG = 1e-14
 """How far off an axis, relative to its own length, a vector may be and still count as lying along it."""

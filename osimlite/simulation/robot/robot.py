@@ -19,7 +19,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Literal
+from itertools import permutations
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -27,7 +28,6 @@ from osimlite.base.records import dataclass, field
 from osimlite.mechanics.multibody.functions import IDENTITY, Function
 from osimlite.mechanics.multibody.mechanism import Mechanism, Values
 from osimlite.mechanics.multibody.spatial import Array, rotation_about, transform
-from osimlite.simulation.robot.shapes import Visual
 
 WORLD = "world"
 """Name of the root link, which URDF readers that let robots float take as the sign that it is fixed."""
@@ -144,3 +144,80 @@ class Robot:
         for joint in self.joints:
             placed[joint.child] = placed[joint.parent] @ joint.across(joint.value(values))
         return placed
+
+
+class Box(NamedTuple):
+    """A box centred on its origin, by whole edge lengths (m)."""
+
+    size: tuple[float, float, float]
+
+
+class Ball(NamedTuple):
+    """A sphere centred on its origin, by radius (m)."""
+
+    radius: float
+
+
+class Tube(NamedTuple):
+    """A cylinder along the Z axis, centred on its origin, by radius and whole length (m)."""
+
+    radius: float
+    length: float
+
+
+class MeshFile(NamedTuple):
+    """A surface in a file; `file` is relative to the file of the robot, `scale` multiplies its coordinates."""
+
+    file: str
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+Shape = Box | Ball | Tube | MeshFile
+
+
+@dataclass(frozen=True, eq=False)
+class Visual:
+    """A shape at `origin` (4, 4) in the frame of what it belongs to.
+
+    `source` is the absolute path of the model's geometry, `color` red, green, blue and opacity from
+    0 to 1.
+    """
+
+    shape: Shape
+    origin: Array
+    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    source: str = ""
+
+
+def principal_axes(inertia: Array) -> tuple[Array, Array]:
+    """Moments (3,) and axes (3, 3), as columns of a rotation matrix, with axes @ diag(moments) @ axes.T = inertia.
+
+    A tensor that is diagonal already keeps its axes; otherwise they are numbered so that they turn
+    least.
+    """
+    if not np.any(inertia - np.diag(np.diag(inertia))):
+        return np.diag(inertia).copy(), np.eye(3)
+    moments, axes = np.linalg.eigh(inertia)
+    weights = np.abs(axes).tolist()
+    order = list(
+        max(
+            permutations(range(3)),
+            key=lambda p: sum(weights[row][place] for row, place in enumerate(p)),
+        )
+    )
+    moments, axes = moments[order], axes[:, order]
+    axes = axes * np.where(np.diag(axes) < 0.0, -1.0, 1.0)
+    if np.linalg.det(axes) < 0.0:
+        weakest = int(np.argmin(np.abs(np.diag(axes))))
+        axes[:, weakest] *= -1.0
+    return moments, axes
+
+
+def breaks_triangle_rule(moments: Array) -> bool:
+    """Whether one principal moment exceeds the sum of the others, or is negative: no body has such an inertia.
+
+    Readers react differently (Bullet takes zero instead). A thin rod or plate, for which the rule
+    holds with equality, passes up to rounding.
+    """
+    small, middle, large = np.sort(moments).tolist()
+    return bool(small < 0.0 or large > (small + middle) * (1.0 + 1e-12))

@@ -32,11 +32,19 @@ from itertools import pairwise
 from osimlite.io.document.escape import quoted
 from osimlite.io.document.lexical import shortest
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.robot.mimics import Mimic, mimics
+from osimlite.simulation.robot.couplings import Mimic, mimics
 from osimlite.simulation.robot.names import UniqueNames
-from osimlite.simulation.robot.principal_axes import principal_axes
-from osimlite.simulation.robot.robot import Link, Robot, RobotJoint
-from osimlite.simulation.robot.shapes import Ball, Box, MeshFile, Tube, Visual
+from osimlite.simulation.robot.robot import (
+    Ball,
+    Box,
+    Link,
+    MeshFile,
+    Robot,
+    RobotJoint,
+    Tube,
+    Visual,
+    principal_axes,
+)
 
 UNLIMITED = 1e9
 """Limit of position, velocity or effort (m, m/s, rad/s, N, N·m) where the model has none."""

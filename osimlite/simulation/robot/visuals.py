@@ -25,7 +25,7 @@ from osimlite.schema.geometry import (
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
 from osimlite.simulation.robot.mesh_files import MeshFiles, MeshProblem
-from osimlite.simulation.robot.shapes import Ball, Box, MeshFile, Shape, Tube, Visual
+from osimlite.simulation.robot.robot import Ball, Box, MeshFile, Shape, Tube, Visual
 
 _Y_TO_Z = transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
 """The frame, in OpenSim's cylinder frame, in which the cylinder lies along Z."""

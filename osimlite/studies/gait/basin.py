@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
-from osimlite.simulation.many import BatchEngine
-from osimlite.simulation.runs import Floats, Ints
+from osimlite.simulation.batches import BatchEngine, Floats, Ints
 from osimlite.studies.gait.cycle import Cycle
 from osimlite.studies.gait.starts import stood
 from osimlite.studies.gait.stepmap import StepMap

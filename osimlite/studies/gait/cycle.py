@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
-from osimlite.simulation.runs import Floats
+from osimlite.simulation.batches import Floats
 from osimlite.studies.gait.stepmap import StepMap
 from osimlite.studies.gait.steps import along_slope
 

@@ -22,7 +22,7 @@ from osimlite.base.require import require
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
-from osimlite.simulation.many import BatchEngine, run_many
+from osimlite.simulation.batches import BatchEngine, run_many
 from osimlite.studies.gait.basin import perturbed, walks_from
 from osimlite.studies.gait.cycle import CONVERGED, MOST_STEPS, Cycle, find_cycle, step_matrix
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing

@@ -9,8 +9,8 @@ from osimlite.base.records import dataclass
 from osimlite.base.text import counted, listed, or_known
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
+from osimlite.simulation.batches import BatchEngine
 from osimlite.simulation.elements.contact import HuntCrossley
-from osimlite.simulation.many import BatchEngine
 
 _OF_A_FOOT = re.compile(r"foot|feet|toe|heel|calc|sole|ball|hallux|met(a|\d)", re.IGNORECASE)
 

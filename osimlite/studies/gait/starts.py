@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.simulation.many import BatchEngine
-from osimlite.simulation.runs import Floats, Ints
+from osimlite.simulation.batches import BatchEngine, Floats, Ints
 from osimlite.studies.gait.foot_contacts import FootContacts
 from osimlite.studies.gait.steps import along_slope
 

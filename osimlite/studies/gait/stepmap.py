@@ -17,9 +17,8 @@ from osimlite.base.records import dataclass
 from osimlite.base.text import listed
 from osimlite.errors import OsimliteError, UnsupportedError
 from osimlite.mechanics.multibody.mechanism import Mechanism
-from osimlite.simulation.many import BatchEngine, Watch, run_many
+from osimlite.simulation.batches import BatchEngine, Floats, Ints, Watch, run_many
 from osimlite.simulation.run import kept_constraints
-from osimlite.simulation.runs import Floats, Ints
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
 from osimlite.studies.gait.steps import Step, along_slope, falls, room_for, walks_of
 from osimlite.studies.gait.symmetry import leg_exchange, neutral_directions

@@ -13,9 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from osimlite.base.records import dataclass, field
-from osimlite.simulation.integrators import DEFAULT_ACCURACY
-from osimlite.simulation.many import ENDINGS, NO_LIMIT, BatchEngine, Runs, Watch, run_many
-from osimlite.simulation.runs import Floats
+from osimlite.simulation.batches import (
+    ENDINGS,
+    NO_LIMIT,
+    BatchEngine,
+    Floats,
+    Runs,
+    Watch,
+    run_many,
+)
+from osimlite.simulation.options import DEFAULT_ACCURACY
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
 
 SHORTEST = 0.05

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.mechanics.multibody.mechanism import GROUND
+from osimlite.simulation.batches import BatchEngine, Floats, Ints
 from osimlite.simulation.elements.contact import HuntCrossley
-from osimlite.simulation.many import BatchEngine
-from osimlite.simulation.runs import Floats, Ints
 from osimlite.studies.gait.foot_contacts import FootContacts
 
 SAME = 1e-6

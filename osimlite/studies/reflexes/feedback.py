@@ -16,7 +16,7 @@ from osimlite.errors import SettingError
 from osimlite.mechanics.kernels.reflexes import LIMITS, TERM
 from osimlite.mechanics.kernels.senses import SENSED
 from osimlite.schema.model import Model
-from osimlite.simulation.held import Gain, Held
+from osimlite.simulation.control_steps import Gain, Held
 from osimlite.studies.reflexes.controllers import CONTROLLERS, Reflexes
 from osimlite.studies.reflexes.parameters import AUTO, Parameter, Parameters, par_line, read_par
 from osimlite.studies.reflexes.scenario import OPTIMIZERS, begun, control_step, legs_of

@@ -30,7 +30,7 @@ import numpy as np
 from osimlite.base.text import did_you_mean
 from osimlite.errors import SettingError
 from osimlite.simulation.link_motion import Moments, centers_of_mass, stations
-from osimlite.simulation.probed import probe_labels, probe_rows
+from osimlite.simulation.run_report import probe_labels, probe_rows
 from osimlite.studies.sweep.variables import Floats
 
 Quantity = Callable[[Any, Moments], Any]

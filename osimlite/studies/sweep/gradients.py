@@ -18,12 +18,10 @@ from osimlite.derivatives.sensitivity import followed
 from osimlite.derivatives.tangents import Steps
 from osimlite.errors import SettingError, SimulationError, UnsupportedError
 from osimlite.mechanics.multibody.spatial import Array
+from osimlite.simulation.batches import Runs, run_many
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.integrators import MERSON
-from osimlite.simulation.many import run_many
+from osimlite.simulation.options import MERSON, report_times
 from osimlite.simulation.pack import pack
-from osimlite.simulation.run_times import report_times
-from osimlite.simulation.runs import Runs
 from osimlite.studies.sweep.measures import Batch, measure
 from osimlite.studies.sweep.plan import MOST_TRIES, Plan
 from osimlite.studies.sweep.variants import Variant, Variants

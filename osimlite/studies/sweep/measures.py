@@ -23,7 +23,7 @@ from osimlite.base.load import module_named, module_of_file
 from osimlite.base.records import dataclass, field, replace
 from osimlite.base.text import did_you_mean, or_known
 from osimlite.errors import ModelError, SettingError
-from osimlite.simulation.runs import Runs, Watch
+from osimlite.simulation.batches import Runs, Watch
 from osimlite.studies.sweep import registry
 from osimlite.studies.sweep.expressions import Expression, Quantity, quantities
 from osimlite.studies.sweep.variables import Floats

@@ -21,15 +21,15 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines import engine_name
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, check_integrator
+from osimlite.simulation.initial_state import in_units_of, suspect_value
+from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, check_integrator
 from osimlite.simulation.run import Simulation
-from osimlite.simulation.start import in_units_of, suspect_value
 from osimlite.studies.sweep.controls import Control, check_nodes, controller_of
 from osimlite.studies.sweep.measures import is_expression, measure_name
 from osimlite.studies.sweep.variables import Gains, Parameter, Range, Variable, variables
 
 if TYPE_CHECKING:
-    from osimlite.simulation.held import Controller, Gain
+    from osimlite.simulation.control_steps import Controller, Gain
 
 Maker = Callable[[Mapping[str, float]], Model]
 """Makes a model from the values of some of its parameters."""

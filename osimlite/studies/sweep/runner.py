@@ -10,8 +10,8 @@ import numpy as np
 
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import OsimliteError, SettingError
-from osimlite.simulation.run_times import report_times
-from osimlite.simulation.runs import Runs, Watch
+from osimlite.simulation.batches import Runs, Watch
+from osimlite.simulation.options import report_times
 from osimlite.studies.sweep.expressions import Expression, driven_names
 from osimlite.studies.sweep.measures import (
     Batch,
@@ -223,7 +223,7 @@ class Runner:
     ) -> tuple[Runs, Endings]:
         if self.plan.engine != "compiled":
             return self._one_by_one(engine, variants, starts)
-        from osimlite.simulation.many import ENDINGS, run_many
+        from osimlite.simulation.batches import ENDINGS, run_many
 
         runs = run_many(
             engine,

@@ -35,13 +35,13 @@ from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.model import Model
+from osimlite.simulation.initial_state import suspect_value
 from osimlite.simulation.properties import Place, each, named, places, spellings
-from osimlite.simulation.start import suspect_value
 from osimlite.studies.sweep.controls import SCALE, Control, control, nodes_of
 
 if TYPE_CHECKING:
     from osimlite.mechanics.multibody.parts import CoordinateInfo
-    from osimlite.simulation.held import Gain
+    from osimlite.simulation.control_steps import Gain
 
 Floats = NDArray[np.float64]
 Range = float | str | Sequence[Any]

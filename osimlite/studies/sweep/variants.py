@@ -25,7 +25,7 @@ from osimlite.schema.controllers import Controller
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
-from osimlite.simulation.many import Renewal
+from osimlite.simulation.batches import Renewal
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
 from osimlite.studies.sweep.controls import Control, VariedControls, controller_of
@@ -34,8 +34,8 @@ from osimlite.studies.sweep.registry import start_named
 from osimlite.studies.sweep.variables import Floats, Gains, Parameter, Property, Slope, Start
 
 if TYPE_CHECKING:
-    from osimlite.simulation.held import Controller as Feedback
-    from osimlite.simulation.held import Held
+    from osimlite.simulation.control_steps import Controller as Feedback
+    from osimlite.simulation.control_steps import Held
 
 RENEWED = Force, Controller, Body, Model
 """What an engine need not be made anew for."""

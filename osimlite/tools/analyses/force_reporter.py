@@ -7,8 +7,8 @@ import numpy as np
 from osimlite.io.tables.old_storage import UNITS
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.tools.analyses import ForceReporter
-from osimlite.simulation.force_labels import label_as_opensim
 from osimlite.simulation.system import System
+from osimlite.simulation.trajectory import label_as_opensim
 from osimlite.tools.constraint_forces import recorded
 from osimlite.tools.motion import Motion, Tables
 

@@ -15,7 +15,7 @@ from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.tools.analyses import JointReaction
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.given_controls import driven
+from osimlite.simulation.run_controls import driven
 from osimlite.simulation.static_optimization import ideal
 from osimlite.tools.joint_wrenches import JointWrenches
 from osimlite.tools.motion import Motion, Tables

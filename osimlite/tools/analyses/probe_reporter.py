@@ -8,7 +8,7 @@ from osimlite.io.tables.old_storage import DEGREES
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.probes import Probe
 from osimlite.schema.tools.analyses import ProbeReporter
-from osimlite.simulation.probed import probe_labels, probe_rows
+from osimlite.simulation.run_report import probe_labels, probe_rows
 from osimlite.tools.motion import Motion, Tables
 
 _DESCRIPTION = (

@@ -18,8 +18,8 @@ from osimlite.schema.actuators import (
     TorqueActuator,
 )
 from osimlite.schema.muscles import Muscle
+from osimlite.simulation.inverse_dynamics import inverse_dynamics
 from osimlite.simulation.paths import Paths
-from osimlite.simulation.recorded import inverse_dynamics
 from osimlite.tools.evidence import root_of
 from osimlite.tools.trials.fit import Numbers
 from osimlite.tools.trials.folder import LOADS, MOTIONS, Folder, Missing, Tool

@@ -13,8 +13,7 @@ from lxml.etree import _Element
 from osimlite.mechanics.multibody.spatial import Array, inverse, quaternion
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.joints import Joint
-from osimlite.simulation.robot.principal_axes import breaks_triangle_rule, principal_axes
-from osimlite.simulation.robot.robot import Link, RobotJoint
+from osimlite.simulation.robot.robot import Link, RobotJoint, breaks_triangle_rule, principal_axes
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.draft import Draft, add, pose, tidy
 from osimlite.translate.mjcf.scenery import FRAMES

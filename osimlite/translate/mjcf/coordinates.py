@@ -8,7 +8,7 @@ import numpy as np
 
 from osimlite.mechanics.multibody.functions import Linear
 from osimlite.schema.joints import Joint
-from osimlite.simulation.robot.drivers import Composed
+from osimlite.simulation.robot.couplings import Composed
 from osimlite.translate.mjcf.draft import Draft, Follower
 
 

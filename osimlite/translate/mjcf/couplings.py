@@ -10,9 +10,15 @@ from numpy.polynomial import Polynomial
 from osimlite.mechanics.multibody.functions import IDENTITY, Linear
 from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.robot.drivers import Composed, Driver, coordinate_drivers, joint_driver
-from osimlite.simulation.robot.lines import Line
-from osimlite.simulation.robot.mimics import couplers, leaders
+from osimlite.simulation.robot.couplings import (
+    Composed,
+    Driver,
+    Line,
+    coordinate_drivers,
+    couplers,
+    joint_driver,
+    leaders,
+)
 from osimlite.simulation.robot.names import joint_names
 from osimlite.simulation.robot.robot import RobotJoint
 from osimlite.translate.fidelity import Error

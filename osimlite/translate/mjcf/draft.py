@@ -24,7 +24,7 @@ from osimlite.mechanics.multibody.spatial import Array, quaternion
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
-from osimlite.simulation.robot.lines import Line
+from osimlite.simulation.robot.couplings import Line
 from osimlite.simulation.robot.mesh_files import MeshFiles
 from osimlite.simulation.robot.names import dotted, joint_names, xml_name
 from osimlite.simulation.robot.robot import Link, Robot

@@ -27,8 +27,8 @@ from osimlite.mechanics.multibody.mechanism import Values
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.robot.drivers import coordinate_drivers
-from osimlite.simulation.robot.principal_axes import principal_axes
+from osimlite.simulation.robot.couplings import coordinate_drivers
+from osimlite.simulation.robot.robot import principal_axes
 from osimlite.simulation.system import System
 from osimlite.translate.mjcf.draft import Version
 from osimlite.translate.mjcf.driven import STATES

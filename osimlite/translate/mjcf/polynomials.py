@@ -9,8 +9,7 @@ from numpy.polynomial import Chebyshev, Polynomial
 
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.robot.drivers import Composed, knots
-from osimlite.simulation.robot.lines import as_line
+from osimlite.simulation.robot.couplings import Composed, as_line, knots
 from osimlite.translate.fidelity import Error
 
 DEGREE = 4

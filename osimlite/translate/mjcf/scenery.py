@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.mechanics.multibody.spatial import cross
-from osimlite.simulation.robot.shapes import Ball, Box, MeshFile, Tube, Visual
+from osimlite.simulation.robot.robot import Ball, Box, MeshFile, Tube, Visual
 from osimlite.translate.mjcf.draft import Draft, Value, add, pose
 
 LOOKS, TOUCHES, MARKS, FRAMES = 2, 3, 4, 5

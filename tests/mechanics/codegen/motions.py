@@ -19,8 +19,8 @@ import numpy as np
 import osimlite
 from osimlite.models.jumper import jumper
 from osimlite.models.walkers import furthest_walker
+from osimlite.simulation.batches import run_many
 from osimlite.simulation.engines import machine_code
-from osimlite.simulation.many import run_many
 from osimlite.simulation.run import Simulation
 
 ROOT = Path(__file__).parents[3]

@@ -15,7 +15,13 @@ import pytest
 from osimlite.mechanics.codegen.cplusplus import write_library
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.laws.carried import is_nothing, plain, settled
-from osimlite.simulation.engines.carrying import ARITHMETIC, IN_PLACE, SLOPES, Carrying, carried_by
+from osimlite.simulation.engines.dual_numbers import (
+    ARITHMETIC,
+    IN_PLACE,
+    SLOPES,
+    Carrying,
+    carried_by,
+)
 from tests.mechanics.codegen.compiled import are_same_bits, compile_text, needs_compiler
 
 DIRECTIONS = 3

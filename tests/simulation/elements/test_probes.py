@@ -24,9 +24,9 @@ from osimlite.schema.probe_types import (
     SystemEnergyProbe,
 )
 from osimlite.simulation import Simulation, read_sto
+from osimlite.simulation.batches import run_many
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.linking import COMPILED, PYTHON
-from osimlite.simulation.many import run_many
 from osimlite.simulation.system import System
 from tests.simulation.elements.muscle_rows import hung, line
 from tests.simulation.test_force_elements import arm

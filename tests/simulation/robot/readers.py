@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from osimlite.mechanics.multibody.spatial import Array, transform
-from osimlite.simulation.robot.principal_axes import principal_axes
-from osimlite.simulation.robot.robot import Link, Robot
+from osimlite.simulation.robot.robot import Link, Robot, principal_axes
 
 
 class Bullet:

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.mechanics.multibody.spatial import rotation_xyz
-from osimlite.simulation.robot.principal_axes import breaks_triangle_rule, principal_axes
+from osimlite.simulation.robot.robot import breaks_triangle_rule, principal_axes
 from osimlite.simulation.robot.urdf import roll_pitch_yaw
 
 sizes = st.floats(1e-6, 1e3)

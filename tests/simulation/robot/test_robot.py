@@ -18,9 +18,9 @@ from osimlite.mechanics.multibody.mechanism import (
 from osimlite.mechanics.multibody.spatial import offset, skew
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation.robot.build import build_robot
+from osimlite.simulation.robot.couplings import range_limits
 from osimlite.simulation.robot.merge_fixed import merge_fixed
 from osimlite.simulation.robot.names import legal, legal_names
-from osimlite.simulation.robot.range_limits import range_limits
 from osimlite.simulation.robot.robot import WORLD, Robot
 from tests.mechanics.multibody.cases import mixed_tree
 from tests.mechanics.multibody.strategies import Case, cases

@@ -16,11 +16,10 @@ from osimlite.mechanics.multibody.joints import TransformAxis, custom
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation.robot.build import build_robot
+from osimlite.simulation.robot.couplings import range_limits
 from osimlite.simulation.robot.merge_fixed import merge_fixed
 from osimlite.simulation.robot.names import legal_names
-from osimlite.simulation.robot.range_limits import range_limits
-from osimlite.simulation.robot.robot import Robot
-from osimlite.simulation.robot.shapes import MeshFile, Visual
+from osimlite.simulation.robot.robot import MeshFile, Robot, Visual
 from osimlite.simulation.robot.urdf import UNLIMITED, number, urdf_text
 from tests.mechanics.multibody.cases import mixed_tree
 from tests.mechanics.multibody.strategies import Case, cases

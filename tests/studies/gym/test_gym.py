@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 import osimlite  # noqa: E402
 from osimlite.base.records import replace  # noqa: E402
 from osimlite.errors import OsimliteError  # noqa: E402
-from osimlite.simulation.integrators import INTEGRATORS  # noqa: E402
+from osimlite.simulation.options import INTEGRATORS  # noqa: E402
 from osimlite.studies.gym.environments import MuscleEnv, MuscleVectorEnv  # noqa: E402
 from osimlite.studies.gym.tasks import TASKS  # noqa: E402
 

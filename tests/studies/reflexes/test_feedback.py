@@ -11,7 +11,7 @@ import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.kernels.reflexes import normal, philox
 from osimlite.models.walking import write_scenario
-from osimlite.simulation.held import HeldRuns
+from osimlite.simulation.control_steps import HeldRuns
 from osimlite.simulation.trajectory import Interrupted
 from osimlite.studies.gym.tasks import arm as task
 from osimlite.studies.reflexes.scenario import Scenario

@@ -10,7 +10,7 @@ import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.models.arm import arm
 from osimlite.models.walking import write_scenario
-from osimlite.simulation.held import Held
+from osimlite.simulation.control_steps import Held
 
 POINT = {"target": "flexor", "source": "forearm", "offset": [0, -0.2, 0], "direction": [0, 1, 0]}
 TURN = {"target": "flexor", "source": "forearm", "KP": "~0.1<0,1>", "KV": 0.1}

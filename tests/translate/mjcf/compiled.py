@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from osimlite.mechanics.multibody.spatial import Array, transform
-from osimlite.simulation.robot.principal_axes import principal_axes
+from osimlite.simulation.robot.robot import principal_axes
 from osimlite.translate.mjcf.export import Mjcf
 
 

@@ -29,7 +29,7 @@ from osimlite import (
 from osimlite.mechanics.kernels.layout import STAGE
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.linking import PYTHON
-from osimlite.simulation.given_controls import driven
+from osimlite.simulation.run_controls import driven
 from osimlite.simulation.system import System
 from osimlite.translate import to_mjcf
 from tests.translate.mjcf.compiled import Compiled

@@ -25,10 +25,9 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.constrained import free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.base import KernelEngine
-from osimlite.simulation.engines.bullet.file import excess, require_masses
-from osimlite.simulation.engines.bullet.stepper import BulletStepper
-from osimlite.simulation.engines.bullet.world import World, bullet
+from osimlite.simulation.engines.bullet.world import World, bullet, excess, require_masses
 from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.euler import SemiImplicitEuler, burst
 from osimlite.simulation.pack_chain import Chain
 from osimlite.simulation.robot.build import build_robot
 from osimlite.simulation.robot.merge_fixed import merge_fixed
@@ -39,6 +38,7 @@ from osimlite.simulation.stepper import Observer, Stepper
 if TYPE_CHECKING:
     from osimlite.simulation.engines.bullet.window import Window
     from osimlite.simulation.robot.visuals import Visuals
+
 
 MASS_MATRIX, ARTICULATED_BODY = "mass-matrix", "articulated-body"
 ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY)
@@ -211,3 +211,45 @@ def _is_plain(mechanism: Mechanism, robot: Robot) -> bool:
         and all(isinstance(item, Lock) for item in mechanism.constraints)
         and not any(mechanism.coordinates[place].locked for place in places)
     )
+
+
+class BulletStepper(SemiImplicitEuler):
+    """Bullet's own fixed steps: speeds by the accelerations at the start of the step, then values by the new speeds.
+
+    That is what a PyBullet user expects of ``stepSimulation``: first order, one force evaluation a
+    step. In the place of the accelerations, the derivative has the forces.
+
+    Args:
+        engine: whose mechanism; each joint of Bullet's is a coordinate.
+        t: initial time, s.
+        y: initial state.
+        h: step, s; a last one may be shorter.
+        observe: called with (time, state) after each step; the loads are those at that state.
+    """
+
+    def __init__(
+        self, engine: BulletEngine, t: float, y: Sequence[float], h: float, observe: Observer
+    ) -> None:
+        super().__init__(
+            engine.applied, t, y, len(engine.order), h, observe=observe, names=engine.state.names
+        )
+        self._engine, self.world, self._places = engine, engine.world, engine.coordinates
+        q, u = engine.state.values(y), engine.state.speeds(y)
+        rates = engine.mechanism.coordinate_rates(q, u)[self._places]
+        self.world.set_state([q[place] for place in self._places], rates.tolist())
+
+    def _moved(self, h: float) -> list[float]:
+        layout, mechanism, count = self._engine.state, self._engine.mechanism, self._nq
+        forces = np.array(self.derivative[count : 2 * count])
+        self.world.step(h, self._engine.joint_forces(self.state, forces))
+        q, rates = np.array(layout.values(self.state)), np.zeros(len(mechanism.coordinates))
+        q[self._places], rates[self._places] = self.world.get_state()
+        z = [
+            x + h * rate
+            for x, rate in zip(self.state[2 * count :], self.derivative[2 * count :], strict=True)
+        ]
+        y = layout.pack(q.tolist(), mechanism.speeds_from_rates(q, rates).tolist(), z)
+        # Bullet clips what would be faster, so that a motion that has burst may look finite.
+        if not max(map(abs, y[: 2 * count]), default=0.0) < 0.5 * self.world.FASTEST:
+            raise burst(self.time, self._h)
+        return y

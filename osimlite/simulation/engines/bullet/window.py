@@ -11,8 +11,7 @@ from contextlib import contextmanager, suppress
 import numpy as np
 
 from osimlite.errors import SimulationError
-from osimlite.simulation.engines.bullet.file import robot_text, temporary_file
-from osimlite.simulation.engines.bullet.world import bullet, muted
+from osimlite.simulation.engines.bullet.world import bullet, muted, robot_text, temporary_file
 from osimlite.simulation.robot.robot import Robot
 
 FRAME = 1.0 / 60.0

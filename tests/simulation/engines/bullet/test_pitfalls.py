@@ -20,7 +20,6 @@ from osimlite.simulation.euler import SemiImplicitEuler
 
 bullet = pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
-from osimlite.simulation.engines.bullet import file as bullet_file  # noqa: E402
 from osimlite.simulation.engines.bullet import world as bullet_world  # noqa: E402
 from osimlite.simulation.engines.bullet.engine import BulletEngine  # noqa: E402
 from osimlite.simulation.engines.bullet.world import World  # noqa: E402
@@ -123,7 +122,6 @@ def test_an_inertia_that_no_body_has_is_kept(monkeypatch, capfd):
         without.setattr(pack_chain, "list_excesses", lambda *_: [])
         assert error(mechanism, "mass-matrix", **state) > 1e-3
     monkeypatch.setattr(bullet_world, "excess", lambda link: 0.0)
-    monkeypatch.setattr(bullet_file, "excess", lambda link: 0.0)
     assert error(mechanism, "articulated-body", **state) > 1e-3
     # Bullet's own complaint stays in the buffer of the C library until then.
     capfd.readouterr()

@@ -10,7 +10,7 @@ import pytest
 import osimlite
 from osimlite.errors import ModelError, OsimliteError, SettingError
 from osimlite.simulation import Simulation
-from osimlite.simulation.many import ENDINGS, Watch, run_many
+from osimlite.simulation.batches import ENDINGS, Watch, run_many
 
 
 @pytest.fixture(scope="module")

@@ -20,12 +20,12 @@ from osimlite.schema.controllers import Controller
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
+from osimlite.simulation.batches import Renewed
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.controls import Controls, ModelControls
 from osimlite.simulation.elements.items import Item
 from osimlite.simulation.elements.kind import kind_of_class
 from osimlite.simulation.elements.probe import DeclaredProbe, probe_elements
-from osimlite.simulation.many import Renewed
 from osimlite.simulation.pack import pack
 
 if TYPE_CHECKING:

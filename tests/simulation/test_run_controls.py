@@ -15,7 +15,7 @@ from osimlite.schema.functions import Constant, LinearFunction
 from osimlite.schema.reporters import TableSource__double_
 from osimlite.simulation import Simulation, StoTable, read_sto, write_sto
 from osimlite.simulation.engines.linking import COMPILED, PYTHON
-from osimlite.simulation.given_controls import driven
+from osimlite.simulation.run_controls import driven
 from osimlite.simulation.system import System
 from tests.simulation.test_force_elements import arm
 

@@ -24,8 +24,8 @@ from osimlite.mechanics.kernels.reflexes import EARLY_STANCE, REFLEXES, UNKNOWN
 from osimlite.mechanics.kernels.senses import SENSES
 from osimlite.mechanics.kernels.walks import COUNTS, FRAMES, LEGS, STEPS
 from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseConstant
-from osimlite.simulation.given_controls import places_of
-from osimlite.simulation.integrators import INITIAL_STEP
+from osimlite.simulation.options import INITIAL_STEP
+from osimlite.simulation.run_controls import places_of
 
 if TYPE_CHECKING:
     from osimlite.schema.model import Model

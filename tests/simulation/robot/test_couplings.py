@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.functions import Linear, Scaled
-from osimlite.simulation.robot.lines import Line, as_line
+from osimlite.simulation.robot.couplings import Line, as_line
 
 X, Y = (0.0, 1.0, 2.0, 3.5), (0.0, 1.0, -1.0, 0.5)
 

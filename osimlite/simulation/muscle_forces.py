@@ -19,7 +19,7 @@ from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
-from osimlite.simulation.recorded import add_forces, followed, loads_of
+from osimlite.simulation.inverse_dynamics import add_forces, followed, loads_of
 from osimlite.simulation.recorded_motion import Recorded, RecordedMotion
 from osimlite.simulation.static_optimization import TITLE, Shared, StaticOptimization
 
