@@ -11,7 +11,7 @@ from osimlite.derivatives.symbols import Vector, casadi
 from osimlite.mechanics.kernels.constrained_dynamics import away_from_ground, bind, toward_ground
 from osimlite.mechanics.kernels.dynamics import evaluate, solve
 from osimlite.mechanics.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, MODEL, OUTCOME, STAGE
-from osimlite.mechanics.kernels.least_squares import REDUNDANT
+from osimlite.mechanics.kernels.linear_algebra import REDUNDANT
 from osimlite.mechanics.kernels.pointers import Law
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array

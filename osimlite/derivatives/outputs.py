@@ -10,9 +10,14 @@ from math import nan
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from osimlite.mechanics.kernels.layout import INERTIA, INERTIA_AT, LINK, LINK_WORK, MODEL
-from osimlite.mechanics.kernels.parts import link_ints
 from osimlite.mechanics.kernels.paths import LENGTH, SPEED
-from osimlite.mechanics.kernels.points import angular_velocity, direction, station, velocity
+from osimlite.mechanics.kernels.points import (
+    angular_velocity,
+    direction,
+    link_ints,
+    station,
+    velocity,
+)
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces

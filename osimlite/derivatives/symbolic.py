@@ -19,10 +19,10 @@ from osimlite.derivatives.symbols import COUNTERPARTS, UNSET, NoFormula, Vector
 from osimlite.mechanics.codegen.reader import Function, Kernel, copy_tree, name_of, stored
 from osimlite.mechanics.kernels import pointers
 from osimlite.mechanics.kernels.functions import pieces_at
-from osimlite.mechanics.kernels.trigonometry import sine_cosine
 from osimlite.mechanics.laws.bezier import curve_value
-from osimlite.mechanics.laws.carried import is_nothing
+from osimlite.mechanics.laws.dual_numbers import is_nothing
 from osimlite.mechanics.laws.millard2012_equilibrium import damped_velocity
+from osimlite.mechanics.laws.rotations import sine_cosine
 
 HELP = {
     "plus_": symbols.plus,

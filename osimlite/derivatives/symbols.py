@@ -347,7 +347,7 @@ def _of(name: str, instead: float | None = None) -> Callable[..., Any]:
 
 
 def sine_cosine(angle: Any) -> tuple[Any, Any]:
-    """As in `kernels/trigonometry.py`, whose polynomials are those of a processor's sine."""
+    """As in `laws/rotations.py`, whose polynomials are those of a processor's sine."""
     return COUNTERPARTS[math.sin](angle), COUNTERPARTS[math.cos](angle)
 
 

@@ -14,6 +14,7 @@ from osimlite.derivatives.outputs import output_columns, probe_places, station_p
 from osimlite.derivatives.stated import StatedModel
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.kernels import merson
+from osimlite.mechanics.kernels.error_control import ACCEPTED, ERRORS, LAST_TIME, NEXT_STEP, REACHED
 from osimlite.mechanics.kernels.layout import (
     CONSTRAINED,
     CONSTRAINT,
@@ -23,7 +24,6 @@ from osimlite.mechanics.kernels.layout import (
     STAGE,
     WORK,
 )
-from osimlite.mechanics.kernels.method import ACCEPTED, ERRORS, LAST_TIME, NEXT_STEP, REACHED
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model, expect_model
 from osimlite.simulation.elements import Forces

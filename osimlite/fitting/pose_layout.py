@@ -9,7 +9,7 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels import pose_record as fit
 from osimlite.mechanics.kernels.layout import CONSTRAINED, LINK, MODEL, MOTION, OPERATION
-from osimlite.mechanics.kernels.least_squares import factor_room
+from osimlite.mechanics.kernels.linear_algebra import factor_room
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.pose_fit import POSES
 from osimlite.mechanics.multibody.constraints import Constraint, Coupler

@@ -21,7 +21,7 @@ from osimlite.errors import SettingError
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.reflexes import EARLY_STANCE, REFLEXES, UNKNOWN
-from osimlite.mechanics.kernels.senses import SENSES
+from osimlite.mechanics.kernels.sensors import SENSES
 from osimlite.mechanics.kernels.walks import COUNTS, FRAMES, LEGS, STEPS
 from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseConstant
 from osimlite.simulation.options import INITIAL_STEP
@@ -76,7 +76,7 @@ class Held:
     paths: tuple[str, ...]  # of the controls, in the order that it has them
     step: float  # for which they are held, s
     sensors: tuple[str, ...]  # what is remembered of a control step
-    senses: Ints  # see :mod:`osimlite.mechanics.kernels.senses`
+    senses: Ints  # see :mod:`osimlite.mechanics.kernels.sensors`
     known: Floats  # its numbers
     plan: Ints  # see :mod:`osimlite.mechanics.kernels.reflexes`
     numbers: Floats  # its numbers

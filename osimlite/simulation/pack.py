@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.mechanics.kernels.curves_abreast import LANES, ROWS
+from osimlite.mechanics.kernels.batched_curves import LANES, ROWS
 from osimlite.mechanics.kernels.layout import CONTACT_WORK, EQUILIBRIUM, ITEM, MODEL, RESPONSE, RUN
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.record import STATES

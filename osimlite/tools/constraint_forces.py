@@ -12,7 +12,7 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.constrained_dynamics import SLIGHT, bind
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL
-from osimlite.mechanics.kernels.parts import link_work
+from osimlite.mechanics.kernels.points import link_work
 from osimlite.mechanics.multibody.body_constraints import carrier
 from osimlite.mechanics.multibody.constraints import Constraint, Coupler
 from osimlite.mechanics.multibody.dynamics import mass_matrix

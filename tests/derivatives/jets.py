@@ -15,7 +15,7 @@ import numpy as np
 
 from osimlite.mechanics.kernels.dynamics import evaluate
 from osimlite.mechanics.kernels.layout import MODEL, STAGE, WORK
-from osimlite.mechanics.laws.carried import is_nothing, settled
+from osimlite.mechanics.laws.dual_numbers import is_nothing, settled
 from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.engines.linking import PYTHON, Program
 

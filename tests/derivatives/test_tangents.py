@@ -38,7 +38,7 @@ from osimlite.errors import SettingError, SimulationError
 from osimlite.mechanics.codegen.toolchain import CompilationError
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.table import LAW_MODULES
-from osimlite.mechanics.laws.carried import is_nothing, settled
+from osimlite.mechanics.laws.dual_numbers import is_nothing, settled
 from osimlite.models.jumper import jumper
 from osimlite.models.walkers import furthest_walker
 from osimlite.simulation.elements.kind import Kind, kinds

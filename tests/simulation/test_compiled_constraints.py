@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from osimlite import Coordinate, Model
 from osimlite.errors import SimulationError, UnsupportedError
-from osimlite.mechanics.kernels import least_squares as ls
+from osimlite.mechanics.kernels import linear_algebra as ls
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.mechanics.multibody import functions as f

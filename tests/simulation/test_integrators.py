@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.errors import OsimliteError, SimulationError
-from osimlite.mechanics.kernels.step_sizes import next_step_size
+from osimlite.mechanics.kernels.error_control import next_step_size
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.stepper import IntegrationError
 from tests.simulation.equations import (

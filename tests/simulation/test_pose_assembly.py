@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import osimlite
 from osimlite.errors import SimulationError
-from osimlite.mechanics.kernels.eigenvalues import diagonalize
+from osimlite.mechanics.kernels.linear_algebra import diagonalize
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.assembly import tolerance_of

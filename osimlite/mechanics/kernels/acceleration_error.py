@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from osimlite.mechanics.kernels.layout import MODEL, OPERATION, OPERATION_WORK, OUTCOME, WORK
 from osimlite.mechanics.kernels.motion import set_row
-from osimlite.mechanics.kernels.parts import operation_ints, operation_work
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.states import copy
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy
+from osimlite.mechanics.kernels.points import operation_ints, operation_work
 from osimlite.mechanics.laws.vectors import ZERO, along, cross, minus, times, vector
 
 SIGN, COORDINATES, TURNS = 0, 1, 3

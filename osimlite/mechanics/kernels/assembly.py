@@ -13,21 +13,20 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from osimlite.mechanics.kernels.constrained_dynamics import bind
-from osimlite.mechanics.kernels.eigenvalues import diagonalize
 from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, OUTCOME, STAGE, WORK
-from osimlite.mechanics.kernels.least_squares import (
+from osimlite.mechanics.kernels.linear_algebra import (
     REDUNDANT,
     ROUNDING,
     cholesky,
+    diagonalize,
     factor_room,
     factorise,
     minimum_norm,
     substitute,
     write_null_space,
 )
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy, is_finite
 from osimlite.mechanics.kernels.projection import position_errors, rows_by_values
-from osimlite.mechanics.kernels.states import copy, is_finite
 
 # Integers: the head, then what each degree of freedom is, three arrays (n,), room for a list (n,)
 # of those that are free, and of each coupler the degree of freedom that depends on others and its

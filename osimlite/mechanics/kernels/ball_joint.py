@@ -12,11 +12,15 @@ from osimlite.mechanics.kernels.layout import (
     WORK,
 )
 from osimlite.mechanics.kernels.motion import add_row, axes_of, set_frame, set_row
-from osimlite.mechanics.kernels.parts import operation_ints, operation_work
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.states import copy
-from osimlite.mechanics.kernels.trigonometry import sine_cosine
-from osimlite.mechanics.laws.rotations import along_axes, body_fixed, transposed, turned_axes
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy
+from osimlite.mechanics.kernels.points import operation_ints, operation_work
+from osimlite.mechanics.laws.rotations import (
+    along_axes,
+    body_fixed,
+    sine_cosine,
+    transposed,
+    turned_axes,
+)
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,

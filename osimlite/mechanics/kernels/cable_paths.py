@@ -40,7 +40,7 @@ from osimlite.mechanics.kernels.cable_surfaces import (
     value,
 )
 from osimlite.mechanics.kernels.layout import ITEM, OUTCOME
-from osimlite.mechanics.kernels.least_squares import factor_room, factorise, minimum_norm
+from osimlite.mechanics.kernels.linear_algebra import factor_room, factorise, minimum_norm
 from osimlite.mechanics.kernels.paths import LENGTH, SPEED, TENSION
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import apply_force, place_frame, station, velocity

@@ -23,8 +23,8 @@ from osimlite.mechanics.kernels.layout import (
     PRODUCT,
     SHARE,
 )
-from osimlite.mechanics.kernels.parts import link_work, operation_ints, operation_work
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.points import link_work, operation_ints, operation_work
 from osimlite.mechanics.laws.vectors import ZERO, cross, dot, put, replaced, times, vector
 
 

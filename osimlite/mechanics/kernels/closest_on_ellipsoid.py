@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import sqrt
 
 from osimlite.mechanics.kernels.pointers import Floats
-from osimlite.mechanics.laws.carried import settled
+from osimlite.mechanics.laws.dual_numbers import settled
 from osimlite.mechanics.laws.vectors import Vector, along, component, minus, norm, plus, unit
 
 FLAT = 2e-13

@@ -41,15 +41,15 @@ from osimlite.mechanics.kernels.layout import (
     STAGE,
     WORK,
 )
-from osimlite.mechanics.kernels.parts import (
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.points import (
     link_ints,
     link_work,
     operation_ints,
     operation_work,
     screw,
+    station,
 )
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
-from osimlite.mechanics.kernels.points import station
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,

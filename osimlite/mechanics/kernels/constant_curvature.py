@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import acos, cos, sin
 
 from osimlite.mechanics.kernels.layout import MODEL, OPERATION, OPERATION_WORK, OUTCOME
-from osimlite.mechanics.kernels.parts import operation_ints, operation_work
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.points import operation_ints, operation_work
 
 COMPONENT, LENGTH, NEUTRAL, TERMS, SERIES = 2, 3, 4, 6, 7
 """Of the table: the component, the length, the two angles where the arguments are zero, the number

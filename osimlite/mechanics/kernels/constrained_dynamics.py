@@ -11,7 +11,7 @@ from math import sqrt
 
 from osimlite.mechanics.kernels.dynamics import SMALLEST_PIVOT, solve
 from osimlite.mechanics.kernels.layout import CONSTRAINED, DOF, ITEM, MODEL, OUTCOME
-from osimlite.mechanics.kernels.least_squares import (
+from osimlite.mechanics.kernels.linear_algebra import (
     REDUNDANT,
     ROUNDING,
     apply_q,
@@ -21,7 +21,7 @@ from osimlite.mechanics.kernels.least_squares import (
     substitute,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
-from osimlite.mechanics.laws.carried import is_nothing
+from osimlite.mechanics.laws.dual_numbers import is_nothing
 
 SAFE_MASS = 1e-10
 """What each speed must move, as part of its inertia, for the mass matrix to be divided by."""

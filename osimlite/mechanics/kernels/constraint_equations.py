@@ -21,13 +21,14 @@ from osimlite.mechanics.kernels.layout import (
     OUTCOME,
     WORK,
 )
-from osimlite.mechanics.kernels.parts import link_ints, link_work
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import (
     acceleration,
     angular_acceleration_bias,
     angular_velocity,
     direction,
+    link_ints,
+    link_work,
     station,
     velocity,
 )

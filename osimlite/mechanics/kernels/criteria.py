@@ -12,7 +12,7 @@ from math import cos, pi, sin
 
 from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.senses import SENSED, SENSES, foot
+from osimlite.mechanics.kernels.sensors import SENSED, SENSES, foot
 
 GAIT, JUMP, NUMBER, LARGEST_LOAD, WHOLE_LOAD, POWERS, TENSIONS, WANG = range(8)
 """Kinds: steps; a jump; how far a number of a row, the load of a leg or that of both are beyond a

@@ -26,8 +26,8 @@ from osimlite.mechanics.kernels.layout import (
     STAGE,
 )
 from osimlite.mechanics.kernels.motion import move, place
-from osimlite.mechanics.kernels.parts import link_ints, link_work
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.points import link_ints, link_work
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,

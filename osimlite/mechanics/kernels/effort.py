@@ -17,7 +17,7 @@ from __future__ import annotations
 from math import sqrt
 
 from osimlite.mechanics.kernels.layout import OUTCOME
-from osimlite.mechanics.kernels.least_squares import cholesky, substitute
+from osimlite.mechanics.kernels.linear_algebra import cholesky, substitute
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 
 FRAMES, EQUATIONS, UNKNOWNS, ENTRIES = 0, 1, 2, 3

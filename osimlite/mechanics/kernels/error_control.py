@@ -5,18 +5,65 @@ from __future__ import annotations
 from math import inf, isfinite, sqrt
 
 from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, OUTCOME, WORK
-from osimlite.mechanics.kernels.method import (
-    ACCEPTED,
-    COUNTED_Q,
-    COUNTED_U,
-    LAST_TIME,
-    LONGEST,
-    NEXT_STEP,
-    REACHED,
-    SHORTEST,
-)
 from osimlite.mechanics.kernels.pointers import Floats, Ints, call
-from osimlite.mechanics.kernels.step_sizes import next_step_size, weight
+
+LAST_TIME, ACCEPTED, COUNTED_Q, COUNTED_U, SHORTEST, LONGEST = 0, 1, 2, 3, 4, 5
+"""What does not change: time that may be reached at most (s); what the error of a step may be, and
+what the sums of the squared errors of values and of speeds are divided by, see `error_norm`; bounds
+of Merson's steps (s), of which the shortest is taken whatever its error.
+"""
+REACHED, NEXT_STEP = 6, 7
+"""Time (s) at the start of the step, and at its end if it was taken; step to try, and to try next."""
+EVALUATED, HAS_DERIVATIVE = 8, 9
+"""How many evaluations it took; whether the derivative at the end was put behind y1."""
+IS_EVALUATED = 10
+"""Whether the last evaluation was that of the start of the step."""
+MEMORY = 11
+"""From here on a method keeps what it likes from step to step; it begins anew where the first of that is 0."""
+
+ERRORS = 4
+"""Place of the errors, in states after WORK_STATE."""
+
+
+PATIENCE = 10_000
+"""Steps that may be tried before a motion that gets nowhere is given up."""
+
+
+def shortest_step(t: float, tried: float) -> float:
+    """The shortest step to take at a time t (s) after so many that were tried.
+
+    As in Simbody, the first steps from 0 may be of any length. OpenSim goes on with such steps for
+    ever; here they end.
+    """
+    return max(2.0**-52 * abs(t), 1e-300) if tried < PATIENCE else 4.0 * 2.0**-52 * max(1.0, abs(t))
+
+
+def weight(value: float) -> float:
+    """What the error of a speed or an auxiliary state counts that has this value at the start of the step."""
+    return 1.0 / abs(value) if abs(value) > 1.0 else 1.0
+
+
+def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: float) -> float:
+    """Step to try after one of size h, as Simbody chooses it; less than h if and only if error > accuracy.
+
+    The estimated error goes with a power of h, so 0.9 h (accuracy / error)^(1/order) should just
+    do. That is taken if it is at least a fifth more or, after a failure, a tenth less; never more
+    than five times or less than a tenth of h.
+
+    Args:
+        h: step just tried, s.
+        error: norm of its estimated error; infinite or not a number after a failed evaluation.
+        accuracy: what the error may be.
+        cut: whether the step was cut short by a limit, so that it is no ground for a larger one.
+        order: of the error.
+    """
+    if not isfinite(error):
+        return 0.1 * h
+    if error > accuracy:
+        wanted: float = 0.9 * h * (accuracy / error) ** (1.0 / order)
+        return max(min(wanted, 0.9 * h), 0.1 * h)
+    wanted = 0.9 * h * (accuracy / error) ** (1.0 / order) if error > 0.0 else inf
+    return h if cut or wanted < 1.2 * h else min(wanted, 5.0 * h)
 
 
 def step_end(h: Floats) -> float:

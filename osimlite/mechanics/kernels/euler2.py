@@ -9,18 +9,21 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from osimlite.mechanics.kernels.error_control import error_norm, judge, projected, step_end
-from osimlite.mechanics.kernels.layout import LINK, MODEL, MOTION, OPERATION, OUTCOME, STAGE, WORK
-from osimlite.mechanics.kernels.method import (
+from osimlite.mechanics.kernels.error_control import (
     ACCEPTED,
     ERRORS,
     EVALUATED,
     HAS_DERIVATIVE,
     MEMORY,
     REACHED,
+    error_norm,
+    judge,
+    projected,
+    step_end,
 )
-from osimlite.mechanics.kernels.parts import link_ints, operation_ints
+from osimlite.mechanics.kernels.layout import LINK, MODEL, MOTION, OPERATION, OUTCOME, STAGE, WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.points import link_ints, operation_ints
 
 HEAD, STATES, IS_IMPLICIT = MEMORY + 1, 3, False
 ORDER = 2.0

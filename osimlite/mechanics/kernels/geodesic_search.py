@@ -40,7 +40,7 @@ from osimlite.mechanics.kernels.cable_surfaces import (
     START,
     SURFACE_NUMBERS,
 )
-from osimlite.mechanics.kernels.least_squares import factor_room, factorise, minimum_norm
+from osimlite.mechanics.kernels.linear_algebra import factor_room, factorise, minimum_norm
 from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.laws.vectors import Vector, cross, dot, minus, norm, times, vector
 

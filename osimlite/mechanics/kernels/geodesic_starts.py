@@ -36,8 +36,7 @@ from osimlite.mechanics.kernels.cable_surfaces import (
 )
 from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.kernels.wrap_cylinder import closest_to_axis
-from osimlite.mechanics.kernels.wrap_sides import action, on_side
-from osimlite.mechanics.kernels.wrapping import NONE
+from osimlite.mechanics.kernels.wrapping import NONE, action, on_side
 from osimlite.mechanics.laws.vectors import (
     Vector,
     along,

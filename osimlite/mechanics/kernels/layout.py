@@ -146,7 +146,7 @@ class RESPONSE(metaclass=Record):
 class RUN(metaclass=Record):
     """Of items that are computed one after another: address of the kernel that computes all of them
     at once, 0 if each is computed by its own; numbers of the first and the end; offset in data of
-    room for curves, see `curves_abreast`.
+    room for curves, see `batched_curves`.
     """
 
     LAW, FIRST, END, ROOM, SIZE = range(5)

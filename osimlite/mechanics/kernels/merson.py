@@ -4,9 +4,17 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.mechanics.kernels.error_control import judge, step_end, step_error
+from osimlite.mechanics.kernels.error_control import (
+    ERRORS,
+    EVALUATED,
+    HAS_DERIVATIVE,
+    MEMORY,
+    REACHED,
+    judge,
+    step_end,
+    step_error,
+)
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
-from osimlite.mechanics.kernels.method import ERRORS, EVALUATED, HAS_DERIVATIVE, MEMORY, REACHED
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 
 HEAD, STATES, IS_IMPLICIT = MEMORY + 1, 3, False

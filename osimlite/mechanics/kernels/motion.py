@@ -16,16 +16,15 @@ from osimlite.mechanics.kernels.layout import (
     TRANSFORM,
     WORK,
 )
-from osimlite.mechanics.kernels.parts import (
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.points import (
     link_ints,
     link_work,
     operation_ints,
     operation_work,
     screw,
 )
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
-from osimlite.mechanics.kernels.trigonometry import sine_cosine
-from osimlite.mechanics.laws.rotations import Axes, X, Y, Z, along_axes, turned_axes
+from osimlite.mechanics.laws.rotations import Axes, X, Y, Z, along_axes, sine_cosine, turned_axes
 from osimlite.mechanics.laws.vectors import ZERO, Vector, along, cross, plus, put, times, vector
 
 BALL_MOVES = 1

@@ -16,9 +16,7 @@ from itertools import pairwise
 from math import inf, sqrt
 
 from osimlite.mechanics.kernels.condensation import condense, correct, linearise, product
-from osimlite.mechanics.kernels.error_control import error_norm, step_error
-from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
-from osimlite.mechanics.kernels.method import (
+from osimlite.mechanics.kernels.error_control import (
     ACCEPTED,
     ERRORS,
     EVALUATED,
@@ -27,9 +25,11 @@ from osimlite.mechanics.kernels.method import (
     MEMORY,
     NEXT_STEP,
     REACHED,
+    error_norm,
+    step_error,
 )
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
-from osimlite.mechanics.kernels.states import is_finite
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, is_finite
 
 ORDER, STEP, EQUAL, CONDENSED, AGE, REFUSED, MATRICES = range(MEMORY, MEMORY + 7)
 """Order; step, s; how many steps were equal; c that the linear equations are for, 0 if for none;

@@ -16,10 +16,9 @@ from osimlite.mechanics.kernels.constrained_dynamics import bind
 from osimlite.mechanics.kernels.dynamics import momentum
 from osimlite.mechanics.kernels.functions import MONOMIALS, several_at, value_at
 from osimlite.mechanics.kernels.layout import CONSTRAINED, DOF, LINK, LINK_WORK, MODEL, STAGE
-from osimlite.mechanics.kernels.parts import link_ints, link_work
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
-from osimlite.mechanics.kernels.points import station
-from osimlite.mechanics.kernels.pose_bend import bend_joint, twisted
+from osimlite.mechanics.kernels.points import link_ints, link_work, station
+from osimlite.mechanics.kernels.pose_curvature import bend_joint, twisted
 from osimlite.mechanics.kernels.pose_record import (
     ARGUMENTS_OF,
     BALL_AT,
@@ -48,7 +47,7 @@ from osimlite.mechanics.kernels.pose_record import (
 )
 from osimlite.mechanics.kernels.pose_sensors import sensors_turn
 from osimlite.mechanics.kernels.projection import position_errors, rows_by_values
-from osimlite.mechanics.kernels.trigonometry import sine_cosine
+from osimlite.mechanics.laws.rotations import sine_cosine
 from osimlite.mechanics.laws.vectors import (
     cross,
     dot,

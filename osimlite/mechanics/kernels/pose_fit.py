@@ -12,9 +12,9 @@ from __future__ import annotations
 from math import floor, inf, pi
 
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy, is_finite
 from osimlite.mechanics.kernels.points import station
-from osimlite.mechanics.kernels.pose_bonds import bend_equations, forget_bends, settle
+from osimlite.mechanics.kernels.pose_constraints import bend_equations, forget_bends, settle
 from osimlite.mechanics.kernels.pose_cost import cost, equations_of, look
 from osimlite.mechanics.kernels.pose_record import (
     GOALS,
@@ -55,7 +55,6 @@ from osimlite.mechanics.kernels.pose_step import (
     list_free,
     solve_free,
 )
-from osimlite.mechanics.kernels.states import copy, is_finite
 from osimlite.mechanics.laws.vectors import put
 
 FITTED, UNSEEN, STUCK, APART = 0.0, 1.0, 2.0, 3.0

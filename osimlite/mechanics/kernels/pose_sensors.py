@@ -13,9 +13,8 @@ from __future__ import annotations
 from math import acos, pi, sqrt
 
 from osimlite.mechanics.kernels.layout import LINK_WORK
-from osimlite.mechanics.kernels.parts import link_work
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.points import direction
+from osimlite.mechanics.kernels.points import direction, link_work
 from osimlite.mechanics.kernels.pose_record import (
     MARKER_NUMBERS,
     MARKERS,
@@ -27,7 +26,7 @@ from osimlite.mechanics.kernels.pose_record import (
     WEIGHTS,
     Fit,
 )
-from osimlite.mechanics.kernels.trigonometry import sine_cosine
+from osimlite.mechanics.laws.rotations import sine_cosine
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import floor, inf, pi
 
 from osimlite.mechanics.kernels.layout import GRAVITY_AT, LINK, MODEL
-from osimlite.mechanics.kernels.parts import link_ints
-from osimlite.mechanics.kernels.pointers import Floats, at
-from osimlite.mechanics.kernels.pose_bonds import settle
+from osimlite.mechanics.kernels.pointers import Floats, at, copy
+from osimlite.mechanics.kernels.points import link_ints
+from osimlite.mechanics.kernels.pose_constraints import settle
 from osimlite.mechanics.kernels.pose_cost import cost, look
 from osimlite.mechanics.kernels.pose_record import (
     AT_END,
@@ -17,7 +17,6 @@ from osimlite.mechanics.kernels.pose_record import (
     VARIABLE,
     Fit,
 )
-from osimlite.mechanics.kernels.states import copy
 from osimlite.mechanics.laws.vectors import dot, vector
 
 INWARDS = 0.3

@@ -7,7 +7,7 @@ Wright, Numerical Optimization, 2006, chapters 16.2 and 16.7).
 from __future__ import annotations
 
 from osimlite.mechanics.kernels.layout import MODEL
-from osimlite.mechanics.kernels.least_squares import (
+from osimlite.mechanics.kernels.linear_algebra import (
     cholesky,
     factorise,
     minimum_norm,

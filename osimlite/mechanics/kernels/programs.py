@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.written import written
+from osimlite.mechanics.kernels.table import written
 from osimlite.mechanics.laws import formulas
 from osimlite.mechanics.laws.formulas import FUNCTIONS, OF_TWO, divide, larger, power, smaller
 

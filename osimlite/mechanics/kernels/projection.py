@@ -13,9 +13,9 @@ from math import inf, sqrt
 
 from osimlite.mechanics.kernels.constrained_dynamics import bind
 from osimlite.mechanics.kernels.layout import CONSTRAINED, CONSTRAINT, MODEL, OUTCOME, STAGE, WORK
-from osimlite.mechanics.kernels.least_squares import factored, solved
+from osimlite.mechanics.kernels.linear_algebra import factored, solved
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
-from osimlite.mechanics.kernels.trigonometry import sine_cosine
+from osimlite.mechanics.laws.rotations import sine_cosine
 
 OVERSHOOT = 0.1
 """The part of the tolerance that a projection aims at."""

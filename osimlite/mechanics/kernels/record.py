@@ -5,12 +5,10 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import NamedTuple
 
-from osimlite.mechanics.kernels.error_control import projected
+from osimlite.mechanics.kernels.error_control import ACCEPTED, projected
 from osimlite.mechanics.kernels.layout import CONTACT_WORK, MODEL, STAGE, WORK
-from osimlite.mechanics.kernels.method import ACCEPTED
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy, cubic
 from osimlite.mechanics.kernels.points import station
-from osimlite.mechanics.kernels.states import copy, cubic
 from osimlite.mechanics.laws.vectors import dot, vector
 
 DONE, FAILED, FULL, STOPPED, TOO_MANY = 0, 1, 2, 3, 4

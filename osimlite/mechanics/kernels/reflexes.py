@@ -1,7 +1,7 @@
 """Reflexes: sums of terms ``gain * (sensor - offset)`` with a delay, each on while a leg is in some states.
 
 The integers are a head, `REFLEXES`; of each term `TERM`; of each gate the sensors of a coordinate
-and of its speed; of each sensor what it feels, `senses.SOURCE`. The numbers of a candidate are a
+and of its speed; of each sensor what it feels, `sensors.SOURCE`. The numbers of a candidate are a
 head, `LIMITS`, in which each leg has its own; of each term delay, gain and offset; of each gate
 delay, least and largest value; those of sources. Where legs have states the first two sensors feel
 their loads. Delays are in control steps. A term without a sensor is ``gain * (t - delay)**power``
@@ -17,7 +17,7 @@ from math import cos, floor, log, pi, sqrt
 
 from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.senses import SOURCE, ahead, felt
+from osimlite.mechanics.kernels.sensors import SOURCE, ahead, felt
 
 EARLY_STANCE, LATE_STANCE, LIFTOFF, SWING, LANDING = range(5)
 """States of a leg."""

@@ -13,9 +13,7 @@ from __future__ import annotations
 from math import inf
 
 from osimlite.mechanics.kernels.condensation import condense, correct, linearise
-from osimlite.mechanics.kernels.error_control import step_error
-from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
-from osimlite.mechanics.kernels.method import (
+from osimlite.mechanics.kernels.error_control import (
     ACCEPTED,
     ERRORS,
     EVALUATED,
@@ -25,9 +23,10 @@ from osimlite.mechanics.kernels.method import (
     MEMORY,
     NEXT_STEP,
     REACHED,
+    step_error,
 )
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
-from osimlite.mechanics.kernels.states import copy, is_finite
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy, is_finite
 
 IS_NEW = MEMORY
 """Whether the derivatives are those at the start of the step."""

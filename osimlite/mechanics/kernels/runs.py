@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.mechanics.kernels.error_control import projected
-from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE
-from osimlite.mechanics.kernels.method import (
+from osimlite.mechanics.kernels.error_control import (
     ACCEPTED,
     EVALUATED,
     HAS_DERIVATIVE,
@@ -19,8 +17,11 @@ from osimlite.mechanics.kernels.method import (
     NEXT_STEP,
     REACHED,
     SHORTEST,
+    projected,
+    shortest_step,
 )
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy, is_finite
 from osimlite.mechanics.kernels.record import (
     ATTEMPTED,
     COUNTED,
@@ -51,8 +52,6 @@ from osimlite.mechanics.kernels.record import (
     note_peaks,
     note_step,
 )
-from osimlite.mechanics.kernels.states import copy, is_finite
-from osimlite.mechanics.kernels.step_sizes import shortest_step
 
 
 def run_several(

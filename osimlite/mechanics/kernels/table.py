@@ -7,9 +7,13 @@ here; those that are written for kinds of forces and probes are in
 
 from __future__ import annotations
 
+import linecache
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any
+
+from osimlite.mechanics.kernels import pointers
+from osimlite.mechanics.kernels.layout import ITEM, MODEL, OUTCOME, RUN, WORK
 
 LAW_MODULES = {
     "evaluate": "dynamics",
@@ -24,8 +28,8 @@ LAW_MODULES = {
     "bdf": "multistep",
     "rosenbrock": "rosenbrock",
     "fit_frames": "pose_fit",
-    "set_controls": "controls",
-    "contact_places": "places",
+    "set_controls": "functions",
+    "contact_places": "contacts",
     "place_ball": "ball_joint",
     "move_ball": "ball_joint",
     "place_drift": "acceleration_error",
@@ -33,8 +37,8 @@ LAW_MODULES = {
     "constrained_dynamics": "constrained_dynamics",
     "chain_dynamics": "chain",
     "project": "projection",
-    "factorise_law": "least_squares",
-    "minimum_norm_law": "least_squares",
+    "factorise_law": "linear_algebra",
+    "minimum_norm_law": "linear_algebra",
     "prescribe": "constraint_equations",
     "couple": "constraint_equations",
     "bind_bodies": "constraint_equations",
@@ -45,10 +49,10 @@ LAW_MODULES = {
     "touch_spheres": "contacts",
     "contact_response": "contacts",
     "smooth_contact_response": "contacts",
-    "touch_ellipsoid": "rare_contacts",
-    "touch_ellipsoids": "rare_contacts",
-    "early_return": "rare_contacts",
-    "touch_mesh": "meshes",
+    "touch_ellipsoid": "ellipsoid_contacts",
+    "touch_ellipsoids": "ellipsoid_contacts",
+    "early_return": "ellipsoid_contacts",
+    "touch_mesh": "mesh_contacts",
     "function_path": "function_paths",
     "pull_coordinates": "function_paths",
     "function_of_one": "function_paths",
@@ -57,7 +61,7 @@ LAW_MODULES = {
     "cable_path": "cable_paths",
     "pull_cable": "cable_paths",
     "wrap_cylinder": "wrap_cylinder",
-    "wrap_sphere": "wrap_sphere",
+    "wrap_sphere": "wrapping",
     "wrap_ellipsoid": "wrap_ellipsoid",
     "wrap_torus": "wrap_torus",
     "trace_path": "wrap_curves",
@@ -91,3 +95,26 @@ def own_function(name: str) -> Callable[..., Any]:
         import_module(f"{__package__}.{LAW_MODULES[name]}"), name
     )
     return function
+
+
+RECORDS = {record.__name__: record for record in (MODEL, ITEM, RUN, WORK, OUTCOME)}
+"""What the code of kernels uses of the layout."""
+GIVEN = 'model: "Ints", reals: "Floats", data: "Floats", y: "Floats", f: "Floats"'
+"""What every kernel is called with, before what it computes."""
+
+
+def written(name: str, module: str, source: str, **scope: Any) -> Callable[..., int]:
+    """A kernel that was written.
+
+    Args:
+        name: of it.
+        module: that it belongs to.
+        source: its text.
+        scope: what this uses, besides the layout.
+    """
+    known = {**RECORDS, "at": pointers.at, "__name__": module, **scope}
+    file = f"<kernel {name}>"
+    exec(compile(source, file, "exec", dont_inherit=True), known)
+    # Tracebacks and `inspect.getsource` show it as they show a file.
+    linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
+    return known[name]

@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from osimlite.mechanics.kernels.criteria import begin_criteria, judged
+from osimlite.mechanics.kernels.error_control import HAS_DERIVATIVE, LAST_TIME, MEMORY
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE
-from osimlite.mechanics.kernels.method import HAS_DERIVATIVE, LAST_TIME, MEMORY
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy, is_finite
 from osimlite.mechanics.kernels.record import (
     COUNTED,
     DONE,
@@ -32,8 +32,7 @@ from osimlite.mechanics.kernels.reflexes import (
     note_senses,
 )
 from osimlite.mechanics.kernels.runs import run, run_of
-from osimlite.mechanics.kernels.senses import SENSED, SENSES, feel
-from osimlite.mechanics.kernels.states import copy, is_finite
+from osimlite.mechanics.kernels.sensors import SENSED, SENSES, feel
 
 FEEL, BEGIN, START = -1, -2, -3
 """Orders besides a number of control steps: to feel what is; then to begin reflexes and excite

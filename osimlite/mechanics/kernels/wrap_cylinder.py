@@ -15,7 +15,6 @@ from math import atan2, cos, inf, pi, radians, sin, sqrt, tan
 
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.wrap_sides import action, nearest_pair, on_side, tangents
 from osimlite.mechanics.kernels.wrapping import (
     ALONE,
     AXIS,
@@ -30,6 +29,10 @@ from osimlite.mechanics.kernels.wrapping import (
     SIDE,
     SIZES,
     SURFACE_LENGTH,
+    action,
+    nearest_pair,
+    on_side,
+    tangents,
 )
 from osimlite.mechanics.laws.vectors import (
     EPSILON,

@@ -16,7 +16,6 @@ from math import acos, cos, isnan, nan, pi, sin, sqrt
 from osimlite.mechanics.kernels.closest_on_ellipsoid import closest_in_plane, closest_point, fan
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.wrap_sides import nowhere, on_side
 from osimlite.mechanics.kernels.wrapping import (
     AXIAL,
     AXIS,
@@ -34,6 +33,8 @@ from osimlite.mechanics.kernels.wrapping import (
     SIDE,
     SIZES,
     SURFACE_LENGTH,
+    nowhere,
+    on_side,
 )
 from osimlite.mechanics.laws.vectors import (
     Vector,

@@ -12,7 +12,6 @@ from math import nan, sqrt
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.wrap_cylinder import around_cylinder
-from osimlite.mechanics.kernels.wrap_sides import nowhere, on_side
 from osimlite.mechanics.kernels.wrapping import (
     ALONE,
     AXIS,
@@ -25,6 +24,8 @@ from osimlite.mechanics.kernels.wrapping import (
     SIDE,
     SIZES,
     WRAPPED,
+    nowhere,
+    on_side,
 )
 from osimlite.mechanics.laws.vectors import (
     Vector,

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from math import hypot
 
-from osimlite.mechanics.laws.carried import plain, settled
+from osimlite.mechanics.laws.dual_numbers import plain, settled
 
 Point = tuple[float, float, float]
 """x, y, and the slope there."""

@@ -14,7 +14,7 @@ from math import isnan, nan
 from typing import NamedTuple
 
 from osimlite.mechanics.laws.bezier import curve_integral, curve_value, value_of_sum
-from osimlite.mechanics.laws.carried import plain, settled
+from osimlite.mechanics.laws.dual_numbers import plain, settled
 from osimlite.mechanics.laws.muscles import (
     SIGNIFICANT,
     MuscleInputs,

@@ -18,7 +18,7 @@ from osimlite.mechanics.kernels.constraint_equations import (
     SLIP,
 )
 from osimlite.mechanics.kernels.layout import COORDINATE
-from osimlite.mechanics.kernels.least_squares import factor_room
+from osimlite.mechanics.kernels.linear_algebra import factor_room
 from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.mechanics.multibody.constraints import Constraint, Coupler, Lock, Prescribed
 from osimlite.mechanics.multibody.function_tables import function_table, table_of_one

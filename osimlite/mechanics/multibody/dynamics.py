@@ -24,8 +24,8 @@ from osimlite.mechanics.kernels.dynamics import (
     spatial_inertias_and_bias,
 )
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL, OUTCOME
-from osimlite.mechanics.kernels.parts import link_work
 from osimlite.mechanics.kernels.pointers import Floats, at
+from osimlite.mechanics.kernels.points import link_work
 from osimlite.mechanics.multibody.functions import floats
 from osimlite.mechanics.multibody.kinematics import Kinematics, numbers
 from osimlite.mechanics.multibody.linear import solutions

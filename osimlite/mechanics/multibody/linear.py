@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.mechanics.kernels.least_squares import REDUNDANT, ROUNDING
+from osimlite.mechanics.kernels.linear_algebra import REDUNDANT, ROUNDING
 from osimlite.mechanics.multibody.spatial import Array
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.layout import ITEM, LINK_WORK, MODEL
-from osimlite.mechanics.kernels.meshes import MESH_WORK, load_mesh
+from osimlite.mechanics.kernels.mesh_contacts import MESH_WORK, load_mesh
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.points import angular_velocity, station, velocity
 from osimlite.mechanics.laws.elastic_foundation import spring_load

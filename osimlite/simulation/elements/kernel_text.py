@@ -8,8 +8,7 @@ from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from osimlite.base.records import dataclass
-from osimlite.mechanics.kernels.condensation import WIDTH
-from osimlite.mechanics.kernels.curves_abreast import (
+from osimlite.mechanics.kernels.batched_curves import (
     LANES,
     answer,
     ask,
@@ -17,9 +16,10 @@ from osimlite.mechanics.kernels.curves_abreast import (
     missed_of,
     value_of,
 )
+from osimlite.mechanics.kernels.condensation import WIDTH
 from osimlite.mechanics.kernels.layout import ITEM
-from osimlite.mechanics.kernels.written import GIVEN, written
-from osimlite.mechanics.laws.carried import carrying, carrying_room, slope_of
+from osimlite.mechanics.kernels.table import GIVEN, written
+from osimlite.mechanics.laws.dual_numbers import carrying, carrying_room, slope_of
 from osimlite.simulation.elements.laws import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
 
 if TYPE_CHECKING:

@@ -6,8 +6,7 @@ from collections.abc import Callable
 from math import nan
 from typing import Any
 
-from osimlite.mechanics.laws.muscles import MuscleInputs
-from osimlite.mechanics.laws.old_muscles import (
+from osimlite.mechanics.laws.deprecated_muscles import (
     ROUNDS,
     TOLERANCE,
     OldMuscle,
@@ -16,6 +15,7 @@ from osimlite.mechanics.laws.old_muscles import (
     generic_velocity_factor,
     next_length,
 )
+from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import Kind, State
 from osimlite.simulation.elements.muscle import height, muscle

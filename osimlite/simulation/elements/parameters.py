@@ -8,7 +8,7 @@ from typing import Any
 
 from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
-from osimlite.mechanics.kernels.controls import with_reflex
+from osimlite.mechanics.kernels.functions import with_reflex
 from osimlite.mechanics.multibody.formula import Formula, program
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import Function

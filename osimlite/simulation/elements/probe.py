@@ -23,7 +23,7 @@ from osimlite.base.records import dataclass
 from osimlite.base.text import did_you_mean
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.kernels.layout import ITEM
-from osimlite.mechanics.kernels.written import GIVEN, written
+from osimlite.mechanics.kernels.table import GIVEN, written
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.links import Places

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from osimlite.mechanics import kernels
 from osimlite.mechanics.kernels import record
 from osimlite.mechanics.kernels.condensation import condensation_room
+from osimlite.mechanics.kernels.error_control import ERRORS
 from osimlite.mechanics.kernels.layout import MODEL
-from osimlite.mechanics.kernels.method import ERRORS
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.table import LAW_MODULES
 from osimlite.simulation.batches import BatchOptions

@@ -11,10 +11,9 @@ from weakref import WeakKeyDictionary
 
 from osimlite.errors import SettingError, SimulationError
 from osimlite.mechanics.kernels import record
+from osimlite.mechanics.kernels.error_control import shortest_step, weight
 from osimlite.mechanics.kernels.layout import MODEL
-from osimlite.mechanics.kernels.pointers import Floats
-from osimlite.mechanics.kernels.states import cubic
-from osimlite.mechanics.kernels.step_sizes import shortest_step, weight
+from osimlite.mechanics.kernels.pointers import Floats, cubic
 from osimlite.simulation.batches import BatchOptions
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.options import (

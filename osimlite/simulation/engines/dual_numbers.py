@@ -14,7 +14,7 @@ from functools import cache
 from types import FunctionType
 from typing import Any
 
-from osimlite.mechanics.laws.carried import (
+from osimlite.mechanics.laws.dual_numbers import (
     carrying,
     carrying_room,
     is_nothing,

@@ -14,7 +14,7 @@ import numpy as np
 from osimlite.base.text import listed, or_known
 from osimlite.errors import SettingError
 from osimlite.mechanics.kernels.reflexes import LIMITS, TERM
-from osimlite.mechanics.kernels.senses import SENSED
+from osimlite.mechanics.kernels.sensors import SENSED
 from osimlite.schema.model import Model
 from osimlite.simulation.control_steps import Gain, Held
 from osimlite.studies.reflexes.controllers import CONTROLLERS, Reflexes

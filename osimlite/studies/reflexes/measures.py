@@ -29,7 +29,7 @@ from osimlite.mechanics.kernels.criteria import (
     WHOLE_LOAD,
 )
 from osimlite.mechanics.kernels.pointers import Ints
-from osimlite.mechanics.kernels.senses import SENSES
+from osimlite.mechanics.kernels.sensors import SENSES
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.settings import Node
 from osimlite.studies.reflexes.walkers import SIDES, Walkers

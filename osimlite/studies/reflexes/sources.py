@@ -1,6 +1,6 @@
 """What reflexes feel: each kind of reflex, and of what it goes by, is one declaration here.
 
-The kernels compute the sources, see :mod:`osimlite.mechanics.kernels.senses`.
+The kernels compute the sources, see :mod:`osimlite.mechanics.kernels.sensors`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from osimlite.mechanics.kernels.senses import (
+from osimlite.mechanics.kernels.sensors import (
     ANGLE,
     IN_ROW,
     POSITION,

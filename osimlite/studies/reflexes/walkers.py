@@ -13,7 +13,7 @@ from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.layout import OUTCOME
 from osimlite.mechanics.kernels.pointers import Ints
 from osimlite.mechanics.kernels.reflexes import REFLEXES
-from osimlite.mechanics.kernels.senses import OF_MUSCLES, SENSES
+from osimlite.mechanics.kernels.sensors import OF_MUSCLES, SENSES
 from osimlite.mechanics.kernels.walks import COUNTS, STEPS
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -99,7 +99,7 @@ class Felt:
         self.senses, self.known = self._sensing(model, lags=lags)
 
     def _sensing(self, model: Model, *, lags: bool) -> tuple[Ints, Array]:
-        """Plan of what is felt, and its numbers; see :mod:`osimlite.mechanics.kernels.senses`."""
+        """Plan of what is felt, and its numbers; see :mod:`osimlite.mechanics.kernels.sensors`."""
         engine, bodies = self.engine, self.mechanism.bodies
         limits: list[int] = []
         for item in model.components(CoordinateLimitForce):

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from osimlite.base.require import require
 from osimlite.errors import OsimliteError
-from osimlite.mechanics.laws.old_muscles import schutte_velocity
+from osimlite.mechanics.laws.deprecated_muscles import schutte_velocity
 from osimlite.mechanics.multibody.schema_functions import numeric
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.muscles import Muscle

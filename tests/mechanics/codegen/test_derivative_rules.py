@@ -14,7 +14,7 @@ import pytest
 
 from osimlite.mechanics.codegen.cplusplus import write_library
 from osimlite.mechanics.kernels.pointers import Floats, Ints
-from osimlite.mechanics.laws.carried import is_nothing, plain, settled
+from osimlite.mechanics.laws.dual_numbers import is_nothing, plain, settled
 from osimlite.simulation.engines.dual_numbers import (
     ARITHMETIC,
     IN_PLACE,

@@ -9,7 +9,7 @@ from textwrap import dedent
 import pytest
 
 from osimlite.mechanics.codegen.sources import compute_digest
-from osimlite.mechanics.kernels import constrained_dynamics, least_squares, pointers
+from osimlite.mechanics.kernels import constrained_dynamics, linear_algebra, pointers
 from osimlite.mechanics.kernels.table import LAW_MODULES
 from osimlite.simulation.elements.laws import law_function
 
@@ -47,8 +47,8 @@ def edited(function, old, new):
 
 
 def test_an_edited_function_concerns_those_that_call_it(changed):
-    reflect = least_squares.reflect
-    result = changed(least_squares, "reflect", edited(reflect, "0.0", "0.5"))
+    reflect = linear_algebra.reflect
+    result = changed(linear_algebra, "reflect", edited(reflect, "0.0", "0.5"))
     # `project` solves by the addresses of these laws.
     paths = {"cable_path", "geodesic_path"}
     searches = {"fit_frames", "assemble_poses"}
@@ -68,12 +68,12 @@ def test_a_changed_number_concerns_those_that_use_it(changed):
 
 
 def test_words_and_layout_concern_nobody(changed):
-    reflect = least_squares.reflect
+    reflect = linear_algebra.reflect
     document = reflect.__doc__
     moved = edited(
         reflect, f'"""{document}"""', '"""Other words."""\n    # A comment, and an empty line.\n'
     )
-    assert not changed(least_squares, "reflect", moved)
+    assert not changed(linear_algebra, "reflect", moved)
 
 
 def test_the_settings_of_a_translator_concern_all():

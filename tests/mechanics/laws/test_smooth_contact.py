@@ -13,6 +13,7 @@ from osimlite.mechanics.laws.smooth_contact import (
     smooth_contact_energy,
     smooth_contact_force,
     smooth_hertz,
+    station_contact_force,
 )
 
 UP = 0.0, 1.0, 0.0
@@ -79,4 +80,25 @@ def test_derivatives_are_those_of_the_force(d, approach, slip, turn, c):
         0.0,
         0.0,
         0.0,
+    )
+
+
+STATION_CONSTANTS = 1e4, 0.01, 0.0, 0.5, 0.2, 0.05
+
+
+def test_station_contact():
+    still = station_contact_force(-0.02, 0.0, 0.0, 0.0, *STATION_CONSTANTS)
+    # Nearly a spring of 10 kN/m that sets in at -0.001 m, and a weak one above it.
+    assert still[0] == still[2] == 0.0 and still[1] == pytest.approx(1e4 * 0.019, rel=0.1)
+    assert station_contact_force(0.01, 0.0, 0.0, 0.0, *STATION_CONSTANTS)[1] == pytest.approx(
+        0.0, abs=1e-6
+    )
+    rising, falling = (
+        station_contact_force(-0.02, 0.0, v, 0.0, *STATION_CONSTANTS)[1] for v in (1.0, -1.0)
+    )
+    assert (rising, falling) == (pytest.approx(0.99 * still[1]), pytest.approx(1.01 * still[1]))
+    fx, fy, fz = station_contact_force(-0.02, 3.0, 0.0, -4.0, *STATION_CONSTANTS)
+    assert (fx, fz) == (
+        pytest.approx(-0.6 * 1.5 * fy, rel=1e-4),
+        pytest.approx(0.8 * 1.5 * fy, rel=1e-4),
     )

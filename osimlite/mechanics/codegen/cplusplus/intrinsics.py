@@ -25,7 +25,7 @@ from osimlite.mechanics.codegen.cplusplus.types import (
     pointer_to,
 )
 from osimlite.mechanics.kernels import pointers
-from osimlite.mechanics.laws import carried
+from osimlite.mechanics.laws import dual_numbers
 
 
 class Reader(Protocol):
@@ -276,11 +276,11 @@ INTRINSICS: dict[Any, Intrinsic] = {
         _infer_offset, lambda codes, kinds, result: f"({codes[0]} + {codes[1]})"
     ),
     pointers.call: Intrinsic(_infer_call, _write_call, INTEGER, has_effects=True),
-    carried.settled: Intrinsic(_infer_settled, _write_settled),
-    carried.is_nothing: _declare_fixed_result("is_nothing", BOOLEAN),
-    carried.plain: Intrinsic(_infer_plain, _write_plain("plain"), FLOAT),
-    carried.slope_of: Intrinsic(_infer_plain, _write_plain("slope_of"), FLOAT),
-    carried.carrying: Intrinsic(_infer_carrying, _write_carrying),
-    carried.carrying_room: Intrinsic(_infer_carrying_room, _write_carrying_room),
+    dual_numbers.settled: Intrinsic(_infer_settled, _write_settled),
+    dual_numbers.is_nothing: _declare_fixed_result("is_nothing", BOOLEAN),
+    dual_numbers.plain: Intrinsic(_infer_plain, _write_plain("plain"), FLOAT),
+    dual_numbers.slope_of: Intrinsic(_infer_plain, _write_plain("slope_of"), FLOAT),
+    dual_numbers.carrying: Intrinsic(_infer_carrying, _write_carrying),
+    dual_numbers.carrying_room: Intrinsic(_infer_carrying_room, _write_carrying_room),
 }
 """How each is written."""

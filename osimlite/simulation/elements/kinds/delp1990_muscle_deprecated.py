@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 from osimlite.mechanics.kernels.functions import value_at
 from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.laws.deprecated_muscles import OldMuscle, scaled_activation_rate
 from osimlite.mechanics.laws.muscles import MuscleInputs
-from osimlite.mechanics.laws.old_muscles import OldMuscle, scaled_activation_rate
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated
 from osimlite.simulation.elements.kind import State
 from osimlite.simulation.elements.old_muscle import (

@@ -3,7 +3,7 @@
 from typing import Any
 
 from osimlite.errors import ModelError
-from osimlite.mechanics.laws.station_contact import station_contact_force
+from osimlite.mechanics.laws.smooth_contact import station_contact_force
 from osimlite.schema.contact_forces import MeyerFregly2016Force
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.body import STATION

@@ -4,8 +4,7 @@ from typing import NamedTuple
 
 from osimlite.mechanics.kernels.functions import value_at
 from osimlite.mechanics.kernels.pointers import Floats
-from osimlite.mechanics.laws.muscles import MuscleInputs
-from osimlite.mechanics.laws.old_muscles import (
+from osimlite.mechanics.laws.deprecated_muscles import (
     NOTHING,
     OldMuscle,
     rigid_cos,
@@ -13,6 +12,7 @@ from osimlite.mechanics.laws.old_muscles import (
     schutte_passive_force,
     schutte_velocity,
 )
+from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.schema.old_muscles import Schutte1993Muscle_Deprecated
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.old_muscle import (

@@ -2,8 +2,7 @@
 
 from typing import NamedTuple
 
-from osimlite.mechanics.laws.muscles import MuscleInputs
-from osimlite.mechanics.laws.old_muscles import (
+from osimlite.mechanics.laws.deprecated_muscles import (
     NOTHING,
     OldMuscle,
     rigid_cos,
@@ -12,6 +11,7 @@ from osimlite.mechanics.laws.old_muscles import (
     thelen_tendon_force,
     thelen_velocity,
 )
+from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.schema.old_muscles import Thelen2003Muscle_Deprecated
 from osimlite.simulation.elements.old_muscle import (
     fibers_at,

@@ -9,7 +9,7 @@ import numpy as np
 
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.constrained_dynamics import SAFE_MASS, SLIGHT
-from osimlite.mechanics.kernels.least_squares import ROUNDING
+from osimlite.mechanics.kernels.linear_algebra import ROUNDING
 from osimlite.mechanics.multibody.linear import shortest, solutions
 from osimlite.mechanics.multibody.spatial import Array, skews
 from tests.mechanics.multibody.independent.constraints import bond

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from osimlite.mechanics.kernels.ball_joint import last_axis
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL, MOTION, OPERATION, OPERATION_WORK
-from osimlite.mechanics.kernels.parts import link_work, operation_ints, operation_work
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.points import link_work, operation_ints, operation_work
 from osimlite.mechanics.kernels.pose_record import (
     AXES_AT,
     BEND,
     SLIDES,
     Fit,
 )
-from osimlite.mechanics.kernels.trigonometry import sine_cosine
+from osimlite.mechanics.laws.rotations import sine_cosine
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,

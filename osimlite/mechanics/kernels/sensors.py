@@ -13,9 +13,8 @@ from __future__ import annotations
 from math import atan2, sqrt
 
 from osimlite.mechanics.kernels.layout import CONTACT_WORK, MODEL, Record
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy
 from osimlite.mechanics.kernels.points import angular_velocity, direction, station, velocity
-from osimlite.mechanics.kernels.states import copy
 from osimlite.mechanics.laws.vectors import ZERO, Vector, along, dot, norm, over, plus, put, vector
 
 OF_MUSCLES = "fiber_length", "fiber_velocity", "tension", "activation", "active_fiber_force"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import inf
 
 from osimlite.mechanics.kernels.layout import MODEL
-from osimlite.mechanics.kernels.least_squares import cholesky, factorise, minimum_norm, substitute
-from osimlite.mechanics.kernels.pointers import Floats, at
+from osimlite.mechanics.kernels.linear_algebra import cholesky, factorise, minimum_norm, substitute
+from osimlite.mechanics.kernels.pointers import Floats, at, copy, is_finite
 from osimlite.mechanics.kernels.pose_cost import coupled, equations_of, follow_couplers, look
 from osimlite.mechanics.kernels.pose_record import (
     AT_END,
@@ -34,7 +34,6 @@ from osimlite.mechanics.kernels.pose_record import (
 )
 from osimlite.mechanics.kernels.pose_step import equations_for, list_free
 from osimlite.mechanics.kernels.projection import REDUNDANT
-from osimlite.mechanics.kernels.states import copy, is_finite
 
 EXACT = 1e-13
 """What constraints may be off (m or rad)."""
