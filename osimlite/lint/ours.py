@@ -73,7 +73,7 @@ def is_root(tag: str) -> bool:
 @cache
 def _class_name(tag: str) -> str | None:
     """The class that a tag means, although it may be misspelt or an old name."""
-    from osimlite.io.document.upgrade.v40600_class_names import RENAMED
+    from osimlite.io.document.upgrade.class_names import RENAMED
     from osimlite.schema.registry import MODULES
 
     known = {**{name: name for name in MODULES}, **RENAMED}

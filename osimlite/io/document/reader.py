@@ -38,7 +38,7 @@ from osimlite.schema.specs import holding
 
 if TYPE_CHECKING:
     from osimlite.io.document.plugins import Paths
-    from osimlite.io.document.upgrade import Change, Refusal, Upgraded
+    from osimlite.io.document.upgrade import Change, Refusal, UpgradeResult
 
 ROOT = "OpenSimDocument"
 
@@ -79,7 +79,7 @@ class Document:
     source: Source
     version: int
     notes: list[Note] = field(default_factory=list)
-    upgraded: Upgraded | None = None
+    upgraded: UpgradeResult | None = None
     fault: NotWellFormedError | None = None
 
     @property
@@ -194,9 +194,9 @@ def document_of(
             None if _class_of(_first(root)) is None else _document(source, root, version, of, None)
         )
         if document is None or any(note.kind in _NOT_KNOWN for note in document.notes):
-            from osimlite.io.document.upgrade import with_present_names
+            from osimlite.io.document.upgrade import rename_old_classes
 
-            upgraded = with_present_names(root)
+            upgraded = rename_old_classes(root)
             if document is None or upgraded is not None:
                 document = _document(source, root, version, of, upgraded)
     return document
@@ -244,7 +244,7 @@ def _document(
     root: etree._Element,
     version: int,
     of: type[Object],
-    upgraded: Upgraded | None,
+    upgraded: UpgradeResult | None,
     is_known: bool = False,
 ) -> Document:
     reader = ObjectReader(_included_by(source))
@@ -258,17 +258,19 @@ def _document(
     return Document(top, source, version, notes, upgraded)
 
 
-def _upgraded(source: Source, root: etree._Element, version: int) -> Upgraded:
+def _upgraded(source: Source, root: etree._Element, version: int) -> UpgradeResult:
     """The tree in the current format; VersionError if something cannot be carried over."""
-    from osimlite.io.document.upgrade import Refused, upgrade
+    from osimlite.io.document.upgrade import UpgradeError, upgrade
 
     try:
         return upgrade(root, version)
-    except Refused as refused:
-        raise _unreadable(source, version, refused.message, refused.number) from None
+    except UpgradeError as error:
+        raise _unreadable(source, version, error.message, error.number) from None
 
 
-def _renumber(source: Source, top: Object, notes: list[Note], upgraded: Upgraded) -> list[Note]:
+def _renumber(
+    source: Source, top: Object, notes: list[Note], upgraded: UpgradeResult
+) -> list[Note]:
     """Give everything read from an upgraded tree the place it has in the old text."""
     source.moved = upgraded.moved
     numbers = upgraded.numbers
@@ -384,7 +386,7 @@ def version_of(source: Source, root: etree._Element) -> int:
     if root.tag == ROOT and number is not None and number >= OLDEST:
         return number
     if text is None and root.tag != ROOT:
-        from osimlite.io.document.upgrade.v40600_class_names import RENAMED
+        from osimlite.io.document.upgrade.class_names import RENAMED
 
         if _class_of(root) is not None or root.tag in RENAMED:
             return OLDEST

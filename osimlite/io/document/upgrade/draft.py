@@ -1,8 +1,8 @@
-"""A document on its way from an old format to the current one: the element tree, and where each element came from."""
+"""Element tree of a document during its upgrade, with a record of where each element came from."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from osimlite.schema.registry import by_tags, class_for
 
 Element = etree._Element
 
-_FAMILY_OF_MEMBERS = {
+_MEMBER_FAMILIES = {
     "ConstraintSet": "Constraint",
     "ContactGeometrySet": "ContactGeometry",
     "ControllerSet": "Controller",
@@ -24,36 +24,50 @@ _FAMILY_OF_MEMBERS = {
     "ProbeSet": "Probe",
     "WrapObjectSet": "WrapObject",
 }
-"""What an object of an unknown class (a plug-in) must be, going by the set it stands in."""
+"""Base class of the members of each set, for objects of unknown classes (plug-ins)."""
 
 
 class Change(NamedTuple):
-    """One thing an upgrade did."""
+    """One change that an upgrade made to one component.
 
-    step: str  # the name of the step
-    below: int  # the version it leads to
-    what: str  # what that step does, in one line
-    where: str  # class and name of the component concerned
-    number: int  # the element it was found at, in document order
-    lost: str | None = None  # what the current format cannot say, if that was more than a default
+    Attributes:
+        step: name of the upgrade step.
+        below: format version that the step leads to.
+        what: description of the step, one line.
+        where: class and name of the component.
+        number: index of the changed element in the old document.
+        lost: content that the current format cannot express; None if that was only a default.
+    """
+
+    step: str
+    below: int
+    what: str
+    where: str
+    number: int
+    lost: str | None = None
 
 
 class Refusal(NamedTuple):
-    """Something over which OpenSim's own upgrade of a document fails, where osimlite's does not."""
+    """Element over which OpenSim's upgrade of a document fails, where osimlite's does not.
 
-    # the object that OpenSim is bringing up to date then; of one that it never reads nothing is
-    # asked
+    Attributes:
+        owner: index of the object that OpenSim upgrades then. OpenSim does not fail over objects
+            that it never reads.
+        number: index of the element in the old document.
+        message: what is wrong, one clause.
+    """
+
     owner: int
-    number: int  # the element concerned, in document order
-    message: str  # what is wrong, in one clause
+    number: int
+    message: str
 
 
-class Refused(Exception):
-    """A document says something that no step can carry over.
+class UpgradeError(Exception):
+    """Error for content that no step can carry over to the current format.
 
     Attributes:
         message: one plain sentence.
-        number: the element concerned, in document order.
+        number: index of the element in the old document.
     """
 
     def __init__(self, message: str, number: int) -> None:
@@ -63,47 +77,41 @@ class Refused(Exception):
 
 
 class Step(NamedTuple):
-    """One step of the upgrade, for documents of a version `below` its own."""
+    """One step of the upgrade.
 
-    below: int
-    order: int
-    name: str
-    what: str
-    apply: Callable[[Draft], None]
-
-
-REGISTERED: list[Step] = []
-"""Every step whose module has been imported."""
-
-
-def step(
-    *, below: int, order: int | None = None
-) -> Callable[[Callable[[Draft], None]], Callable[[Draft], None]]:
-    """Register a function as the step that documents of a version under `below` need.
-
-    The first line of its docstring says what it does to a document. `order` stands in for `below`
-    where a step must run sooner than its number says.
+    Attributes:
+        below: documents of a version below this one need the step.
+        name: name in reports and in the table of steps.
+        apply: function that changes a draft. The first line of its docstring describes the change.
     """
 
-    def register(function: Callable[[Draft], None]) -> Callable[[Draft], None]:
-        what = (function.__doc__ or "").strip().splitlines()[0].rstrip(".")
-        REGISTERED.append(
-            Step(below, below if order is None else order, function.__name__, what, function)
-        )
-        return function
+    below: int
+    name: str
+    apply: Callable[[Draft], None]
 
-    return register
+    @property
+    def what(self) -> str:
+        """Description of the step, one line."""
+        return (self.apply.__doc__ or "").strip().splitlines()[0].rstrip(".")
 
 
 @by_tags
-def families(tag: str) -> frozenset[str]:
-    """The names of the class that a tag stands for and of its bases; none for a tag that is no class."""
+def find_families(tag: str) -> frozenset[str]:
+    """Return the names of the class of a tag and of its bases; none if the tag is not a class."""
     cls = class_for(as_written(tag))
     return frozenset() if cls is None else frozenset(base.__name__ for base in cls.__mro__)
 
 
 class Draft:
-    """The element tree of an old document, changed step by step. `version` is that of the document as it was."""
+    """Element tree of an old document, which the steps change in place.
+
+    Attributes:
+        root: root element.
+        version: format version of the old document.
+        touched: elements that steps created, renamed or moved, in this order.
+        step: step that is running.
+        refusals: elements over which OpenSim's upgrade fails.
+    """
 
     def __init__(self, root: Element, version: int) -> None:
         self.root = root
@@ -112,70 +120,75 @@ class Draft:
         self.step: Step | None = None
         self.refusals: list[Refusal] = []
         self._changes: list[tuple[Step, Element, Element, str | None]] = []
-        if self.moves:
-            # Now or never: the steps to come move elements about.
+        if self.moves_elements:
+            # Number the elements now, because steps move them later.
             assert self.numbers
 
     @property
-    def moves(self) -> bool:
-        """Whether steps move elements; those of version 4 leave every element in its place."""
+    def moves_elements(self) -> bool:
+        """Whether steps move elements; those of version 4 leave every element in its position."""
         return self.version < 40000
 
     @cached_property
     def numbers(self) -> dict[Element, int]:
-        """The number of every element in the document as it was.
+        """Index of every element in the old document.
 
-        An element that a step makes has the number of the element it was made from.
+        An element that a step creates has the index of the element it was created from.
         """
         return {element: number for number, element in enumerate(self.root.iter(etree.Element))}
 
     @cached_property
     def _tags(self) -> dict[str, set[str]]:
-        """Every tag that there is or was, by the families of its class."""
+        """All tags that the document has or had, by the names of their classes and base classes."""
         result: dict[str, set[str]] = {}
         for tag in {element.tag for element in self.numbers}:
-            for family in families(tag):
+            for family in find_families(tag):
                 result.setdefault(family, set()).add(tag)
         return result
 
-    def _know(self, tag: str) -> None:
-        for family in families(tag):
+    def _register_tag(self, tag: str) -> None:
+        for family in find_families(tag):
             self._tags.setdefault(family, set()).add(tag)
 
     @property
     def changes(self) -> list[Change]:
-        """What the steps have done, in the order of the document."""
+        """Changes that the steps have made, in the order of the old document."""
         result = [
-            Change(step.name, step.below, step.what, describe(owner), self.numbers[place], lost)
+            Change(
+                step.name, step.below, step.what, describe_element(owner), self.numbers[place], lost
+            )
             for step, owner, place, lost in self._changes
         ]
         return sorted(result, key=lambda change: change.number)
 
-    def wrap(self, tag: str) -> None:
-        """Put a new root around the tree."""
-        made = etree.Element(tag)
-        self.numbers[made] = self.numbers[self.root]
-        made.append(self.root)
-        self.root = made
+    def wrap_root(self, tag: str) -> None:
+        """Put a new root element around the tree."""
+        new = etree.Element(tag)
+        self.numbers[new] = self.numbers[self.root]
+        new.append(self.root)
+        self.root = new
 
     @property
     def model(self) -> Element | None:
-        """The model, if the document holds one."""
+        """The element of the model, or None if the document has no model."""
         return self.root.find("Model")
 
-    def of_model(self, tag: str) -> list[tuple[Element, Element]]:
-        """The model and its first child with a tag, or nothing: for whoever does something if both are there."""
-        return [] if self.model is None else [*having([self.model], tag)]
+    def find_in_model(self, tag: str) -> list[tuple[Element, Element]]:
+        """Return the model and its first child with a tag as one pair; no pair if either is missing."""
+        return [] if self.model is None else [*find_with_child([self.model], tag)]
 
-    def every(self, *kinds: str) -> list[Element]:
-        """Every element of the classes named or of classes derived from them, in document order.
+    def find_all(self, *kinds: str) -> list[Element]:
+        """Return all elements of some classes or of classes derived from them, in document order.
 
-        Objects of unknown classes count as what the set they stand in says.
+        An object of an unknown class counts as a member of the class that its set contains.
+
+        Args:
+            kinds: names of classes.
         """
         tags = {tag for kind in kinds for tag in self._tags.get(kind, ())}
         sets = [
             owner
-            for owner, kind in _FAMILY_OF_MEMBERS.items()
+            for owner, kind in _MEMBER_FAMILIES.items()
             if kind in kinds and owner in self._tags
         ]
         result = list(self.root.iter(*tags)) if tags else []
@@ -183,8 +196,8 @@ class Draft:
             strange = [
                 member
                 for owner in self.root.iter(*sets)
-                for member in members(owner)
-                if not families(member.tag)
+                for member in list_members(owner)
+                if not find_families(member.tag)
             ]
             if strange:
                 result = sorted(
@@ -192,8 +205,8 @@ class Draft:
                 )
         return result
 
-    def tagged(self, *tags: str) -> list[Element]:
-        """Every element with one of these tags, in document order."""
+    def find_tagged(self, *tags: str) -> list[Element]:
+        """Return all elements with one of these tags, in document order."""
         return list(self.root.iter(*tags))
 
     def add(
@@ -205,107 +218,136 @@ class Draft:
         source: Element,
         name: str | None = None,
     ) -> Element:
-        """Append a new element made from `source`."""
-        made = etree.SubElement(parent, tag)
-        made.text = text
+        """Append a new element to `parent` and return it.
+
+        Args:
+            parent: element that gets the new child.
+            tag: tag of the new element.
+            text: its text; None for no text.
+            source: element of the old document that it comes from, for positions in messages.
+            name: its attribute `name`; None for no name.
+        """
+        new = etree.SubElement(parent, tag)
+        new.text = text
         if name is not None:
-            made.set("name", name)
-        self.numbers[made] = self.numbers[source]
-        self._know(tag)
-        self.touched[made] = None
-        return made
+            new.set("name", name)
+        self.numbers[new] = self.numbers[source]
+        self._register_tag(tag)
+        self.touched[new] = None
+        return new
 
     def rename(self, element: Element, tag: str) -> None:
-        """Give an element another tag."""
+        """Give an element a new tag."""
         element.tag = tag
-        self._know(tag)
+        self._register_tag(tag)
         self.touched[element] = None
 
     def move(self, element: Element, parent: Element) -> None:
-        """Make an element the last child of another."""
+        """Move an element to the end of `parent`."""
         element.tail = None
         parent.append(element)
         self.touched[element] = None
 
     def remove(self, element: Element) -> None:
-        """Take an element out."""
+        """Remove an element from its parent."""
         parent = element.getparent()
         assert parent is not None
         parent.remove(element)
 
     def rename_child(self, parent: Element, old: str, new: str) -> bool:
-        """Give the first child `old` the tag `new`; whether there was one."""
+        """Rename the first child with the tag `old` to `new`; return whether there was one."""
         child = parent.find(old)
         if child is None:
             return False
         self.rename(child, new)
         return True
 
-    def list_in(self, parent: Element, tag: str, *, source: Element) -> Element:
-        """The child that lists objects, made if it is not there."""
+    def rename_properties(self, family: str, tags: Mapping[str, str]) -> None:
+        """Rename properties of all components of a class, and record each changed component.
+
+        Args:
+            family: name of the class; components of derived classes count too.
+            tags: new tags by old tags.
+        """
+        for component in self.find_all(family):
+            # A list, not a generator: all tags of a component have to be renamed.
+            if any([self.rename_child(component, old, new) for old, new in tags.items()]):
+                self.record_change(component)
+
+    def get_list(self, parent: Element, tag: str, *, source: Element) -> Element:
+        """Return the child with a tag that lists objects; create it if it is missing."""
         result = parent.find(tag)
         return self.add(parent, tag, source=source) if result is None else result
 
     def is_a(self, element: Element, family: str) -> bool:
-        """Whether an element is of a class or one derived from it; of an unknown class, by the set it stands in."""
-        if families(element.tag):
-            return family in families(element.tag)
+        """Return whether an element is of a class or of a class derived from it.
+
+        For an unknown class, the set that contains the element decides.
+        """
+        if find_families(element.tag):
+            return family in find_families(element.tag)
         objects = element.getparent()
         owner = None if objects is None or objects.tag != "objects" else objects.getparent()
-        return owner is not None and _FAMILY_OF_MEMBERS.get(owner.tag) == family
+        return owner is not None and _MEMBER_FAMILIES.get(owner.tag) == family
 
-    def refuse(self, owner: Element, element: Element, message: str) -> None:
-        """Record that OpenSim fails over an element when it brings its owner up to date."""
+    def record_refusal(self, owner: Element, element: Element, message: str) -> None:
+        """Record that OpenSim fails over an element when it upgrades the owner."""
         self.refusals.append(Refusal(self.numbers[owner], self.numbers[element], message))
 
-    def changed(
+    def record_change(
         self, element: Element, *, at: Element | None = None, lost: str | None = None
     ) -> None:
-        """Record that the current step changed an element, at which place inside, and what was lost."""
+        """Record that the current step changed an element.
+
+        Args:
+            element: changed component.
+            at: element inside that the change concerns; default the component.
+            lost: content that the current format cannot express.
+        """
         assert self.step is not None
         self._changes.append((self.step, element, element if at is None else at, lost))
 
 
-def describe(element: Element) -> str:
-    """An element as a reader knows it: its class and its name."""
+def describe_element(element: Element) -> str:
+    """Return class and name of an element for messages."""
     name = element.get("name")
     tag = as_written(element.tag)
     return f"{tag} '{name}'" if name else tag
 
 
-def members(owner: Element) -> Iterator[Element]:
-    """The objects of a set."""
+def list_members(owner: Element) -> Iterator[Element]:
+    """Yield the objects of a set."""
     objects = owner.find("objects")
     if objects is not None:
         yield from (child for child in objects if isinstance(child.tag, str))
 
 
-def having(owners: Iterable[Element], tag: str) -> Iterator[tuple[Element, Element]]:
-    """Elements, each with its first child of a tag; those without one are left out."""
+def find_with_child(owners: Iterable[Element], tag: str) -> Iterator[tuple[Element, Element]]:
+    """Yield each owner that has a child with a tag, together with the first such child."""
     for owner in owners:
         child = owner.find(tag)
         if child is not None:
             yield owner, child
 
 
-def elements(parent: Element) -> list[Element]:
-    """The child elements, without comments."""
+def list_elements(parent: Element) -> list[Element]:
+    """Return the child elements, without comments."""
     return [child for child in parent if isinstance(child.tag, str)]
 
 
-def text_of(parent: Element, tag: str) -> str | None:
-    """The text of the first child with a tag, white space collapsed; None if there is none."""
+def get_child_text(parent: Element, tag: str) -> str | None:
+    """Return the text of the first child with a tag, white space collapsed; None without such a child."""
     child = parent.find(tag)
-    return None if child is None else plain(child)
+    return None if child is None else get_text(child)
 
 
-def plain(element: Element) -> str:
-    """The text of an element, white space collapsed."""
+def get_text(element: Element) -> str:
+    """Return the text of an element, white space collapsed."""
     return " ".join(split("".join([element.text or "", *(node.tail or "" for node in element)])))
 
 
-def reals(text: str | None, count: int) -> list[float] | None:
-    """The numbers in a text, or None unless there are exactly `count`."""
+def parse_reals(text: str | None, count: int) -> list[float] | None:
+    """Return the numbers in a text; None unless there are exactly `count` readable numbers."""
     words = split(text or "")
     if len(words) != count:
         return None
@@ -316,21 +358,21 @@ def reals(text: str | None, count: int) -> list[float] | None:
 
 
 def is_true(text: str) -> bool:
-    """A switch as OpenSim converts it; what cannot be read is false."""
+    """Return the value of a switch as OpenSim reads it; an unreadable text is false."""
     return text.lower() in ("true", "1")
 
 
-def body_path(name: str) -> str:
-    """The path of a body in a document of version 4, from its name."""
+def make_body_path(name: str) -> str:
+    """Return the path of a body in a document of version 4."""
     return "/ground" if name == "ground" else f"/bodyset/{name}"
 
 
-def path_of(component: Element) -> str:
-    """The path of a component, by the rules of version 4; unnamed ones go by their class."""
+def make_path(component: Element) -> str:
+    """Return the path of a component by the rules of version 4; a component without a name has that of its class."""
     words: list[str] = []
     here: Element | None = component
     while here is not None and here.tag != "Model":
-        kinds = families(here.tag)
+        kinds = find_families(here.tag)
         if "ModelComponentSet" in kinds:
             words.append(here.tag.lower())
         elif "Component" in kinds or here is component:

@@ -1,8 +1,8 @@
-"""Content that is newer than the version a document states.
+"""Search for content that is newer than the version a document states.
 
-OpenSim trusts the number and reads such a document by the rules of the old format. To bring it up
-to date by these rules would add what is there already in its new form: a second inertia, other
-frames.
+OpenSim trusts the number and reads such a document by the rules of the old format. An upgrade by
+these rules would add content a second time that exists already in the new form, such as the inertia
+or the frames.
 """
 
 from __future__ import annotations
@@ -18,11 +18,17 @@ from osimlite.io.document.upgrade.draft import Element
 
 
 class NewerContent(NamedTuple):
-    """An element that came after the version of its document."""
+    """An element that is newer than the version of its document.
+
+    Attributes:
+        element: the element.
+        parent: tag of the object that contains it.
+        since: version that introduced it.
+    """
 
     element: Element
-    parent: str  # tag of the object that it stands in
-    since: int  # version that introduced it
+    parent: str
+    since: int
 
 
 _MARKS = (
@@ -46,13 +52,13 @@ _MARKS = (
     ),
     (re.compile(r"\w+Constraint"), {"isEnforced": 30509}),
 )
-"""Properties that no older document has, by the class that they stand in, with the version that brought them."""
+"""Properties of some classes, with the version that introduced each."""
 
 
 def find_newer_content(root: Element, version: int) -> NewerContent | None:
     """Return the first element of a document that is newer than its version, or None."""
     for element in root.iter(etree.Element):
-        for tags in _marks_of(element.tag):
+        for tags in _get_marks(element.tag):
             for child in element.iterchildren(etree.Element):
                 since = tags.get(as_written(child.tag), 0)
                 if version < since and (len(child) or (child.text or "").strip()):
@@ -61,6 +67,9 @@ def find_newer_content(root: Element, version: int) -> NewerContent | None:
 
 
 @lru_cache(maxsize=1000)
-def _marks_of(tag: str) -> list[dict[str, int]]:
-    """Return the properties to look for in elements of a tag; documents have thousands of elements of few tags."""
+def _get_marks(tag: str) -> list[dict[str, int]]:
+    """Return the properties to search in elements of a tag.
+
+    The result is cached, because documents have thousands of elements of few tags.
+    """
     return [tags for pattern, tags in _MARKS if pattern.fullmatch(as_written(tag))]

@@ -1,7 +1,7 @@
-"""What OpenSim's own upgrade of an old document insists on: where it is missing or unreadable, OpenSim loads nothing.
+"""Checks of what OpenSim's upgrade of old documents requires; without it, OpenSim loads nothing.
 
-Each entry was read in OpenSim's sources and tried. What remains a property of the current format is
-read leniently later; it is not here.
+Each entry was read in OpenSim's sources and tried with OpenSim 4.6. Properties that the current
+format still has are absent: OpenSim reads them leniently after the upgrade.
 """
 
 from __future__ import annotations
@@ -12,58 +12,65 @@ from functools import cache
 from math import isfinite, isinf
 
 from osimlite.io.document.lexical import Unclean, real, split
-from osimlite.io.document.upgrade.draft import Draft, Element, elements, plain
+from osimlite.io.document.upgrade.draft import Draft, Element, get_text, list_elements
 
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
-_SHOWN = "VisibleObject/GeometrySet/objects/DisplayGeometry"
+_DISPLAY_GEOMETRY = "VisibleObject/GeometrySet/objects/DisplayGeometry"
 
 
-def check(draft: Draft) -> None:
-    """Note everything in a document, as it was, over which OpenSim fails when it brings it up to date."""
-    for family, since, below, paths, kind in _READ:
-        if since <= draft.version < below:
-            reads, words = _KINDS[kind]
-            for owner in draft.every(family):
-                if family == "Body" and owner.get("name") == "ground":
-                    # OpenSim reads of it only what is drawn, and what wraps.
-                    continue
-                for path in paths.split():
-                    for place in _at(owner, path):
-                        if not _is_value(place):
-                            draft.refuse(
-                                owner,
-                                place,
-                                f"<{place.tag}> must be {words} and holds elements or comments",
-                            )
-                        elif not reads(plain(place)):
-                            draft.refuse(
-                                owner, place, f"<{place.tag}> is '{plain(place)[:60]}', not {words}"
-                            )
+def check_strict_reading(draft: Draft) -> None:
+    """Record every element of an old document over which OpenSim's upgrade fails."""
+    _check_values(draft)
     if draft.version < 30501:
-        _bodies(draft)
+        _check_bodies(draft)
     if draft.version < 30508:
-        for component in draft.every("Component"):
-            _connectors(draft, component)
+        for component in draft.find_all("Component"):
+            _check_connectors(draft, component)
     if draft.version < 30505:
-        for joint in draft.every("Joint"):
-            _joint(draft, joint)
+        for joint in draft.find_all("Joint"):
+            _check_joint(draft, joint)
     if draft.version < 30502:
-        for frame in draft.every("PhysicalFrame"):
+        for frame in draft.find_all("PhysicalFrame"):
             visible = frame.find("VisibleObject")
             named = draft.version < 20101 or (
                 visible is not None and visible.find("GeometrySet") is not None
             )
             if visible is not None and named and "name" not in frame.attrib:
-                draft.refuse(frame, frame, f"<{frame.tag}> has geometry and no name")
+                draft.record_refusal(frame, frame, f"<{frame.tag}> has geometry and no name")
 
 
-def _bodies(draft: Draft) -> None:
-    """Every body but ground has a <Joint>, which may be empty; a joint in it names its <parent_body>."""
+def _check_values(draft: Draft) -> None:
+    """Record every element of `_STRICT_VALUES` that OpenSim cannot read."""
+    for family, since, below, paths, value_type in _STRICT_VALUES:
+        if since <= draft.version < below:
+            is_readable, words = _VALUE_TYPES[value_type]
+            for owner in draft.find_all(family):
+                if family == "Body" and owner.get("name") == "ground":
+                    # Of ground OpenSim reads only geometry and wrap objects.
+                    continue
+                for path in paths.split():
+                    for element in _find_elements(owner, path):
+                        if not _is_value(element):
+                            draft.record_refusal(
+                                owner,
+                                element,
+                                f"<{element.tag}> must be {words} and holds elements or comments",
+                            )
+                        elif not is_readable(get_text(element)):
+                            draft.record_refusal(
+                                owner,
+                                element,
+                                f"<{element.tag}> is '{get_text(element)[:60]}', not {words}",
+                            )
+
+
+def _check_bodies(draft: Draft) -> None:
+    """Check that every body but ground has a <Joint>, and that a joint in it names its <parent_body>."""
     if draft.model is None:
         return
     objects = draft.model.find("BodySet/objects")
     if objects is None:
-        draft.refuse(
+        draft.record_refusal(
             draft.model,
             draft.model,
             "the model has no <BodySet> with <objects>, not even one with ground",
@@ -75,44 +82,46 @@ def _bodies(draft: Draft) -> None:
         if body is ground:
             continue
         wrapper = body.find("Joint")
-        inside = [] if wrapper is None else elements(wrapper)
+        children = [] if wrapper is None else list_elements(wrapper)
         if wrapper is None:
-            draft.refuse(body, body, "a body has no <Joint>, not even an empty one")
-        elif inside:
-            parent = inside[0].find("parent_body")
+            draft.record_refusal(body, body, "a body has no <Joint>, not even an empty one")
+        elif children:
+            parent = children[0].find("parent_body")
             if parent is None:
-                draft.refuse(body, inside[0], f"<{inside[0].tag}> has no <parent_body>")
+                draft.record_refusal(body, children[0], f"<{children[0].tag}> has no <parent_body>")
             elif not _is_value(parent):
-                draft.refuse(
+                draft.record_refusal(
                     body, parent, "<parent_body> must be a name and holds elements or comments"
                 )
 
 
-def _connectors(draft: Draft, component: Element) -> None:
-    """Every entry of <connectors> has a name and a <connectee_name>."""
-    listed = component.find("connectors")
-    for connector in [] if listed is None else elements(listed):
+def _check_connectors(draft: Draft, component: Element) -> None:
+    """Check that every entry of <connectors> has a name and a <connectee_name>."""
+    connectors = component.find("connectors")
+    for connector in [] if connectors is None else list_elements(connectors):
         connectee = connector.find("connectee_name")
         if "name" not in connector.attrib:
-            draft.refuse(component, connector, f"<{connector.tag}> in <connectors> has no name")
+            draft.record_refusal(
+                component, connector, f"<{connector.tag}> in <connectors> has no name"
+            )
         elif connectee is None or not _is_value(connectee):
-            draft.refuse(
+            draft.record_refusal(
                 component, connector, f"<{connector.tag}> has no <connectee_name> with a name in it"
             )
 
 
-def _joint(draft: Draft, joint: Element) -> None:
-    """A joint that stands in no body says in <connectors> what it joins."""
+def _check_joint(draft: Draft, joint: Element) -> None:
+    """Check that a joint outside a body names its frames in <connectors>."""
     wrapper = joint.getparent()
     body = None if wrapper is None or wrapper.tag != "Joint" else wrapper.getparent()
     if draft.version < 30501 and body is not None and body.tag == "Body":
         return
-    listed = joint.find("connectors")
-    entries = [] if listed is None else listed.findall("Connector_PhysicalFrame_")
+    connectors = joint.find("connectors")
+    entries = [] if connectors is None else connectors.findall("Connector_PhysicalFrame_")
     names = {entry.get("name") for entry in entries}
     for side in ("parent", "child"):
         if not names & {f"{side}_frame", f"{side}_body"}:
-            draft.refuse(
+            draft.record_refusal(
                 joint,
                 joint,
                 f"<{joint.tag}> has no <Connector_PhysicalFrame_ name='{side}_frame'> in <connectors>",
@@ -120,20 +129,20 @@ def _joint(draft: Draft, joint: Element) -> None:
             return
 
 
-def _at(owner: Element, path: str) -> Iterator[Element]:
-    """The first element of each step of a path, as OpenSim takes it; every <DisplayGeometry> there is."""
+def _find_elements(owner: Element, path: str) -> Iterator[Element]:
+    """Yield the elements at a path as OpenSim finds them: the first of each tag, but every <DisplayGeometry>."""
     first, _, rest = path.partition("/")
     result = owner.findall(first)
     for child in result if first == "DisplayGeometry" else result[:1]:
         if rest:
-            yield from _at(child, rest)
+            yield from _find_elements(child, rest)
         else:
             yield child
 
 
 def _is_value(element: Element) -> bool:
-    """Whether an element is nothing but one text."""
-    if elements(element):
+    """Return whether an element has one text and no child elements."""
+    if list_elements(element):
         return False
     return (
         sum(
@@ -146,6 +155,7 @@ def _is_value(element: Element) -> bool:
 
 
 def _is_number(text: str) -> bool:
+    """Return whether OpenSim reads a number from a text."""
     word, *others = split(text) or [""]
     try:
         value = real(word)
@@ -154,11 +164,14 @@ def _is_number(text: str) -> bool:
     return not others or isfinite(value)
 
 
-def _is_whole(text: str) -> bool:
+def _is_integer(text: str) -> bool:
+    """Return whether a text is an integer of 32 bits."""
     return re.fullmatch(r"[+-]?[0-9]+", text) is not None and -(2**31) <= int(text) < 2**31
 
 
 def _is_vector(size: int) -> Callable[[str], bool]:
+    """Return the predicate for texts that OpenSim reads as a vector of finite numbers."""
+
     def reads(text: str) -> bool:
         result = _vector_pattern(size).fullmatch(text)
         return result is not None and not any(
@@ -170,22 +183,26 @@ def _is_vector(size: int) -> Callable[[str], bool]:
 
 @cache
 def _vector_pattern(size: int) -> re.Pattern[str]:
-    """Return the pattern of a vector; compiled at first use, since few documents need it and it takes a millisecond."""
+    """Return the pattern of a vector."""
+    # Compiled at first use: few documents need it, and it takes a millisecond.
     numbers = r"\s*,?\s*".join([f"({_NUMBER})"] * size).replace(r"\s*,?\s*", r"(?:\s*,\s*|\s+)")
     return re.compile(rf"{numbers}|~?\s*\[\s*{numbers}\s*\]|~?\s*\(\s*{numbers}\s*\)")
 
 
-_KINDS: dict[str, tuple[Callable[[str], bool], str]] = {
+_VALUE_TYPES: dict[str, tuple[Callable[[str], bool], str]] = {
     "text": (lambda text: True, "one text"),
     "number": (_is_number, "a number"),
-    "whole": (_is_whole, "a whole number"),
+    "integer": (_is_integer, "an integer"),
     "three": (_is_vector(3), "three finite numbers"),
     "six": (_is_vector(6), "six finite numbers"),
 }
+"""Predicate and description of each type of value."""
 
-_PLACES = "location_in_parent orientation_in_parent location_in_child orientation_in_child"
+_JOINT_TRANSFORMS = (
+    "location_in_parent orientation_in_parent location_in_child orientation_in_child"
+)
 
-_READ: tuple[tuple[str, int, int, str, str], ...] = (
+_STRICT_VALUES: tuple[tuple[str, int, int, str, str], ...] = (
     (
         "Body",
         0,
@@ -196,12 +213,12 @@ _READ: tuple[tuple[str, int, int, str, str], ...] = (
     ("PhysicalFrame", 0, 30502, "VisibleObject/scale_factors", "three"),
     ("PhysicalFrame", 0, 30502, "VisibleObject/transform", "six"),
     ("PhysicalFrame", 0, 20101, "VisibleObject/geometry_files", "text"),
-    ("PhysicalFrame", 20101, 30502, f"{_SHOWN}/geometry_file", "text"),
-    ("PhysicalFrame", 20101, 30502, f"{_SHOWN}/transform", "six"),
-    ("PhysicalFrame", 20101, 30502, f"{_SHOWN}/scale_factors", "three"),
-    ("PhysicalFrame", 20101, 30502, f"{_SHOWN}/display_preference", "whole"),
-    ("Appearance", 0, 30505, "representation", "whole"),
-    ("Joint", 0, 30505, _PLACES, "three"),
+    ("PhysicalFrame", 20101, 30502, f"{_DISPLAY_GEOMETRY}/geometry_file", "text"),
+    ("PhysicalFrame", 20101, 30502, f"{_DISPLAY_GEOMETRY}/transform", "six"),
+    ("PhysicalFrame", 20101, 30502, f"{_DISPLAY_GEOMETRY}/scale_factors", "three"),
+    ("PhysicalFrame", 20101, 30502, f"{_DISPLAY_GEOMETRY}/display_preference", "integer"),
+    ("Appearance", 0, 30505, "representation", "integer"),
+    ("Joint", 0, 30505, _JOINT_TRANSFORMS, "three"),
     ("Joint", 0, 30500, "location orientation", "three"),
     ("Joint", 0, 30514, "reverse", "text"),
     ("Coordinate", 0, 30514, "motion_type", "text"),
@@ -221,9 +238,13 @@ _READ: tuple[tuple[str, int, int, str, str], ...] = (
     ),
     ("ContactGeometry", 0, 30507, "display_preference", "text"),
     ("Muscle", 0, 30513, "min_control max_control", "number"),
-    ("GeometryPath", 0, 30516, "VisibleObject/display_preference", "whole"),
+    ("GeometryPath", 0, 30516, "VisibleObject/display_preference", "integer"),
     ("GeometryPath", 0, 30516, "default_color", "text"),
-    ("WrapObject", 0, 30515, "display_preference VisibleObject/display_preference", "whole"),
+    ("WrapObject", 0, 30515, "display_preference VisibleObject/display_preference", "integer"),
     ("WrapObject", 0, 30515, "color", "text"),
 )
-"""What is read strictly: in which class, in documents from which version and below which, where, and as what."""
+"""Values that OpenSim's upgrade reads strictly.
+
+Each row has the class, the first version and the version after the last to which it applies, paths
+of elements separated by blanks, and a key of `_VALUE_TYPES`.
+"""

@@ -1,8 +1,8 @@
-"""To 40600: classes that have changed their name."""
+"""Classes that have a new name, in documents of every version."""
 
 from __future__ import annotations
 
-from osimlite.io.document.upgrade.draft import Draft, Element, step
+from osimlite.io.document.upgrade.draft import Draft, Element
 
 RENAMED = {
     "ActuatorSet": "ForceSet",
@@ -29,28 +29,32 @@ RENAMED = {
     "rdCMC_Point": "CMC_Point",
     "rdCMC_TaskSet": "CMC_TaskSet",
 }
-"""Old names of classes, which OpenSim 4.6 still takes in documents of every version."""
+
+
+"""New names of classes by their old names, which OpenSim 4.6 accepts in documents of every version."""
+
 
 RENAMED_MEMBERS = {"Force": "PointActuator", "Torque": "TorqueActuator"}
-"""Old names that say something else outside a set."""
 
 
-@step(below=40600, order=0)
-def class_names(draft: Draft) -> None:
-    """Classes get their present names.
+"""New names of classes by old names that have another meaning outside a set."""
 
-    It comes first: the steps after it know the present names only. Defaults of a class under its
-    old name keep it: OpenSim passes over them.
+
+def rename_classes(draft: Draft) -> None:
+    """Rename classes that have an old name.
+
+    Defaults of a class under its old name keep that name, because OpenSim ignores them.
     """
-    for element in draft.tagged(*RENAMED, *RENAMED_MEMBERS):
+    for element in draft.find_tagged(*RENAMED, *RENAMED_MEMBERS):
         parent = element.getparent()
-        place = None if parent is None else parent.tag
-        if element.tag in RENAMED_MEMBERS and place == "objects":
-            _name(draft, element, RENAMED_MEMBERS[element.tag])
-        elif element.tag in RENAMED and place != "defaults":
-            _name(draft, element, RENAMED[element.tag])
+        parent_tag = None if parent is None else parent.tag
+        if element.tag in RENAMED_MEMBERS and parent_tag == "objects":
+            _rename_class(draft, element, RENAMED_MEMBERS[element.tag])
+        elif element.tag in RENAMED and parent_tag != "defaults":
+            _rename_class(draft, element, RENAMED[element.tag])
 
 
-def _name(draft: Draft, element: Element, new: str) -> None:
+def _rename_class(draft: Draft, element: Element, new: str) -> None:
+    """Rename an element and record the change."""
     draft.rename(element, new)
-    draft.changed(element)
+    draft.record_change(element)
