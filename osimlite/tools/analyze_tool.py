@@ -16,18 +16,18 @@ from osimlite.simulation.initial_state import columns_of_states
 from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
+from osimlite.tools.dynamics_setup import (
+    StateRows,
+    build_model,
+    build_simulation,
+    compute_analyses,
+    find_analyses,
+    report_rows,
+    satisfy_constraints,
+)
 from osimlite.tools.job import Job
 from osimlite.tools.motion import BoolArray, Motion, Record
 from osimlite.tools.outcome import Outcome
-from osimlite.tools.through_time import (
-    StateRows,
-    analyse,
-    analyses_of,
-    constrained,
-    simulation_of,
-    tell_rows,
-    told_model,
-)
 
 SAME_TIME = 2.0**-45.5
 """How much later or earlier a row of speeds may be than that of the coordinates, s."""
@@ -35,15 +35,15 @@ MOST_SPANS = 5
 """Spans of time without an equilibrium that a message names."""
 
 
-def run(job: Job, outcome: Outcome) -> None:
+def run_analyze_tool(job: Job, outcome: Outcome) -> None:
     """Compute every analysis that is on along the rows of the motion between two times."""
     setup: AnalyzeTool = job.setup
-    analyses = analyses_of(job)
+    analyses = find_analyses(job)
     if not analyses:
         raise job.error("none of its analyses is on; give it one")
     states = job.path("states_file")
-    model = told_model(job)
-    with simulation_of(job, model) as simulation:
+    model = build_model(job)
+    with build_simulation(job, model) as simulation:
         if states is None:
             first, rows, record = _followed(job, outcome, simulation, model)
         else:
@@ -70,10 +70,10 @@ def run(job: Job, outcome: Outcome) -> None:
             result,
             record=record,
             unbalanced=unbalanced,
-            simulate=lambda changed: simulation_of(job, changed),
+            simulate=lambda changed: build_simulation(job, changed),
         )
-        analyse(job, outcome, analyses, motion, first)
-    tell_rows(job, outcome, motion)
+        compute_analyses(job, outcome, analyses, motion, first)
+    report_rows(job, outcome, motion)
 
 
 def equilibrate_rows(
@@ -158,7 +158,9 @@ def _followed(
     else:
         own, speeds, others = _given(job, given, recorded, simulation)
     rows = zip(
-        recorded.times.tolist(), *constrained(recorded, speeds, simulation, model), strict=True
+        recorded.times.tolist(),
+        *satisfy_constraints(recorded, speeds, simulation, model),
+        strict=True,
     )
 
     def states() -> Iterator[tuple[float, list[float]]]:

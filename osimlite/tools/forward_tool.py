@@ -8,25 +8,25 @@ from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.tools.dynamics import ForwardTool
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.options import MOST_STEPS
 from osimlite.simulation.run import Simulation
+from osimlite.simulation.options import MOST_STEPS
+from osimlite.tools.dynamics_setup import (
+    StateRows,
+    build_model,
+    build_simulation,
+    compute_analyses,
+    find_analyses,
+    report_rows,
+)
 from osimlite.tools.job import Job
 from osimlite.tools.motion import Motion
 from osimlite.tools.outcome import Outcome
-from osimlite.tools.through_time import (
-    StateRows,
-    analyse,
-    analyses_of,
-    simulation_of,
-    tell_rows,
-    told_model,
-)
 
 
-def run(job: Job, outcome: Outcome) -> None:
+def run_forward_tool(job: Job, outcome: Outcome) -> None:
     """Follow the motion with OpenSim's steps; write states and controls at the end of each, and the analyses."""
     setup: ForwardTool = job.setup
-    analyses = analyses_of(job)
+    analyses = find_analyses(job)
     bounds = setup.minimum_integrator_step_size, setup.maximum_integrator_step_size
     if not 0.0 < setup.integrator_error_tolerance < 1.0:
         raise job.error(
@@ -37,8 +37,8 @@ def run(job: Job, outcome: Outcome) -> None:
         raise job.error(
             f"steps from {bounds[0]:g} s to {bounds[1]:g} s are none; give a longest that is longer"
         )
-    model = told_model(job)
-    with simulation_of(job, model) as simulation:
+    model = build_model(job)
+    with build_simulation(job, model) as simulation:
         start, y = _start(job, outcome, simulation)
         if not start < setup.final_time:
             raise job.error(
@@ -56,8 +56,8 @@ def run(job: Job, outcome: Outcome) -> None:
         steps = list(zip(times, states, strict=True))
         motion = Motion(model, simulation, np.array(times), np.array(states), steps)
         _write(job, outcome, motion)
-        analyse(job, outcome, analyses, motion)
-    tell_rows(job, outcome, motion)
+        compute_analyses(job, outcome, analyses, motion)
+    report_rows(job, outcome, motion)
 
 
 def _start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[float, list[float]]:

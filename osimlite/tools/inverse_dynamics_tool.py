@@ -1,30 +1,37 @@
-"""OpenSim's InverseDynamicsTool: the generalized forces that a measured motion takes."""
+"""OpenSim's InverseDynamicsTool: the generalized forces of a measured motion, and the loads at joints."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
+from osimlite.base.records import replace
 from osimlite.base.text import did_you_mean, listed
 from osimlite.io.tables.storage import StoTable
 from osimlite.io.tables.times import both_of
 from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.kinematics import Kinematics
 from osimlite.mechanics.multibody.mechanism import Mechanism
-from osimlite.schema.joints import Joint
+from osimlite.mechanics.multibody.parts import GROUND
+from osimlite.mechanics.multibody.schema_frames import Placements
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.joints import Joint, ScapulothoracicJoint
 from osimlite.schema.model import Model
 from osimlite.schema.tools.dynamics import InverseDynamicsTool
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.recorded_motion import RecordedMotion, exclude_forces
 from osimlite.tools.evidence import Evidence, root_of
 from osimlite.tools.job import Job
-from osimlite.tools.joint_loads import loads_at_joints
 from osimlite.tools.outcome import Outcome
 
 
-def run(job: Job, outcome: Outcome) -> None:
+def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     """Compute the generalized forces."""
     setup: InverseDynamicsTool = job.setup
     model = job.model()
-    joints = _joints(job, model, outcome)
+    joints = _find_reported_joints(job, model, outcome)
     recorded = RecordedMotion.read(
         build_mechanism(model, opensim_derivatives=True), job.needed("coordinates_file")
     )
@@ -52,7 +59,7 @@ def run(job: Job, outcome: Outcome) -> None:
         result[
             :, [place for body in recorded.mechanism.bodies for place in body.mobilizer.coordinates]
         ] = table.rows
-        at_joints = loads_at_joints(model, joints, recorded, result)
+        at_joints = compute_joint_loads(model, joints, recorded, result)
         outcome.table(job.in_results(setup.output_body_forces_file), at_joints)
     outcome.evidence = Evidence.of(
         model,
@@ -65,10 +72,10 @@ def run(job: Job, outcome: Outcome) -> None:
     row, column = np.unravel_index(int(np.abs(table.rows).argmax()), table.rows.shape)
     most = f"{table.columns[column]}, {table.rows[row, column]:.6g} at {table.times[row]:g} s"
     outcome.tell("largest", most)
-    _tell_residuals(outcome, recorded.mechanism, table)
+    _report_residuals(outcome, recorded.mechanism, table)
 
 
-def _tell_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -> None:
+def _report_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -> None:
     """Say what the joint to ground has to push, which nothing does in life: J. Hicks et al., J Biomech Eng 137, 2015.
 
     Their advice is 5 % of the measured force at most, and moments of 1 % of that times the height
@@ -95,7 +102,7 @@ def _tell_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -> 
             )
 
 
-def _joints(job: Job, model: Model, outcome: Outcome) -> list[Joint]:
+def _find_reported_joints(job: Job, model: Model, outcome: Outcome) -> list[Joint]:
     """The joints whose loads are asked for; OpenSim warns of those that are not there."""
     known = {joint.name: joint for joint in model.joint_set.objects}
     result: list[Joint] = []
@@ -109,3 +116,113 @@ def _joints(job: Job, model: Model, outcome: Outcome) -> list[Joint]:
             message = f"there is no joint '{name}'{did_you_mean(name, known)}: its loads are left out, as in OpenSim"
             outcome.tell("joints_to_report_body_forces", message)
     return result
+
+
+SIGNIFICANT_REAL = 2.0**-45.5
+"""Simbody's SignificantReal: forces of this size are none."""
+
+
+def compute_joint_loads(
+    model: Model, joints: Sequence[Joint], recorded: RecordedMotion, forces: Array
+) -> StoTable:
+    """Force (N) and torque (N m) on the child of each joint at its frame, in ground, that do what its forces do.
+
+    Where either does some of it, that counts which does more with less; the other one does the
+    rest, and each is the shortest that does.
+
+    Args:
+        model: whose joints.
+        joints: those that are asked for.
+        recorded: the motion.
+        forces: generalized forces (t, n) in the order of the mechanism.
+    """
+    mechanism, placements = recorded.mechanism, Placements(model.tree())
+    carried = {body.path: index for index, body in enumerate(mechanism.bodies)}
+    by_joint = {body.mobilizer.joint: index for index, body in enumerate(mechanism.bodies)}
+    asked, labels = [], []
+    for joint in joints:
+        frame = placements.named(joint, "socket_child_frame")
+        base, _ = placements.frame(frame)
+        # OpenSim asks what carries the child, and besides what has the joint's coordinates: others
+        # if it closes a loop.
+        asked.append((joint, {carried[base], by_joint[placements.path(joint)]}))
+        root = f"{joint.name}_{placements.path(frame).rpartition('/')[2]}"
+        labels += [f"{root}_{what}{axis}" for what in "FM" for axis in "XYZ"]
+    # OpenSim moves a scapula by two mobilizers: along the ellipsoid, and about the axis of winging.
+    hinges = [
+        [
+            _split_mobilizer(mechanism, body, apart=isinstance(joint, ScapulothoracicJoint))
+            for body in bodies
+        ]
+        for joint, bodies in asked
+    ]
+    rows = np.zeros((len(recorded.times), len(joints), 2, 3))
+    for row, q, own in zip(rows, recorded.values, forces, strict=True):
+        state = mechanism.at(q)
+        for number, each in enumerate(hinges):
+            row[number] = sum(_compute_joint_load(state, *hinge, own) for hinge in each)
+    title = "Inverse Dynamics Body Forces at Specified Joints"
+    return StoTable(title, recorded.times, tuple(labels), rows.reshape(len(rows), -1))
+
+
+_Hinge = tuple[list[int], Mechanism]
+"""Coordinates, and the mechanism of one body that they move in ground."""
+
+
+def _split_mobilizer(
+    mechanism: Mechanism, body: int, *, apart: bool
+) -> tuple[int, Array, list[_Hinge]]:
+    """What the mobilizer of a body does: the body that carries it, where in that, and the hinges one after another.
+
+    If `apart`, each of its motions is a hinge of its own.
+    """
+    mobilizer = mechanism.bodies[body].mobilizer
+    groups = [[motion] for motion in mobilizer.motions] if apart else [[*mobilizer.motions]]
+    hinges: list[_Hinge] = []
+    for motions in groups[::-1] if mobilizer.reversed else groups:
+        used = sorted({place for motion in motions for place in motion.coordinates})
+        renumbered: Any = [
+            replace(m, coordinates=tuple(map(used.index, m.coordinates))) for m in motions
+        ]
+        places = [mobilizer.coordinates[place] for place in used]
+        still, count = np.eye(4), tuple(range(len(used)))
+        alone = replace(
+            mobilizer, motions=renumbered, coordinates=count, parent_frame=still, child_frame=still
+        )
+        carried = replace(mechanism.bodies[body], parent=GROUND, mobilizer=alone)
+        infos = tuple(
+            replace(mechanism.coordinates[place], locked=False, prescribed=None) for place in places
+        )
+        hinges.append((places, Mechanism(mobilizer.joint, (carried,), infos)))
+    inner = mobilizer.child_frame if mobilizer.reversed else mobilizer.parent_frame
+    return mechanism.bodies[body].parent, inner[:3, :3], hinges
+
+
+def _compute_joint_load(
+    state: Kinematics, parent: int, inner: Array, hinges: Sequence[_Hinge], forces: Array
+) -> Array:
+    """Force and torque (2, 3) in ground for the generalized forces (n,) at hinges one after another."""
+    rotation, load = state.rotations[parent] @ inner, np.zeros((2, 3))
+    for places, hinge in hinges:
+        across = hinge.at(state.q[places])
+        load += _compute_hinge_load(across.jacobians[0].T, forces[places]) @ rotation.T
+        rotation = rotation @ across.rotations[0]
+    return load
+
+
+def _compute_hinge_load(hinge: Array, wanted: Array) -> Array:
+    """Force and torque (2, 3) for the generalized forces (k,) of a hinge whose motion has the Jacobian (k, 6)."""
+    turning, moving = hinge[:, :3], hinge[:, 3:]
+    force, torque = _solve_shortest(moving, wanted), _solve_shortest(turning, wanted)
+    by_force, by_torque = moving @ force, turning @ torque
+    size_by_force, size_by_torque = np.linalg.norm(by_force), np.linalg.norm(by_torque)
+    if size_by_force > SIGNIFICANT_REAL and size_by_torque > SIGNIFICANT_REAL:
+        if size_by_torque * np.linalg.norm(force) > size_by_force * np.linalg.norm(torque):
+            force = _solve_shortest(moving, wanted - by_torque)
+        else:
+            torque = _solve_shortest(turning, wanted - by_force)
+    return np.array((force, torque))
+
+
+def _solve_shortest(rows: Array, values: Array) -> Array:
+    return np.asarray(np.linalg.lstsq(rows, values, rcond=1e-13)[0], dtype=np.float64)

@@ -26,9 +26,9 @@ from osimlite.schema.muscles import Millard2012AccelerationMuscle, Muscle
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.simulation.elements.muscle import SPRING
-from osimlite.tools.joint_wrenches import JointWrenches
 from osimlite.tools.motion import Motion
 from osimlite.tools.muscle_quantities import CHECKED, KNOWN, quantities
+from osimlite.tools.reaction_forces import JointWrenches
 
 Reader = Callable[[Motion, Any, str], Array]
 """The rows (t, k) of an output of a component along a motion; the path of the component is the last argument."""

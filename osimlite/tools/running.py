@@ -5,12 +5,9 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 
 from osimlite.base.files import from_folder
-from osimlite.base.load import module_name
 from osimlite.base.text import counted, listed
 from osimlite.base.writing import ResultWriter
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
@@ -30,6 +27,7 @@ from osimlite.schema.specs import file_specs
 from osimlite.tools.job import Job, NotRunnable
 from osimlite.tools.named_files import expect_few, read_subject
 from osimlite.tools.outcome import Outcome
+from osimlite.tools.registry import TOOLS, import_function
 
 IGNORED = ("OSIM101",)
 """Errors that OpenSim runs a setup with: properties that it does not know, such as those of other versions."""
@@ -99,7 +97,7 @@ def run(
     file = Path(setup)
     top = read_any(file)
     tag = type(top).__name__
-    if not _is_there(tag):
+    if tag not in TOOLS:
         raise NotRunnable(
             f"setups of {tag} cannot be run; those of {listed(runnable())} can", file=str(file)
         )
@@ -122,12 +120,11 @@ def run(
         misspelt = [found for found in outcome.warnings if found.suggestion is not None]
         if tell is not None and misspelt:
             tell(Report(misspelt, report.texts))
-    tool = import_module(f"{__package__}.{module_name(tag)}")
+    run_tool = import_function(TOOLS[tag])
     writer = ResultWriter.for_document(file, output, overwrite=overwrite, outside=write_outside)
     try:
-        tool.run(
-            Job(top, file, None if output is None else Path(output), refine, simulates), outcome
-        )
+        folder = None if output is None else Path(output)
+        run_tool(Job(top, file, folder, refine, simulates), outcome)
         outcome.write(file, writer)
     except OsimliteError as error:
         from osimlite.simulation.elements.gather import SKIP_ADVICE
@@ -189,15 +186,7 @@ def _is_run_by_opensim(error: Finding) -> bool:
 
 def runnable() -> list[str]:
     """The names of the classes whose setups can be run."""
-    return [tag for tag in MODULES if _is_there(tag)]
-
-
-def _is_there(tag: str) -> bool:
-    """Whether a class is one of tools, and has a module here."""
-    of_tools = MODULES.get(tag, "").startswith(
-        ("osimlite.schema.tools.", "osimlite.schema.moco.studies")
-    )
-    return of_tools and find_spec(f"{__package__}.{module_name(tag)}") is not None
+    return [tag for tag in MODULES if tag in TOOLS]
 
 
 def _reports(setup: str, away: dict[str, None]) -> Iterator[Report]:

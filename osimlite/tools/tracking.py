@@ -21,9 +21,9 @@ from osimlite.simulation.lowpass import continued, lowpassed_by_sinc
 from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.static_optimization import least_effort
+from osimlite.tools.dynamics_setup import build_static_optimization, satisfy_constraints
 from osimlite.tools.job import Job, NotRunnable
 from osimlite.tools.outcome import Outcome
-from osimlite.tools.through_time import constrained, sharing_of
 
 PADDING, ORDER = 60, 50
 """Rows that OpenSim adds at both ends of the motion, and the order of its filter."""
@@ -90,7 +90,7 @@ class Desired:
         padded = replace(recorded, times=times, values=values)
         # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints
         # change the values.
-        values, speeds = constrained(padded, padded.rates[0], simulation, model)
+        values, speeds = satisfy_constraints(padded, padded.rates[0], simulation, model)
         # OpenSim assembles every row of the desired motion at the time 0: its functions say one
         # value for all rows.
         for place, info in enumerate(mechanism.coordinates):
@@ -257,8 +257,8 @@ class Sharing:
         self, job: Job, model: Model, mechanism: Mechanism, tasks: Tasks, exact: bool
     ) -> None:
         self.tasks, self.exact, self.mechanism = tasks, exact, mechanism
-        self._unit = sharing_of(job, model, mechanism, muscles="isometric")
-        self._strong = sharing_of(job, model, mechanism) if exact else None
+        self._unit = build_static_optimization(job, model, mechanism, muscles="isometric")
+        self._strong = build_static_optimization(job, model, mechanism) if exact else None
         self.names = self._unit.names
         self.optimal = self._unit.optimal_forces
         if not self.optimal.all():

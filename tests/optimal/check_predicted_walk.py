@@ -12,8 +12,8 @@ import osimlite
 from osimlite.base.records import replace
 from osimlite.cli import main
 from osimlite.optimal.simulated import check_by_simulation
-from osimlite.tools import moco_study
 from osimlite.tools.job import Job
+from osimlite.tools.moco_tools import report_solution
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.report import collect_contacts, collect_controls, collect_trials
 from osimlite.view.motion import contact_forces
@@ -111,7 +111,7 @@ def test_a_report_shows_what_was_found(walk):
     folder, found = walk
     file = folder / "human-walks.omoco"
     outcome, problem = Outcome(), osimlite.moco.build_problem(file)
-    moco_study.report(Job(problem.study, file, simulates=True), problem, found, outcome)
+    report_solution(Job(problem.study, file, simulates=True), problem, found, outcome)
     told = dict(outcome.told)
     assert {"effort", "roughness", "objective"} <= {*told}
     near = re.fullmatch(

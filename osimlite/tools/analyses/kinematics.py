@@ -1,15 +1,16 @@
-"""OpenSim's Kinematics: values of coordinates, their speeds, and the derivatives of these."""
+"""OpenSim's analyses of motion: Kinematics, BodyKinematics and PointKinematics."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from osimlite.io.tables.old_storage import UNITS
-from osimlite.schema.tools.analyses import Kinematics
+from osimlite.io.tables.old_storage import DEGREES, UNITS
+from osimlite.mechanics.multibody.spatial import angles_xyz
+from osimlite.schema.tools.analyses import BodyKinematics, Kinematics, PointKinematics
 from osimlite.tools.motion import Motion, Tables
 
 
-def compute(analysis: Kinematics, motion: Motion, tables: Tables) -> None:
+def write_kinematics(analysis: Kinematics, motion: Motion, tables: Tables) -> None:
     """Write values, speeds and accelerations, the last by the model's own forces."""
     infos = motion.mechanism.coordinates
     names = [info.name for info in infos]
@@ -29,3 +30,105 @@ def compute(analysis: Kinematics, motion: Motion, tables: Tables) -> None:
             in_degrees=analysis.in_degrees,
             description=f"\n{UNITS}",
         )
+
+
+CENTER_OF_MASS = "center_of_mass"
+
+
+def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Tables) -> None:
+    """Write places with body-fixed X-Y-Z angles, velocities and accelerations, in ground or along each body's axes.
+
+    Places, and what is said of the whole mass centre, are always in ground.
+    """
+    bodies, tree = motion.model.body_set.objects, motion.model.tree()
+    places = {body.path: place for place, body in enumerate(motion.mechanism.bodies)}
+    local, total = (
+        analysis.express_results_in_body_local_frame,
+        sum(body.mass for body in bodies) or 1.0,
+    )
+    result, whole = [], np.zeros((3, len(motion.times), 3))
+    for body in bodies:
+        place = places[tree.path_of(body) or ""]
+        linear = np.array(motion.links.point(place, np.array(body.mass_center)))
+        whole += body.mass / total * linear
+        rotation, _ = motion.links.placed(place, np.eye(4))
+        rows = np.stack([linear, [angles_xyz(rotation), *motion.links.turning(place)]], axis=2)
+        if local:
+            rows[1:] = rows[1:] @ rotation
+        if analysis.in_degrees:
+            rows[:, :, 1] = np.degrees(rows[:, :, 1])
+        result.append(rows.reshape(3, -1, 6))
+    names = [body.name for body in bodies]
+    chosen = motion.chosen(
+        analysis.bodies, [*names, CENTER_OF_MASS], f"bodies of '{analysis.name}'"
+    )
+    own = [place for place in chosen if place < len(names)]
+    columns = [
+        f"{names[place]}_{what}" for place in own for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")
+    ]
+    parts = [np.empty((3, len(motion.times), 0)), *(result[place] for place in own)]
+    if len(names) in chosen:
+        parts.append(whole)
+        columns += [f"{CENTER_OF_MASS}_{axis}" for axis in "XYZ"]
+    frame = "bodyLocal" if local else "global"
+    for rows, (suffix, title) in zip(
+        np.concatenate(parts, axis=2),
+        (
+            ("pos_global", "Positions"),
+            (f"vel_{frame}", "Velocities"),
+            (f"acc_{frame}", "Accelerations"),
+        ),
+        strict=True,
+    ):
+        description = BODY_DESCRIPTION.format(
+            motion.model.name, "body-local" if local else "ground"
+        )
+        tables.add(
+            suffix, title, columns, rows, in_degrees=analysis.in_degrees, description=description
+        )
+
+
+BODY_DESCRIPTION = (
+    "\nThis file contains the kinematics (positions and orientations,\n"
+    "velocities and angular velocities, or accelerations and angular accelerations)\n"
+    "of the centers of mass of the body segments in model {}.\n"
+    "\nBody segment orientations are described using body-fixed X-Y-Z Euler angles.\n"
+    "\nAngular velocities and accelerations are expressed in the {} frame.\n"
+    f"\nUnits are S.I. units (seconds, meters, Newtons, ...)\n{DEGREES}"
+)
+
+
+def write_point_kinematics(analysis: PointKinematics, motion: Motion, tables: Tables) -> None:
+    """Write the three: in ground, or the place in the frame of another body, and the rates of ground along its axes."""
+    mechanism, own, beside = (
+        motion.mechanism,
+        str(analysis.body_name),
+        str(analysis.relative_to_body_name),
+    )
+    body, placed = mechanism.placement(motion.frame(own, *FRAME_SEARCH) or own)
+    result = np.array(
+        motion.links.point(body, placed[:3, :3] @ np.array(analysis.point) + placed[:3, 3])
+    )
+    path = motion.frame(beside, *FRAME_SEARCH)
+    if path is not None:
+        rotation, origin = motion.links.placed(*mechanism.placement(path))
+        result[0] -= origin
+        result = (result[..., None, :] @ rotation)[..., 0, :]
+    elif beside not in ("", "none"):
+        tables.outcome.tell(
+            analysis.name, f"there is no frame '{beside}': results are in ground, as in OpenSim"
+        )
+    labels = [f"state_{axis}" for axis in range(3)]
+    for rows, (suffix, title) in zip(result, POINT_TABLES, strict=True):
+        tables.add(
+            suffix,
+            f"Point{title}",
+            labels,
+            rows,
+            description="No description.",
+            of=f"_{analysis.point_name}",
+        )
+
+
+FRAME_SEARCH = "PhysicalFrame", "/bodyset"
+POINT_TABLES = ("pos", "Position"), ("vel", "Velocity"), ("acc", "Acceleration")

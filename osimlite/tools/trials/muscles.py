@@ -11,7 +11,7 @@ from osimlite.lint.trial import Number
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.tools.analyses import MuscleAnalysis
 from osimlite.schema.tools.dynamics import AnalyzeTool
-from osimlite.tools import analyze_tool
+from osimlite.tools.analyze_tool import run_analyze_tool
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.trials.fit import Numbers
@@ -76,5 +76,5 @@ def passive_forces(tool: Tool, file: Path, *, is_states: bool) -> StoTable:
     setup.lowpass_cutoff_frequency_for_coordinates = -1.0 if is_states else tool.cutoff
     setup.analysis_set.objects.append(analysis)
     outcome = Outcome()
-    analyze_tool.run(Job(setup, tool.job.file), outcome)
+    run_analyze_tool(Job(setup, tool.job.file), outcome)
     return outcome.tables["trial_muscles_PassiveFiberForce.sto"]

@@ -1,25 +1,29 @@
-"""OpenSim's MuscleAnalysis: lengths, velocities, forces and powers of muscles, their moment arms and moments."""
+"""OpenSim's analyses of muscles: MuscleAnalysis and StaticOptimization."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from osimlite.io.tables.control_nodes import control_set
 from osimlite.io.tables.old_storage import UNITS
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.muscles import Muscle
-from osimlite.schema.tools.analyses import MuscleAnalysis
+from osimlite.schema.tools.analyses import MuscleAnalysis, StaticOptimization
 from osimlite.simulation.elements.muscle import SPRING
 from osimlite.simulation.paths import Paths
+from osimlite.simulation.static_optimization import Shared
+from osimlite.tools.analyses.reporters import FORCES_DESCRIPTION
+from osimlite.tools.dynamics_setup import build_static_optimization
 from osimlite.tools.motion import Motion, Tables
 from osimlite.tools.muscle_quantities import CHECKED, KNOWN, OF_DYNAMICS, quantities
 
-_DESCRIPTION = (
+MUSCLE_DESCRIPTION = (
     "\nThis analysis gathers basic information about muscles during a simulation "
     f"(e.g., forces, tendon lengths, moment arms, etc).\n{UNITS}"
 )
 
 
-def compute(analysis: MuscleAnalysis, motion: Motion, tables: Tables) -> None:
+def write_muscle_analysis(analysis: MuscleAnalysis, motion: Motion, tables: Tables) -> None:
     """Write a table for each quantity, and two for each coordinate."""
     every = list(motion.model.components(Muscle))
     chosen = motion.chosen(
@@ -34,16 +38,16 @@ def compute(analysis: MuscleAnalysis, motion: Motion, tables: Tables) -> None:
                 f"'{analysis.name}' asks for '{muscle.name}', a {type(muscle).__name__}, {why}"
             )
     names = [muscle.name for muscle in muscles]
-    result = _of_all(motion, muscles)
+    result = _compute_tables(motion, muscles)
     if not motion.mechanism.total_mass > np.finfo(float).eps:
         result |= {suffix: np.full_like(result[suffix], np.nan) for suffix in OF_DYNAMICS}
     for suffix, rows in result.items():
-        tables.add(suffix, suffix, names, rows, description=_DESCRIPTION)
+        tables.add(suffix, suffix, names, rows, description=MUSCLE_DESCRIPTION)
     if analysis.compute_moments:
         _add_moments(analysis, motion, tables, muscles, result["TendonForce"])
 
 
-def _of_all(motion: Motion, muscles: list[Muscle]) -> dict[str, Array]:
+def _compute_tables(motion: Motion, muscles: list[Muscle]) -> dict[str, Array]:
     """The tables (t, m) of muscles of whatever classes."""
     result: dict[str, Array] = {}
     tree = motion.model.tree()
@@ -75,4 +79,46 @@ def _add_moments(
         names, own = [muscle.name for muscle in muscles], arms[:, :, place]
         for what, result in (("MomentArm", own), ("Moment", own * tension)):
             title = f"{what}_{infos[place].name}"
-            tables.add(title, title, names, result, description=_DESCRIPTION)
+            tables.add(title, title, names, result, description=MUSCLE_DESCRIPTION)
+
+
+ACTIVATION_DESCRIPTION = "This file contains static optimization results.\n"
+
+
+def write_static_optimization(analysis: StaticOptimization, motion: Motion, tables: Tables) -> None:
+    """Write activations, forces and controls; what has no solution is no number there, and told."""
+    job = tables.job
+    if motion.record is None:
+        raise job.unable(
+            f"'{analysis.name}' cannot be computed of a motion that was not measured; give it to an AnalyzeTool"
+        )
+    if not analysis.use_model_force_set:
+        raise job.unable(
+            f"'{analysis.name}' has use_model_force_set off, with which OpenSim crashes; set it to true"
+        )
+    muscles = "active" if analysis.use_muscle_physiology else "isometric"
+    problem = build_static_optimization(
+        job, motion.model, motion.mechanism, exponent=analysis.activation_exponent, muscles=muscles
+    )
+    shared = problem.share(motion.times, motion.values, motion.speeds, motion.wanted)
+    forces = problem.records(shared, motion.values, motion.speeds)
+    activations = shared.table()
+    tables.add(
+        "activation",
+        activations.name,
+        activations.columns,
+        activations.rows,
+        description=ACTIVATION_DESCRIPTION,
+    )
+    tables.add("force", forces.name, forces.columns, forces.rows, description=FORCES_DESCRIPTION)
+    tables.add_text("controls.xml", "".join(control_set(activations)))
+    _report_unsolved(shared, analysis.name, tables)
+
+
+def _report_unsolved(shared: Shared, name: str, tables: Tables) -> None:
+    """Say how it went: times without a solution, and what is missing there."""
+    outcome = tables.outcome
+    outcome.summary[f"{name}_unsolved"] = np.count_nonzero(~shared.solved)
+    if said := shared.unsolved():
+        outcome.done = False
+        outcome.tell(name, said)

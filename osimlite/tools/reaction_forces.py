@@ -1,4 +1,4 @@
-"""What the constraints of a model push bodies and coordinates with."""
+"""Forces of constraints and wrenches at joints along a motion."""
 
 from __future__ import annotations
 
@@ -24,7 +24,12 @@ from osimlite.mechanics.multibody.parts import GROUND
 from osimlite.mechanics.multibody.program import Program
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema import constraints as schema
+from osimlite.schema.joints import Joint
 from osimlite.simulation.constrained import constraints_on
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.controls import Controls
+from osimlite.simulation.link_motion import LinkMotion
+from osimlite.simulation.system import System
 from osimlite.tools.motion import Motion
 
 
@@ -68,7 +73,7 @@ class ConstraintForces:
         mechanism, state = self.state.mechanism, self.state
         bodies = [body for body in constraint.bodies if body != GROUND]
         held: Any = constraint
-        program = _apart(mechanism, held)
+        program = _build_separate_bodies(mechanism, held)
         data, y, f = program.state(
             np.zeros(6 * len(mechanism.bodies)), np.zeros(6 * len(mechanism.bodies))
         )
@@ -95,7 +100,7 @@ class ConstraintForces:
 
 
 @lru_cache
-def _apart(mechanism: Mechanism, constraint: Any) -> Program:
+def _build_separate_bodies(mechanism: Mechanism, constraint: Any) -> Program:
     """A constraint between bodies whose velocities are speeds of their own, each body a link without a joint."""
     count = len(mechanism.bodies)
     links = [Link(GROUND, []) for _ in range(count)]
@@ -105,14 +110,14 @@ def _apart(mechanism: Mechanism, constraint: Any) -> Program:
     )
 
 
-def recorded(motion: Motion) -> tuple[list[str], Array]:
+def compute_constraint_records(motion: Motion) -> tuple[list[str], Array]:
     """Labels and numbers (t, m) that OpenSim's constraints record of the forces on their bodies and mobilizers.
 
     Forces come before moments, along the axes of the body that carries all those of a constraint.
     All have the opposite sign of what pushes, as the multipliers of Simbody have.
     """
     if motion.unbalanced and motion.balanced.any():
-        columns, part = recorded(motion.select(motion.balanced))
+        columns, part = compute_constraint_records(motion.select(motion.balanced))
         result = np.full((len(motion.times), len(columns)), np.nan)
         result[motion.balanced] = part
         return columns, result
@@ -135,13 +140,13 @@ def recorded(motion: Motion) -> tuple[list[str], Array]:
                     ).ravel()
                 )
                 columns = [
-                    f"{_name(mechanism, body)}_{what}{axis}"
+                    f"{_get_body_name(mechanism, body)}_{what}{axis}"
                     for body in constraint.bodies
                     for what in "FM"
                     for axis in "xyz"
                 ]
             else:
-                places = _mobilities(mechanism, constraint)
+                places = _find_mobilities(mechanism, constraint)
                 row.append(
                     (multipliers @ constraint.acceleration_equations(forces.state)[0])[places]
                 )
@@ -152,11 +157,11 @@ def recorded(motion: Motion) -> tuple[list[str], Array]:
     return labels, np.array(rows)
 
 
-def _name(mechanism: Mechanism, body: int) -> str:
+def _get_body_name(mechanism: Mechanism, body: int) -> str:
     return "ground" if body == GROUND else mechanism.bodies[body].name
 
 
-def _mobilities(mechanism: Mechanism, constraint: Constraint) -> list[int]:
+def _find_mobilities(mechanism: Mechanism, constraint: Constraint) -> list[int]:
     """Places of all coordinates of the joints that a coupler speaks of, its dependent coordinate last."""
     assert isinstance(constraint, Coupler)
     owners = {
@@ -166,3 +171,69 @@ def _mobilities(mechanism: Mechanism, constraint: Constraint) -> list[int]:
     }
     joints = dict.fromkeys(owners[place] for place in constraint.coordinates)
     return [place for joint in joints for place in joint]
+
+
+class JointWrenches:
+    """What the joints carry along a motion, by the Newton-Euler equations of the bodies beyond them."""
+
+    @classmethod
+    def along(cls, motion: Motion, controls: Controls | None = None) -> JointWrenches:
+        """Those of a motion, which are found once if nothing else drives the actuators."""
+        if controls is not None:
+            return cls(motion, controls)
+        return motion.once("joint wrenches", lambda: cls(motion, None))
+
+    def __init__(self, motion: Motion, controls: Controls | None) -> None:
+        self.mechanism = motion.mechanism
+        self.carried = {
+            body.mobilizer.joint: index for index, body in enumerate(self.mechanism.bodies)
+        }
+        system = System(self.mechanism, motion.simulation.forces, apart=True)
+        if controls is not None:
+            system.drive(controls)
+        balanced = motion.select(motion.balanced) if motion.unbalanced else motion
+        self.moved = LinkMotion.of(
+            system, balanced.table, balanced.accelerations[:, list(system.order)]
+        )
+        if self.mechanism.constrained:
+            for links, forces in zip(
+                self.moved.links, ConstraintForces.along(balanced), strict=True
+            ):
+                self._push(links, forces)
+        if motion.unbalanced:
+            self.moved = LinkMotion(system, self._spread(motion))
+
+    def _spread(self, motion: Motion) -> Array:
+        """Return the links at all times (t, l, n): without wrenches where a muscle lacks an equilibrium."""
+        still = System(self.mechanism.released(), Forces(()), apart=True)
+        moments = np.column_stack([motion.times, still.state.rows(motion.values, motion.speeds)])
+        links = still.links_in_motion(moments, motion.accelerations[:, list(still.order)])
+        links[motion.balanced] = self.moved.links
+        return links
+
+    def _push(self, links: Array, forces: ConstraintForces) -> None:
+        """Let constraints push bodies (l, n), and all that carry them."""
+        for constraint, multipliers in forces.multipliers:
+            for body, wrench in zip(
+                constraint.bodies, forces.on_bodies(constraint, multipliers), strict=True
+            ):
+                force, here = wrench[3:], forces.state.origins[body]
+                while body != GROUND:
+                    arm = here - links[body, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
+                    about = np.concatenate([wrench[:3] + np.cross(arm, force), force])
+                    links[body, LINK_WORK.WRENCH : LINK_WORK.WRENCH + 6] += about
+                    body = self.mechanism.bodies[body].parent
+
+    def of(self, joint: Joint, side: str) -> tuple[Array, Array, Array]:
+        """Force, moment, and the origin of the joint's frame at which they act (t, 3), in ground."""
+        outer = self.carried[joint.path]
+        body, link = self.mechanism.bodies[outer], self.moved.links[:, outer]
+        mobilizer = body.mobilizer
+        # The body that the joint carries in the tree gets what is missing there, the other one the
+        # opposite.
+        is_outer = (side == "child") != mobilizer.reversed
+        wrench = (-1.0 if is_outer else 1.0) * link[:, LINK_WORK.WRENCH : LINK_WORK.WRENCH + 6]
+        frame = mobilizer.child_frame if side == "child" else mobilizer.parent_frame
+        _, place = self.moved.placed(outer if is_outer else body.parent, frame)
+        arm = place - link[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
+        return wrench[:, 3:], wrench[:, :3] - np.cross(arm, wrench[:, 3:]), place

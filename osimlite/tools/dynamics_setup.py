@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from importlib.util import find_spec
+from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from osimlite.base.load import module_name
 from osimlite.base.text import listed
 from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -30,55 +27,55 @@ from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import Job
 from osimlite.tools.motion import Motion, Tables
 from osimlite.tools.outcome import Outcome
+from osimlite.tools.registry import ANALYSES, import_function
 
-_ANALYSES = "osimlite.tools.analyses"
-
-Analyses = list[tuple[Any, ModuleType]]
-"""Analyses of a setup, and the modules that compute them."""
+Analyses = list[tuple[Any, Callable[[Any, Motion, Tables], None]]]
+"""Analyses of a setup, each with the function that computes and writes it."""
 
 
-def analyses_of(job: Job) -> Analyses:
-    """The analyses that are on.
+def find_analyses(job: Job) -> Analyses:
+    """Return the analyses of a setup that are on.
 
     Raises:
-        NotRunnable: there is no module for one.
+        NotRunnable: osimlite cannot compute one of them.
     """
     setup: AbstractTool = job.setup
     result = []
     for item in setup.analysis_set.objects:
         if item.on:
             tag = type(item).__name__
-            name = f"{_ANALYSES}.{module_name(tag)}"
-            if find_spec(name) is None:
+            if tag not in ANALYSES:
                 raise job.unable(
-                    f"the analysis '{item.name}' is a {tag}, which cannot be computed yet"
+                    f"the analysis '{item.name}' is a {tag}, which osimlite cannot compute yet; "
+                    "switch it off with <on>false</on>"
                 )
-            result.append((item, import_module(name)))
+            result.append((item, import_function(ANALYSES[tag])))
     return result
 
 
-def analyse(job: Job, outcome: Outcome, analyses: Analyses, motion: Motion, first: int = 0) -> None:
+def compute_analyses(
+    job: Job, outcome: Outcome, analyses: Analyses, motion: Motion, first: int = 0
+) -> None:
     """Compute analyses along the rows of a motion.
 
-    As in OpenSim, the first and the last row are always among those of an analysis, and between
-    them those whose number is a multiple of its `step_interval`; its `start_time` and `end_time`
-    mean nothing.
+    As in OpenSim, an analysis has the first and the last row, and between them the rows whose
+    number is a multiple of its `step_interval`. Its `start_time` and `end_time` have no effect.
 
     Args:
-        job: what is done.
-        outcome: that has the tables written.
-        analyses: what is computed.
+        job: setup of the tool.
+        outcome: collects the tables.
+        analyses: analyses with the functions that compute them.
         motion: all rows.
-        first: number of the first row.
+        first: number of the first row in the file of the motion.
     """
     numbers = np.arange(first, first + len(motion.times))
-    for item, module in analyses:
-        own = motion
+    for item, write in analyses:
+        part = motion
         if item.step_interval > 1:
-            chosen = numbers % item.step_interval == 0
-            chosen[[0, -1]] = True
-            own = motion.select(chosen)
-        module.compute(item, own, Tables(job, outcome, item.name, own.times, describe_gaps(own)))
+            selected = numbers % item.step_interval == 0
+            selected[[0, -1]] = True
+            part = motion.select(selected)
+        write(item, part, Tables(job, outcome, item.name, part.times, describe_gaps(part)))
 
 
 def describe_gaps(motion: Motion) -> str:
@@ -89,7 +86,7 @@ def describe_gaps(motion: Motion) -> str:
     return f"NaN stands where no equilibrium of fibers and tendon was found of {names}, and for what depends on it.\n"
 
 
-def told_model(job: Job) -> Model:
+def build_model(job: Job) -> Model:
     """The model of a setup with the forces and controllers that the setup gives it.
 
     Raises:
@@ -126,7 +123,7 @@ def _from_here(job: Job, item: Object) -> Any:
     return item
 
 
-def simulation_of(job: Job, model: Model) -> Simulation:
+def build_simulation(job: Job, model: Model) -> Simulation:
     """What computes the model of a setup under its loads, with OpenSim's mistakes: its numbers are asked for."""
     return Simulation(
         model,
@@ -138,7 +135,9 @@ def simulation_of(job: Job, model: Model) -> Simulation:
     )
 
 
-def sharing_of(job: Job, model: Model, mechanism: Mechanism, **choices: Any) -> StaticOptimization:
+def build_static_optimization(
+    job: Job, model: Model, mechanism: Mechanism, **choices: Any
+) -> StaticOptimization:
     """What shares the forces of a motion among the actuators of the model of a setup under its loads, as OpenSim."""
     return StaticOptimization(
         model,
@@ -150,7 +149,7 @@ def sharing_of(job: Job, model: Model, mechanism: Mechanism, **choices: Any) -> 
     )
 
 
-def constrained(
+def satisfy_constraints(
     recorded: RecordedMotion, speeds: Array, simulation: Simulation, model: Model
 ) -> tuple[Array, Array]:
     """Values and speeds (t, n) of a motion that fulfil the constraints: the speeds those alone that are prescribed."""
@@ -222,7 +221,7 @@ class StateRows(NamedTuple):
             outcome.tell("not in the file", f"{listed(self.missing)}: the default values are taken")
 
 
-def tell_rows(job: Job, outcome: Outcome, motion: Motion) -> None:
+def report_rows(job: Job, outcome: Outcome, motion: Motion) -> None:
     """Say how many rows there are, and keep what a report shows of them."""
     times = motion.times
     outcome.evidence = Evidence.of(

@@ -1,4 +1,4 @@
-"""The JointReaction analysis: what each joint carries."""
+"""OpenSim's analyses of forces: Actuation and JointReaction."""
 
 from __future__ import annotations
 
@@ -7,56 +7,64 @@ from collections.abc import Sequence
 import numpy as np
 
 from osimlite.base.text import counted, did_you_mean, listed
+from osimlite.io.tables.old_storage import UNITS
 from osimlite.io.tables.storage import read_sto
 from osimlite.mechanics.multibody.schema_frames import Placements
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.actuators import ScalarActuator
+from osimlite.schema.actuators import Actuator, ScalarActuator
 from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
-from osimlite.schema.tools.analyses import JointReaction
+from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.tools.analyses import Actuation, JointReaction
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.run_controls import driven
 from osimlite.simulation.static_optimization import ideal
-from osimlite.tools.joint_wrenches import JointWrenches
+from osimlite.tools.dynamics_setup import build_simulation
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.through_time import simulation_of
+from osimlite.tools.reaction_forces import JointWrenches
 
-_TITLE = "Joint Reaction Loads"
-_DESCRIPTION = (
+REACTION_TITLE = "Joint Reaction Loads"
+REACTION_DESCRIPTION = (
     "\nThis file contains the reaction forces and moments\n"
     "applied to the specified body of a joint pair and expressed  in the specified reference frame.\n"
     "\nUnits are S.I. units (seconds, meters, Newtons, ...)"
 )
-_ENDINGS = ("fx", "fy", "fz", "mx", "my", "mz", "px", "py", "pz")
+REACTION_ENDINGS = ("fx", "fy", "fz", "mx", "my", "mz", "px", "py", "pz")
 
 
-def compute(analysis: JointReaction, motion: Motion, tables: Tables) -> None:
+def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Tables) -> None:
     """Write the force (N), the moment (N m) and the point (m) at which they act of every joint that is asked for."""
     mechanism, model = motion.mechanism, motion.model
-    joints = _joints(analysis, model, tables)
-    sides = _of_each("apply_on_bodies", analysis.apply_on_bodies or ("child",), joints, tables)
-    frames = _of_each("express_in_frame", analysis.express_in_frame or ("ground",), joints, tables)
-    loads = JointWrenches.along(*_overridden(analysis, motion, tables))
+    joints = _find_joints(analysis, model, tables)
+    sides = _expand_words("apply_on_bodies", analysis.apply_on_bodies or ("child",), joints, tables)
+    frames = _expand_words(
+        "express_in_frame", analysis.express_in_frame or ("ground",), joints, tables
+    )
+    loads = JointWrenches.along(*_override_forces(analysis, motion, tables))
     columns: list[str] = []
     rows: list[Array] = []
     for joint, word, asked in zip(joints, sides, frames, strict=True):
         side = word.lower()
         if side not in ("child", "parent"):
             raise tables.job.error(f"apply_on_bodies has '{side}'; it says child or parent")
-        bases = {end: _base(model, joint, end) for end in ("child", "parent")}
-        frame = _frame(motion, asked, bases, tables)
+        bases = {end: _find_base_path(model, joint, end) for end in ("child", "parent")}
+        frame = _find_frame_path(motion, asked, bases, tables)
         force, moment, place = loads.of(joint, side)
         rotation, origin = loads.moved.placed(*mechanism.placement(frame))
         back = rotation.transpose(0, 2, 1)
         rows += [(back @ item[..., None])[..., 0] for item in (force, moment, place - origin)]
-        root = f"{joint.name}_on_{_last(bases[side])}_in_{_last(frame)}"
-        columns += [f"{root}_{ending}" for ending in _ENDINGS]
+        root = f"{joint.name}_on_{_get_last_name(bases[side])}_in_{_get_last_name(frame)}"
+        columns += [f"{root}_{ending}" for ending in REACTION_ENDINGS]
     tables.add(
-        "ReactionLoads", _TITLE, columns, np.concatenate(rows, axis=1), description=_DESCRIPTION
+        "ReactionLoads",
+        REACTION_TITLE,
+        columns,
+        np.concatenate(rows, axis=1),
+        description=REACTION_DESCRIPTION,
     )
 
 
-def _joints(analysis: JointReaction, model: Model, tables: Tables) -> list[Joint]:
+def _find_joints(analysis: JointReaction, model: Model, tables: Tables) -> list[Joint]:
     """The joints that are asked for; OpenSim finds each after the one before only, and leaves the others out."""
     every = model.joint_set.objects
     names = list(map(str, analysis.joint_names)) or ["ALL"]
@@ -71,7 +79,7 @@ def _joints(analysis: JointReaction, model: Model, tables: Tables) -> list[Joint
     return [known[name] for name in names]
 
 
-def _of_each(
+def _expand_words(
     what: str, given: Sequence[object], joints: Sequence[Joint], tables: Tables
 ) -> list[str]:
     """The word for each joint; one may be for all."""
@@ -84,13 +92,13 @@ def _of_each(
     return words
 
 
-def _base(model: Model, joint: Joint, end: str) -> str:
+def _find_base_path(model: Model, joint: Joint, end: str) -> str:
     """The path of the body (or ground) that an end of a joint is fixed to."""
     placements = Placements(model.tree())
     return placements.frame(placements.named(joint, f"socket_{end}_frame"))[0]
 
 
-def _frame(motion: Motion, asked: str, bases: dict[str, str], tables: Tables) -> str:
+def _find_frame_path(motion: Motion, asked: str, bases: dict[str, str], tables: Tables) -> str:
     """The path of a frame that is asked for by a word or as OpenSim finds it: in the model, its bodies, its joints."""
     result = motion.frame(asked, "Frame", "/bodyset", "/jointset") or bases.get(asked.lower())
     if result is None:
@@ -99,11 +107,11 @@ def _frame(motion: Motion, asked: str, bases: dict[str, str], tables: Tables) ->
     return result
 
 
-def _last(path: str) -> str:
+def _get_last_name(path: str) -> str:
     return path.rpartition("/")[2]
 
 
-def _overridden(
+def _override_forces(
     analysis: JointReaction, motion: Motion, tables: Tables
 ) -> tuple[Motion, Controls | None]:
     """The motion of a model whose actuators push as a file says, and what drives them.
@@ -135,7 +143,7 @@ def _overridden(
                 f"the {type(item).__name__} '{item.name}' cannot push as '{path}' says, which is not done yet"
             )
         model.force_set.objects[places[id(item)]] = other
-    simulation = simulation_of(tables.job, model)
+    simulation = build_simulation(tables.job, model)
     forces = {item.name: (table.times, table[item.name]) for item in actuators}
     first, last = (float(time) for time in motion.times[[0, -1]])
     controls = driven(
@@ -146,3 +154,43 @@ def _overridden(
     return Motion(
         model, simulation, motion.times, np.array([simulation.state.pack(q, u) for q, u in pairs])
     ), controls
+
+
+ACTUATION_DESCRIPTION = (
+    "\nThis file contains either the forces, speeds, or powers developed\n"
+    "by the actuators of a model during a simulation.\n"
+    "\nAn actuator force is a generalized force, meaning that it can be either a force (N) or a torque (Nm).\n"
+    "\nAn actuator speed is the rate at which an actuator shortens. Depending on the actuator,\n"
+    "a speed can be either a translational speed (m/s) or an angular speed (deg/s or rad/s).\n"
+    "\nAn actuator power (Watts) is the rate at which an actuator does work.  Positive power means\n"
+    "that the actuator is delivering energy to the model; negative power means that the actuator\n"
+    "is absorbing energy from the model.\n"
+    f"\n{UNITS}"
+)
+
+
+def write_actuation(analysis: Actuation, motion: Motion, tables: Tables) -> None:
+    """Write three tables of the actuators that are on."""
+    actuators = [
+        item
+        for item in motion.model.force_set.objects
+        if isinstance(item, Actuator) and item.appliesForce
+    ]
+    for item in actuators:
+        if item.control_count != 1:
+            raise tables.job.unable(
+                f"'{analysis.name}' asks for one force of '{item.name}', a {type(item).__name__}, which has several; "
+                "OpenSim crashes there"
+            )
+    tree = motion.model.tree()
+    known = motion.known([tree.path_of(item) or "" for item in actuators], "actuation", "speed")
+    force, speed = known["actuation"], known["speed"]
+    # A tension pulls against the lengthening speed.
+    sense = np.array([-1.0 if isinstance(item, PathActuator) else 1.0 for item in actuators])
+    names = [item.name for item in actuators]
+    for suffix, title, rows in (
+        ("force", "ActuatorForces", force),
+        ("speed", "ActuatorSpeeds", speed),
+        ("power", "ActuatorPowers", sense * force * speed),
+    ):
+        tables.add(suffix, title, names, rows, description=ACTUATION_DESCRIPTION)

@@ -1,4 +1,4 @@
-"""A run of RRATool or CMCTool: the motion that a model makes while it follows another, and the files of it."""
+"""OpenSim's RRATool and CMCTool: a model follows a measured motion by forces or excitations that are computed."""
 
 from __future__ import annotations
 
@@ -6,27 +6,145 @@ from pathlib import Path
 
 import numpy as np
 
+from osimlite.base.text import did_you_mean
 from osimlite.io.document.printer import to_text
 from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.control_sets import ControlSet
+from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.schema.tools.analyses import Actuation, Kinematics
 from osimlite.schema.tools.tracking import CMCTool, RRATool
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.run import Simulation
 from osimlite.tools.computed_control import ComputedControl, Control, Followed
+from osimlite.tools.dynamics_setup import (
+    build_model,
+    build_simulation,
+    build_static_optimization,
+    compute_analyses,
+    find_analyses,
+    report_rows,
+)
 from osimlite.tools.job import Job
 from osimlite.tools.motion import Motion
 from osimlite.tools.outcome import Outcome
-from osimlite.tools.through_time import analyse, analyses_of, simulation_of, tell_rows
 from osimlite.tools.tracking import Desired, Sharing, Tasks, require_no_controllers
+
+RRA_WINDOW = 1e-3
+"""For which controls are computed, s."""
+FARTHEST = 0.1
+"""A mass centre is moved by no more than this, m."""
+
+
+def run_rra_tool(job: Job, outcome: Outcome) -> None:
+    """Move the mass centre if that is asked for, then follow the motion, and write what residuals are left."""
+    setup: RRATool = job.setup
+    model, whole = build_model(job), job.model()
+    with build_simulation(job, model) as simulation:
+        desired = Desired.of(job, outcome, simulation, model)
+    if setup.adjust_com_to_reduce_residuals:
+        _move_mass_center(job, outcome, model, whole, desired)
+        outcome.text(_get_model_output(job, setup.output_model_file.strip()), to_text(whole))
+    motion = _track_motion(job, outcome, model, desired, RRA_WINDOW, exact=False)
+    if motion is None:
+        return
+    forces = outcome.tables[f"{setup.name}_Actuation_force.sto"]
+    averages = _average_residual_columns(forces.times, forces.columns, forces.rows)
+    outcome.summary["average_residuals"] = dict(zip(RESIDUALS, averages, strict=True))
+    if words := _describe_residuals(averages):
+        outcome.tell("average residuals", words)
+    lines = "".join(
+        f"{name} average = {value:g}\n" for name, value in zip(RESIDUALS, averages, strict=True)
+    )
+    outcome.text(job.in_results(f"{setup.name}_avgResiduals.txt"), f"Average Residuals:\n\n{lines}")
+
+
+def _move_mass_center(
+    job: Job, outcome: Outcome, model: Model, whole: Model, desired: Desired
+) -> None:
+    """Move the mass centre of a body in two models so that the moments about the horizontal axes average to nothing.
+
+    The masses that would take the vertical force away are only told, as OpenSim does.
+    """
+    setup: RRATool = job.setup
+    name = str(setup.adjusted_com_body)
+    bodies = {body.name: body for body in model.components(Body)}
+    if name not in bodies:
+        raise job.error(
+            f"adjusted_com_body is '{name}', which is no body of the model{did_you_mean(name, bodies)}"
+        )
+    body, gravity = bodies[name], model.gravity
+    weight = abs(gravity[1]) * body.mass
+    if weight < 2.0**-45.5:
+        outcome.tell("mass center", f"'{name}' has no weight: it stays where it is, as in OpenSim")
+        return
+    before = _compute_average_residuals(job, model, desired)
+    dx, dz = np.clip([before[5] / weight, -before[3] / weight], -FARTHEST, FARTHEST).tolist()
+    x, y, z = body.mass_center
+    for each in (model, whole):
+        next(item for item in each.components(Body) if item.name == name).mass_center = (
+            x - dx,
+            y,
+            z - dz,
+        )
+    total = sum(item.mass for item in bodies.values())
+    change = before[1] / gravity[1]
+    outcome.summary |= {"mass_center_moved": [-dx, 0.0, -dz], "mass_change": change}
+    outcome.tell("mass center", f"of {name} moved by {-dx:.4g} m along x and {-dz:.4g} m along z")
+    outcome.tell(
+        "mass",
+        f"{total:.6g} kg, and {change:+.4g} kg would take the vertical residual away; OpenSim leaves that to you",
+    )
+    for when, averages in (
+        ("before", before),
+        ("after", _compute_average_residuals(job, model, desired)),
+    ):
+        outcome.tell(f"residuals {when}", _describe_residuals(averages))
+
+
+def _compute_average_residuals(job: Job, model: Model, desired: Desired) -> list[float]:
+    """Averages of the residuals that the motion takes as it was measured, in the time of the setup."""
+    setup: RRATool = job.setup
+    mechanism: Mechanism = build_mechanism(model, opensim_derivatives=True)
+    sharing = build_static_optimization(job, model, mechanism, muscles="isometric")
+    given = setup.initial_time_for_com_adjustment, setup.final_time_for_com_adjustment
+    own = max(setup.initial_time, desired.start), min(setup.final_time, desired.end)
+    first, last = own if given == (-1.0, -1.0) else given
+    rows = [
+        max(0, int(np.searchsorted(desired.times, time, side="right")) - 1)
+        for time in (first, last)
+    ]
+    chosen = slice(rows[0], rows[1] + 1)
+    times, values, speeds = desired.times[chosen], desired.values[chosen], desired.speeds[chosen]
+    (wanted,) = derivatives_of_samples(desired.times, desired.speeds, times, (1,))
+    forces = sharing.balanced(times, values, speeds, wanted)
+    return _average_residual_columns(times, sharing.names, forces)
+
+
+def run_cmc_tool(job: Job, outcome: Outcome) -> None:
+    """Follow the motion window by window, and write controls, states and forces."""
+    setup: CMCTool = job.setup
+    if setup.actuators_to_exclude:
+        raise job.unable(
+            "actuators_to_exclude is given, and all actuators are controlled here; leave it empty"
+        )
+    model = build_model(job)
+    with build_simulation(job, model) as simulation:
+        desired = Desired.of(job, outcome, simulation, model)
+    _track_motion(
+        job, outcome, model, desired, setup.cmc_time_window, setup.use_fast_optimization_target
+    )
+
 
 RESIDUALS = "FX", "FY", "FZ", "MX", "MY", "MZ"
 """What OpenSim's tools take for residual forces and moments of the pelvis."""
 
 
-def track(
+def _track_motion(
     job: Job, outcome: Outcome, model: Model, desired: Desired, window: float, exact: bool
 ) -> Motion | None:
     """Have a model follow a motion, and write what OpenSim writes of it; None if it does not begin.
@@ -41,7 +159,7 @@ def track(
     """
     setup: RRATool | CMCTool = job.setup
     require_no_controllers(job, model)
-    analyses = analyses_of(job)
+    analyses = find_analyses(job)
     have = {type(item) for item, _ in analyses}
     for cls in (Actuation, Kinematics):
         if cls not in have:
@@ -49,18 +167,18 @@ def track(
     for item in setup.analysis_set.objects:
         if isinstance(item, Kinematics):
             item.in_degrees = True
-    analyses = analyses_of(job)
+    analyses = find_analyses(job)
     start, end = max(setup.initial_time, desired.start), min(setup.final_time, desired.end)
     if not start < end - window:
         raise job.error(
             f"there is no window of {window:g} s from {start:g} s to {end:g} s; give a later final_time"
         )
-    with simulation_of(job, model) as simulation:
+    with build_simulation(job, model) as simulation:
         tasks = Tasks.of(job, simulation.mechanism)
         sharing = Sharing(job, model, simulation.mechanism, tasks, exact)
-        controls = _controls(job, sharing, model)
+        controls = _create_controls(job, sharing, model)
         tracker = ComputedControl(job, simulation, desired, tasks, sharing, controls, window)
-        y, followed = _first_state(job, simulation, desired, start), Followed()
+        y, followed = _compute_first_state(job, simulation, desired, start), Followed()
         if tracker.has_states:
             start, y = tracker.at_rest(start, y, followed)
         if not followed.failure:
@@ -79,20 +197,22 @@ def track(
         motion = Motion(
             model, simulation, np.array(followed.times), np.array(followed.states), moments
         )
-        _write(job, outcome, tracker, motion, followed)
-        analyse(job, outcome, analyses, motion)
-        _tell(job, outcome, motion, followed)
+        _write_tables(job, outcome, tracker, motion, followed)
+        compute_analyses(job, outcome, analyses, motion)
+        _report_errors(job, outcome, motion, followed)
     return motion
 
 
-def _controls(job: Job, sharing: Sharing, model: Model) -> list[Control]:
+def _create_controls(job: Job, sharing: Sharing, model: Model) -> list[Control]:
     path = job.path("constraints_file")
     given = None if path is None else job.read(path, ControlSet)
     actuators = {item.name: item for item in model.force_set.objects}
     return [Control.of(actuators[name], given) for name in sharing.names]
 
 
-def _first_state(job: Job, simulation: Simulation, desired: Desired, start: float) -> list[float]:
+def _compute_first_state(
+    job: Job, simulation: Simulation, desired: Desired, start: float
+) -> list[float]:
     """Return the state (y,) of the desired motion at a time; fibers are where they were in the default pose.
 
     Like OpenSim's, it need not fulfil the constraints: only the integration that begins with it
@@ -108,7 +228,7 @@ def _first_state(job: Job, simulation: Simulation, desired: Desired, start: floa
     return simulation.state.pack(q.tolist(), u.tolist(), default[2 * len(simulation.state.order) :])
 
 
-def _write(
+def _write_tables(
     job: Job, outcome: Outcome, tracker: ComputedControl, motion: Motion, followed: Followed
 ) -> None:
     name, precision = job.setup.name, job.setup.output_precision
@@ -139,8 +259,8 @@ def _write(
     outcome.text(job.in_results(f"{name}_controls.xml"), to_text(controls, numbers="opensim"))
 
 
-def _tell(job: Job, outcome: Outcome, motion: Motion, followed: Followed) -> None:
-    tell_rows(job, outcome, motion)
+def _report_errors(job: Job, outcome: Outcome, motion: Motion, followed: Followed) -> None:
+    report_rows(job, outcome, motion)
     errors = np.abs([*followed.errors.values()])
     infos = motion.mechanism.coordinates
     turning = [info.name for info in infos if info.motion_type == "rotational"]
@@ -158,7 +278,7 @@ def _tell(job: Job, outcome: Outcome, motion: Motion, followed: Followed) -> Non
             )
 
 
-def average_residuals(times: Array, columns: tuple[str, ...], rows: Array) -> list[float]:
+def _average_residual_columns(times: Array, columns: tuple[str, ...], rows: Array) -> list[float]:
     """Averages over time of the columns that OpenSim takes for residuals, 0 where there is none."""
     if len(times) < 2:
         return [0.0] * len(RESIDUALS)
@@ -166,13 +286,13 @@ def average_residuals(times: Array, columns: tuple[str, ...], rows: Array) -> li
     return [float(areas[columns.index(name)]) if name in columns else 0.0 for name in RESIDUALS]
 
 
-def residual_words(averages: list[float]) -> str:
+def _describe_residuals(averages: list[float]) -> str:
     """Averages in words."""
     return ", ".join(
         f"{name} {value:.4g}" for name, value in zip(RESIDUALS, averages, strict=True) if value
     )
 
 
-def model_file(job: Job, name: str) -> Path:
+def _get_model_output(job: Job, name: str) -> Path:
     """Where a changed model goes."""
     return job.result(name or "adjusted_model.osim")

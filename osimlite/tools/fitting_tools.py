@@ -1,0 +1,189 @@
+"""OpenSim's tools of fitting: ScaleTool, InverseKinematicsTool, IMUPlacer and IMUInverseKinematicsTool."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.base.records import replace
+from osimlite.base.text import listed
+from osimlite.fitting.fit_messages import IGNORED, describe_unknown, told
+from osimlite.fitting.ik_tool import motion_table, run_inverse_kinematics
+from osimlite.fitting.inverse_kinematics import inverse_kinematics
+from osimlite.fitting.marker_data import MarkerData
+from osimlite.fitting.orientation_data import OrientationData
+from osimlite.fitting.scale_tool import run_scale
+from osimlite.fitting.sensors import place_sensors
+from osimlite.io.document.printer import to_text
+from osimlite.io.tables.old_storage import UNITS
+from osimlite.io.tables.storage import StoTable, read_sto
+from osimlite.io.tables.times import both_of
+from osimlite.schema.frames import PhysicalFrame
+from osimlite.schema.tools.inverse_kinematics import (
+    IKMarkerTask,
+    IMUInverseKinematicsTool,
+    InverseKinematicsTool,
+)
+from osimlite.schema.tools.sensors import IMUPlacer
+from osimlite.tools.evidence import Evidence
+from osimlite.tools.job import NONE, Job
+from osimlite.tools.outcome import Outcome
+
+
+def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
+    """Fit every frame to its minimum; write coordinates, and errors and places of the markers where asked for."""
+    setup: InverseKinematicsTool = job.setup
+    coordinates = job.path("coordinate_file")
+    table = None if coordinates is None else read_sto(coordinates)
+    data = MarkerData.of(job.needed("marker_file"))
+    model = job.model()
+    motion = run_inverse_kinematics(setup, model, data, table)
+    times = motion.times
+    if setup.output_motion_file.strip() not in NONE:
+        outcome.table(job.result(setup.output_motion_file), motion_table(motion), f"\n{UNITS}")
+    if setup.report_errors:
+        # Of the markers that are seen; like OpenSim, the mean is over all markers, seen or not.
+        squares = np.nan_to_num(motion.marker_errors**2)
+        totals = squares.sum(axis=1)
+        rows = np.column_stack(
+            [totals, np.sqrt(totals / squares.shape[1]), np.sqrt(squares.max(axis=1))]
+        )
+        labels = ("total_squared_error", "marker_error_RMS", "marker_error_max")
+        path = job.in_results(f"{setup.name}_ik_marker_errors.sto")
+        outcome.table(path, StoTable("Model Marker Errors from IK", times, labels, rows))
+    if setup.report_marker_locations:
+        columns = tuple(f"{name}_t{axis}" for name in motion.markers for axis in "xyz")
+        path = job.in_results(f"{setup.name}_ik_model_marker_locations.sto")
+        places = motion.places.reshape(len(times), -1)
+        outcome.table(path, StoTable("Model Marker Locations from IK", times, columns, places))
+    outcome.evidence = Evidence.of(
+        model,
+        job.needed("model_file"),
+        motion.mechanism,
+        times,
+        motion.values,
+        markers=motion.markers,
+        measured=motion.measured,
+        places=motion.places,
+    )
+    if words := describe_unknown(model, IGNORED):
+        outcome.warn("unknown classes", words)
+    outcome.summary |= motion.summary
+    for words in told(motion):
+        outcome.tell("markers", words)
+    asked = [
+        task.name
+        for task in setup.ik_task_set.objects
+        if task.apply and isinstance(task, IKMarkerTask)
+    ]
+    for what, names in (
+        ("not fitted", [name for name in data.names if name not in motion.markers]),
+        ("not in the data", [name for name in asked if name not in data.names]),
+    ):
+        if names:
+            outcome.summary[what.replace(" ", "_")] = names
+            outcome.tell(what, listed(names))
+
+
+def run_scale_tool(job: Job, outcome: Outcome) -> None:
+    """Scale the model and place its markers; write models, factors and the pose that the setup names."""
+    result = run_scale(job.setup, job.file.parent)
+    for name, text in result.texts.items():
+        outcome.text(job.result(name), text)
+    if result.unknown:
+        outcome.warn("unknown classes", result.unknown)
+    if result.measured is not None:
+        outcome.summary["ratios"] = dict(result.measured.ratios)
+        for name, ratio in result.measured.ratios.items():
+            outcome.tell(name, f"{ratio:.6g}")
+        for note in result.measured.notes:
+            outcome.tell("left out", note)
+    if result.placed is not None:
+        outcome.summary |= result.placed.pose.summary
+        for words in result.placed.told():
+            outcome.tell("markers", words)
+
+
+def run_imu_placer(job: Job, outcome: Outcome) -> None:
+    """Place the sensors, and write the model with them."""
+    setup: IMUPlacer = job.setup
+    model = job.model()
+    data = OrientationData.of(job.needed("orientation_file_for_calibration"))
+    data = data.turned(setup.sensor_to_opensim_rotations)
+    placed = place_sensors(model, data, setup.base_imu_label, setup.base_heading_axis)
+    if setup.output_model_file.strip() not in NONE:
+        outcome.text(job.result(setup.output_model_file), to_text(model, numbers="opensim"))
+    outcome.summary |= placed._asdict()
+    outcome.tell("placed", listed(placed.names, most=100))
+    if placed.left_out:
+        outcome.tell(
+            "left out", f"{listed(placed.left_out)}: the model has no frame of these names"
+        )
+    if placed.heading is not None:
+        outcome.tell(
+            "heading", f"turned by {math.degrees(placed.heading):.6g} degrees about the vertical"
+        )
+
+
+ERRORS, DEGREES = "OrientationErrors", {"inDegrees": "yes"}
+"""What OpenSim calls the table of errors, and the header of one in degrees."""
+
+
+def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
+    """Fit every frame to its minimum; write coordinates, and angles of the sensors from their data where asked for."""
+    setup: IMUInverseKinematicsTool = job.setup
+    model, file = job.model(), job.needed("orientations_file")
+    data = (
+        OrientationData.of(file)
+        .between(*both_of(setup.time_range))
+        .turned(setup.sensor_to_opensim_rotations)
+    )
+    frames = {frame.name for frame in model.components(PhysicalFrame)} & {*data.names}
+    weights = {
+        item.name: item.weight
+        for item in reversed(setup.orientation_weights.objects)
+        if item.name in frames
+    }
+    motion = inverse_kinematics(model, orientations=data, weights=weights)
+    asked, folder = (
+        "" if name.strip() in NONE else name.strip()
+        for name in (setup.output_motion_file, setup.results_directory)
+    )
+    beside, _, name = asked.replace("\\", "/").rpartition("/")
+    name = name or f"ik_{file.stem}"
+    tables = {
+        name if "." in name else f"{name}.mot": replace(
+            motion_table(motion), header=DEGREES | {"name": name}
+        )
+    }
+    if setup.report_errors:
+        # A sensor that was not measured has no error, which OpenSim writes as 0.
+        errors = np.nan_to_num(motion.orientation_errors)
+        table = StoTable(ERRORS, motion.times, motion.sensors, errors, header={"name": ERRORS})
+        tables[f"{name}_orientationErrors.sto"] = table
+    for place, table in tables.items():
+        if folder or job.output is not None:
+            outcome.new_table(job.in_results(place), table)
+        elif asked:
+            outcome.new_table(job.result(str(Path(beside) / place)), table)
+    if not outcome.tables:
+        outcome.tell(
+            "nothing written",
+            "the setup names neither a results_directory nor an output_motion_file",
+        )
+    outcome.evidence = Evidence.of(
+        model,
+        job.needed("model_file"),
+        motion.mechanism,
+        motion.times,
+        motion.values,
+        sensors=motion.sensors,
+        angles=motion.orientation_errors,
+    )
+    outcome.summary |= motion.summary
+    for words in told(motion):
+        outcome.tell("sensors", words)
+    if silent := [name for name in data.names if name not in frames]:
+        outcome.tell("left out", f"{listed(silent)}: the model has no frame of these names")
