@@ -19,7 +19,7 @@ import numpy as np
 
 import osimlite
 from _moco_studies import CORE, GAIT, TESTS, gait_tool, sources
-from osimlite.fitting.modifying.processing import processed
+from osimlite.fitting.modifying.operators import processed
 from osimlite.io.tables.storage import StoTable, read_sto, write_sto
 
 THEIRS = (

@@ -47,11 +47,11 @@ def ik(
     from osimlite.base.files import make_folder, write_atomically
     from osimlite.base.text import listed
     from osimlite.cli._console import say
-    from osimlite.fitting.ik_tool import motion_table, told
+    from osimlite.fitting.fit_messages import IGNORED, describe_unknown, told
+    from osimlite.fitting.ik_tool import motion_table
     from osimlite.fitting.inverse_kinematics import inverse_kinematics
     from osimlite.fitting.marker_data import MarkerData
     from osimlite.fitting.orientation_data import holds_orientations
-    from osimlite.fitting.unknown_classes import IGNORED, describe_unknown
     from osimlite.io.document.reader import read
     from osimlite.io.tables.old_storage import UNITS, printed
     from osimlite.io.tables.storage import write_sto

@@ -49,7 +49,7 @@ def modify(
     from osimlite.base.text import counted
     from osimlite.cli._console import add_row, plain_console, plain_table, say
     from osimlite.errors import DocumentError, SettingError
-    from osimlite.fitting.modifying.processing import processed
+    from osimlite.fitting.modifying.operators import processed
     from osimlite.fitting.modifying.words import change_of
     from osimlite.io.document.printer import write
     from osimlite.io.document.reader import read, read_any

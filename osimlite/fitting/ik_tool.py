@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from osimlite.base.text import counted, did_you_mean, listed
+from osimlite.base.text import did_you_mean
 from osimlite.errors import SettingError
-from osimlite.fitting.fitted_motion import ADVICE, FittedMotion
+from osimlite.fitting.fitted_motion import FittedMotion
 from osimlite.fitting.inverse_kinematics import check_weight, fitted, marker_stations
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.pose_layout import Goal
@@ -29,10 +28,6 @@ from osimlite.schema.tools.inverse_kinematics import (
     InverseKinematicsTool,
 )
 
-ABSURD = 1.0
-"""A root mean square of the marker errors (m) that no pose of a person leaves."""
-MOST_NAMED = 8
-"""Coordinates that no measurement determines, which a message names."""
 UNNAMED = ("", "Unassigned")
 """What stands for no file."""
 
@@ -135,43 +130,3 @@ def motion_table(motion: FittedMotion) -> StoTable:
 def coordinate_table(name: str, folder: Path) -> StoTable | None:
     """The coordinate file of a setup, if it names one."""
     return None if name in UNNAMED else read_sto(folder / name)
-
-
-def told(motion: FittedMotion, advice: tuple[float, float] = ADVICE, of: str = "") -> Iterator[str]:
-    """What a user should know of a motion, beside what OpenSim's documentation advises of (some) markers, m."""
-    result = motion.summary
-    if "rms_marker_error" in result:
-        rms, largest = result["rms_marker_error"], result["largest_marker_error"]
-        most = " and ".join(f"{100.0 * limit:g}" for limit in advice)
-        advised = (
-            ""
-            if rms < advice[0] and largest < advice[1]
-            else f"; OpenSim advises less than {most} cm{of}"
-        )
-        advised += "; check the units of the data" if rms > ABSURD else ""
-        yield (
-            f"{counted(result['frames'], 'frame')}, {counted(result['markers'], 'marker')}: "
-            f"errors of {100.0 * rms:.2f} cm (root mean square), "
-            f"at most {100.0 * largest:.2f} cm ({result['worst_marker']} at {result['worst_time']:g} s){advised}"
-        )
-    if "rms_orientation_error" in result:
-        rms, largest = (
-            math.degrees(result[f"{which}_orientation_error"]) for which in ("rms", "largest")
-        )
-        yield (
-            f"{result['frames']} frames, {result['sensors']} sensors: errors of {rms:.2f} degrees (root mean square), "
-            f"at most {largest:.2f} degrees ({result['worst_sensor']} at {result['worst_sensor_time']:g} s)"
-        )
-    if result["partly_unseen"]:
-        parts = [f"{name} ({100.0 * part:.3g} %)" for name, part in result["partly_unseen"].items()]
-        yield f"not seen in every frame: {listed(parts)}"
-    if result["frames_unseen"]:
-        frames = counted(result["frames_unseen"], "frame")
-        yield f"{frames} in which nothing with a weight was seen: the pose stays as it was before"
-    if motion.undetermined:
-        yield (
-            f"no measurement determines {listed(motion.undetermined, most=MOST_NAMED)}: they stay near the default "
-            "pose (OpenSim may end elsewhere, as in the middle of their ranges); lock them, or give them a task"
-        )
-    if result["frames_unsettled"]:
-        yield f"in {counted(result['frames_unsettled'], 'frame')} the best pose was not reached"

@@ -8,8 +8,9 @@ import numpy as np
 
 from osimlite.base.records import dataclass
 from osimlite.errors import SettingError
+from osimlite.fitting.fit_messages import told
 from osimlite.fitting.fitted_motion import FittedMotion
-from osimlite.fitting.ik_tool import tasks_of, told
+from osimlite.fitting.ik_tool import tasks_of
 from osimlite.fitting.inverse_kinematics import fitted
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.measuring import frames_between

@@ -9,13 +9,13 @@ from pathlib import Path
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import did_you_mean
 from osimlite.errors import DocumentError, SettingError
+from osimlite.fitting.fit_messages import describe_unknown
 from osimlite.fitting.ik_tool import UNNAMED, coordinate_table
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.marker_data import Measured as Markers
 from osimlite.fitting.measuring import Measured, Measuring, scale_set
 from osimlite.fitting.placing import Placed, place_markers, pose_text
 from osimlite.fitting.scaling import scale_model
-from osimlite.fitting.unknown_classes import describe_unknown
 from osimlite.io.document.kept import read_anew
 from osimlite.io.document.printer import to_text
 from osimlite.io.document.reader import read_any

@@ -9,7 +9,7 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.base.text import did_you_mean
-from osimlite.fitting.modifying.processing import processed
+from osimlite.fitting.modifying.operators import processed
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.spatial import Array

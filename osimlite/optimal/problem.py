@@ -16,7 +16,7 @@ from osimlite.base.records import replace
 from osimlite.derivatives.functions import CasadiModel
 from osimlite.derivatives.symbols import casadi
 from osimlite.errors import SettingError
-from osimlite.fitting.modifying.processing import processed
+from osimlite.fitting.modifying.operators import processed
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.asked import MAX_MESH_INTERVALS, MAX_MESH_VALUES, StudyContext

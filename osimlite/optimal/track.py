@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.base.records import replace
-from osimlite.fitting.modifying.processing import processed
+from osimlite.fitting.modifying.operators import processed
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.optimal.ipopt import Progress

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.fitting.ik_tool import told
+from osimlite.fitting.fit_messages import told
 from osimlite.fitting.marker_data import MarkerData
 from tests.labs import LABS, change, copy_lab
 

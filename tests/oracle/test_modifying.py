@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 import osimlite
+from osimlite.fitting.modifying.operators import processed
 from osimlite.fitting.modifying.path_fitting import fit_paths
-from osimlite.fitting.modifying.processing import processed
 from osimlite.schema.difference import differences
 from osimlite.schema.tools import processors as p
 

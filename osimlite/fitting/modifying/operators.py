@@ -5,12 +5,13 @@ The results are those of OpenSim's ModelProcessor, names and places included.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from osimlite.base.text import did_you_mean
 from osimlite.errors import ModelError, UnsupportedError
+from osimlite.io.document.kept import read_anew
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.mechanics.multibody import build_mechanism
@@ -30,6 +31,7 @@ from osimlite.schema.muscles import (
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.prescribed import ExternalLoads
 from osimlite.schema.tools import processors as p
+from osimlite.schema.tools.processors import ModelOperator, ModelProcessor
 
 GREY = (0.5, 0.5, 0.5)
 """Of paths that were muscles'."""
@@ -285,3 +287,37 @@ def _loads(model: Model, operator: p.ModOpAddExternalLoads, folder: Path) -> Non
     loads.name = "externalloads"  # OpenSim loses the name that the file says.
     loads.datafile = str((file.parent / loads.datafile.strip()).absolute())
     model.add(loads)
+
+
+def processed(processor: ModelProcessor, folder: str | Path = ".") -> Model:
+    """The model of a processor, changed as that says.
+
+    Args:
+        processor: of a study or a tool; its `filepath` is looked for from the folder.
+        folder: of its document.
+
+    Raises:
+        DocumentError: a file is missing or holds something else.
+        ModelError: it has no model, or an operator names what is not there.
+        UnsupportedError: an operator cannot be applied.
+    """
+    name = processor.filepath.strip()
+    if name:
+        model = read_anew(Path(folder) / name, Model)
+    elif processor.model is not None:
+        model = processor.model.copy_deep()
+    else:
+        raise ModelError("a ModelProcessor has neither a filepath nor a model; give it one")
+    apply(model, processor.operators, folder)
+    return model
+
+
+def apply(model: Model, operators: Iterable[ModelOperator], folder: str | Path = ".") -> None:
+    """Change a model as operators say, in their order; errors as of :func:`processed`."""
+    for operator in operators:
+        operation = OPERATIONS.get(type(operator))
+        if operation is None:
+            name = getattr(operator, "class_name", "") or type(operator).__name__
+            known = ", ".join(cls.__name__ for cls in OPERATIONS)
+            raise UnsupportedError(f"a {name} cannot be applied; there are {known}")
+        operation(model, operator, Path(folder))

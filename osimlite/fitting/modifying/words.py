@@ -9,9 +9,8 @@ from typing import Any
 from osimlite.base.text import or_known
 from osimlite.errors import SettingError
 from osimlite.fitting.modifying.contact import smooth_contacts
-from osimlite.fitting.modifying.operators import put_paths
+from osimlite.fitting.modifying.operators import apply, put_paths
 from osimlite.fitting.modifying.path_fitting import Fitted, fit_paths
-from osimlite.fitting.modifying.processing import apply
 from osimlite.schema.model import Model, expect_model
 from osimlite.schema.tools import processors as p
 

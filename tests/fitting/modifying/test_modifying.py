@@ -11,8 +11,8 @@ pytest.importorskip("numpy", reason="needs numpy (extra 'sim')")
 
 import osimlite
 from osimlite.errors import OsimliteError, SettingError, UnsupportedError
+from osimlite.fitting.modifying.operators import processed
 from osimlite.fitting.modifying.path_fitting import fit_paths
-from osimlite.fitting.modifying.processing import processed
 from osimlite.fitting.modifying.words import modify
 from osimlite.models.jumper import jumper
 from osimlite.models.walkers import furthest_walker

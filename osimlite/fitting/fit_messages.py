@@ -1,0 +1,87 @@
+"""Messages about fits: errors, coordinates that nothing determines, and parts of unknown classes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from osimlite.base.text import counted, listed
+from osimlite.fitting.fitted_motion import ADVICE, FittedMotion
+from osimlite.schema.base import Unknown
+from osimlite.schema.model import Model
+
+ABSURD = 1.0
+"""A root mean square of the marker errors (m) that no pose of a person leaves."""
+MAX_NAMED_COORDINATES = 8
+"""Coordinates that no measurement determines, which a message names."""
+IGNORED = "without effect on the fit"
+"""What becomes of parts of unknown classes where a motion is fitted to markers."""
+MAX_NAMED_PARTS = 3
+"""Parts that a message names one by one."""
+
+
+def told(motion: FittedMotion, advice: tuple[float, float] = ADVICE, of: str = "") -> Iterator[str]:
+    """What a user should know of a motion, beside what OpenSim's documentation advises of (some) markers, m."""
+    result = motion.summary
+    if "rms_marker_error" in result:
+        rms, largest = result["rms_marker_error"], result["largest_marker_error"]
+        most = " and ".join(f"{100.0 * limit:g}" for limit in advice)
+        advised = (
+            ""
+            if rms < advice[0] and largest < advice[1]
+            else f"; OpenSim advises less than {most} cm{of}"
+        )
+        advised += "; check the units of the data" if rms > ABSURD else ""
+        yield (
+            f"{counted(result['frames'], 'frame')}, {counted(result['markers'], 'marker')}: "
+            f"errors of {100.0 * rms:.2f} cm (root mean square), "
+            f"at most {100.0 * largest:.2f} cm ({result['worst_marker']} at {result['worst_time']:g} s){advised}"
+        )
+    if "rms_orientation_error" in result:
+        rms, largest = (
+            math.degrees(result[f"{which}_orientation_error"]) for which in ("rms", "largest")
+        )
+        yield (
+            f"{result['frames']} frames, {result['sensors']} sensors: errors of {rms:.2f} degrees (root mean square), "
+            f"at most {largest:.2f} degrees ({result['worst_sensor']} at {result['worst_sensor_time']:g} s)"
+        )
+    if result["partly_unseen"]:
+        parts = [f"{name} ({100.0 * part:.3g} %)" for name, part in result["partly_unseen"].items()]
+        yield f"not seen in every frame: {listed(parts)}"
+    if result["frames_unseen"]:
+        frames = counted(result["frames_unseen"], "frame")
+        yield f"{frames} in which nothing with a weight was seen: the pose stays as it was before"
+    if motion.undetermined:
+        yield (
+            f"no measurement determines {listed(motion.undetermined, most=MAX_NAMED_COORDINATES)}: they stay near the default "
+            "pose (OpenSim may end elsewhere, as in the middle of their ranges); lock them, or give them a task"
+        )
+    if result["frames_unsettled"]:
+        yield f"in {counted(result['frames_unsettled'], 'frame')} the best pose was not reached"
+
+
+def find_unknown(model: Model) -> list[str]:
+    """Return the parts of a model whose classes are unknown, each as ``path (class)``.
+
+    Args:
+        model: which is searched, with all that its components hold.
+    """
+    tree = model.tree()
+    parts = [part for part in model.walk() if isinstance(part, Unknown)]
+    return [f"{tree.path_of(part) or part.name or 'a part'} ({part.class_name})" for part in parts]
+
+
+def describe_unknown(model: Model, consequence: str) -> str:
+    """Return a sentence that names the components of unknown classes, or "" without such components.
+
+    Args:
+        model: that was read.
+        consequence: what became of them, as in "not scaled".
+    """
+    parts = find_unknown(model)
+    if not parts:
+        return ""
+    return (
+        f"{consequence}: {counted(len(parts), 'part')} of classes that osimlite does not know, "
+        f"{listed(parts, most=MAX_NAMED_PARTS)}; OpenSim refuses the model unless the plug-in of these classes is loaded"
+    )
