@@ -8,8 +8,8 @@ from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.tools.dynamics import ForwardTool
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.run import Simulation
 from osimlite.simulation.options import MOST_STEPS
+from osimlite.simulation.run import Simulation
 from osimlite.tools.dynamics_setup import (
     StateRows,
     build_model,

@@ -18,9 +18,9 @@ from osimlite.schema.tools.analyses import (
     ProbeReporter,
     StatesReporter,
 )
-from osimlite.simulation.trajectory import label_as_opensim
 from osimlite.simulation.run_report import probe_labels, probe_rows
 from osimlite.simulation.system import System
+from osimlite.simulation.trajectory import label_as_opensim
 from osimlite.tools.motion import Motion, Tables
 from osimlite.tools.outputs import reader_of
 from osimlite.tools.reaction_forces import compute_constraint_records
