@@ -25,7 +25,7 @@ import numpy as np
 from osimlite.base.files import TABLES
 from osimlite.lint import Config, Finding
 from osimlite.lint.many import check_files
-from osimlite.lint.suffixes import project_files
+from osimlite.lint.project_files import project_files
 
 KITS = Path(__file__).resolve().parents[1] / "docs" / "adoption"
 AS_BEFORE = "OpenSim 4.6 reads: as before"

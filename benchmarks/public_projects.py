@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from osimlite.lint import Finding, validate
-from osimlite.lint.suffixes import TABLES, project_files
+from osimlite.lint.project_files import TABLES, project_files
 
 KINDS = ("models", "setups", "tables")
 

@@ -16,8 +16,8 @@ from mkdocs.structure.pages import Page
 from typer.testing import CliRunner
 
 from osimlite.cli import COMMANDS, app
-from osimlite.lint.engine import all_rules, groups
 from osimlite.lint.pages import group_page
+from osimlite.lint.registry import all_rules, groups
 from osimlite.schema.base import Object
 from osimlite.schema.descriptions import described, meaning_of, value_of
 from osimlite.schema.fields import Held, Value

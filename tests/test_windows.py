@@ -133,7 +133,7 @@ def test_an_old_console_is_shown_no_codes_of_colours(monkeypatch: pytest.MonkeyP
 def test_other_programs_are_told_paths_with_slashes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("osimlite.lint.reporters.sarif.PurePath", PureWindowsPath)
+    monkeypatch.setattr("osimlite.lint.reporters.interchange.PurePath", PureWindowsPath)
     monkeypatch.setattr("osimlite.lint.baseline.Path", PureWindowsPath)
     report = Report(
         [

@@ -16,8 +16,8 @@ from osimlite.errors import MissingFileError, OsimliteError
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
+from osimlite.lint.project_files import project_files
 from osimlite.lint.reporters import FOR_PEOPLE, FORMATS, render
-from osimlite.lint.suffixes import project_files
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -221,8 +221,12 @@ def terminal_width() -> int:
 
 
 def _statistics(report: Report, everything: bool) -> str:
-    from osimlite.lint.engine import all_rules
-    from osimlite.lint.reporters.style import passed, summary, unmeasured
+    from osimlite.lint.registry import all_rules
+    from osimlite.lint.reporters.terminal import (
+        describe_skipped,
+        describe_unmeasured,
+        format_summary,
+    )
 
     known = {rule.code: rule for rule in all_rules()}
     rows = [f"{count:6d}  {code}  {known[code].name}" for code, count in report.codes.most_common()]
@@ -230,8 +234,8 @@ def _statistics(report: Report, everything: bool) -> str:
         "\n".join(
             [
                 *rows,
-                summary(report),
-                *filter(None, [passed(report, everything), unmeasured(report)]),
+                format_summary(report),
+                *filter(None, [describe_skipped(report, everything), describe_unmeasured(report)]),
             ]
         )
         + "\n"

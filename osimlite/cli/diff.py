@@ -36,7 +36,7 @@ def diff(
     from osimlite.cli._console import say
     from osimlite.errors import OsimliteError
     from osimlite.io.document.reader import read_any
-    from osimlite.lint.suffixes import is_table
+    from osimlite.lint.project_files import is_table
     from osimlite.schema.difference import differences
     from osimlite.schema.model import Model
 

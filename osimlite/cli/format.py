@@ -34,7 +34,7 @@ def format(
     from osimlite.errors import OsimliteError
     from osimlite.io.document.formatting import formatted
     from osimlite.io.document.source import Source
-    from osimlite.lint.suffixes import DOCUMENTS, project_files
+    from osimlite.lint.project_files import DOCUMENTS, project_files
 
     changed, same, worst = 0, 0, 0
     for path in project_files(paths, (".osim", *DOCUMENTS), only_ours=only_ours):

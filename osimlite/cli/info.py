@@ -36,7 +36,7 @@ def info(
     from osimlite.cli._console import Facts, say
     from osimlite.io.document.reader import read_document
     from osimlite.io.document.source import Source
-    from osimlite.lint.suffixes import is_table
+    from osimlite.lint.project_files import is_table
     from osimlite.schema.base import Object
     from osimlite.schema.coordinates import Coordinate
     from osimlite.schema.joints import Joint

@@ -27,7 +27,7 @@ def rule(
     from osimlite.base.text import did_you_mean
     from osimlite.cli._console import show
     from osimlite.errors import OsimliteError
-    from osimlite.lint.engine import all_rules, groups
+    from osimlite.lint.registry import all_rules, groups
 
     rules = all_rules()
     columns = max(shutil.get_terminal_size().columns, 60) if sys.stdout.isatty() else 80

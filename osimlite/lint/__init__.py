@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 from osimlite.base.files import named_mesh_folders
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Finding, Report, Severity
-from osimlite.lint.suffixes import project_files
+from osimlite.lint.project_files import project_files
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from osimlite.io.document.plugins import Paths
     from osimlite.io.document.source import Source
-    from osimlite.lint.engine import all_rules
+    from osimlite.lint.registry import all_rules
     from osimlite.schema.model import Model
 
 __all__ = [
@@ -96,7 +96,7 @@ def __getattr__(name: str) -> Any:
     # The rules and all that they need are imported when they are wanted, not for what was found
     # before.
     if name == "all_rules":
-        from osimlite.lint.engine import all_rules
+        from osimlite.lint.registry import all_rules
 
         return all_rules
     raise AttributeError(f"module 'osimlite.lint' has no attribute '{name}'")

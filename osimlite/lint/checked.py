@@ -11,7 +11,7 @@ from osimlite.lint.suppressions import Suppression, suppressions
 if TYPE_CHECKING:
     from osimlite.io.document.source import Position, Source
     from osimlite.lint.diagnostic import Fix
-    from osimlite.lint.engine import Rule
+    from osimlite.lint.registry import Rule
     from osimlite.schema.base import Object
 
 

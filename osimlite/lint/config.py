@@ -4,23 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError
 from osimlite.lint.diagnostic import Severity
 
 if TYPE_CHECKING:
-    from osimlite.lint.engine import Rule
-
-
-class Threshold(NamedTuple):
-    """A number from which on a rule speaks: its name in the settings, its default, its unit, and what it is."""
-
-    name: str
-    default: float
-    unit: str
-    meaning: str
+    from osimlite.lint.registry import Rule, Threshold
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +68,7 @@ class Config:
 
 def _check_thresholds(given: Mapping[str, float]) -> None:
     from osimlite.base.text import did_you_mean
-    from osimlite.lint.engine import all_rules
+    from osimlite.lint.registry import all_rules
 
     known = [threshold.name for rule in all_rules() for threshold in rule.thresholds]
     for name, number in given.items():
@@ -109,7 +100,7 @@ def checked_words(words: tuple[str, ...] | list[str] | str | None) -> tuple[str,
     cleaned = tuple(word.strip() for word in given if word.strip())
     if not cleaned:
         return ()
-    from osimlite.lint.engine import all_rules, groups
+    from osimlite.lint.registry import all_rules, groups
 
     for word in cleaned:
         if not any(rule.matches(word) for rule in all_rules()):

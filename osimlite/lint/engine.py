@@ -1,264 +1,26 @@
-"""The registry of rules, and running them.
-
-A rule is a function of the subject and of `found`, which it calls once per finding. Its docstring
-is its page.
-"""
+"""Run the rules on a subject: read it, select the rules, apply suppressions, sort the findings."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import cache
-from importlib import import_module
-from inspect import cleandoc
-from pkgutil import iter_modules
-from typing import Any, Literal, Unpack
+from collections.abc import Callable
 
-from osimlite.base.records import dataclass, replace
-from osimlite.base.text import brief, listed
+from osimlite.base.text import listed
 from osimlite.errors import SpecialFileError
 from osimlite.io.document.reader import collector_paused
-from osimlite.io.document.source import Position, Source
+from osimlite.io.document.source import Source
 from osimlite.io.document.survey import Survey, survey
-from osimlite.lint import rules
-from osimlite.lint.checked import Checked, Where
-from osimlite.lint.config import Config, Threshold
+from osimlite.lint.checked import Checked
+from osimlite.lint.config import Config
 from osimlite.lint.construction import CONSTRUCTION
-from osimlite.lint.diagnostic import NOT_MEASURED, Finding, Fix, Report, Severity
-from osimlite.lint.faults import Fault, faults_in
+from osimlite.lint.diagnostic import NOT_MEASURED, Finding, Report
 from osimlite.lint.measures import MEASURES
+from osimlite.lint.project_files import is_document, is_table
+from osimlite.lint.registry import Check, FindingSink, Rule, all_rules, get_rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.suffixes import is_document, is_table
 from osimlite.lint.suppressions import Suppression
 from osimlite.schema.base import Object
 from osimlite.schema.model import Model
 from osimlite.schema.registry import let_count
-
-ERROR, WARNING, INFO = Severity.ERROR, Severity.WARNING, Severity.INFO
-
-FAMILIES = {
-    "0": "text",
-    "1": "structure",
-    "2": "values",
-    "3": "references",
-    "4": "topology",
-    "5": "physics",
-    "6": "paths",
-    "7": "files",
-    "8": "data",
-    "9": "trials",
-}
-"""The families of rules by the first digit of their codes."""
-
-
-@dataclass(frozen=True, slots=True)
-class FindingSink:
-    """What a rule calls for each finding of a subject."""
-
-    rules: dict[str, Rule]
-    subject: Checked
-    findings: list[Finding]
-
-    def __call__(
-        self,
-        message: str,
-        item: Object | None = None,
-        *,
-        fault: str = "",
-        at: Position | None = None,
-        severity: Severity | None = None,
-        suggestion: str | None = None,
-        certain: bool = False,
-        fix: Fix | None = None,
-        **where: Unpack[Where],
-    ) -> None:
-        """Note one finding; where it is, is said as in :meth:`Subject.position`, or by `at`.
-
-        A rule that tells faults apart says which it is, by its name; what nobody wants to hear of
-        is passed over.
-
-        Of a rule about tables or documents that mends, a suggestion is a mend: safe if it is
-        `certain` or differs in letter case alone.
-        """
-        rule, subject = self.rules.get(fault), self.subject
-        if rule is None:
-            return
-        if at is None and (item is not None or where.get("number") is not None):
-            at = subject.position(item, **where)
-        line, column, length = at if at is not None else (None, None, 1)
-        if rule.mends and rule.about != "model" and suggestion is not None and at is not None:
-            named = where.get("word") or (
-                item and getattr(item, where.get("attribute") or where.get("tag") or "name")
-            )
-            fix = fix or subject.replacing(at, named, suggestion, certain=certain)
-        elif subject.upgraded:
-            # What is said of an upgraded document need not be said of its text.
-            fix = None
-        self.findings.append(
-            Finding(
-                rule.code,
-                rule.name,
-                subject.config.severity_of(rule, severity or rule.severity_in(subject.version)),
-                brief(message),
-                subject.file,
-                line,
-                column,
-                max(1, length),
-                subject.path(item),
-                suggestion,
-                # Nor need what is said of one that was guessed at.
-                None if subject.sure_until is not None else fix,
-            )
-        )
-
-
-Check = Callable[[Any, FindingSink], None]
-Mends = Literal["", "safe", "unsafe", "both"]
-
-
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """One registered rule.
-
-    `severity` is that of its findings unless it says otherwise of one; `before` has another for
-    documents older than a version, where OpenSim does something else with them. `mends` says of
-    what kind its mends are, `about` what it looks
-    at: ``model``, ``table``, ``document`` (a setup, or a part of one), ``measures`` (of the model's
-    paths and muscles), ``construction`` (what stops the computation of a model), ``trial`` (what
-    was measured of a finished one). A rule that tells faults apart is a `group`: there is a rule
-    for each `fault`, all with the same `check`.
-    """
-
-    code: str
-    name: str
-    severity: Severity
-    check: Check
-    before: tuple[int, Severity] | None = None
-    thresholds: tuple[Threshold, ...] = ()
-    mends: Mends = ""
-    about: str = "model"
-    fault: Fault | None = None
-    group: str = ""
-
-    @property
-    def family(self) -> str:
-        """The family the code belongs to."""
-        return FAMILIES[self.code[4]]
-
-    @property
-    def page(self) -> str:
-        """What it does, why that is bad, an example and the same mended: the paragraphs of the docstring.
-
-        The example stands there once, its lines marked as in a diff: `-` what fails, `+` what mends
-        it.
-        """
-        if self.fault is not None:
-            return self.fault.page(f"{self.code[:-2]} {self.group}")
-        summary, what, why, example = cleandoc(self.check.__doc__ or "").split("\n\n", 3)
-        fence, *lines, end = example.splitlines()
-        fails, mended = (
-            "\n".join(line[2:] for line in lines if line[:1] != left_out) for left_out in "+-"
-        )
-        return (
-            f"{summary}\n\n## What it does\n{what}\n\n## Why is this bad\n{why}\n\n"
-            f"## Example\n{fence}\n{fails}\n{end}\n\n## Use instead\n{fence}\n{mended}\n{end}"
-        )
-
-    @property
-    def summary(self) -> str:
-        """The first line of the page."""
-        told = (
-            self.fault.summary
-            if self.fault is not None
-            else (self.check.__doc__ or "").partition("\n")[0]
-        )
-        return told.rstrip(".")
-
-    def severity_in(self, version: int | None) -> Severity:
-        """The severity of its findings in a document of a version; None stands for the current one."""
-        if self.before is not None and version is not None and version < self.before[0]:
-            return self.before[1]
-        return self.severity
-
-    def is_called(self, word: str) -> bool:
-        """Whether `word` is this rule's code, the beginning of it, its name or that of its group."""
-        return bool(word) and (
-            self.code.startswith(word.upper()) or word in (self.name, self.group)
-        )
-
-    def matches(self, word: str) -> bool:
-        """Whether the rule is called so, or `word` is its family."""
-        return self.is_called(word) or word in (self.family, "ALL")
-
-
-_RULES: dict[str, Rule] = {}
-_GROUPS: dict[str, Rule] = {}
-_NAMES: set[str] = set()
-
-
-def rule(
-    code: str,
-    name: str,
-    *,
-    severity: Severity,
-    before: tuple[int, Severity] | None = None,
-    thresholds: tuple[Threshold, ...] = (),
-    mends: Mends = "",
-    about: str = "model",
-    faults: str = "",
-    frames: Mapping[str, str] | None = None,
-) -> Callable[[Check], Check]:
-    """Register a function as the rule `code`; the other arguments are those of :class:`Rule`.
-
-    With `faults` it is a group: these are listed as :mod:`osimlite.lint.faults` says, with examples
-    that stand in `frames`.
-    """
-
-    def register(check: Check) -> Check:
-        whole = Rule(code, name, severity, check, before, thresholds, mends, about)
-        if not faults:
-            _add(_RULES, whole)
-            return check
-        _add(_GROUPS, whole)
-        for fault in faults_in(faults, frames or {}):
-            own: Any = {
-                "code": code + fault.number,
-                "name": fault.name,
-                "mends": fault.mends,
-                "group": name,
-            }
-            _add(_RULES, replace(whole, severity=Severity(fault.severity), fault=fault, **own))
-        return check
-
-    return register
-
-
-def _add(table: dict[str, Rule], rule: Rule) -> None:
-    if not _NAMES.isdisjoint((rule.code, rule.name)):
-        raise ValueError(f"rule {rule.code} {rule.name} is registered twice")
-    _NAMES.update((rule.code, rule.name))
-    table[rule.code] = rule
-
-
-APART = {"document": ("setup_", "moco"), "table": ("table", "marker_table"), "trial": ("trial_",)}
-"""How the names of modules begin whose rules are about these alone: nobody else loads them."""
-
-
-@cache
-def all_rules(about: str = "") -> tuple[Rule, ...]:
-    """Every rule, by code; if it is said what the rules are about, perhaps none that are about something else."""
-    others = tuple(
-        name for kind, names in APART.items() if about not in ("", kind) for name in names
-    )
-    for module in iter_modules(rules.__path__):
-        if not module.name.startswith(others):
-            import_module(f"{rules.__name__}.{module.name}")
-    return tuple(_RULES[code] for code in sorted(_RULES))
-
-
-def groups() -> tuple[Rule, ...]:
-    """What rules with one beginning of their codes have in common, by code."""
-    all_rules()
-    return tuple(_GROUPS[code] for code in sorted(_GROUPS))
 
 
 def check_source(source: Source, config: Config | None = None) -> Report:
@@ -375,7 +137,10 @@ def _make_ignore_test(comments: list[Suppression]) -> Callable[[Finding], bool]:
     def is_ignored(finding: Finding) -> bool:
         near = by_line.get(finding.line or 0, [])
         return any(
-            [comment.covers(finding, _RULES[finding.code].is_called) for comment in (*long, *near)]
+            [
+                comment.covers(finding, get_rule(finding.code).is_called)
+                for comment in (*long, *near)
+            ]
         )
 
     return is_ignored

@@ -9,7 +9,7 @@ from osimlite.errors import OsimliteError
 from osimlite.io.document.escape import escape
 from osimlite.io.document.source import Position, Source
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report
-from osimlite.lint.suffixes import is_table
+from osimlite.lint.project_files import is_table
 
 
 def replaced(

@@ -117,7 +117,7 @@ def _checked(jobs: list[Job], processes: int | None) -> Iterator[tuple[Job, Repo
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
-    from osimlite.lint.engine import all_rules
+    from osimlite.lint.registry import all_rules
 
     # On Linux the processes begin with all that is loaded here.
     all_rules()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from inspect import cleandoc
 
-from osimlite.lint.engine import FAMILIES, Rule, all_rules, groups
+from osimlite.lint.registry import FAMILIES, Rule, all_rules, groups
 
 _MENDS = {
     "": "none",

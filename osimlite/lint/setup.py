@@ -17,9 +17,9 @@ from osimlite.io.document.kept import top_at
 from osimlite.io.document.survey import Survey
 from osimlite.lint.beside import beginning, documents_of, folders_in, table_at, tree_at
 from osimlite.lint.config import Config
-from osimlite.lint.engine import Rule
+from osimlite.lint.project_files import is_table
+from osimlite.lint.registry import Rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.suffixes import is_table
 from osimlite.lint.table import Table
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Reference

@@ -25,7 +25,7 @@ from osimlite.schema.tree import Resolution, Tree, Use
 
 if TYPE_CHECKING:
     from osimlite.io.document.upgrade.draft import Change, Refusal
-    from osimlite.lint.engine import Rule
+    from osimlite.lint.registry import Rule
 
 T = TypeVar("T", bound=Object)
 S = TypeVar("S", bound="Subject")

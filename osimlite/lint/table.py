@@ -13,8 +13,7 @@ from osimlite.io.tables.headers import MARK, Entry, MarkerHeader, StorageHeader,
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.rows import Rows
-from osimlite.lint.scan import Scan, number_in
+from osimlite.lint.scan import Rows, Scan, number_in
 from osimlite.lint.suppressions import Suppression, suppressions_in_header
 
 _CELL = re.compile(rb"[^ \t\r\n]+")

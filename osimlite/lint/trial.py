@@ -12,9 +12,9 @@ from typing import ClassVar, NamedTuple
 
 from osimlite.io.document.source import Position
 from osimlite.lint.checked import Checked
-from osimlite.lint.config import Config, Threshold
+from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Severity
-from osimlite.lint.engine import FindingSink
+from osimlite.lint.registry import FindingSink, Threshold
 
 TRIAL = "trial"
 """What rules are about that need such numbers."""
@@ -118,7 +118,7 @@ class Trial(Checked):
 
     def judge(
         self,
-        found: FindingSink,
+        report: FindingSink,
         limits: Sequence[Threshold | float],
         source: str,
         advice: str,
@@ -127,13 +127,13 @@ class Trial(Checked):
         """Compare the numbers of a rule with limits: beyond the largest they are bad, beyond the least they are okay.
 
         Args:
-            found: of the rule.
+            report: the collector of the rule's findings.
             limits: settings, or numbers that are parts of what a number is compared with.
             source: of the limits.
             advice: what to look at.
             kind: only numbers of this kind.
         """
-        (rule,) = found.rules.values()
+        (rule,) = report.rules.values()
         for number in self.numbers:
             if number.rule != rule.name or number.kind != kind:
                 continue
@@ -169,7 +169,7 @@ class Trial(Checked):
             if verdict != GOOD:
                 unit = "" if not number.unit else f" {number.unit}" if number.unit != "%" else " %"
                 more = f", and more than {bad:.3g}{unit} is bad" if bad > good else ""
-                found(
+                report(
                     f"{KINDS.get(kind, '')}{number.of} is {_rounded(number.value)}{unit}"
                     f"{f' ({number.where})' if number.where else ''}: up to {good:.3g}{unit} is good{more} ({source}); "
                     f"{f'{number.side}; ' if number.side else ''}{advice}",

@@ -17,9 +17,9 @@ from osimlite.lint.diagnostic import Finding, Report, merged
 from osimlite.lint.engine import run as checked
 from osimlite.lint.engine import subject_of
 from osimlite.lint.many import settings_of
+from osimlite.lint.project_files import is_table
 from osimlite.lint.rules.values import KEEPS_DEFAULT
 from osimlite.lint.setup import Setup
-from osimlite.lint.suffixes import is_table
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.schema.base import Object
 from osimlite.schema.registry import MODULES

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.lint.engine import all_rules
+from osimlite.lint.registry import all_rules
 from tests.cli.command import run
 
 WALKER = Path(__file__).resolve().parents[2] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
@@ -142,7 +142,7 @@ def test_what_is_no_certain_mend_is_named(tmp_path):
     assert shown.err == "Would mend 0 places; --unsafe-fixes would mend 1 place more.\n"
     mended = run("validate", path, "--fix")
     assert mended.err == "Mended 0 places; --unsafe-fixes would mend 1 place more.\n"
-    assert "1 is mended by --unsafe-fixes." in mended.out
+    assert "1 can be fixed with --unsafe-fixes." in mended.out
     clean = run("validate", WALKER, "--diff")
     assert clean.code == 0 and clean.err == "Would mend 0 places.\n"
 
@@ -173,7 +173,7 @@ def test_a_baseline_lets_an_old_repository_begin(faulty):
     baseline = faulty.parent / "baseline.json"
     assert run("validate", faulty, "--write-baseline", baseline).code == 0
     done = run("validate", faulty, "--baseline", baseline)
-    assert done.code == 0 and done.out == "Nothing found in 1 file, besides 3 of the baseline.\n"
+    assert done.code == 0 and done.out == "Nothing found in 1 file (3 more in the baseline).\n"
 
 
 def test_settings_of_the_project_hold(faulty):

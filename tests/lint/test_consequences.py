@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.lint.consequences import consequence
+from osimlite.lint.rules.domains import consequence
 from osimlite.schema.facts import NAN, REFUSED, Facts
 from osimlite.schema.fields import Value
 from osimlite.schema.registry import MODULES, class_for

@@ -23,8 +23,8 @@ from osimlite.io.document.printer import to_text
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.lint.engine import check_source, run, subject_of
+from osimlite.lint.project_files import is_table
 from osimlite.lint.reporters import render
-from osimlite.lint.suffixes import is_table
 from osimlite.schema.base import Object
 from osimlite.schema.difference import differences
 from osimlite.simulation import read_sto

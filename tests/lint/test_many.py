@@ -17,7 +17,7 @@ from osimlite.lint import Config, validate
 from osimlite.lint import many as module
 from osimlite.lint.cache import digest_of_code
 from osimlite.lint.many import Texts, check_files, settings_of
-from osimlite.lint.ours import is_ours
+from osimlite.lint.project_files import is_ours
 
 MESH = """\
 <OpenSimDocument Version="40600">

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from osimlite.io.document.source import Source
-from osimlite.lint import Config, measures, parts, validate
+from osimlite.lint import Config, measures, validate
 from osimlite.lint.many import check_files
 from osimlite.mechanics.multibody.parts import CoordinateInfo
 from tests.bare import BareEnvironment
@@ -157,7 +157,7 @@ def test_without_machine_code_many_surfaces_are_not_measured(jumping, monkeypatc
     from osimlite.lint.measuring import model
 
     monkeypatch.setattr(measures, "FEW", -1)
-    parts.remembered.clear()
+    measures.remembered.clear()
     with monkeypatch.context() as without:
         without.setattr(model, "has_machine_code", lambda: False)
         (why,) = check_files([str(jumping)], Config()).unmeasured

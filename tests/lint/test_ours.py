@@ -8,7 +8,7 @@ import pytest
 
 from osimlite.cli import main
 from osimlite.lint import validate
-from osimlite.lint.ours import is_ours
+from osimlite.lint.project_files import is_ours
 
 SETUP = """<?xml version="1.0"?>
 <OpenSimDocument Version="40600">
@@ -103,13 +103,13 @@ def test_what_is_passed_over_is_counted_and_named(tmp_path, monkeypatch, capsys)
         (folder / f"{name}.xml").write_text(OTHERS[name])
     for form in ("concise", "full"):
         assert main_code("validate", ".", "--format", form) == 0
-        assert "2 files are none of OpenSim's." in capsys.readouterr().out
+        assert "2 files skipped (not OpenSim files)." in capsys.readouterr().out
         assert main_code("validate", ".", "--format", form, "--all") == 0
-        assert "Not OpenSim's: maven.xml, urdf.xml." in capsys.readouterr().out
+        assert "Skipped, not OpenSim files: maven.xml, urdf.xml." in capsys.readouterr().out
     assert main_code("validate", ".", "--statistics") == 0
-    assert "2 files are none of OpenSim's." in capsys.readouterr().out
+    assert "2 files skipped (not OpenSim files)." in capsys.readouterr().out
     assert main_code("validate", "m.osim") == 0
-    assert "none of OpenSim's" not in capsys.readouterr().out
+    assert "skipped" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("path", ["nowhere", "nowhere/", "no.where/", "./a/b"])

@@ -9,7 +9,7 @@ import pytest
 
 import osimlite.lint.measuring
 from osimlite.io.document.source import Source
-from osimlite.lint import Config, measures, parts, validate
+from osimlite.lint import Config, measures, validate
 from osimlite.lint.many import check_files
 from osimlite.lint.subject import Subject
 
@@ -41,7 +41,7 @@ def asked(monkeypatch):
         return result
 
     monkeypatch.setattr(osimlite.lint.measuring, "measured", measured)
-    parts.remembered.clear()
+    measures.remembered.clear()
     return results
 
 
@@ -55,7 +55,7 @@ def told(text):
 
 
 def fresh(text):
-    parts.remembered.clear()
+    measures.remembered.clear()
     return told(text)
 
 
@@ -117,9 +117,9 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch, 
     result = check_files([str(path)], Config()).codes
     (kept,) = findings_cache.glob("*/measured/*.json")
     subject = Subject(osimlite.io.document.survey.survey(Source(text.encode())))
-    own = parts.parts_of(subject)
-    parts.remembered.clear()
-    known = parts.recall(own, kept.parents[1])
+    own = measures.parts_of(subject)
+    measures.remembered.clear()
+    known = measures.recall(own, kept.parents[1])
     assert known.measures == measures_of(text)
     for wrong in (
         "{}",
@@ -128,15 +128,15 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch, 
         json.dumps([{}, [1]]),
         kept.read_text().replace('"poses"', "5")[:-9],
     ):
-        parts.remembered.clear()
+        measures.remembered.clear()
         kept.write_text(wrong)
-        assert parts.recall(own, kept.parents[1]) is None
-    parts.remembered.clear()
+        assert measures.recall(own, kept.parents[1]) is None
+    measures.remembered.clear()
     assert check_files([str(path)], Config()).codes == result
 
 
 def measures_of(text):
-    parts.remembered.clear()
+    measures.remembered.clear()
     subject = Subject(osimlite.io.document.survey.survey(Source(text.encode())))
     assert not subject.unmeasured()
     return measures.measures_of(subject)
@@ -147,4 +147,4 @@ def test_a_model_whose_classes_stand_elsewhere_has_no_parts(fixtures):
     subject = Subject(
         osimlite.io.document.survey.survey(Source(text.encode())), Config(classes=("x.toml",))
     )
-    assert parts.parts_of(subject) is None
+    assert measures.parts_of(subject) is None

@@ -108,7 +108,7 @@ def test_a_baseline_knows_them_again(project):
     )
     assert found("--baseline", "known.json") == (set(), 0)
     assert command("validate", ".", "--baseline", "known.json").out.endswith(
-        " files, besides 5 of the baseline.\n"
+        " files (5 more in the baseline).\n"
     )
     change(project / "leg.mot", "nColumns=6", "nColumns=7")
     assert found("--baseline", "known.json") == ({("leg.mot", "OSIM802")}, 1)

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 from osimlite.io.document.source import Source
-from osimlite.lint import Config, Severity, validate
+from osimlite.lint import Config, Severity, rules, validate
 from osimlite.lint.baseline import without_baseline, write_baseline
-from osimlite.lint.engine import APART, FAMILIES, Rule, all_rules, groups
 from osimlite.lint.pages import index, page_of
+from osimlite.lint.registry import FAMILIES, RULE_MODULES, Rule, all_rules, groups
 from osimlite.schema.model import CURRENT_VERSION
 from tests.cases import of_each
 
@@ -70,9 +70,14 @@ def test_the_skeleton_is_without_findings(path):
 @of_each(all_rules(), lambda rule: rule.code)
 def test_a_module_that_only_some_subjects_load_is_about_these(rule):
     module = rule.check.__module__.rpartition(".")[2]
-    assert {kind for kind, names in APART.items() if module.startswith(names)} == {rule.about} & {
-        *APART
-    }
+    (subject,) = (about for about, modules in RULE_MODULES.items() if module in modules)
+    assert subject == (rule.about if rule.about in RULE_MODULES else "model")
+
+
+def test_the_table_of_rule_modules_names_every_module():
+    folder = Path(rules.__path__[0])
+    known = [module for modules in RULE_MODULES.values() for module in modules]
+    assert sorted(known) == sorted({path.stem for path in folder.glob("*.py")} - {"__init__"})
 
 
 @of_each(all_rules(), lambda rule: rule.code)

@@ -14,7 +14,7 @@ from osimlite.io.document.source import Source
 from osimlite.lint import Config, Severity, validate
 from osimlite.lint.baseline import without_baseline, write_baseline
 from osimlite.lint.cache import key_of
-from osimlite.lint.engine import all_rules
+from osimlite.lint.registry import all_rules
 from osimlite.lint.settings import Settings, settings_for
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / "lint"

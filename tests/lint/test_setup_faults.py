@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from osimlite.lint.engine import run, subject_of
-from osimlite.lint.suffixes import is_document, is_table
+from osimlite.lint.project_files import is_document, is_table
 from tests.lint.setup_faults import FAULTS, HARMLESS, STUDIES, TEXTS, UNTOLD, Fault, put_in
 
 

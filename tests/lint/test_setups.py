@@ -12,7 +12,7 @@ from osimlite.cli._validating import run as validate_paths
 from osimlite.lint import Config, validate
 from osimlite.lint.engine import run, subject_of
 from osimlite.lint.many import check_files
-from osimlite.lint.suffixes import project_files
+from osimlite.lint.project_files import project_files
 from osimlite.schema.registry import MODULES
 
 

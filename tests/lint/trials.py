@@ -10,7 +10,8 @@ import re
 from osimlite.io.document.source import Position
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
-from osimlite.lint.engine import Rule, run
+from osimlite.lint.engine import run
+from osimlite.lint.registry import Rule
 from osimlite.lint.trial import KINDS, Number, Trial
 
 LINE = re.compile(

@@ -15,13 +15,13 @@ from osimlite.io.document.survey import survey
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
-from osimlite.lint.engine import all_rules, run, subject_in, use_classes
+from osimlite.lint.engine import run, subject_in, use_classes
 from osimlite.lint.measures import MEASURES
-from osimlite.lint.ours import BEGINNING, is_ours
+from osimlite.lint.project_files import BEGINNING, is_ours, is_table
+from osimlite.lint.registry import all_rules
 from osimlite.lint.settings import settings_for
 from osimlite.lint.setup import Setup
 from osimlite.lint.subject import Subject
-from osimlite.lint.suffixes import is_table
 from osimlite.schema.base import Component, Object
 from osimlite.schema.editing import named_by
 from osimlite.schema.model import Model

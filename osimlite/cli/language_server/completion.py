@@ -11,7 +11,7 @@ from osimlite.cli.language_server.cursor import Cursor, Element, single_objects
 from osimlite.cli.language_server.hover import is_list
 from osimlite.cli.language_server.names import names, reference_of
 from osimlite.io.document.lexical import formatter
-from osimlite.lint.suffixes import is_document
+from osimlite.lint.project_files import is_document
 from osimlite.schema.descriptions import described, meaning_of, value_of
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.registry import class_for, tags_of

@@ -1,4 +1,4 @@
-"""Formats of a report, one small module each. A reporter turns a report into a text."""
+"""Formats of a report: a renderer turns a report into a text."""
 
 from __future__ import annotations
 
@@ -7,9 +7,19 @@ from importlib import import_module
 from osimlite.errors import OsimliteError
 from osimlite.lint.diagnostic import Report
 
-FORMATS = ("full", "concise", "json", "github", "sarif", "junit")
+RENDERERS = {
+    "full": ("terminal", "render_full"),
+    "concise": ("terminal", "render_concise"),
+    "json": ("interchange", "render_json"),
+    "github": ("interchange", "render_github"),
+    "sarif": ("interchange", "render_sarif"),
+    "junit": ("interchange", "render_junit"),
+}
+"""Module and function of each format; a module is imported when its format is used."""
+
+FORMATS = tuple(RENDERERS)
 FOR_PEOPLE = ("full", "concise")
-"""The formats that are read on a terminal; the others are for programs, and are UTF-8 wherever they go."""
+"""The formats for a terminal; the others are for programs and are always written in UTF-8."""
 
 
 def render(
@@ -20,23 +30,30 @@ def render(
     width: int = 80,
     everything: bool = False,
 ) -> str:
-    """The report in a format.
+    """Return a report as text in a format.
 
-    Args: report: what was found. name: one of `FORMATS`. colour: whether to write the colours of a
-        terminal, in the formats that people read. width: columns to keep to, in the full format.
-        everything: whether findings that are alike are all written, where people read them; else
-        the first stands for all. The formats for programs are always whole.
+    Args:
+        report: the report.
+        name: one of `FORMATS`.
+        colour: whether to write terminal colours, in the formats for people.
+        width: number of columns, in the full format.
+        everything: whether the formats for people show every finding; otherwise one finding stands
+            for similar ones. The formats for programs always have every finding.
+
+    Returns:
+        The text.
 
     Raises:
-        OsimliteError: there is no such format.
+        OsimliteError: the format is unknown.
     """
-    if name not in FORMATS:
+    if name not in RENDERERS:
         from osimlite.base.text import listed
 
         raise OsimliteError(f"--format is one of {listed(FORMATS)}, not '{name}'")
-    module = import_module(f"osimlite.lint.reporters.{name}")
+    module, function = RENDERERS[name]
+    renderer = getattr(import_module(f"osimlite.lint.reporters.{module}"), function)
     if name == "full":
-        return str(module.render(report, colour=colour, width=width, everything=everything))
+        return str(renderer(report, colour=colour, width=width, everything=everything))
     if name == "concise":
-        return str(module.render(report, colour=colour, everything=everything))
-    return str(module.render(report))
+        return str(renderer(report, colour=colour, everything=everything))
+    return str(renderer(report))

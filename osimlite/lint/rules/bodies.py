@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import TypedDict
 
-from osimlite.lint.config import Threshold
 from osimlite.lint.diagnostic import Fix
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.inertia import possible_inertia, principal_axes
 from osimlite.lint.placement import on_base
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, Threshold, rule
 from osimlite.lint.skeleton import skeleton
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
@@ -30,7 +29,7 @@ MASS = Threshold("largest-mass", 1000.0, "kg", "no body of a model is heavier")
 
 
 @rule("OSIM501", "missing-mass", severity=ERROR)
-def missing_mass(subject: Subject, found: FindingSink) -> None:
+def missing_mass(subject: Subject, report: FindingSink) -> None:
     """A body has no mass.
 
     Reports bodies whose mass is not given.
@@ -49,11 +48,11 @@ def missing_mass(subject: Subject, found: FindingSink) -> None:
             and "mass" not in body.model_fields_set
             and not subject.noted(body, mass)
         ):
-            found(f"{called(body)} has no mass: OpenSim refuses to load the file", body)
+            report(f"{called(body)} has no mass: OpenSim refuses to load the file", body)
 
 
 @rule("OSIM502", "impossible-inertia", severity=WARNING, thresholds=(SLACK,), mends="unsafe")
-def impossible_inertia(subject: Subject, found: FindingSink) -> None:
+def impossible_inertia(subject: Subject, report: FindingSink) -> None:
     """No distribution of mass has this inertia.
 
     Reports inertias of which one principal moment is larger than the other two together, and by how
@@ -72,7 +71,7 @@ def impossible_inertia(subject: Subject, found: FindingSink) -> None:
         small, middle, large = moments
         if small >= 0 and large > (small + middle) * (1 + slack):
             excess = 100 * (large / (small + middle) - 1) if small + middle > 0 else math.inf
-            found(
+            report(
                 f"the inertia of {called(body)} is impossible: its largest principal moment, {quantity(large)}, is "
                 f"more than the sum of the others, {quantity(small + middle)}"
                 + (f", by {excess:.3g} %" if math.isfinite(excess) else "")
@@ -84,7 +83,7 @@ def impossible_inertia(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM503", "inertia-not-positive", severity=WARNING, thresholds=(SLACK,), mends="unsafe")
-def inertia_not_positive(subject: Subject, found: FindingSink) -> None:
+def inertia_not_positive(subject: Subject, report: FindingSink) -> None:
     """An inertia has a negative principal moment.
 
     Reports inertias that are negative about some axis: a negative moment, or products that are too
@@ -104,7 +103,7 @@ def inertia_not_positive(subject: Subject, found: FindingSink) -> None:
             cause = (
                 "" if min(body.inertia[:3]) < 0 else "; its products are too large for its moments"
             )
-            found(
+            report(
                 f"the inertia of {called(body)} has a negative principal moment, {quantity(moments[0])}{cause}"
                 + _closest(body),
                 body,
@@ -114,7 +113,7 @@ def inertia_not_positive(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM504", "no-inertia", severity=WARNING)
-def no_inertia(subject: Subject, found: FindingSink) -> None:
+def no_inertia(subject: Subject, report: FindingSink) -> None:
     """A body has mass and no inertia.
 
     Reports bodies with a mass whose inertia is zero or not given; and, for information, those
@@ -132,7 +131,7 @@ def no_inertia(subject: Subject, found: FindingSink) -> None:
     inertia = Body.field_specs()["inertia"]
     for body in subject.each(Body):
         if body.mass == 0.0 and any(body.inertia) and not subject.noted(body, inertia):
-            found(
+            report(
                 f"{called(body)} has an inertia and no mass: OpenSim sets the inertia to zero",
                 body,
                 tag="inertia",
@@ -141,7 +140,7 @@ def no_inertia(subject: Subject, found: FindingSink) -> None:
         if body.mass > 0 and not any(body.inertia) and not subject.noted(body, inertia):
             state = "is zero" if "inertia" in body.model_fields_set else "is not given"
             spins = _spins_freely(subject, body)
-            found(
+            report(
                 f"the inertia of {called(body)} {state} though its mass is {quantity(body.mass, 'kg')}"
                 + (": nothing resists its joint, and accelerations become NaN" if spins else ""),
                 body,
@@ -165,7 +164,7 @@ def _spins_freely(subject: Subject, body: Body) -> bool:
 
 
 @rule("OSIM523", "mass-out-of-proportion", severity=WARNING, thresholds=(MASS, GYRATION))
-def mass_out_of_proportion(subject: Subject, found: FindingSink) -> None:
+def mass_out_of_proportion(subject: Subject, report: FindingSink) -> None:
     """A mass, or an inertia for its mass, is larger than that of any body.
 
     Reports bodies heavier than a tonne, and inertias that would need the mass to lie several metres
@@ -183,7 +182,7 @@ def mass_out_of_proportion(subject: Subject, found: FindingSink) -> None:
     heaviest, widest = subject.config.value_of(MASS), subject.config.value_of(GYRATION)
     for body in subject.each(Body):
         if heaviest < body.mass < math.inf:
-            found(
+            report(
                 f"the mass of {called(body)} is {quantity(body.mass, 'kg')}; in grams?",
                 body,
                 tag="mass",
@@ -194,7 +193,7 @@ def mass_out_of_proportion(subject: Subject, found: FindingSink) -> None:
             continue
         radius = math.sqrt(max(moments[2], 0) / body.mass)
         if radius > widest:
-            found(
+            report(
                 f"the inertia of {called(body)} is as if its {quantity(body.mass, 'kg')} lay {quantity(radius, 'm')} "
                 "from its mass center; in kg mm^2?",
                 body,

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping
 
 from osimlite.base.text import nearest
 from osimlite.io.document.notes import Note
-from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.fixes import renamed, replaced
 from osimlite.lint.old_tags import successor
+from osimlite.lint.registry import ERROR, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
 from osimlite.schema.base import Object
@@ -20,7 +20,7 @@ from osimlite.schema.specs import FieldSpec, field_specs
 
 
 @rule("OSIM102", "unknown-class", severity=ERROR, mends="both")
-def unknown_class(subject: Subject, found: FindingSink) -> None:
+def unknown_class(subject: Subject, report: FindingSink) -> None:
     """An object is of a class that OpenSim does not have.
 
     Reports elements that should be objects and are of no class of OpenSim 4.6: misspelt, in the
@@ -55,7 +55,7 @@ def unknown_class(subject: Subject, found: FindingSink) -> None:
             message += "; if it belongs to a plug-in, load that first: nothing in it was checked"
         same = suggestion is not None and suggestion.lower() == note.word.lower()
         fix = renamed(subject.source, note.number, suggestion, safe=same)
-        found(message, owner, number=note.number, suggestion=suggestion, fix=fix)
+        report(message, owner, number=note.number, suggestion=suggestion, fix=fix)
 
 
 PLUGINS = {
@@ -129,7 +129,7 @@ def _is_part(specs: Mapping[str, FieldSpec], tag: str) -> bool:
 
 
 @rule("OSIM103", "wrong-class", severity=ERROR)
-def wrong_class(subject: Subject, found: FindingSink) -> None:
+def wrong_class(subject: Subject, report: FindingSink) -> None:
     """An object of a known class stands where that class may not stand.
 
     Reports members of a set, or of another property, that are of a class the property does not
@@ -154,7 +154,7 @@ def wrong_class(subject: Subject, found: FindingSink) -> None:
         holder = (
             f"{called(owner)}: {note.spec.tag}" if note.spec.tag != "objects" else called(owner)
         )
-        found(
+        report(
             f"{holder} takes {a(kinds)}, not {a(note.word)}: OpenSim {_fate(subject, note)}{where}",
             owner,
             number=note.number,
@@ -162,7 +162,7 @@ def wrong_class(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM108", "wrong-part-name", severity=ERROR, mends="unsafe")
-def wrong_part_name(subject: Subject, found: FindingSink) -> None:
+def wrong_part_name(subject: Subject, report: FindingSink) -> None:
     """A part of an object has a name other than that of its property.
 
     Reports objects such as `<FrameGeometry name="axes">`: a property that holds one object finds it
@@ -182,7 +182,7 @@ def wrong_part_name(subject: Subject, found: FindingSink) -> None:
         spec = part_for(note, owner)
         if spec is not None:
             assert subject.source is not None
-            found(
+            report(
                 f"{called(owner)} takes its {spec.tag} by that name; OpenSim ignores this {note.word}",
                 owner,
                 number=note.number,
@@ -198,7 +198,7 @@ def wrong_part_name(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM109", "missing-wrapper", severity=ERROR)
-def missing_wrapper(subject: Subject, found: FindingSink) -> None:
+def missing_wrapper(subject: Subject, report: FindingSink) -> None:
     """Members of a set do not stand in its `<objects>`.
 
     Reports objects that stand directly in a set or in the object that should list them.
@@ -222,7 +222,7 @@ def missing_wrapper(subject: Subject, found: FindingSink) -> None:
         if wrapper is None or id(owner) in reported:
             continue
         reported.add(id(owner))
-        found(
+        report(
             f"{called(owner)} holds {note.word} objects inside <{wrapper}> only; OpenSim ignores this one"
             + (" and the others" if standing[id(owner)] > 1 else ""),
             owner,

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from osimlite.base.text import counted
 from osimlite.lint.construction import CONSTRUCTION, Obstacle, Stage, obstacles_of
 from osimlite.lint.diagnostic import Severity
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Unknown
 from osimlite.schema.registry import further_classes

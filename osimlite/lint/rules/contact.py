@@ -7,7 +7,7 @@ from itertools import combinations
 from typing import Any
 
 from osimlite.base.text import listed
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.rules.references import broken_references
 from osimlite.lint.skeleton import base_of
 from osimlite.lint.subject import Subject
@@ -20,7 +20,7 @@ from osimlite.schema.tree import Use
 
 
 @rule("OSIM321", "contact-without-partner", severity=WARNING)
-def contact_without_partner(subject: Subject, found: FindingSink) -> None:
+def contact_without_partner(subject: Subject, report: FindingSink) -> None:
     """A contact force has no two surfaces that can meet.
 
     Reports contact forces that list no contact geometry, or only one, over all their parameter sets
@@ -48,9 +48,9 @@ def contact_without_partner(subject: Subject, found: FindingSink) -> None:
             listed_one = f"one surface, '{uses[0].text}'" if uses else "no contact geometry"
             message = f"{called(force)} lists {listed_one}: it never acts"
         if holders:
-            found(message, holders[0], tag="geometry")
+            report(message, holders[0], tag="geometry")
         else:
-            found(message, force)
+            report(message, force)
 
 
 _ROUND = frozenset(("ContactSphere", "ContactEllipsoid"))
@@ -89,7 +89,7 @@ def _reason_for_no_contact(subject: Subject, force: Component, uses: list[Use]) 
 
 
 @rule("OSIM322", "contact-listed-twice", severity=ERROR)
-def contact_listed_twice(subject: Subject, found: FindingSink) -> None:
+def contact_listed_twice(subject: Subject, report: FindingSink) -> None:
     """A contact force lists the same surface twice.
 
     Reports every mention of a contact geometry after the first within one force.
@@ -113,7 +113,7 @@ def contact_listed_twice(subject: Subject, found: FindingSink) -> None:
             if target is None:
                 continue
             if id(target) in seen:
-                found(
+                report(
                     f"{called(force)} lists '{target.name}' again: OpenSim counts it twice and the force is doubled",
                     use.holder,
                     tag=use.spec.tag,
@@ -124,7 +124,7 @@ def contact_listed_twice(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM323", "unused-contact-geometry", severity=INFO)
-def unused_contact_geometry(subject: Subject, found: FindingSink) -> None:
+def unused_contact_geometry(subject: Subject, report: FindingSink) -> None:
     """A contact geometry is used by nothing.
 
     Reports contact geometry that no force and no path names.
@@ -154,7 +154,7 @@ def unused_contact_geometry(subject: Subject, found: FindingSink) -> None:
     }
     for surface in surfaces:
         if id(surface) not in used:
-            found(f"no force uses {called(surface)}", surface, attribute="name")
+            report(f"no force uses {called(surface)}", surface, attribute="name")
 
 
 _SURFACES = {"ContactGeometry", "ContactSphere", "ContactHalfSpace"}

@@ -5,13 +5,22 @@ from __future__ import annotations
 import math
 
 from osimlite.io.document.lexical import shortest
-from osimlite.lint.config import Threshold
-from osimlite.lint.constants import constant_value
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, Threshold, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
+from osimlite.schema.base import Object
 from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.functions import (
+    Constant,
+    GCVSpline,
+    LinearFunction,
+    MultiplierFunction,
+    PiecewiseConstantFunction,
+    PiecewiseLinearFunction,
+    PolynomialFunction,
+    SimmSpline,
+)
 from osimlite.schema.joints import Joint
 
 ANGLE = Threshold(
@@ -32,7 +41,7 @@ ORIENTATION = Threshold(
 
 
 @rule("OSIM511", "inverted-range", severity=WARNING, mends="unsafe")
-def inverted_range(subject: Subject, found: FindingSink) -> None:
+def inverted_range(subject: Subject, report: FindingSink) -> None:
     """The range of a coordinate ends before it begins.
 
     Reports ranges whose first number is larger than the second; an error if the coordinate is
@@ -58,7 +67,7 @@ def inverted_range(subject: Subject, found: FindingSink) -> None:
                 if coordinate.clamped
                 else ""
             )
-            found(
+            report(
                 f"the range of {called(coordinate)} runs from {quantity(low)} down to {quantity(high)}{refused}",
                 coordinate,
                 tag="range",
@@ -71,7 +80,7 @@ def inverted_range(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM512", "default-outside-range", severity=WARNING)
-def default_outside_range(subject: Subject, found: FindingSink) -> None:
+def default_outside_range(subject: Subject, report: FindingSink) -> None:
     """The default value of a coordinate lies outside its range.
 
     Reports such defaults; an error if the coordinate is clamped.
@@ -99,7 +108,7 @@ def default_outside_range(subject: Subject, found: FindingSink) -> None:
                 if coordinate.clamped
                 else ""
             )
-            found(
+            report(
                 f"the default value of {called(coordinate)}, {quantity(coordinate.default_value)}, is outside its "
                 f"range, {quantity(low)} to {quantity(high)}{refused}",
                 coordinate,
@@ -143,7 +152,7 @@ def locked_and_prescribed(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM513", "prescribed-without-function", severity=ERROR)
-def prescribed_without_function(subject: Subject, found: FindingSink) -> None:
+def prescribed_without_function(subject: Subject, report: FindingSink) -> None:
     """A coordinate is prescribed and has no function.
 
     Reports coordinates with `<prescribed>true</prescribed>` and no `<prescribed_function>`.
@@ -159,7 +168,7 @@ def prescribed_without_function(subject: Subject, found: FindingSink) -> None:
     """
     for coordinate in subject.each(Coordinate):
         if coordinate.prescribed and coordinate.prescribed_function is None:
-            found(
+            report(
                 f"{called(coordinate)} is prescribed without a prescribed_function: OpenSim lets it move freely",
                 coordinate,
                 tag="prescribed",
@@ -169,7 +178,7 @@ def prescribed_without_function(subject: Subject, found: FindingSink) -> None:
 @rule(
     "OSIM514", "degrees-for-radians", severity=WARNING, thresholds=(ANGLE, UNBOUNDED, ORIENTATION)
 )
-def degrees_for_radians(subject: Subject, found: FindingSink) -> None:
+def degrees_for_radians(subject: Subject, report: FindingSink) -> None:
     """An angle looks as if it were in degrees.
 
     Reports rotational coordinates whose default value or range goes beyond five turns, in radians,
@@ -197,14 +206,14 @@ def degrees_for_radians(subject: Subject, found: FindingSink) -> None:
             )
             # 99999.9 and the like stand for "no bound".
             if turns < largest < unbounded:
-                found(
+                report(
                     f"the range of {called(coordinate)}, {quantity(coordinate.range)}, is in radians; in degrees?",
                     coordinate,
                     tag="range",
                     suggestion=" ".join(f"{math.radians(bound):.6g}" for bound in coordinate.range),
                 )
             if turns < abs(coordinate.default_value) < math.inf:
-                found(
+                report(
                     f"the default value of {called(coordinate)}, {quantity(coordinate.default_value)}, is in radians; "
                     "in degrees?",
                     coordinate,
@@ -218,9 +227,28 @@ def degrees_for_radians(subject: Subject, found: FindingSink) -> None:
             for item in items:
                 angles = getattr(item, spec.name)
                 if any(largest < abs(angle) < math.inf for angle in angles):
-                    found(
+                    report(
                         f"{subject.titled(item, spec)}, {quantity(angles)}, is in radians; in degrees?",
                         item,
                         tag=spec.tag,
                         suggestion=" ".join(f"{math.radians(angle):.6g}" for angle in angles),
                     )
+
+
+def constant_value(function: Object | None) -> float | None:
+    """Return the value of a function that is constant; None if it changes, or is not known."""
+    match function:
+        case Constant():
+            return function.value
+        case MultiplierFunction():
+            inner = constant_value(function.function)
+            return None if inner is None else function.scale * inner
+        case LinearFunction() if len(function.coefficients) > 1:
+            return None if function.coefficients[0] else function.coefficients[1]
+        case PolynomialFunction() if function.coefficients:
+            return None if any(function.coefficients[:-1]) else function.coefficients[-1]
+        case (
+            SimmSpline() | GCVSpline() | PiecewiseLinearFunction() | PiecewiseConstantFunction()
+        ) if function.y:
+            return function.y[0] if len({*function.y}) == 1 else None
+    return None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from osimlite.base.text import listed, nearest
 from osimlite.lint.axes import axes_of, axes_refused, coordinates_of
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.mechanics.laws.vectors import cross, norm
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 @rule("OSIM410", "made-up-coordinate", severity=ERROR)
-def made_up_coordinate(subject: Subject, found: FindingSink) -> None:
+def made_up_coordinate(subject: Subject, report: FindingSink) -> None:
     """An axis of a custom joint names a coordinate that the joint does not declare.
 
     Reports such names where OpenSim takes the model all the same; where it refuses the model, the
@@ -59,7 +59,7 @@ def made_up_coordinate(subject: Subject, found: FindingSink) -> None:
                 if not isinstance(name, str) or name in declared:
                     continue
                 word, nth = subject.word_at(axis, "coordinates", index)
-                found(
+                report(
                     f"{axis.name} of {called(joint)} names '{name}', which the joint does not declare: OpenSim makes a "
                     "coordinate of that name up",
                     axis,
@@ -72,7 +72,7 @@ def made_up_coordinate(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM412", "axis-without-coordinate", severity=ERROR)
-def axis_without_coordinate(subject: Subject, found: FindingSink) -> None:
+def axis_without_coordinate(subject: Subject, report: FindingSink) -> None:
     """An axis of a custom joint has a function and no coordinate for it.
 
     Reports axes that name no coordinate though their function wants a variable. Constant and linear
@@ -100,7 +100,7 @@ def axis_without_coordinate(subject: Subject, found: FindingSink) -> None:
                 "LinearFunction",
                 "Unknown",
             ):
-                found(
+                report(
                     f"{axis.name} of {called(joint)} names no coordinate for its {called(axis.function)}: "
                     "OpenSim crashes",
                     axis,
@@ -109,7 +109,7 @@ def axis_without_coordinate(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM413", "collinear-axes", severity=ERROR)
-def collinear_axes(subject: Subject, found: FindingSink) -> None:
+def collinear_axes(subject: Subject, report: FindingSink) -> None:
     """Two rotations, or two translations, of a custom joint have the same axis.
 
     Reports axes of a custom joint that are parallel to one before of the same kind, or have no
@@ -147,7 +147,7 @@ def collinear_axes(subject: Subject, found: FindingSink) -> None:
                         if short
                         else f"is parallel to that of {twin.name if twin else ''}"
                     )
-                    found(
+                    report(
                         f"the axis of {axis.name} of {called(joint)} {state}: OpenSim refuses to load the file",
                         axis,
                         tag="axis",
@@ -155,7 +155,7 @@ def collinear_axes(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM414", "idle-coordinate", severity=ERROR)
-def idle_coordinate(subject: Subject, found: FindingSink) -> None:
+def idle_coordinate(subject: Subject, report: FindingSink) -> None:
     """A coordinate of a custom joint moves nothing.
 
     Reports coordinates that no axis uses, or only with a function that does not change with them in
@@ -183,13 +183,13 @@ def idle_coordinate(subject: Subject, found: FindingSink) -> None:
         for coordinate in idle:
             axes = [axis.name for axis in axes_of(joint) if coordinate.name in axis.names]
             state = f"does not change {listed(axes)} of it" if axes else "is on no axis of it"
-            found(
+            report(
                 f"{called(coordinate)} of {called(joint)} {state}: accelerations become NaN, without a message",
                 coordinate,
                 attribute="name",
             )
         if not idle and _rank(list(columns.values())) < len(columns):
-            found(
+            report(
                 f"the coordinates of {called(joint)} move it in the same way: accelerations are NaN, or anything",
                 joint,
                 number=subject.element_of(joint, "coordinates"),

@@ -9,8 +9,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from osimlite.base.text import listed, nearest
-from osimlite.lint.consequences import consequence
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject, once
 from osimlite.lint.words import quantity, shown
 from osimlite.schema.base import Object
@@ -19,8 +18,36 @@ from osimlite.schema.fields import Value, domain_test
 from osimlite.schema.specs import FieldSpec, lineage, value_specs
 
 
+def consequence(
+    cls: type[Object], name: str, number: float, *, rigid_tendon: bool = False
+) -> tuple[str, bool]:
+    """What happens with `number`, outside its domain, in a property; and whether that is a failure.
+
+    A rigid tendon may have no length, where an elastic one needs some.
+    """
+    is_allowed = rigid_tendon and name == "tendon_slack_length"
+    for base in cls.__mro__:
+        facts = base.__dict__.get("facts")
+        if facts is None:
+            continue
+        case = (
+            facts.missing
+            if number != number
+            else facts.zero
+            if number == 0 and not is_allowed
+            else {}
+        )
+        for fates in (case, facts.outside, {REFUSED: facts.refused}):
+            for fate, properties in fates.items():
+                if name in properties.split():
+                    return fate, bool(fate)
+        if name in facts.doubts:
+            return facts.doubts[name], False
+    return "", False
+
+
 @rule("OSIM205", "not-finite", severity=ERROR)
-def not_finite(subject: Subject, found: FindingSink) -> None:
+def not_finite(subject: Subject, report: FindingSink) -> None:
     """A number is NaN, or infinite where that makes no sense.
 
     Reports NaN in any number, and infinity except in bounds (ranges, smallest and largest
@@ -48,7 +75,7 @@ def not_finite(subject: Subject, found: FindingSink) -> None:
         ]
         if bad:
             fate = _fate_of_nan(item, spec, bad[0])
-            found(
+            report(
                 f"{subject.titled(item, spec)} is {shown(value)}: {fate}",
                 item,
                 tag=spec.tag,
@@ -70,7 +97,7 @@ def _fate_of_nan(item: Object, spec: FieldSpec, number: float) -> str:
 
 
 @rule("OSIM206", "impossible-value", severity=ERROR)
-def impossible_value(subject: Subject, found: FindingSink) -> None:
+def impossible_value(subject: Subject, report: FindingSink) -> None:
     """A number makes OpenSim fail or compute NaN.
 
     Reports values outside their domain of which it is known that OpenSim refuses them, or computes
@@ -88,11 +115,11 @@ def impossible_value(subject: Subject, found: FindingSink) -> None:
     """
     for item, spec, value, verdict in outside(subject):
         if verdict.known:
-            _report_domain(subject, found, item, spec, value, verdict)
+            _report_domain(subject, report, item, spec, value, verdict)
 
 
 @rule("OSIM207", "doubtful-value", severity=WARNING)
-def doubtful_value(subject: Subject, found: FindingSink) -> None:
+def doubtful_value(subject: Subject, report: FindingSink) -> None:
     """A number is outside the values that make sense for its property.
 
     Reports numbers outside the domain that the property declares: a negative radius or dissipation,
@@ -108,11 +135,11 @@ def doubtful_value(subject: Subject, found: FindingSink) -> None:
     """
     for item, spec, value, verdict in outside(subject):
         if not verdict.known:
-            _report_domain(subject, found, item, spec, value, verdict)
+            _report_domain(subject, report, item, spec, value, verdict)
     for item, spec, value in _reals(subject):
         huge = [number for number in _numbers(value) if HUGE <= abs(number) < math.inf]
         if huge and not _bound(item, spec):
-            found(
+            report(
                 f"{subject.titled(item, spec)} is {shown(value)}: no quantity of a motion is of this size",
                 item,
                 tag=spec.tag,
@@ -121,7 +148,7 @@ def doubtful_value(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM208", "unknown-choice", severity=ERROR)
-def unknown_choice(subject: Subject, found: FindingSink) -> None:
+def unknown_choice(subject: Subject, report: FindingSink) -> None:
     """A property has a value other than those that mean something.
 
     Reports words and numbers outside the list of those that OpenSim knows for a property.
@@ -147,7 +174,7 @@ def unknown_choice(subject: Subject, found: FindingSink) -> None:
                     continue
                 for word in value if isinstance(value, tuple) else (value,):
                     if word not in choices:
-                        found(
+                        report(
                             f"{subject.titled(item, spec)} is '{word}'; OpenSim knows {listed(map(str, choices))}",
                             item,
                             tag=spec.tag,
@@ -236,7 +263,7 @@ def _is_missing(item: Object, spec: FieldSpec, value: Any) -> bool:
 
 def _report_domain(
     subject: Subject,
-    found: FindingSink,
+    report: FindingSink,
     item: Object,
     spec: FieldSpec,
     value: Any,
@@ -245,7 +272,7 @@ def _report_domain(
     given = spec.name in item.model_fields_set
     assert isinstance(spec.kind, Value)
     if verdict.number != verdict.number:
-        found(
+        report(
             f"{subject.titled(item, spec)} is not given and has no default: {verdict.fate}",
             item,
             tag=spec.tag,
@@ -262,7 +289,7 @@ def _report_domain(
         .replace("!=", "other than")
     )
     fate = f": {verdict.fate}" if verdict.fate else ""
-    found(
+    report(
         f"{subject.titled(item, spec)} is {size}, it should be {wanted}{fate}",
         item,
         tag=spec.tag,

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
-from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.placement import Pose, default_poses, on_base
+from osimlite.lint.registry import ERROR, FindingSink, rule
 from osimlite.lint.skeleton import base_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called

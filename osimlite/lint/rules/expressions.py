@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from osimlite.errors import ModelError
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.rules.functions import UNUSED, is_unused
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called

@@ -8,7 +8,7 @@ from functools import lru_cache
 from osimlite.base.files import NAMED_SO
 from osimlite.base.text import counted, listed
 from osimlite.io.document.source import Source
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
@@ -17,7 +17,7 @@ from osimlite.schema.geometry import Mesh
 
 
 @rule("OSIM701", "missing-mesh", severity=WARNING)
-def missing_mesh(subject: Subject, found: FindingSink) -> None:
+def missing_mesh(subject: Subject, report: FindingSink) -> None:
     """A mesh file is not there.
 
     Looks for the file of each mesh where OpenSim does: beside the model, in the folder `Geometry`
@@ -51,7 +51,7 @@ def missing_mesh(subject: Subject, found: FindingSink) -> None:
         severity = ERROR if isinstance(item, ContactMesh) else None
         if not name:
             fate = "" if severity is None else ": OpenSim refuses the model"
-            found(f"{called(item)} names no file{fate}", item, tag=tag, severity=severity)
+            report(f"{called(item)} names no file{fate}", item, tag=tag, severity=severity)
             continue
         if any(folders.has(place, name) for place in places):
             continue
@@ -72,11 +72,11 @@ def missing_mesh(subject: Subject, found: FindingSink) -> None:
                     f"the file '{name}' of {called(item)} is there as '{twin}': only Windows reads a backslash so, and "
                     "other systems do not find it"
                 )
-        found(message, item, tag=tag, suggestion=twin, severity=severity)
+        report(message, item, tag=tag, suggestion=twin, severity=severity)
 
 
 @rule("OSIM702", "included-file", severity=INFO)
-def included_file(subject: Subject, found: FindingSink) -> None:
+def included_file(subject: Subject, report: FindingSink) -> None:
     """An object is kept in another file.
 
     Reports `file=` on an object: for information, as a warning if that file is not there or does
@@ -103,7 +103,7 @@ def included_file(subject: Subject, found: FindingSink) -> None:
         included = note.owner.layout is not None and note.owner.layout.include is not None
         read = included or (subject.folder is None and not note.why)
         if note.owner is subject.top:
-            found(
+            report(
                 f"OpenSim does not look for {called(note.owner)} in '{note.value}': it reads what stands here",
                 note.owner,
                 number=note.number,
@@ -126,7 +126,7 @@ def included_file(subject: Subject, found: FindingSink) -> None:
         wanted = sum(subject.resolution(use).target is note.owner for use in uses)
         if wanted:
             fate += f", while {counted(wanted, 'reference')} to it {'leads' if wanted == 1 else 'lead'} nowhere"
-        found(
+        report(
             f"{called(note.owner)} {state} '{note.value}'{why}{fate}",
             note.owner,
             number=note.number,
@@ -151,7 +151,7 @@ def _has_content(source: Source | None, number: int) -> bool:
 
 
 @rule("OSIM703", "missing-data-file", severity=ERROR)
-def missing_data_file(subject: Subject, found: FindingSink) -> None:
+def missing_data_file(subject: Subject, report: FindingSink) -> None:
     """A file of measured loads, of controls or of a table is not there.
 
     Looks for the files of external loads, of controllers and of table sources beside the model and
@@ -190,7 +190,7 @@ def missing_data_file(subject: Subject, found: FindingSink) -> None:
         fate = (
             "it has no controls" if cls == "ControlSetController" else "OpenSim refuses the model"
         )
-        found(
+        report(
             f"the file '{name}' of {called(item)} is not there: {fate}",
             item,
             tag=tag,

@@ -8,7 +8,7 @@ from typing import Final, cast
 
 from osimlite.base.text import counted
 from osimlite.lint.axes import axes_of
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.base import Component, Object
@@ -34,7 +34,7 @@ Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstant
 
 
 @rule("OSIM601", "unsorted-abscissae", severity=ERROR)
-def unsorted_abscissae(subject: Subject, found: FindingSink) -> None:
+def unsorted_abscissae(subject: Subject, report: FindingSink) -> None:
     """The x values of a function do not rise.
 
     Reports the first x that is smaller than the one before it, and of splines also the first that
@@ -78,7 +78,7 @@ def unsorted_abscissae(subject: Subject, found: FindingSink) -> None:
                 )
                 relation = "repeats" if here == before else "is smaller than"
                 word, nth = subject.word_at(function, "x", index)
-                found(
+                report(
                     f"x of {subject.called_with(function)}: number {index + 1}, {quantity(here)}, {relation} the one "
                     f"before; {fate}",
                     function,
@@ -92,7 +92,7 @@ def unsorted_abscissae(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM602", "unequal-points", severity=ERROR)
-def unequal_points(subject: Subject, found: FindingSink) -> None:
+def unequal_points(subject: Subject, report: FindingSink) -> None:
     """A function has not as many y values as x values.
 
     Reports tabulated functions whose lists are of different length. Too many y are a warning.
@@ -121,7 +121,7 @@ def unequal_points(subject: Subject, found: FindingSink) -> None:
             if ys < xs
             else "the rest is ignored"
         )
-        found(
+        report(
             f"{subject.called_with(function)} has {xs} x and {ys} y: {fate}",
             function,
             tag="y",
@@ -130,7 +130,7 @@ def unequal_points(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM603", "too-few-points", severity=ERROR)
-def too_few_points(subject: Subject, found: FindingSink) -> None:
+def too_few_points(subject: Subject, report: FindingSink) -> None:
     """A function has too few points.
 
     Reports a SimmSpline of fewer than two points, a GCVSpline of fewer than twice its half order or
@@ -160,7 +160,7 @@ def too_few_points(subject: Subject, found: FindingSink) -> None:
                 else "not given"
             )
             fate = _describe_refusal(subject, function)
-            found(
+            report(
                 f"half_order of {subject.called_with(function)} is {given}: {fate}; 2 is a cubic spline",
                 function,
                 tag="half_order",
@@ -171,7 +171,7 @@ def too_few_points(subject: Subject, found: FindingSink) -> None:
             if is_off or isinstance(function, GCVSpline):
                 fate = _describe_refusal(subject, function)
             given = counted(len(function.x), "point")
-            found(
+            report(
                 f"{subject.called_with(function)} has {given} and needs {least}: {fate}",
                 function,
                 tag="x",
@@ -180,7 +180,7 @@ def too_few_points(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM604", "coefficient-count", severity=WARNING)
-def coefficient_count(subject: Subject, found: FindingSink) -> None:
+def coefficient_count(subject: Subject, report: FindingSink) -> None:
     """A linear function or a polynomial has too many or too few coefficients.
 
     Reports linear functions without coefficients (an error), polynomials of several variables with
@@ -205,7 +205,7 @@ def coefficient_count(subject: Subject, found: FindingSink) -> None:
         if not function.coefficients:
             is_off = is_unused(subject, function)
             fate = UNUSED if is_off else "OpenSim crashes when it needs a value"
-            found(
+            report(
                 f"{subject.called_with(function)} has no coefficients: {fate}",
                 function,
                 tag="coefficients",
@@ -223,7 +223,7 @@ def coefficient_count(subject: Subject, found: FindingSink) -> None:
         if given != wanted:
             is_off = is_unused(subject, polynomial)
             fate = UNUSED if is_off else "OpenSim fails when it needs a value"
-            found(
+            report(
                 f"{subject.called_with(polynomial)} has {counted(given, 'coefficient')}; "
                 f"{counted(dimension, 'variable')} to order {order} need {wanted}: {fate}",
                 polynomial,
@@ -238,7 +238,7 @@ def coefficient_count(subject: Subject, found: FindingSink) -> None:
                 if given < wanted
                 else "OpenSim ignores the rest"
             )
-            found(
+            report(
                 f"the LinearFunction of {called(holder)} has {counted(given, 'coefficient')} for "
                 f"{counted(names, 'coordinate')}: {wanted} belong there; {fate}",
                 function,
@@ -303,7 +303,7 @@ _NEEDED: Final = {
 
 
 @rule("OSIM605", "missing-function", severity=ERROR)
-def missing_function(subject: Subject, found: FindingSink) -> None:
+def missing_function(subject: Subject, report: FindingSink) -> None:
     """A function is not there that OpenSim cannot do without.
 
     Reports MultiplierFunctions, CoordinateCouplerConstraints and FunctionBasedPaths without a
@@ -329,7 +329,7 @@ def missing_function(subject: Subject, found: FindingSink) -> None:
             functions = getattr(force, name)
             if isinstance(functions, FunctionSet) and len(functions.objects) not in (0, 3):
                 given = counted(len(functions.objects), "function")
-                found(
+                report(
                     f"{name} of {called(force)} has {given}, not three or none: OpenSim refuses to load the file",
                     functions,
                 )
@@ -344,12 +344,12 @@ def missing_function(subject: Subject, found: FindingSink) -> None:
         for item in subject.named(kind):
             for name in properties:
                 if getattr(item, name) is None:
-                    found(f"{called(item)} has no {name}: {refused}", item, tag=name)
+                    report(f"{called(item)} has no {name}: {refused}", item, tag=name)
     for function in subject.each(MultiplierFunction):
         if function.function is None:
             is_off = is_unused(subject, function)
             fate = UNUSED if is_off else "OpenSim fails when it needs a value"
-            found(
+            report(
                 f"{subject.called_with(function)} has no function to multiply: {fate}",
                 function,
                 severity=WARNING if is_off else None,

@@ -1,20 +1,22 @@
-"""OSIM4xx: single joints, their frames and coordinates."""
+"""OSIM4xx: single joints, their frames, coordinates and rotations."""
 
 from __future__ import annotations
 
 from osimlite.base.text import counted, listed
 from osimlite.lint.axes import axes_refused, coordinates_of, names_on_axes
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.placement import turning_axes
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.skeleton import base_of, skeleton
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
+from osimlite.mechanics.laws.vectors import dot
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Ground
 from osimlite.schema.joints import Joint
 
 
 @rule("OSIM402", "joint-to-itself", severity=ERROR)
-def joint_to_itself(subject: Subject, found: FindingSink) -> None:
+def joint_to_itself(subject: Subject, report: FindingSink) -> None:
     """A joint connects a body to itself.
 
     Reports joints whose two frames are the same or are fixed to the same body.
@@ -33,7 +35,7 @@ def joint_to_itself(subject: Subject, found: FindingSink) -> None:
     """
     for link in skeleton(subject).links:
         if link.child_base is not None and link.parent_base is link.child_base:
-            found(
+            report(
                 f"both frames of {called(link.joint)} are fixed to {called(link.child_base)}; OpenSim refuses this",
                 link.joint,
                 tag="socket_child_frame",
@@ -41,7 +43,7 @@ def joint_to_itself(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM405", "wrong-coordinate-count", severity=ERROR)
-def wrong_coordinate_count(subject: Subject, found: FindingSink) -> None:
+def wrong_coordinate_count(subject: Subject, report: FindingSink) -> None:
     """A joint has not as many coordinates as it needs.
 
     Reports joints with more or fewer coordinates than their class moves by, custom joints with a
@@ -69,13 +71,13 @@ def wrong_coordinate_count(subject: Subject, found: FindingSink) -> None:
             reason = f"no axis of {called(custom)} uses {listed(unused)}"
             if not unused:
                 reason = f"{called(custom)} declares more coordinates than its axes use"
-            found(
+            report(
                 f"{reason}: OpenSim refuses the model",
                 custom,
                 number=subject.element_of(custom, "coordinates"),
             )
         if not names and not declared_names:
-            found(
+            report(
                 f"{called(custom)} has no coordinate: OpenSim crashes; a joint that does not move is a WeldJoint",
                 custom,
             )
@@ -88,14 +90,14 @@ def wrong_coordinate_count(subject: Subject, found: FindingSink) -> None:
             given > 0 or _says_none(subject, joint)
         )
         if not declared and wanted and subject.source is not None:
-            found(
+            report(
                 f"{called(joint)} gives no coordinates; OpenSim makes {wanted} up, called '_coord_0'"
                 + (f" to '_coord_{wanted - 1}'" if wanted > 1 else ""),
                 joint,
                 severity=WARNING,
             )
         elif given != wanted and (declared or given):
-            found(
+            report(
                 f"{called(joint)} has {counted(given, 'coordinate')}, {a(type(joint).tag)} has {wanted}: "
                 "OpenSim refuses the model",
                 joint,
@@ -114,7 +116,7 @@ def _says_none(subject: Subject, joint: Joint) -> bool:
 
 
 @rule("OSIM406", "shared-coordinate-name", severity=ERROR)
-def shared_coordinate_name(subject: Subject, found: FindingSink) -> None:
+def shared_coordinate_name(subject: Subject, report: FindingSink) -> None:
     """Two joints have a coordinate of the same name.
 
     Reports the second coordinate of a name, with the forces and others that look the name up.
@@ -145,11 +147,11 @@ def shared_coordinate_name(subject: Subject, found: FindingSink) -> None:
         message = f"{called(component)} has the name of a coordinate of {called(tree.parent_of(known) or known)}"
         if users:
             message += f"; {listed(dict.fromkeys(users), most=3)} {'finds' if len(users) == 1 else 'all find'} that one"
-        found(message, component, attribute="name", severity=None if users else WARNING)
+        report(message, component, attribute="name", severity=None if users else WARNING)
 
 
 @rule("OSIM408", "ground-as-child", severity=INFO)
-def ground_as_child(subject: Subject, found: FindingSink) -> None:
+def ground_as_child(subject: Subject, report: FindingSink) -> None:
     """A joint has ground as its child.
 
     Reports joints whose child frame is fixed to ground.
@@ -173,7 +175,7 @@ def ground_as_child(subject: Subject, found: FindingSink) -> None:
     """
     for link in skeleton(subject).links:
         if isinstance(link.child_base, Ground) and link.parent_base is not link.child_base:
-            found(
+            report(
                 f"the child of {called(link.joint)} is ground; OpenSim turns the joint round",
                 link.joint,
                 tag="socket_child_frame",
@@ -181,7 +183,7 @@ def ground_as_child(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM409", "stray-joint-frame", severity=WARNING)
-def stray_joint_frame(subject: Subject, found: FindingSink) -> None:
+def stray_joint_frame(subject: Subject, report: FindingSink) -> None:
     """A joint holds a frame that has nothing to do with it.
 
     Reports frames in the `<frames>` of a joint that are fixed to neither of the bodies it connects.
@@ -218,10 +220,59 @@ def stray_joint_frame(subject: Subject, found: FindingSink) -> None:
                 continue
             deepest = max(depth.get(id(end), 0) for end in (link.parent_base, link.child_base))
             late = depth.get(id(base), 0) > deepest
-            found(
+            report(
                 f"{called(frame)} of {called(link.joint)} is fixed to {called(base)}, which the joint does not connect"
                 + ("; OpenSim refuses the model" if late else ""),
                 frame,
                 tag="socket_parent",
                 severity=ERROR if late else None,
             )
+
+
+_LOCKED = 1e-8
+"""Sine of the angle between an axis and the plane of the others; below it OpenSim 4.6 computes NaN (measured)."""
+
+
+@rule("OSIM416", "gimbal-lock", severity=ERROR)
+def gimbal_lock(subject: Subject, report: FindingSink) -> None:
+    """Two of the three rotations of a joint are about one axis in the default pose.
+
+    Reports GimbalJoints, and CustomJoints with three rotations, whose second rotation has by
+    default a right angle that lays the third axis on the first.
+
+    The joint cannot turn about the direction that is lost, its mass matrix has no inverse there,
+    and every acceleration of the model is NaN, or beyond 1e12 rad/s^2 where rounding leaves a
+    little, also where the coordinates are locked. Inverse kinematics goes on, but the two angles
+    may take any value. A default a thousandth away is enough; a BallJoint has no such pose.
+
+    ```xml
+      <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+      <GimbalJoint name="ankle">
+          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+          <socket_child_frame>/bodyset/foot</socket_child_frame>
+          <coordinates>
+              <Coordinate name="ankle_rx" />
+    -         <Coordinate name="ankle_ry"> <default_value>1.5707963267948966</default_value> </Coordinate>
+    +         <Coordinate name="ankle_ry"> <default_value>1.57</default_value> </Coordinate>
+              <Coordinate name="ankle_rz" />
+          </coordinates>
+      </GimbalJoint>
+    ```
+    """
+    for joint in subject.each(Joint):
+        turns = turning_axes(subject, joint)
+        if len(turns) == 3:
+            (first, one), (_, two), (third, three) = turns
+            across = (
+                two[1] * three[2] - two[2] * three[1],
+                two[2] * three[0] - two[0] * three[2],
+                two[0] * three[1] - two[1] * three[0],
+            )
+            if abs(dot(one, across)) < _LOCKED:
+                second = next(item for item in coordinates_of(joint) if item.name == turns[1][0])
+                report(
+                    f"{called(joint)} starts in gimbal lock: {first} and {third} turn about one axis, and "
+                    "accelerations are NaN or without bounds",
+                    second,
+                    tag="default_value",
+                )

@@ -11,8 +11,8 @@ from osimlite.io.document.lexical import ABSENT, Unclean, converter
 from osimlite.io.document.names import ATTRIBUTE
 from osimlite.io.document.source import Source
 from osimlite.io.document.spans import blank_remarks
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import without_attribute, without_element, without_text
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Component
@@ -22,7 +22,7 @@ from osimlite.schema.specs import field_specs
 
 
 @rule("OSIM105", "unknown-attribute", severity=ERROR, mends="safe")
-def unknown_attribute(subject: Subject, found: FindingSink) -> None:
+def unknown_attribute(subject: Subject, report: FindingSink) -> None:
     """An element has an attribute that means nothing.
 
     Reports attributes of objects other than `name` and `file`; a warning on an element that is no
@@ -50,7 +50,7 @@ def unknown_attribute(subject: Subject, found: FindingSink) -> None:
         )
         of_xml = INFO if _of_xml(note.word) else None
         place = subject.attribute_name(note.number, note.word)
-        found(
+        report(
             message,
             owner,
             at=place,
@@ -59,7 +59,7 @@ def unknown_attribute(subject: Subject, found: FindingSink) -> None:
             fix=None if of_xml else fix,
         )
     for number, tag, word in _beside_objects(subject):
-        found(
+        report(
             f"OpenSim ignores the attribute '{word}' of <{tag}>; it is lost when the model is written",
             at=subject.attribute_name(number, word),
             severity=INFO if _of_xml(word) else WARNING,
@@ -95,7 +95,7 @@ def _beside_objects(subject: Subject) -> Iterator[tuple[int, str, str]]:
 
 
 @rule("OSIM106", "stray-text", severity=WARNING, mends="safe")
-def stray_text(subject: Subject, found: FindingSink) -> None:
+def stray_text(subject: Subject, report: FindingSink) -> None:
     """There is text between elements.
 
     Reports text that stands beside elements, where only elements have a meaning.
@@ -123,7 +123,7 @@ def stray_text(subject: Subject, found: FindingSink) -> None:
         text = stray.splitlines()[0]
         shown = "U+FEFF (a byte-order mark)" if text == "\ufeff" else f"'{text}'"
         whole = without_text(source, start, start + len(stray))
-        found(
+        report(
             f"OpenSim ignores the text {shown} between elements",
             at=source.position(start, len(text)),
             fix=whole,
@@ -150,7 +150,7 @@ def _beside_elements(source: Source) -> Iterator[tuple[int, str]]:
 
 
 @rule("OSIM110", "defaults", severity=WARNING, mends="safe")
-def defaults_block(subject: Subject, found: FindingSink) -> None:
+def defaults_block(subject: Subject, report: FindingSink) -> None:
     """The file has a `<defaults>` block.
 
     Reports `<defaults>`: a warning if there is something in it, else for information. What OpenSim
@@ -171,7 +171,7 @@ def defaults_block(subject: Subject, found: FindingSink) -> None:
         return
     number = subject.element_of(model, "defaults")
     if number is not None and source.children(number):
-        found(
+        report(
             "<defaults> changes the defaults of every model that OpenSim loads later",
             model,
             number=number,
@@ -181,7 +181,7 @@ def defaults_block(subject: Subject, found: FindingSink) -> None:
             for name, kind in _OF_TOOLS.get(tag, {}).items():
                 value = source.child(item, name)
                 if value is not None and (wanted := _unread(source, value, kind)):
-                    found(
+                    report(
                         f"<{name}> of the {tag} in <defaults> is not {wanted}: OpenSim refuses to load the file",
                         model,
                         number=value,
@@ -189,11 +189,11 @@ def defaults_block(subject: Subject, found: FindingSink) -> None:
                     )
     elif number is not None:
         fix = without_element(source, number)
-        found("<defaults> is empty and can go", model, number=number, severity=INFO, fix=fix)
+        report("<defaults> is empty and can go", model, number=number, severity=INFO, fix=fix)
 
 
 @rule("OSIM111", "force-outside-set", severity=INFO)
-def force_outside_set(subject: Subject, found: FindingSink) -> None:
+def force_outside_set(subject: Subject, report: FindingSink) -> None:
     """Forces stand elsewhere than in the ForceSet.
 
     Reports forces, actuators and muscles among the `<components>` of the model or of another part
@@ -217,7 +217,7 @@ def force_outside_set(subject: Subject, found: FindingSink) -> None:
     for forces in places.values():
         first, others = forces[0], len(forces) - 1
         more = f" and {others} more" if others else ""
-        found(
+        report(
             f"{called(first)}{more} {'stand' if others else 'stands'} outside the ForceSet: "
             f"{'they act' if others else 'it acts'}, and what asks the model for its forces or muscles does not find "
             + ("them" if others else "it"),
@@ -227,7 +227,7 @@ def force_outside_set(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM112", "not-upgradable", severity=ERROR)
-def not_upgradable(subject: Subject, found: FindingSink) -> None:
+def not_upgradable(subject: Subject, report: FindingSink) -> None:
     """OpenSim cannot bring an old document up to date.
 
     Reports what OpenSim needs while it changes a document of an older version into the current
@@ -266,7 +266,7 @@ def not_upgradable(subject: Subject, found: FindingSink) -> None:
     for refusal in subject.refusals:
         if refusal.number in told:
             continue
-        found(
+        report(
             f"{refusal.message}: OpenSim, which has to bring a document of version {subject.version} up to date, "
             "refuses to load it",
             number=refusal.number,

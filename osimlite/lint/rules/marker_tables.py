@@ -6,7 +6,7 @@ from math import hypot
 
 from osimlite.io.document.source import Position
 from osimlite.io.tables.headers import METRES
-from osimlite.lint.engine import INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import INFO, WARNING, FindingSink, rule
 from osimlite.lint.table import Table
 
 _LARGEST, _SMALLEST = 8.0, 0.02
@@ -14,7 +14,7 @@ _LARGEST, _SMALLEST = 8.0, 0.02
 
 
 @rule("OSIM811", "marker-units", severity=WARNING, mends="unsafe", about="table")
-def marker_units(table: Table, found: FindingSink) -> None:
+def marker_units(table: Table, report: FindingSink) -> None:
     """The units of a marker file do not fit its numbers.
 
     Looks how far the markers of a frame are spread: more than 8 m or less than 2 cm is no moving
@@ -48,7 +48,7 @@ def marker_units(table: Table, found: FindingSink) -> None:
         right = next(
             (name for name in ("m", "mm", "cm") if 0.2 <= usual * METRES[name] <= 3.0), None
         )
-        found(
+        report(
             f"the markers of a frame are spread over {usual * unit:.3g} m if the units are '{units.value.text}'",
             at=units.value.at,
             suggestion=right,
@@ -64,7 +64,7 @@ def _spread(sample: list[float]) -> float | None:
 
 
 @rule("OSIM812", "marker-gap", severity=WARNING, about="table")
-def marker_gap(table: Table, found: FindingSink) -> None:
+def marker_gap(table: Table, report: FindingSink) -> None:
     """A marker is at the origin, or only a part of it is there.
 
     Finds markers at 0 0 0, where programs put what they did not see, markers of which one or two
@@ -93,18 +93,18 @@ def marker_gap(table: Table, found: FindingSink) -> None:
             if fault.kind == "zero"
             else "lacks a part of its place"
         )
-        found(
+        report(
             f"the marker '{name}' {what}{fault.more()}",
             at=Position(fault.line, fault.column, fault.length),
         )
     for label in [
         label for number, label in enumerate(table.labels) if number in table.rows.unseen
     ]:
-        found(f"no frame has the marker '{label.text}'", at=label.at, severity=INFO)
+        report(f"no frame has the marker '{label.text}'", at=label.at, severity=INFO)
 
 
 @rule("OSIM813", "frame-number", severity=INFO, about="table")
-def frame_number(table: Table, found: FindingSink) -> None:
+def frame_number(table: Table, report: FindingSink) -> None:
     """The frames of a marker file are not numbered one after the other.
 
     Compares the number of each frame with that of the frame before.
@@ -129,4 +129,4 @@ def frame_number(table: Table, found: FindingSink) -> None:
             if fault.text
             else "the number of the frame is missing"
         )
-        found(f"{what}{fault.more()}", at=Position(fault.line, fault.column, max(1, fault.length)))
+        report(f"{what}{fault.more()}", at=Position(fault.line, fault.column, max(1, fault.length)))

@@ -7,8 +7,8 @@ import re
 from osimlite.io.document.source import Source
 from osimlite.io.document.spans import blank_remarks
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced, without_text
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 
 _CONTROLS = re.compile("[\f\v]")
@@ -19,7 +19,7 @@ _NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
 
 
 @rule("OSIM008", "character-reference", severity=ERROR, mends="safe")
-def character_reference(subject: Subject, found: FindingSink) -> None:
+def character_reference(subject: Subject, report: FindingSink) -> None:
     """A numeric character reference stands for a character beyond ASCII.
 
     Reports references such as `&#233;` with a number above 127.
@@ -39,7 +39,7 @@ def character_reference(subject: Subject, found: FindingSink) -> None:
     for match in _NUMBERED.finditer(source.text):
         number = int(match[1], 16) if match[1] else int(match[2])
         if 127 < number < 0x110000:
-            found(
+            report(
                 f"OpenSim cuts '{match[0]}' to the byte 0x{number & 255:02X}; write the character itself",
                 at=(place := source.position(match.start(), len(match[0]))),
                 suggestion=chr(number),
@@ -48,7 +48,7 @@ def character_reference(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM009", "lenient-xml", severity=WARNING, mends="safe")
-def lenient_xml(subject: Subject, found: FindingSink) -> None:
+def lenient_xml(subject: Subject, report: FindingSink) -> None:
     """The text is not XML in a way that OpenSim overlooks.
 
     Reports a bare `&`, `]]>`, two hyphens inside a comment, characters that XML does not have,
@@ -77,14 +77,14 @@ def lenient_xml(subject: Subject, found: FindingSink) -> None:
                 known = note.value != note.word
                 better = str(note.value) if known else f"&amp;{note.word[1:]}"
                 does = f"leaves the & out and keeps '{note.word[1:]}'" if known else "leaves it out"
-                found(
+                report(
                     f"'{note.word}' is not XML; OpenSim {does}, others refuse the file",
                     at=place,
                     suggestion=better,
                     fix=replaced(source, place, better),
                 )
             case "hyphens-in-comment":
-                found(
+                report(
                     f"'{note.word}' may not stand in a comment; OpenSim reads it, others refuse the file",
                     at=place,
                     suggestion="-",
@@ -97,23 +97,23 @@ def lenient_xml(subject: Subject, found: FindingSink) -> None:
                     if odd
                     else f"'{note.word.splitlines()[0][:40]}'"
                 )
-                found(f"{what} is not XML; {note.value}, others refuse the file", at=place)
+                report(f"{what} is not XML; {note.value}, others refuse the file", at=place)
             case "control-character":
                 place = source.position(_control(source, offset))
-                found(
+                report(
                     f"the character {note.word} is not XML; OpenSim takes it for a blank, others refuse the file",
                     at=place,
                     fix=replaced(source, place, " "),
                 )
             case _:
-                found(
+                report(
                     "the XML declaration belongs at the very beginning; OpenSim reads it here, others refuse the file",
                     at=place,
                     fix=without_text(source, offset, offset + len(note.word)),
                 )
     start = source.text.find("<?xml")
     if start > 0 and not source.text[:start].strip():
-        found(
+        report(
             "there are blanks before the XML declaration; OpenSim reads the file, others refuse it",
             at=source.position(start, 5),
             fix=Fix((Edit(0, start, ""),)),
@@ -136,7 +136,7 @@ def _control(source: Source, start: int) -> int:
 
 
 @rule("OSIM011", "text-outside-root", severity=ERROR, mends="safe")
-def text_outside_root(subject: Subject, found: FindingSink) -> None:
+def text_outside_root(subject: Subject, report: FindingSink) -> None:
     """There is text before or after the root element.
 
     Reports text that stands outside `<OpenSimDocument>`, be it a remark that is no comment, what an
@@ -164,7 +164,7 @@ def text_outside_root(subject: Subject, found: FindingSink) -> None:
             what = (
                 "a byte-order mark" if note.kind == "byte-order-mark" else f"the text '{note.word}'"
             )
-            found(
+            report(
                 f"{what} stands outside the document: OpenSim refuses the file",
                 at=source.position(start, len(note.word)),
                 fix=without_text(source, start, start + 1)
@@ -174,7 +174,7 @@ def text_outside_root(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM012", "byte-order-mark", severity=INFO)
-def byte_order_mark(subject: Subject, found: FindingSink) -> None:
+def byte_order_mark(subject: Subject, report: FindingSink) -> None:
     """The file has a byte-order mark.
 
     Reports the bytes EF BB BF at the beginning of a file, which some Windows editors write, and the
@@ -192,11 +192,11 @@ def byte_order_mark(subject: Subject, found: FindingSink) -> None:
     """
     source = subject.source
     if source is not None and source.encoding == "utf-8-sig":
-        found("the file begins with a byte-order mark", at=source.position(0))
+        report("the file begins with a byte-order mark", at=source.position(0))
 
 
 @rule("OSIM013", "closing-tag", severity=ERROR, mends="safe")
-def closing_tag(subject: Subject, found: FindingSink) -> None:
+def closing_tag(subject: Subject, report: FindingSink) -> None:
     """There is white space in a closing tag.
 
     Reports closing tags such as `</mass >`, and those that are broken over two lines.
@@ -215,7 +215,7 @@ def closing_tag(subject: Subject, found: FindingSink) -> None:
     plain = blank_remarks(source.text, "-")
     for match in _BLANK_IN_CLOSING.finditer(plain):
         start, end = match.span(1)
-        found(
+        report(
             f"OpenSim cannot read '{''.join(match[0].split())[:-1]} >': no white space may stand in a closing tag",
             at=source.position(match.start(), start - match.start()),
             suggestion="".join(match[0].split()),

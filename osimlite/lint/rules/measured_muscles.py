@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from osimlite.lint.config import Threshold
-from osimlite.lint.engine import INFO, WARNING, FindingSink, rule
 from osimlite.lint.measures import MEASURES, measures_of
+from osimlite.lint.registry import INFO, WARNING, FindingSink, Threshold, rule
 from osimlite.lint.rules.muscles import LONGEST
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -18,7 +17,7 @@ OFF = Threshold(
 
 
 @rule("OSIM635", "start-off-equilibrium", severity=INFO, thresholds=(OFF,), about=MEASURES)
-def start_off_equilibrium(subject: Subject, found: FindingSink) -> None:
+def start_off_equilibrium(subject: Subject, report: FindingSink) -> None:
     """A muscle starts far from equilibrium.
 
     Reports muscles with an elastic tendon whose fibers, in the default pose and at their default
@@ -47,13 +46,13 @@ def start_off_equilibrium(subject: Subject, found: FindingSink) -> None:
         muscle = subject.tree.at(start.owner)
         (length, settled), (tension, settled_tension) = start.lengths, start.tensions
         if settled != settled:
-            found(
+            report(
                 f"{called(muscle)} has no equilibrium in the default pose: OpenSim fails where it is asked to find it",
                 muscle,
                 severity=WARNING,
             )
         elif abs(length - settled) > most or abs(tension - settled_tension) > most:
-            found(
+            report(
                 f"{called(muscle)} starts with fibers of {length:.3g} optimal lengths and a tension of {tension:.3g} "
                 f"max_isometric_force; in equilibrium these are {settled:.3g} and {settled_tension:.3g}",
                 muscle,
@@ -62,7 +61,7 @@ def start_off_equilibrium(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM636", "fiber-limit", severity=INFO, thresholds=(LONGEST,), about=MEASURES)
-def fiber_limit(subject: Subject, found: FindingSink) -> None:
+def fiber_limit(subject: Subject, report: FindingSink) -> None:
     """The fibers of a muscle reach a limit within the ranges of the coordinates.
 
     Reports muscles whose fibers in equilibrium, fully active, are as short as pennation
@@ -89,15 +88,15 @@ def fiber_limit(subject: Subject, found: FindingSink) -> None:
         muscle = subject.tree.at(reach.owner)
         lengths = f"{reach.length:.3g} optimal lengths"
         if reach.length != reach.length:
-            found(f"{called(muscle)} has no equilibrium {reach.pose}", muscle)
+            report(f"{called(muscle)} has no equilibrium {reach.pose}", muscle)
         elif reach.is_active and reach.is_limit:
-            found(
+            report(
                 f"fully active, the fibers of {called(muscle)} are as short as they can be, {lengths}, {reach.pose}",
                 muscle,
                 tag="tendon_slack_length",
             )
         elif not reach.is_active and reach.length > longest:
-            found(
+            report(
                 f"at rest, the fibers of {called(muscle)} are {lengths} long {reach.pose}",
                 muscle,
                 tag="optimal_fiber_length",

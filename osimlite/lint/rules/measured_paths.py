@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from osimlite.base.text import listed
-from osimlite.lint.config import Threshold
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.measures import MEASURES, MovingPoint, measures_of
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, Threshold, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 
@@ -21,7 +20,7 @@ OFF = Threshold(
 
 
 @rule("OSIM631", "wrong-wrapping", severity=WARNING, thresholds=(OFF,), about=MEASURES)
-def wrong_wrapping(subject: Subject, found: FindingSink) -> None:
+def wrong_wrapping(subject: Subject, report: FindingSink) -> None:
     """OpenSim computes a path around surfaces wrongly.
 
     Reports paths whose length in OpenSim is a millimetre or more off that along geodesics, the
@@ -70,7 +69,7 @@ def wrong_wrapping(subject: Subject, found: FindingSink) -> None:
             )
             by_default = f"{1000.0 * wrapping.default:.3g} mm in the default pose and by "
             default = by_default if wrapping.pose.values and abs(wrapping.default) >= SHOWN else ""
-            found(
+            report(
                 f"OpenSim's length of the path of {called(owner)} around {surfaces} is off by {default}"
                 f"{1000.0 * wrapping.worst:.3g} mm {wrapping.pose}",
                 owner,
@@ -83,7 +82,7 @@ JUMP = Threshold(
 
 
 @rule("OSIM632", "path-jump", severity=WARNING, thresholds=(JUMP,), about=MEASURES)
-def path_jump(subject: Subject, found: FindingSink) -> None:
+def path_jump(subject: Subject, report: FindingSink) -> None:
     """The length of a path jumps.
 
     Reports paths whose length jumps by a millimetre or more where a coordinate takes a value within
@@ -116,11 +115,11 @@ def path_jump(subject: Subject, found: FindingSink) -> None:
             else "its way changes"
         )
         length = f"the length of the path of {called(owner)}"
-        found(f"{length} jumps by {1000.0 * jump.size:.3g} mm {jump.pose}, where {why}", owner)
+        report(f"{length} jumps by {1000.0 * jump.size:.3g} mm {jump.pose}, where {why}", owner)
 
 
 @rule("OSIM633", "length-of-wrap", severity=ERROR, about=MEASURES)
-def length_of_wrap(subject: Subject, found: FindingSink) -> None:
+def length_of_wrap(subject: Subject, report: FindingSink) -> None:
     """OpenSim computes a negative length of a path on a surface, or none.
 
     Reports wraps of which OpenSim subtracts the length of the path on the surface instead of adding
@@ -147,12 +146,12 @@ def length_of_wrap(subject: Subject, found: FindingSink) -> None:
         owner = subject.tree.at(item.owner)
         path = f"the path of {called(owner)}"
         if item.length < 0.0:
-            found(
+            report(
                 f"OpenSim counts {path} on '{item.surface}' as {1000.0 * item.length:.3g} mm {item.pose}",
                 owner,
             )
         else:
-            found(
+            report(
                 f"{path} goes straight through '{item.surface}' {item.pose}: OpenSim finds no points",
                 owner,
             )
@@ -173,7 +172,7 @@ RATE = Threshold(
 
 
 @rule("OSIM634", "moving-point-range", severity=WARNING, thresholds=(MADE_UP, RATE), about=MEASURES)
-def moving_point_range(subject: Subject, found: FindingSink) -> None:
+def moving_point_range(subject: Subject, report: FindingSink) -> None:
     """A moving path point has no place for all values of its coordinate.
 
     Reports moving points whose functions end before the range of their coordinate does, and make
@@ -214,13 +213,13 @@ def moving_point_range(subject: Subject, found: FindingSink) -> None:
         owner, end = subject.tree.at(point.owner), point.end
         names = f"'{point.point}' of {called(owner)}"
         if point.moved >= made_up:
-            found(
+            report(
                 f"the functions of the place of {names} end {end.sized(point.beyond, 3)} before the range of "
                 f"'{end.coordinate}': OpenSim lets it move on by {1000.0 * point.moved:.3g} mm, to its place at {end}",
                 owner,
             )
         else:
-            found(
+            report(
                 f"beyond the range of '{end.coordinate}', which nothing keeps it in, {names} rests and OpenSim goes on "
                 f"as if it moved, by {1000.0 * point.rate:.3g} mm per {end.unit or 'unit'} at {end}",
                 owner,

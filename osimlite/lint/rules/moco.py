@@ -8,8 +8,8 @@ from itertools import chain
 from typing import Any
 
 from osimlite.base.text import listed
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.posture import angles_of, coordinate_of
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
@@ -24,7 +24,7 @@ _ALLOW = ("allow_unused_references", "kinematics_allow_extra_columns")
 
 
 @rule("OSIM861", "impossible-bounds", severity=ERROR, about="document")
-def impossible_bounds(setup: Setup, found: FindingSink) -> None:
+def impossible_bounds(setup: Setup, report: FindingSink) -> None:
     """Bounds of a study leave no value.
 
     Compares both ends of all bounds, bounds at the start and at the end with those of the whole
@@ -50,14 +50,14 @@ def impossible_bounds(setup: Setup, found: FindingSink) -> None:
             ends: tuple[float, ...] = getattr(item, tag, ())
             whole: tuple[float, ...] = item.bounds
             if len(ends) == 2 and ends[0] > ends[1]:
-                found(f"bounds from {ends[0]:g} to {ends[1]:g}: OpenSim fails", item, tag=tag)
+                report(f"bounds from {ends[0]:g} to {ends[1]:g}: OpenSim fails", item, tag=tag)
             elif (
                 ends
                 and whole
                 and whole[0] <= whole[-1]
                 and (ends[-1] < whole[0] or ends[0] > whole[-1])
             ):
-                found(
+                report(
                     f"{tag} of {called(item)} are outside its bounds from {whole[0]:g} to {whole[-1]:g}: OpenSim fails",
                     item,
                     tag=tag,
@@ -72,28 +72,28 @@ def impossible_bounds(setup: Setup, found: FindingSink) -> None:
                 and coordinate_of(info.name) in angles
                 and largest > 10.0
             ):
-                found(
+                report(
                     f"a bound of {largest:g} for the angle '{info.name}' is in radians: in degrees?",
                     info,
                     severity=WARNING,
                 )
         for bounds in (phase.time_initial_bounds, phase.time_final_bounds):
             if bounds._index and not bounds.bounds:
-                found(
+                report(
                     "a time without bounds may be any: the optimizer seldom ends",
                     bounds,
                     severity=WARNING,
                 )
         starts, ends = phase.time_initial_bounds.bounds, phase.time_final_bounds.bounds
         if starts and ends and ends[-1] < starts[0]:
-            found(
+            report(
                 f"the phase ends at {ends[-1]:g} s at the latest, and begins at {starts[0]:g} s at the earliest",
                 phase.time_final_bounds,
                 tag="bounds",
             )
         for infos in (phase.state_infos, phase.control_infos, phase.input_control_infos):
             for info in _repeated(infos):
-                found(
+                report(
                     f"'{info.name}' has bounds already: these replace all of them",
                     info,
                     attribute="name",
@@ -123,7 +123,7 @@ _COUNTED = (
 
 
 @rule("OSIM862", "study-data", severity=ERROR, about="document")
-def study_data(setup: Setup, found: FindingSink) -> None:
+def study_data(setup: Setup, report: FindingSink) -> None:
     """A table that a study follows, or starts from, does not fit its model.
 
     Looks for tables that are not named, for motions that do not say whether they are in degrees,
@@ -153,7 +153,7 @@ def study_data(setup: Setup, found: FindingSink) -> None:
     """
     for processor in setup.named("ModelProcessor"):
         if not processor.filepath and processor.model is None:
-            found(
+            report(
                 f"{called(processor)} names no model: OpenSim refuses the study",
                 processor,
                 tag="filepath",
@@ -165,12 +165,12 @@ def study_data(setup: Setup, found: FindingSink) -> None:
             tag = next((file.tag for file in file_specs(spec.accepts, "file")), "")
             name = getattr(held, tag, "").strip()
             if not name and spec.names.required and tag:
-                found(f"{called(item)} names no table to follow: OpenSim refuses it", item)
+                report(f"{called(item)} names no table to follow: OpenSim refuses it", item)
             table = setup.table(name)
             if table is not None and spec.names.target == "state variable":
                 said = table.entries.get("inDegrees")
                 if said is None or said.value.text not in ("yes", "no"):
-                    found(
+                    report(
                         f"'{name}' must say inDegrees=yes or inDegrees=no: OpenSim refuses the study",
                         held,
                         tag=tag,
@@ -180,7 +180,7 @@ def study_data(setup: Setup, found: FindingSink) -> None:
                 for time in ("initial_time", "final_time"):
                     wanted = getattr(item, time)
                     if wanted is not None and not first <= wanted <= last:
-                        found(
+                        report(
                             f"'{name}' has {first!r} to {last!r} s, and not {wanted!r} s: OpenSim refuses the tool",
                             item,
                             tag=time,
@@ -189,7 +189,7 @@ def study_data(setup: Setup, found: FindingSink) -> None:
             for column in (
                 [] if allowed or table is None else _strangers(setup, spec.names, held, table)
             ):
-                found(
+                report(
                     f"'{name}' has a column '{column}', which is nothing of the model: OpenSim refuses the study",
                     held,
                     tag=tag,
@@ -198,7 +198,7 @@ def study_data(setup: Setup, found: FindingSink) -> None:
         return
     for item, guess in setup.with_tables(setup.having("guess_file"), "guess_file"):
         if fault := _fault_of_guess(setup, setup.tree, guess):
-            found(
+            report(
                 f"the guess '{item.guess_file}' {fault}: OpenSim refuses it", item, tag="guess_file"
             )
 
@@ -257,7 +257,7 @@ def _strangers(setup: Setup, reference: Reference, held: Any, table: Table) -> l
 
 
 @rule("OSIM863", "study-parts", severity=ERROR, about="document")
-def study_parts(setup: Setup, found: FindingSink) -> None:
+def study_parts(setup: Setup, report: FindingSink) -> None:
     """A part of a study has a name or a target that OpenSim refuses.
 
     Looks for goals, constraints and parameters without a name or with that of another, for
@@ -282,9 +282,9 @@ def study_parts(setup: Setup, found: FindingSink) -> None:
         for parts in (phase.goals, phase.parameters, phase.path_constraints):
             for part in parts:
                 if not part.name:
-                    found(f"{called(part)} has no name: OpenSim refuses it", part)
+                    report(f"{called(part)} has no name: OpenSim refuses it", part)
             for part in _repeated([part for part in parts if part.name]):
-                found(
+                report(
                     f"another is called '{part.name}' already: OpenSim refuses it",
                     part,
                     attribute="name",
@@ -295,7 +295,7 @@ def study_parts(setup: Setup, found: FindingSink) -> None:
             names = [force.name for force in getattr(loads, "objects", ())]
             for group in goal.contact_groups if names else ():
                 if group.external_force_name not in names:
-                    found(
+                    report(
                         f"the loads have no force '{group.external_force_name}': OpenSim refuses the goal",
                         group,
                         tag="external_force_name",
@@ -311,7 +311,7 @@ def study_parts(setup: Setup, found: FindingSink) -> None:
                 continue
             fault = _fault_of(parameter, component)
             if fault:
-                found(
+                report(
                     f"{fault}: OpenSim refuses the study",
                     parameter,
                     tag="property_name",
@@ -338,7 +338,7 @@ def study_parts(setup: Setup, found: FindingSink) -> None:
                     f"{called(joint)} has speeds that are not the rates of its coordinates"
                 )
             for fault in faults if tree.path_of(joint) not in welded else ():
-                found(f"{fault}: Moco refuses the model", processor, tag="filepath")
+                report(f"{fault}: Moco refuses the model", processor, tag="filepath")
 
 
 def _fault_of(parameter: Any, component: Component) -> str:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from osimlite.lint.config import Threshold
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.placement import default_poses, on_base
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, Threshold, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.mechanics.laws.vectors import Vector
@@ -22,7 +21,7 @@ LONGEST = Threshold("longest-fiber", 2.0, "of the optimal length", "no fiber sta
 
 
 @rule("OSIM621", "doubtful-muscle", severity=WARNING, thresholds=(PENNATION, SHORTEST, LONGEST))
-def doubtful_muscle(subject: Subject, found: FindingSink) -> None:
+def doubtful_muscle(subject: Subject, report: FindingSink) -> None:
     """The fibers of a muscle have an implausible length or angle.
 
     Reports a pennation angle of a quarter turn or more, and a default fiber length, given in the
@@ -46,7 +45,7 @@ def doubtful_muscle(subject: Subject, found: FindingSink) -> None:
     for muscle in subject.named("Muscle"):
         angle = muscle.pennation_angle_at_optimal
         if steepest <= angle < math.inf:
-            found(
+            report(
                 f"the pennation angle of {called(muscle)} is {quantity(angle, 'rad')}"
                 + (", a quarter turn or more" if angle >= math.pi / 2 else "")
                 + ("; in degrees?" if angle > math.pi else ""),
@@ -59,7 +58,7 @@ def doubtful_muscle(subject: Subject, found: FindingSink) -> None:
         if given and length is not None and optimal > 0 and 0 < length < math.inf:
             ratio = length / optimal
             if not shortest <= ratio <= longest:
-                found(
+                report(
                     f"the default fiber length of {called(muscle)}, {quantity(length, 'm')}, is {ratio:.3g} times its "
                     "optimal length",
                     muscle,
@@ -68,7 +67,7 @@ def doubtful_muscle(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM622", "control-below-activation", severity=ERROR)
-def control_below_activation(subject: Subject, found: FindingSink) -> None:
+def control_below_activation(subject: Subject, report: FindingSink) -> None:
     """The least control of a muscle is below its least activation.
 
     Reports Thelen and Millard muscles whose `min_control` is smaller than their
@@ -86,7 +85,7 @@ def control_below_activation(subject: Subject, found: FindingSink) -> None:
     """
     for muscle in subject.named("Muscle"):
         if muscle.min_control < getattr(muscle, "minimum_activation", -math.inf):
-            found(
+            report(
                 f"min_control of {called(muscle)} is {quantity(muscle.min_control)}, less than its minimum_activation, "
                 f"{quantity(muscle.minimum_activation)}: OpenSim refuses the model",
                 muscle,
@@ -97,7 +96,7 @@ def control_below_activation(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM623", "out-of-reach", severity=WARNING, thresholds=(LONGEST,))
-def out_of_reach(subject: Subject, found: FindingSink) -> None:
+def out_of_reach(subject: Subject, report: FindingSink) -> None:
     """The path of a muscle leaves its fibers no length that they could have.
 
     Reports muscles whose path, in the default pose, is shorter than the slack tendon, or longer
@@ -129,13 +128,13 @@ def out_of_reach(subject: Subject, found: FindingSink) -> None:
         length = sum(math.dist(*pair) for pair in pairwise(points))
         tells = f"the path of {called(muscle)} is {length:.4g} m long in the default pose"
         if length < slack and not path.path_wrap_set.objects:
-            found(
+            report(
                 f"{tells}, less than its tendon_slack_length, {slack:.4g} m",
                 muscle,
                 tag="tendon_slack_length",
             )
         elif (ratio := (length - slack) / optimal) > longest:
-            found(
+            report(
                 f"{tells}, which leaves its fibers {ratio:.3g} optimal lengths beyond the slack tendon",
                 muscle,
                 tag="optimal_fiber_length",
@@ -143,7 +142,7 @@ def out_of_reach(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM624", "shared-time-constants", severity=WARNING)
-def shared_time_constants(subject: Subject, found: FindingSink) -> None:
+def shared_time_constants(subject: Subject, report: FindingSink) -> None:
     """Muscles differ in time constants that OpenSim has only once.
 
     Reports each DeGrooteFregly2016Muscle whose `activation_time_constant`,
@@ -173,7 +172,7 @@ def shared_time_constants(subject: Subject, found: FindingSink) -> None:
         for tag in _SHARED:
             own, counts = getattr(muscle, tag), getattr(first, tag)
             if own != counts:
-                found(
+                report(
                     f"{tag} of {called(muscle)} is {quantity(own)}, and OpenSim computes with {quantity(counts)}, that "
                     f"of {called(first)}",
                     muscle,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.base.text import counted, listed
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.rules.references import Broken, broken_references
 from osimlite.lint.subject import Subject, once
 from osimlite.lint.words import called
@@ -19,7 +19,7 @@ _ILLEGAL = frozenset(ILLEGAL_CHARACTERS)
 
 
 @rule("OSIM311", "duplicate-name", severity=ERROR)
-def duplicate_name(subject: Subject, found: FindingSink) -> None:
+def duplicate_name(subject: Subject, report: FindingSink) -> None:
     """Two components beside each other have the same name.
 
     Reports the second of two siblings with one name, with the name OpenSim gives it and with those
@@ -48,11 +48,11 @@ def duplicate_name(subject: Subject, found: FindingSink) -> None:
         message = f"another {called(renamed.first)} stands beside this one; OpenSim renames this to '{renamed.name}'"
         if users:
             message += f", and {listed(users, most=3)} then {'uses' if len(users) == 1 else 'use'} the first"
-        found(message, item, attribute="name", suggestion=None)
+        report(message, item, attribute="name", suggestion=None)
 
 
 @rule("OSIM312", "illegal-name", severity=ERROR, before=(30500, WARNING))
-def illegal_name(subject: Subject, found: FindingSink) -> None:
+def illegal_name(subject: Subject, report: FindingSink) -> None:
     """The name of a component has a character that names cannot have.
 
     Reports white space, `/`, `\\`, `*` and `+` in the names of components.
@@ -82,7 +82,7 @@ def illegal_name(subject: Subject, found: FindingSink) -> None:
         shown = listed(
             ["white space" if character.isspace() else f"'{character}'" for character in bad]
         )
-        found(
+        report(
             f"the name of {called(component)} has {shown} in it: OpenSim refuses to load the file",
             component,
             attribute="name",
@@ -106,7 +106,7 @@ def illegal_name(subject: Subject, found: FindingSink) -> None:
                 )
                 if frame:
                     fate = "OpenSim makes frames of that name for the joints and refuses them"
-                found(
+                report(
                     f"the name '{name}' has white space in it: in a file of version {subject.version} {fate}",
                     at=place,
                     suggestion=better,
@@ -115,7 +115,7 @@ def illegal_name(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM313", "missing-name", severity=WARNING)
-def missing_name(subject: Subject, found: FindingSink) -> None:
+def missing_name(subject: Subject, report: FindingSink) -> None:
     """A component that others name by its name has none.
 
     Reports members of sets, and coordinates, without a name or with an empty one. It is an error if
@@ -156,7 +156,7 @@ def missing_name(subject: Subject, found: FindingSink) -> None:
                 "reference",
             )
             message += f", while {count} to '{wanted[0]}' {'leads' if count.startswith('1 ') else 'lead'} nowhere"
-        found(
+        report(
             message,
             component,
             attribute="name",

@@ -7,8 +7,7 @@ from itertools import pairwise
 from math import pi, radians
 
 from osimlite.base.text import counted
-from osimlite.lint.config import Threshold
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, Threshold, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.base import Object
@@ -20,7 +19,7 @@ from osimlite.schema.wrapping import WrapObject
 
 
 @rule("OSIM611", "short-path", severity=ERROR)
-def short_path(subject: Subject, found: FindingSink) -> None:
+def short_path(subject: Subject, report: FindingSink) -> None:
     """A path has fewer than two points.
 
     Reports geometry paths with no point, or with one, muscles and springs without a path, and a
@@ -43,22 +42,22 @@ def short_path(subject: Subject, found: FindingSink) -> None:
         if len(points) > 1 or owner is None:
             continue
         if path._index is not None or subject.source is None:
-            found(
+            report(
                 f"the path of {called(owner)} has {counted(len(points), 'point')} and needs two",
                 path,
             )
         elif not any(note.owner is owner and note.kind in _NOT_READ for note in subject.notes):
-            found(f"{called(owner)} has no path, and OpenSim refuses the model", owner)
+            report(f"{called(owner)} has no path, and OpenSim refuses the model", owner)
     for path in subject.named("Scholz2015GeometryPath"):
         elements = path.path_elements
         count = sum(item.tag == _CABLE_POINT for item in elements)
         owner = subject.tree.parent_of(path) or path
         if count < 2:
-            found(f"the path of {called(owner)} has {counted(count, 'point')} and needs two", path)
+            report(f"the path of {called(owner)} has {counted(count, 'point')} and needs two", path)
             continue
         for item, end in ((elements[0], "begins"), (elements[-1], "ends")):
             if item.tag != _CABLE_POINT:
-                found(
+                report(
                     f"the path of {called(owner)} {end} with an obstacle, and OpenSim refuses the model",
                     item,
                 )
@@ -75,7 +74,7 @@ DISTANCE = Threshold(
 
 
 @rule("OSIM612", "coincident-path-points", severity=WARNING, thresholds=(DISTANCE,))
-def coincident_path_points(subject: Subject, found: FindingSink) -> None:
+def coincident_path_points(subject: Subject, report: FindingSink) -> None:
     """Two points of a path that follow each other are in the same place.
 
     Reports a point fixed at the same place of the same frame as the point before it.
@@ -107,7 +106,7 @@ def coincident_path_points(subject: Subject, found: FindingSink) -> None:
             frame = subject.target_of(point, "socket_parent_frame")
             if frame is not None and frame is subject.target_of(before, "socket_parent_frame"):
                 owner = subject.tree.parent_of(path)
-                found(
+                report(
                     f"{called(point)} of {called(owner or path)} is in the same place as '{before.name}' before it",
                     point,
                     tag="location",
@@ -115,7 +114,7 @@ def coincident_path_points(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM613", "inverted-point-range", severity=WARNING)
-def inverted_point_range(subject: Subject, found: FindingSink) -> None:
+def inverted_point_range(subject: Subject, report: FindingSink) -> None:
     """A conditional path point is never in the path.
 
     Reports conditional points whose range ends before it begins, or lies outside of the range of
@@ -135,15 +134,15 @@ def inverted_point_range(subject: Subject, found: FindingSink) -> None:
     for point in subject.each(ConditionalPathPoint):
         low, high = point.range
         if low > high:
-            found(
+            report(
                 f"the range of {called(point)} runs from {quantity(low)} down to {quantity(high)}: it never counts",
                 point,
                 tag="range",
             )
         elif "range" in point.model_fields_set:
-            _report_unreachable(subject, found, point)
+            _report_unreachable(subject, report, point)
         else:
-            found(
+            report(
                 f"{called(point)} has no range: it counts only where the coordinate is exactly 0",
                 point,
                 tag="range",
@@ -189,7 +188,7 @@ def _report_unreachable(subject: Subject, report: FindingSink, point: Conditiona
 
 
 @rule("OSIM614", "unused-wrap-object", severity=INFO)
-def unused_wrap_object(subject: Subject, found: FindingSink) -> None:
+def unused_wrap_object(subject: Subject, report: FindingSink) -> None:
     """No path wraps around a wrap surface.
 
     Reports wrap objects that no path names.
@@ -214,11 +213,11 @@ def unused_wrap_object(subject: Subject, found: FindingSink) -> None:
     }
     for surface in surfaces:
         if id(surface) not in used:
-            found(f"no path wraps around {called(surface)}", surface, attribute="name")
+            report(f"no path wraps around {called(surface)}", surface, attribute="name")
 
 
 @rule("OSIM615", "moving-point-coordinates", severity=ERROR)
-def moving_point_coordinates(subject: Subject, found: FindingSink) -> None:
+def moving_point_coordinates(subject: Subject, report: FindingSink) -> None:
     """The location of a moving path point depends on more than one coordinate.
 
     Reports moving path points whose x, y and z follow different coordinates.
@@ -240,7 +239,7 @@ def moving_point_coordinates(subject: Subject, found: FindingSink) -> None:
         x, *others = (subject.target_of(point, tag) for tag in tags)
         for tag, other in zip(tags[1:], others, strict=True):
             if x is not None and other is not None and other is not x:
-                found(
+                report(
                     f"{called(point)} follows {called(x)} along x and {called(other)} along {tag[7]}: OpenSim refuses "
                     "the model",
                     point,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from osimlite.lint.config import Threshold
-from osimlite.lint.engine import INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import INFO, WARNING, FindingSink, Threshold, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.coordinates import Coordinate
@@ -38,7 +37,7 @@ UNLIMITED = Threshold(
 
 
 @rule("OSIM505", "strange-gravity", severity=WARNING, thresholds=(GRAVITY,))
-def strange_gravity(subject: Subject, found: FindingSink) -> None:
+def strange_gravity(subject: Subject, report: FindingSink) -> None:
     """Gravity is far from that of the Earth.
 
     Reports gravity stronger than 30 m/s^2, which is usually one in millimetres, and gravity that
@@ -59,13 +58,13 @@ def strange_gravity(subject: Subject, found: FindingSink) -> None:
         return
     if size > subject.config.value_of(GRAVITY):
         unit = "; in millimetres?" if 9000 < size < 11000 else ""
-        found(f"gravity is {quantity(size, 'm/s^2')}{unit}", model, tag="gravity")
+        report(f"gravity is {quantity(size, 'm/s^2')}{unit}", model, tag="gravity")
     elif model.gravity[1] > 1e-9 * size and model.gravity[1] > 0.9 * size:
-        found("gravity points up: Y is the upward axis in OpenSim", model, tag="gravity")
+        report("gravity points up: Y is the upward axis in OpenSim", model, tag="gravity")
 
 
 @rule("OSIM506", "friction-order", severity=WARNING)
-def friction_order(subject: Subject, found: FindingSink) -> None:
+def friction_order(subject: Subject, report: FindingSink) -> None:
     """Static friction is smaller than dynamic friction.
 
     Reports contact materials whose static coefficient is below the dynamic one.
@@ -85,7 +84,7 @@ def friction_order(subject: Subject, found: FindingSink) -> None:
     """
     for material in subject.each(HuntCrossleyContactParameters):
         if 0 <= material.static_friction < material.dynamic_friction:
-            found(
+            report(
                 f"static friction of {subject.called(material)}, {quantity(material.static_friction)}, is smaller than "
                 f"dynamic friction, {quantity(material.dynamic_friction)}"
                 + (
@@ -99,7 +98,7 @@ def friction_order(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM507", "limits-swapped", severity=WARNING)
-def limits_swapped(subject: Subject, found: FindingSink) -> None:
+def limits_swapped(subject: Subject, report: FindingSink) -> None:
     """The upper limit of a limit force lies below its lower limit.
 
     Reports limit forces whose upper limit is smaller than the lower one.
@@ -116,7 +115,7 @@ def limits_swapped(subject: Subject, found: FindingSink) -> None:
     """
     for force in subject.each(CoordinateLimitForce):
         if force.upper_limit < force.lower_limit:
-            found(
+            report(
                 f"the upper limit of {called(force)}, {quantity(force.upper_limit)}, is below the lower limit, "
                 f"{quantity(force.lower_limit)}: both act at once",
                 force,
@@ -125,7 +124,7 @@ def limits_swapped(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM508", "limit-outside-range", severity=INFO, thresholds=(BEYOND,))
-def limit_outside_range(subject: Subject, found: FindingSink) -> None:
+def limit_outside_range(subject: Subject, report: FindingSink) -> None:
     """A limit force begins beyond the range of its coordinate.
 
     Reports limits that lie outside the range of the coordinate by more than the transition.
@@ -148,7 +147,7 @@ def limit_outside_range(subject: Subject, found: FindingSink) -> None:
             ("lower_limit", force.lower_limit, force.lower_limit < low - slack),
         ):
             if outside:
-                found(
+                report(
                     f"{tag} of {called(force)} is {quantity(limit, unit)}, beyond the range of '{coordinate.name}' "
                     f"({quantity(low)} to {quantity(high, unit)})",
                     force,
@@ -157,7 +156,7 @@ def limit_outside_range(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM509", "limit-inside-range", severity=INFO, thresholds=(INSIDE, UNLIMITED))
-def limit_inside_range(subject: Subject, found: FindingSink) -> None:
+def limit_inside_range(subject: Subject, report: FindingSink) -> None:
     """A limit force begins well inside the range of its coordinate.
 
     Reports limits inside the range of the coordinate by more than the transition and a quarter of
@@ -204,7 +203,7 @@ def limit_inside_range(subject: Subject, found: FindingSink) -> None:
                 small = max(abs(force.lower_limit), abs(force.upper_limit)) <= 2 * math.pi
                 near = min(abs(meant - low), abs(meant - high)) <= 0.1 * (high - low)
                 radians = unit == "deg" and small and near
-                found(
+                report(
                     f"{tag} of {called(force)} is {quantity(limit, unit)}, inside the range of '{coordinate.name}' "
                     f"({quantity(low)} to {quantity(high, unit)})"
                     + ("; in radians?" if radians else "")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 from osimlite.base.text import listed, nearest
 from osimlite.io.document.source import Source
 from osimlite.lint.axes import axes_refused, made_up_paths
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject, once
 from osimlite.lint.words import a, called, closest, nearest_name
 from osimlite.schema.base import Component, Object, Unknown
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @rule("OSIM301", "unresolved-reference", severity=ERROR, mends="both")
-def unresolved_reference(subject: Subject, found: FindingSink) -> None:
+def unresolved_reference(subject: Subject, report: FindingSink) -> None:
     """A component names another component that does not exist.
 
     Follows every reference by OpenSim's own rule for that property and reports those that lead
@@ -49,11 +49,11 @@ def unresolved_reference(subject: Subject, found: FindingSink) -> None:
             message += "; the words of a list are separated by blanks, without commas"
         elif broken.hint == "illegal":
             message += "; a path has no white space and none of \\ * +"
-        _report(subject, found, broken, message)
+        _report(subject, report, broken, message)
 
 
 @rule("OSIM302", "reference-to-wrong-type", severity=ERROR, mends="unsafe")
-def reference_to_wrong_type(subject: Subject, found: FindingSink) -> None:
+def reference_to_wrong_type(subject: Subject, report: FindingSink) -> None:
     """A reference leads to a component of a class that the property cannot use.
 
     Reports references to something that exists and is of another kind: a joint as the parent frame,
@@ -76,11 +76,11 @@ def reference_to_wrong_type(subject: Subject, found: FindingSink) -> None:
         )
         if fixed:
             message += f"; contact geometry fixed to it: {listed(fixed)}"
-        _report(subject, found, broken, message)
+        _report(subject, report, broken, message)
 
 
 @rule("OSIM303", "missing-reference", severity=ERROR)
-def missing_reference(subject: Subject, found: FindingSink) -> None:
+def missing_reference(subject: Subject, report: FindingSink) -> None:
     """A property that must name a component names none.
 
     Reports sockets and names that are empty or not given.
@@ -97,7 +97,7 @@ def missing_reference(subject: Subject, found: FindingSink) -> None:
     for broken in _broken(subject, "empty"):
         use = broken.use
         if use.spec.name == "name":
-            found(
+            report(
                 f"the name of {a(type(use.holder).tag)} is blank; it must be that of {a(use.reference.target)}; "
                 "OpenSim switches the whole probe off",
                 use.holder,
@@ -106,7 +106,7 @@ def missing_reference(subject: Subject, found: FindingSink) -> None:
             continue
         given = use.spec.name in use.holder.model_fields_set
         state = "is empty" if given else "is not given"
-        found(
+        report(
             f"{use.spec.tag} of {_holder(subject, use)} {state}; it must name {a(use.reference.target)}",
             use.holder,
             tag=use.spec.tag,
@@ -114,7 +114,7 @@ def missing_reference(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM304", "reference-form", severity=ERROR, mends="both")
-def reference_form(subject: Subject, found: FindingSink) -> None:
+def reference_form(subject: Subject, report: FindingSink) -> None:
     """A component is named by its path where a bare name belongs, or by its name where a path belongs.
 
     Reports references that would be right in another form: a bare name in a socket, a path without
@@ -135,7 +135,7 @@ def reference_form(subject: Subject, found: FindingSink) -> None:
         if wanted == "a path" and "/" in broken.text and not broken.text.startswith("/"):
             wanted = "a path that begins with a slash"
         message = f"{_names(subject, broken.use)} '{broken.text}'; this property wants {wanted}"
-        _report(subject, found, broken, message)
+        _report(subject, report, broken, message)
     for change in subject.changes:
         if change.step == "set_levels" and subject.source is not None:
             if _is_repeated(subject.source, change.number):
@@ -146,7 +146,7 @@ def reference_form(subject: Subject, found: FindingSink) -> None:
             place = subject.source.of_text(inner)
             start = subject.source.line_start(place.line) + place.column - 1
             text = subject.source.text[start : start + place.length]
-            found(
+            report(
                 f"{change.where} names '{text}', as files did while version 4 was made: OpenSim 4.6 finds nothing "
                 "there and refuses the model; `osimlite upgrade` writes the path anew",
                 at=place,
@@ -174,7 +174,7 @@ def _is_repeated(source: Source, number: int) -> bool:
 
 
 @rule("OSIM305", "reference-case", severity=ERROR, mends="safe")
-def reference_case(subject: Subject, found: FindingSink) -> None:
+def reference_case(subject: Subject, report: FindingSink) -> None:
     """A reference is right but for upper and lower case.
 
     Reports references that lead to a component once case is ignored.
@@ -189,7 +189,7 @@ def reference_case(subject: Subject, found: FindingSink) -> None:
     for broken in _broken(subject, "case"):
         _report(
             subject,
-            found,
+            report,
             broken,
             f"{_names(subject, broken.use)} '{broken.text}'; upper and lower case count",
         )
@@ -417,7 +417,7 @@ def _contacts_on(subject: Subject, frame: Object) -> list[str]:
     ]
 
 
-def _report(subject: Subject, found: FindingSink, broken: Broken, message: str) -> None:
+def _report(subject: Subject, report: FindingSink, broken: Broken, message: str) -> None:
     use = broken.use
     value = getattr(use.holder, use.spec.name)
     before = value[: use.position] if isinstance(value, tuple) and use.position else ()
@@ -441,7 +441,7 @@ def _report(subject: Subject, found: FindingSink, broken: Broken, message: str) 
     ):
         # What OpenSim ignores here may hold what is meant.
         place = None
-    found(
+    report(
         message,
         use.holder,
         tag=None if by_name else use.spec.tag,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 from osimlite.base.text import counted
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.rules.domains import outside
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
@@ -39,7 +39,7 @@ from osimlite.schema.tree import is_a
 
 
 @rule("OSIM209", "contradicting-values", severity=ERROR)
-def contradicting_values(subject: Subject, found: FindingSink) -> None:
+def contradicting_values(subject: Subject, report: FindingSink) -> None:
     """Numbers of one object contradict each other.
 
     Reports curves of muscles whose numbers make no curve, what a class of muscles does not have or
@@ -70,11 +70,11 @@ def contradicting_values(subject: Subject, found: FindingSink) -> None:
                     relation(item, owner) if relation is not None else item.contradictions()
                 ):
                     of = "" if item.name and item is owner else f" of {called(owner)}"
-                    found(f"{called(item)}{of}: {message}: {REFUSED}", item, tag=tag)
+                    report(f"{called(item)}{of}: {message}: {REFUSED}", item, tag=tag)
 
 
 @rule("OSIM510", "controls-swapped", severity=WARNING)
-def controls_swapped(subject: Subject, found: FindingSink) -> None:
+def controls_swapped(subject: Subject, report: FindingSink) -> None:
     """The least control of an actuator is above its largest.
 
     Reports actuators and muscles whose `min_control` is larger than their `max_control`.
@@ -94,7 +94,7 @@ def controls_swapped(subject: Subject, found: FindingSink) -> None:
         low, high = actuator.min_control, actuator.max_control
         if low > high:
             given = "min_control" if "min_control" in actuator.model_fields_set else "max_control"
-            found(
+            report(
                 f"min_control of {called(actuator)}, {quantity(low)}, is above its max_control, {quantity(high)}",
                 actuator,
                 tag=given,

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.base.text import listed
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, content_of, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import meant, nearest_name
@@ -15,7 +15,7 @@ from osimlite.schema.tree import is_a
 
 
 @rule("OSIM842", "missing-column", severity=WARNING, about="document")
-def missing_column(setup: Setup, found: FindingSink) -> None:
+def missing_column(setup: Setup, report: FindingSink) -> None:
     """A table of coordinates lacks coordinates of the model, or has none of them.
 
     Compares the columns of a table of coordinates with the coordinates of the model: OpenSim's
@@ -48,21 +48,21 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
         }
         lacking = sorted(name for name in names - columns if not setup.is_bound(name))
         if not names & columns and names & _find_names_in_paths(table):
-            found(
+            report(
                 f"'{getattr(item, tag)}' names the coordinates by paths: OpenSim's inverse dynamics does not know "
                 "these, and computes the moments of the default pose; osimlite knows them",
                 item,
                 tag=tag,
             )
         elif not names & columns:
-            found(
+            report(
                 f"'{getattr(item, tag)}' has no column of a coordinate of the model",
                 item,
                 tag=tag,
                 severity=ERROR,
             )
         elif lacking:
-            found(
+            report(
                 f"'{getattr(item, tag)}' has no column {listed(map(repr, lacking))}: OpenSim takes "
                 f"{'0' if is_a(item, 'AbstractTool') else 'the default value'}{meant(lacking, columns - names)}",
                 item,
@@ -76,7 +76,7 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
             else []
         )
         if unknown and setup.tree is not None:
-            found(
+            report(
                 f"the model has no state {listed(map(repr, unknown))} of '{item.states_file}': "
                 "OpenSim leaves the column out",
                 item,
@@ -84,7 +84,7 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
             )
         lacking = _lacking_states(setup, states) if states is not None and states.labels else []
         if lacking:
-            found(
+            report(
                 f"'{item.states_file}' has no column for {listed(lacking)}: OpenSim takes the default value",
                 item,
                 tag="states_file",
@@ -94,14 +94,14 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
             if task.apply and task.value_type == "from_file":
                 values = setup.table(user.coordinate_file)
                 if not user.coordinate_file.strip() or user.coordinate_file == "Unassigned":
-                    found(
+                    report(
                         f"no coordinate_file is there for '{task.name}': OpenSim refuses it",
                         task,
                         tag="value_type",
                         severity=ERROR,
                     )
                 elif values is not None and values.labels and task.name not in values.columns:
-                    found(
+                    report(
                         f"'{user.coordinate_file}' has no column '{task.name}': OpenSim refuses it",
                         task,
                         attribute="name",

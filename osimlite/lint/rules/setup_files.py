@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.project_files import is_table
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.setup import UNGIVEN, Naming, Setup, content_of, is_given, motion_of
-from osimlite.lint.suffixes import is_table
 from osimlite.lint.words import a, called
 from osimlite.schema.specs import file_specs
 from osimlite.schema.tree import is_a
@@ -23,7 +23,7 @@ _SHARED = {
 
 
 @rule("OSIM821", "missing-input", severity=ERROR, mends="safe", about="document")
-def missing_input(setup: Setup, found: FindingSink) -> None:
+def missing_input(setup: Setup, report: FindingSink) -> None:
     """A file that a setup reads is not there, or is not named.
 
     Looks for every file that a setup reads where OpenSim does: beside the setup, if OpenSim is
@@ -52,7 +52,7 @@ def missing_input(setup: Setup, found: FindingSink) -> None:
         why = "; a backslash separates no folders but on Windows" if "\\" in naming.name else ""
         goes_on = is_a(naming.item, "ControlSetController")
         fate = "OpenSim goes on without" if goes_on else "OpenSim refuses the setup"
-        found(
+        report(
             f"the file '{naming.name}' of {called(naming.item)} is not there{why}: {fate}",
             naming.item,
             tag=naming.spec.tag,
@@ -62,7 +62,7 @@ def missing_input(setup: Setup, found: FindingSink) -> None:
         )
     for maker in setup.having("marker_set_file"):
         if "marker_set_file" in maker.model_fields_set and not maker.marker_set_file.strip():
-            found(
+            report(
                 f"marker_set_file of {called(maker)} is empty, and OpenSim refuses the setup; leave it out, or write "
                 "Unassigned",
                 maker,
@@ -72,7 +72,7 @@ def missing_input(setup: Setup, found: FindingSink) -> None:
     for item in setup.items:
         for spec in file_specs(type(item), "file"):
             if spec.reference.required and not is_given(getattr(item, spec.name)):
-                found(
+                report(
                     f"{called(item)} names no {spec.tag}: {UNGIVEN}",
                     item,
                     tag=spec.tag,
@@ -83,7 +83,7 @@ def missing_input(setup: Setup, found: FindingSink) -> None:
             and item is not setup.top
             and not (item.model.filepath or getattr(item.model.model, "_index", None))
         ):
-            found(f"{called(item)} has no model: {UNGIVEN}", item, severity=WARNING)
+            report(f"{called(item)} has no model: {UNGIVEN}", item, severity=WARNING)
         if is_a(item, "AnalyzeTool"):
             given = [
                 tag for tag in ("states_file", "coordinates_file") if is_given(getattr(item, tag))
@@ -96,7 +96,7 @@ def missing_input(setup: Setup, found: FindingSink) -> None:
                 )
                 severity = ERROR if given else WARNING
                 fate = "OpenSim refuses it" if given else UNGIVEN
-                found(
+                report(
                     f"{called(item)} names {what}: {fate}",
                     item,
                     tag="coordinates_file",
@@ -121,7 +121,7 @@ def _in_other_case(naming: Naming) -> str | None:
 
 
 @rule("OSIM822", "input-of-another-kind", severity=ERROR, about="document")
-def input_of_another_kind(setup: Setup, found: FindingSink) -> None:
+def input_of_another_kind(setup: Setup, report: FindingSink) -> None:
     """A file that a setup reads holds something else than is needed.
 
     Compares the ending of a table, and the class at the top of a document, with what the property
@@ -145,7 +145,7 @@ def input_of_another_kind(setup: Setup, found: FindingSink) -> None:
             continue
         if wanted in _ENDINGS:
             if not naming.name.lower().endswith(_ENDINGS[wanted]):
-                found(
+                report(
                     f"{naming.spec.tag} of {called(naming.item)} must be a table ({', '.join(_ENDINGS[wanted])})",
                     naming.item,
                     tag=naming.spec.tag,
@@ -154,7 +154,7 @@ def input_of_another_kind(setup: Setup, found: FindingSink) -> None:
             top = None if is_table(naming.name) else setup.document(naming.name)
             held = "a table" if top is None else a(type(top).__name__)
             if is_table(naming.name) or (top is not None and not is_a(top, wanted)):
-                found(
+                report(
                     f"{naming.spec.tag} of {called(naming.item)} must hold a {wanted}, '{naming.name}' holds {held}",
                     naming.item,
                     tag=naming.spec.tag,
@@ -162,7 +162,7 @@ def input_of_another_kind(setup: Setup, found: FindingSink) -> None:
 
 
 @rule("OSIM823", "lost-output", severity=WARNING, mends="both", about="document")
-def lost_output(setup: Setup, found: FindingSink) -> None:
+def lost_output(setup: Setup, report: FindingSink) -> None:
     """Results would be lost, or land in another place.
 
     Looks at the folder for results, of which OpenSim makes the last part only, at folders of output
@@ -184,13 +184,13 @@ def lost_output(setup: Setup, found: FindingSink) -> None:
     for naming in setup.named_files("output-folder"):
         above = os.path.dirname(os.path.abspath(os.path.join(setup.folder, naming.name)))
         if not os.path.isdir(above):
-            found(
+            report(
                 f"of '{naming.name}' OpenSim makes the last folder only: its results are lost",
                 naming.item,
                 tag=naming.spec.tag,
             )
         elif os.path.isabs(naming.name) and not os.path.isdir(naming.name):
-            found(
+            report(
                 f"'{naming.name}' is not there: if OpenSim may not make it, the results are lost",
                 naming.item,
                 tag=naming.spec.tag,
@@ -202,7 +202,7 @@ def lost_output(setup: Setup, found: FindingSink) -> None:
         folder = os.path.dirname(naming.name)
         if is_a(naming.item, "InverseDynamicsTool"):
             if folder:
-                found(
+                report(
                     f"OpenSim leaves the folder of '{naming.name}' out and writes into results_directory",
                     naming.item,
                     tag=naming.spec.tag,
@@ -214,7 +214,7 @@ def lost_output(setup: Setup, found: FindingSink) -> None:
             and not os.path.isdir(os.path.join(setup.folder, folder))
             and os.path.normpath(folder) not in made
         ):
-            found(
+            report(
                 f"the folder of '{naming.name}' is not there: OpenSim does not make it",
                 naming.item,
                 tag=naming.spec.tag,
@@ -222,7 +222,7 @@ def lost_output(setup: Setup, found: FindingSink) -> None:
     for tool in setup.named("InverseKinematicsTool"):
         folder, name = os.path.normpath(tool.results_directory or "."), tool.output_motion_file
         if folder != "." and name and not os.path.dirname(name):
-            found(
+            report(
                 f"'{name}' is written beside the setup: results_directory does not count for it",
                 tool,
                 tag="output_motion_file",
@@ -232,7 +232,7 @@ def lost_output(setup: Setup, found: FindingSink) -> None:
     for item in setup.items:
         for spec in file_specs(type(item), "output-file"):
             if spec.reference.required and not getattr(item, spec.name).strip():
-                found(
+                report(
                     f"{called(item)} names no {spec.tag}: its results get no proper file",
                     item,
                     tag=spec.tag,
@@ -240,7 +240,7 @@ def lost_output(setup: Setup, found: FindingSink) -> None:
 
 
 @rule("OSIM824", "tools-differ", severity=INFO, about="document")
-def tools_differ(setup: Setup, found: FindingSink) -> None:
+def tools_differ(setup: Setup, report: FindingSink) -> None:
     """A tool leaves out what another tool takes into account for the same motion.
 
     Compares a tool with all others in its folder that are given the same file of coordinates:
@@ -280,7 +280,7 @@ def tools_differ(setup: Setup, found: FindingSink) -> None:
                 and tag not in told
             ):
                 told.add(tag)
-                found(
+                report(
                     f"'{os.path.basename(file)}' {what.format(two)} for the same motion, this tool does not",
                     setup.top,
                     tag=tag,

@@ -9,8 +9,8 @@ from typing import Any
 
 from osimlite.base.text import counted
 from osimlite.io.tables.headers import METRES
-from osimlite.lint.engine import WARNING, FindingSink, rule
 from osimlite.lint.posture import marker_places
+from osimlite.lint.registry import WARNING, FindingSink, rule
 from osimlite.lint.rules.setup_markers import cells_of, marker_users, rows_between
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
@@ -27,7 +27,7 @@ _SIDES = (("R", "L"), ("r", "l"), ("Right", "Left"), ("right", "left"), ("RIGHT"
 
 
 @rule("OSIM855", "scale-factor", severity=WARNING, about="document")
-def scale_factor(setup: Setup, found: FindingSink) -> None:
+def scale_factor(setup: Setup, report: FindingSink) -> None:
     """A body would be scaled by an implausible factor.
 
     Looks for factors given by hand, and for measurements, that make a body less than half or more
@@ -50,7 +50,7 @@ def scale_factor(setup: Setup, found: FindingSink) -> None:
     for scale in setup.named("Scale"):
         for factor in dict.fromkeys(scale.scales) if scale.apply else ():
             if not _LEAST <= factor <= _MOST:
-                found(f"{called(scale)} scales {scale.segment} by {factor:g}", scale, tag="scales")
+                report(f"{called(scale)} scales {scale.segment} by {factor:g}", scale, tag="scales")
     for scaler, table in setup.with_tables(setup.named("ModelScaler"), "marker_file"):
         if setup.tree is None or not scaler.apply or "measurements" not in scaler.scaling_order:
             continue
@@ -75,7 +75,7 @@ def scale_factor(setup: Setup, found: FindingSink) -> None:
                     before = math.dist(places[one], places[other])
                     factor = apart / before if before else math.inf
                     if factor < _LEAST or factor > _MOST:
-                        found(
+                        report(
                             f"{one} and {other} are {apart:.3g} m apart in '{scaler.marker_file}', and {before:.3g} m "
                             f"in the model: {called(measurement)} scales by {factor:.3g}",
                             pair,
@@ -84,7 +84,7 @@ def scale_factor(setup: Setup, found: FindingSink) -> None:
 
 
 @rule("OSIM856", "swapped-sides", severity=WARNING, about="document")
-def swapped_sides(setup: Setup, found: FindingSink) -> None:
+def swapped_sides(setup: Setup, report: FindingSink) -> None:
     """A marker of the right side was measured on the left, and its fellow on the right.
 
     Compares, for each two markers whose names differ by the side alone, the way from the left one
@@ -131,7 +131,7 @@ def swapped_sides(setup: Setup, found: FindingSink) -> None:
         for (right, left), rows, wrong in zip(pairs, seen, turned, strict=True):
             if rows and wrong >= 0.8 * rows:
                 task = next((task for task in user.ik_task_set.objects if task.name == right), None)
-                found(
+                report(
                     f"in {wrong} of {counted(rows, 'row')} of '{user.marker_file}' that were looked at, '{right}' and "
                     f"'{left}' are the other way round than other markers of both sides: are they swapped?",
                     task or user,

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from osimlite.base.text import listed
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.placement import Pose, on_base
 from osimlite.lint.posture import model_subject, poses_in
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, members, motion_of
 from osimlite.lint.subject import once
 from osimlite.lint.table import Table
@@ -25,7 +25,7 @@ docs/public-projects.md that measure gaits none is farther than 0.275 from the o
 
 
 @rule("OSIM843", "load-columns", severity=ERROR, mends="both", about="document")
-def load_columns(setup: Setup, found: FindingSink) -> None:
+def load_columns(setup: Setup, report: FindingSink) -> None:
     """The columns of a measured force are not in the data.
 
     Looks for the columns whose labels begin with the identifiers of an external force: there must
@@ -57,31 +57,31 @@ def load_columns(setup: Setup, found: FindingSink) -> None:
         names = [force.name for force in forces]
         for index, force in enumerate(forces):
             if force.name in names[:index]:
-                found(
+                report(
                     f"a force is called '{force.name}' already",
                     force,
                     attribute="name",
                     severity=WARNING,
                 )
             if not str(force.applied_to_body):
-                found(
+                report(
                     f"{called(force)} acts on no body: OpenSim refuses it",
                     force,
                     tag="applied_to_body",
                 )
             if not force.appliesForce:
-                found(f"{called(force)} does not act", force, tag="appliesForce", severity=INFO)
+                report(f"{called(force)} does not act", force, tag="appliesForce", severity=INFO)
                 continue
             if not force.force_identifier and (
                 force.point_identifier or not force.torque_identifier
             ):
-                found(
+                report(
                     f"{called(force)} names no columns of a force: OpenSim refuses it",
                     force,
                     tag="force_identifier",
                 )
             elif force.force_identifier and not force.point_identifier:
-                found(
+                report(
                     f"{called(force)} has no point: OpenSim lets it act at the origin of {force.applied_to_body}",
                     force,
                     tag="point_identifier",
@@ -94,7 +94,7 @@ def load_columns(setup: Setup, found: FindingSink) -> None:
                 own = [column for column in columns if column.startswith(prefix)]
                 if len(own) != 3 or len(set(own)) != 3:
                     what = listed(own) if own else "none"
-                    found(
+                    report(
                         f"'{loads.datafile}' must have three columns that begin with '{prefix}' ({tag} of "
                         f"{called(force)}), it has {what}: OpenSim refuses the loads",
                         force,
@@ -104,7 +104,7 @@ def load_columns(setup: Setup, found: FindingSink) -> None:
                 elif [column[-1:].lower() for column in own] != ["x", "y", "z"] and {
                     column[-1:].lower() for column in own
                 } == {"x", "y", "z"}:
-                    found(
+                    report(
                         f"'{loads.datafile}' has {listed(own)} in this order: OpenSim takes the first for x",
                         force,
                         tag=tag,
@@ -113,7 +113,7 @@ def load_columns(setup: Setup, found: FindingSink) -> None:
 
 
 @rule("OSIM849", "load-place", severity=WARNING, about="document")
-def load_place(setup: Setup, found: FindingSink) -> None:
+def load_place(setup: Setup, report: FindingSink) -> None:
     """A measured force acts far away from its body, or is expressed in another frame than its setup says.
 
     Puts the model into poses of the motion that the tool is given, and looks where measured forces
@@ -166,7 +166,7 @@ def load_place(setup: Setup, found: FindingSink) -> None:
                 ]
             far = [push.away for push in acting if push.away > _NEAR]
             if len(far) > max(2, len(acting) // 4):
-                found(
+                report(
                     f"at {len(far)} of {len(acting)} times {called(force)} acts more than {_NEAR:g} m from "
                     f"{force.applied_to_body}, by up to {max(far):.3g} m: is it another body's, or are its points in "
                     "another frame or other units?",
@@ -174,7 +174,7 @@ def load_place(setup: Setup, found: FindingSink) -> None:
                     tag="applied_to_body",
                 )
             elif sum(push.twist > _NEAR for push in acting) > max(2, len(acting) // 4):
-                found(
+                report(
                     f"the torque of {called(force)} is that of its force {max(push.twist for push in acting):.3g} m "
                     "farther: is it in newton millimetres, or about another point?",
                     force,
@@ -186,7 +186,7 @@ def load_place(setup: Setup, found: FindingSink) -> None:
                 if push.written != push.direction
             ]
             if len(lifted) > 2 and max(lifted) > 0.03 and min(lifted) > -0.02:
-                found(
+                report(
                     f"{called(force)} is expressed in {force.force_expressed_in_body}, and its numbers look like those "
                     "of ground: they point up as they are",
                     force,
@@ -194,7 +194,7 @@ def load_place(setup: Setup, found: FindingSink) -> None:
                 )
         lift = sum(part * share for part, share in zip(whole, up, strict=True))
         if math.hypot(*whole) > max(0.5 * mass * weight, 2.0 * lift):
-            found(
+            report(
                 f"together these forces push with {math.hypot(*whole):.0f} N ({', '.join(f'{n:.0f}' for n in whole)}) "
                 "on the average, and that is not up: are their axes or signs other ones?",
                 loads,

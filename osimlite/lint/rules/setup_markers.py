@@ -8,7 +8,7 @@ from itertools import islice
 from typing import Any
 
 from osimlite.base.text import counted
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.scan import number_in
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
@@ -21,7 +21,7 @@ def marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
 
 
 @rule("OSIM841", "marker-not-measured", severity=WARNING, about="document")
-def marker_not_measured(setup: Setup, found: FindingSink) -> None:
+def marker_not_measured(setup: Setup, report: FindingSink) -> None:
     """A marker that is to be fitted is not in the data.
 
     Looks up each marker of the tasks, and of pairs that measure lengths, among the labels of the
@@ -55,7 +55,7 @@ def marker_not_measured(setup: Setup, found: FindingSink) -> None:
         model = setup.names_of("Marker")
         both = [task for task in tasks if task.name in labels and task.name in model]
         if tasks and model and not both:
-            found(
+            report(
                 f"no marker of the tasks is in both the model and '{user.marker_file}': OpenSim crashes",
                 user,
                 tag="marker_file",
@@ -64,7 +64,7 @@ def marker_not_measured(setup: Setup, found: FindingSink) -> None:
         if setup.tree is not None and not model:
             maker = next(setup.named("GenericModelMaker"), None)
             tag = "model_file" if maker is None else "marker_set_file"
-            found(
+            report(
                 "the model has no markers: OpenSim refuses the tool",
                 maker or user,
                 tag=tag,
@@ -75,14 +75,14 @@ def marker_not_measured(setup: Setup, found: FindingSink) -> None:
             free = sum(not setup.is_bound(name) for name in setup.tree.of_class("Coordinate"))
         others = sum(task.apply for task in members(user.ik_task_set, "IKCoordinateTask"))
         if 3 * len(both) + others < free:
-            found(
+            report(
                 f"{counted(len(both), 'marker')} and {counted(others, 'coordinate task')} cannot tell the {free} free "
                 "coordinates of the model",
                 user.ik_task_set,
             )
         for task in tasks:
             if task.name not in labels:
-                found(
+                report(
                     f"'{user.marker_file}' has no marker '{task.name}': OpenSim leaves the task out",
                     task,
                     attribute="name",
@@ -96,7 +96,7 @@ def marker_not_measured(setup: Setup, found: FindingSink) -> None:
             ):
                 for name in pair.markers:
                     if name not in static.columns:
-                        found(
+                        report(
                             f"'{scaler.marker_file}' has no marker '{name}': OpenSim leaves the whole measurement "
                             f"'{measurement.name}' out",
                             pair,
@@ -105,7 +105,7 @@ def marker_not_measured(setup: Setup, found: FindingSink) -> None:
                             suggestion=nearest_name(str(name), static.columns),
                         )
                     elif name in gone:
-                        found(
+                        report(
                             f"'{name}' is not seen in every row of '{scaler.marker_file}' that is averaged: OpenSim "
                             f"leaves the whole measurement '{measurement.name}' out",
                             pair,

@@ -8,7 +8,7 @@ from typing import Any
 
 from osimlite.base.text import listed
 from osimlite.lint.checked import Where
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.base import Component, Object, Unknown
@@ -27,7 +27,7 @@ _PLACES = {"Marker": "/markerset", "Force": "/forceset", "Controller": "/control
 
 
 @rule("OSIM831", "unknown-name", severity=ERROR, mends="both", about="document")
-def unknown_name(setup: Setup, found: FindingSink) -> None:
+def unknown_name(setup: Setup, report: FindingSink) -> None:
     """A setup names what the model of its tool does not have.
 
     Looks up every marker, coordinate, body, joint, muscle and actuator that a setup, or a set that
@@ -65,7 +65,7 @@ def unknown_name(setup: Setup, found: FindingSink) -> None:
             for item in items if what else ():
                 if getattr(item, spec.name) in ("", None) and counts(item):
                     fate, severity = _FATES[kind.fate]
-                    found(
+                    report(
                         f"{called(item)} names no {what}: {fate}",
                         item,
                         tag=spec.tag,
@@ -108,7 +108,7 @@ def unknown_name(setup: Setup, found: FindingSink) -> None:
         if use.spec.tag == "@name":
             where = {"attribute": "name"}
             names = names.difference(other.name for other in setup.by_class[type(item)])
-        found(
+        report(
             f"the model has no {what} '{text}', which {called(item)} names: {fate}{more}",
             item,
             **where,
@@ -116,7 +116,7 @@ def unknown_name(setup: Setup, found: FindingSink) -> None:
             suggestion=text.lower() if more else nearest_name(text, sorted(names)),
         )
     if setup.tool is not None and is_a(setup.tool[1], "AbstractTool"):
-        _look_up_controls(setup, setup.tool[1], setup.names_of("Actuator") | unknown, found)
+        _look_up_controls(setup, setup.tool[1], setup.names_of("Actuator") | unknown, report)
 
 
 def _what(kind: Reference) -> str | None:
@@ -147,7 +147,7 @@ def _looked_up(
     return what, text, target or (tree.walk(text, "", "Frame").target if what == "frame" else None)
 
 
-def _look_up_controls(setup: Setup, tool: Object, plain: set[str], found: FindingSink) -> None:
+def _look_up_controls(setup: Setup, tool: Object, plain: set[str], report: FindingSink) -> None:
     """Tell controls, and columns of controls, that are those of no actuator."""
     if not plain:
         return
@@ -159,7 +159,7 @@ def _look_up_controls(setup: Setup, tool: Object, plain: set[str], found: Findin
     free = sorted(actuators.difference(control.name for control in controls))
     for control in controls:
         if control.name not in actuators:
-            found(
+            report(
                 f"the model has no actuator for {called(control)}: {fate}",
                 control,
                 attribute="name",
@@ -167,9 +167,9 @@ def _look_up_controls(setup: Setup, tool: Object, plain: set[str], found: Findin
                 suggestion=nearest_name(control.name, free),
             )
         elif not follows and getattr(control, "x_nodes", None) == []:
-            found(f"{called(control)} has no nodes: OpenSim fails", control, tag="x_nodes")
+            report(f"{called(control)} has no nodes: OpenSim fails", control, tag="x_nodes")
         elif follows and not control.is_model_control:
-            found(
+            report(
                 f"{called(control)} bounds no control of the model: OpenSim fails",
                 control,
                 tag="is_model_control",
@@ -178,7 +178,7 @@ def _look_up_controls(setup: Setup, tool: Object, plain: set[str], found: Findin
         setup.named("ControlSetController"), "controls_file"
     ):
         if lost := [column for column in table.columns if column not in actuators]:
-            found(
+            report(
                 f"the model has no actuator for the columns {listed(map(repr, lost))} of "
                 f"'{controller.controls_file}': OpenSim refuses it",
                 controller,
@@ -196,7 +196,7 @@ def _is_made(setup: Setup, text: str) -> bool:
 
 
 @rule("OSIM832", "excluded-force", severity=WARNING, mends="unsafe", about="document")
-def excluded_force(setup: Setup, found: FindingSink) -> None:
+def excluded_force(setup: Setup, report: FindingSink) -> None:
     """Inverse dynamics is told to leave out a force that there is not.
 
     Compares `forces_to_exclude` with the words OpenSim knows (ALL, ACTUATORS, MUSCLES), the groups
@@ -223,7 +223,7 @@ def excluded_force(setup: Setup, found: FindingSink) -> None:
     names = [force.name for force in forces.objects]
     for tool in setup.named("InverseDynamicsTool"):
         if not tool.forces_to_exclude and any(is_a(force, "Muscle") for force in forces.objects):
-            found(
+            report(
                 f"{called(tool)} leaves out no force: muscles take part",
                 tool,
                 tag="forces_to_exclude",
@@ -237,7 +237,7 @@ def excluded_force(setup: Setup, found: FindingSink) -> None:
         ):
             continue
         why = "; the model has groups, and of forces with groups OpenSim looks at the groups alone"
-        found(
+        report(
             f"the model has no force or group of forces '{word}'{why if word in names else ''}: OpenSim leaves "
             "nothing out for it",
             use.holder,

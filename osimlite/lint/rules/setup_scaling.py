@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from osimlite.lint.engine import ERROR, FindingSink, rule
+from osimlite.lint.registry import ERROR, FindingSink, rule
 from osimlite.lint.setup import UNGIVEN, Setup, is_given, members
 from osimlite.lint.words import called, nearest_name
 
@@ -88,7 +88,7 @@ frame. OpenSim fails; repeat the frame at a later time.
 
 
 @rule("OSIM853", "scale-setting", severity=ERROR, about="document", faults=_FAULTS, frames=_FRAMES)
-def scale_setting(setup: Setup, found: FindingSink) -> None:
+def scale_setting(setup: Setup, report: FindingSink) -> None:
     """A setting of the scale tool has no effect, or makes it fail.
 
     Looks at the mass, the order of scaling, measurements, axes, steps that are left out, and times
@@ -102,7 +102,7 @@ def scale_setting(setup: Setup, found: FindingSink) -> None:
         if tool.mass == 0.0 or (
             tool.mass < 0.0 and scaler.apply and scaler.preserve_mass_distribution
         ):
-            found(
+            report(
                 f"a mass of {tool.mass:g}: OpenSim leaves the mass as it is",
                 tool,
                 tag="mass",
@@ -110,11 +110,11 @@ def scale_setting(setup: Setup, found: FindingSink) -> None:
             )
     for scaler in setup.named("ModelScaler"):
         if not scaler.apply:
-            found("the model is not scaled", scaler, tag="apply", fault="model-not-scaled")
+            report("the model is not scaled", scaler, tag="apply", fault="model-not-scaled")
             continue
         for word in scaler.scaling_order:
             if word not in ("measurements", "manualScale"):
-                found(
+                report(
                     f"'{word}' is no way of scaling: OpenSim refuses it",
                     scaler,
                     tag="scaling_order",
@@ -124,14 +124,14 @@ def scale_setting(setup: Setup, found: FindingSink) -> None:
                 )
         measures = "measurements" in scaler.scaling_order
         if scaler.scaling_order[:1] == ("manualScale",) and measures:
-            found(
+            report(
                 "measurements come last and overwrite what is scaled by hand",
                 scaler,
                 tag="scaling_order",
                 fault="manual-scale-overwritten",
             )
         if measures and scaler.measurement_set.objects and not is_given(scaler.marker_file):
-            found(
+            report(
                 f"{called(scaler)} measures, and names no marker_file: {UNGIVEN}",
                 scaler,
                 tag="marker_file",
@@ -142,21 +142,21 @@ def scale_setting(setup: Setup, found: FindingSink) -> None:
             continue
         pairs = members(measurement.marker_pair_set, "MarkerPair")
         if not pairs:
-            found(
+            report(
                 f"{called(measurement)} has no pair of markers: it measures nothing",
                 measurement,
                 fault="measurement-without-pair",
             )
         for pair in pairs:
             if len(pair.markers) != 2:
-                found(
+                report(
                     f"a pair has two markers, this one {len(pair.markers)}: OpenSim crashes",
                     pair,
                     tag="markers",
                     fault="marker-pair-count",
                 )
             elif pair.markers[0] == pair.markers[1]:
-                found(
+                report(
                     f"both markers of a pair are '{pair.markers[0]}': OpenSim leaves {called(measurement)} out",
                     pair,
                     tag="markers",
@@ -165,7 +165,7 @@ def scale_setting(setup: Setup, found: FindingSink) -> None:
     for scale in setup.named("BodyScale"):
         for axis in scale.axes:
             if axis not in ("X", "Y", "Z"):
-                found(
+                report(
                     f"'{axis}' is none of the axes X, Y and Z: OpenSim leaves it out",
                     scale,
                     tag="axes",
@@ -175,31 +175,31 @@ def scale_setting(setup: Setup, found: FindingSink) -> None:
                 )
     for placer in setup.named("MarkerPlacer"):
         if not placer.apply:
-            found(
+            report(
                 "the markers are not placed, and the tool says that it failed",
                 placer,
                 tag="apply",
                 fault="markers-not-placed",
             )
         elif not is_given(placer.output_model_file):
-            found(
+            report(
                 "the model with its markers placed is not written",
                 placer,
                 tag="output_model_file",
                 fault="placed-model-not-written",
             )
         if placer.apply and placer.time_range and not placer.time_range[0] < placer.time_range[-1]:
-            found(
+            report(
                 f"times from {placer.time_range[0]:g} to {placer.time_range[-1]:g} s cannot be averaged: OpenSim fails",
                 placer,
                 tag="time_range",
                 fault="static-times",
             )
         elif placer.apply and len(placer.time_range) == 2 and is_given(placer.marker_file):
-            _check_static_times(setup, placer, found)
+            _check_static_times(setup, placer, report)
 
 
-def _check_static_times(setup: Setup, placer: Any, found: FindingSink) -> None:
+def _check_static_times(setup: Setup, placer: Any, report: FindingSink) -> None:
     """Report a static trial with one frame or none within the time range of the marker placer."""
     table = setup.table(placer.marker_file)
     if table is None or table.span is None or not table.is_markers:
@@ -208,7 +208,7 @@ def _check_static_times(setup: Setup, placer: Any, found: FindingSink) -> None:
     if first < last:
         return
     if table.span[0] == table.span[1]:
-        found(
+        report(
             f"'{placer.marker_file}' has one frame, at {table.span[0]:g} s, and OpenSim averages over a range of "
             "times: it fails; repeat the row at a later time",
             placer,
@@ -216,7 +216,7 @@ def _check_static_times(setup: Setup, placer: Any, found: FindingSink) -> None:
             fault="static-times",
         )
     else:
-        found(
+        report(
             f"'{placer.marker_file}' goes from {table.span[0]:g} to {table.span[1]:g} s, of which the times of the "
             "tool hold no two: OpenSim fails",
             placer,

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.base.text import listed
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, meant, nearest_name
@@ -23,7 +23,7 @@ def _orientations(setup: Setup) -> Iterator[tuple[Any, str, str, Table]]:
 
 
 @rule("OSIM848", "sensor-without-frame", severity=WARNING, about="document")
-def sensor_without_frame(setup: Setup, found: FindingSink) -> None:
+def sensor_without_frame(setup: Setup, report: FindingSink) -> None:
     """A measured sensor has no frame in the model, or a sensor that a tool names was not measured.
 
     Compares the columns of measured orientations with the frames of the model: inverse kinematics
@@ -50,7 +50,7 @@ def sensor_without_frame(setup: Setup, found: FindingSink) -> None:
         # OpenSim takes any key that has this in it.
         held = [entry.value.text for key, entry in table.entries.items() if "DataType" in key]
         if held[:1] != ["Quaternion"]:
-            found(
+            report(
                 f"'{file}' must say DataType=Quaternion: OpenSim refuses it",
                 item,
                 tag=tag,
@@ -58,7 +58,7 @@ def sensor_without_frame(setup: Setup, found: FindingSink) -> None:
             )
         base = getattr(item, "base_imu_label", "")
         if base and base not in table.columns:
-            found(
+            report(
                 f"'{file}' has no sensor '{base}': OpenSim refuses the setup",
                 item,
                 tag="base_imu_label",
@@ -67,7 +67,7 @@ def sensor_without_frame(setup: Setup, found: FindingSink) -> None:
             )
         for weight in getattr(getattr(item, "orientation_weights", None), "objects", ()):
             if weight.name not in table.columns:
-                found(
+                report(
                     f"'{file}' has no sensor '{weight.name}': {called(weight)} is the weight of none",
                     weight,
                     attribute="name",
@@ -79,14 +79,14 @@ def sensor_without_frame(setup: Setup, found: FindingSink) -> None:
             continue
         if len(lost) == len(table.columns):
             wanted = f", as '{min(frames)}' is" if ending else ""
-            found(
+            report(
                 f"no column of '{file}' is called as a frame of the model{wanted}: OpenSim refuses it",
                 item,
                 tag=tag,
                 severity=ERROR,
             )
         elif lost:
-            found(
+            report(
                 f"the model has no frame for {listed(map(repr, lost))} of '{file}': OpenSim leaves them out"
                 f"{meant(lost, frames)}",
                 item,

@@ -7,15 +7,15 @@ from collections import Counter
 from typing import Any
 
 from osimlite.base.text import listed
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.posture import angles_of
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.words import called
 from osimlite.schema.tree import is_a
 
 
 @rule("OSIM851", "task-weight", severity=ERROR, about="document")
-def task_weight(setup: Setup, found: FindingSink) -> None:
+def task_weight(setup: Setup, report: FindingSink) -> None:
     """The weights of tasks make no sense.
 
     Looks for weights that are negative or no number, for tasks without weight (their default is 0),
@@ -35,7 +35,7 @@ def task_weight(setup: Setup, found: FindingSink) -> None:
     for tasks in setup.named("IKTaskSet"):
         applied = [task for task in members(tasks, "IKTask") if task.apply]
         if tasks.objects and not applied:
-            found(
+            report(
                 "no task of this set applies: OpenSim takes all markers, each with the weight 1",
                 tasks,
                 severity=WARNING,
@@ -44,14 +44,14 @@ def task_weight(setup: Setup, found: FindingSink) -> None:
         for task in applied:
             seen[type(task).__name__, task.name] += 1
             if seen[type(task).__name__, task.name] == 2:
-                found(
+                report(
                     f"'{task.name}' has a task already: one of them counts",
                     task,
                     attribute="name",
                     severity=WARNING,
                 )
             if task.weight < 0:
-                found(
+                report(
                     f"the weight of {called(task)} is {task.weight:g}: OpenSim refuses it",
                     task,
                     tag="weight",
@@ -59,7 +59,7 @@ def task_weight(setup: Setup, found: FindingSink) -> None:
             elif task.weight == 0:
                 given = setup.element_of(task, "weight") is not None
                 what = "weighs 0" if given else "has no weight, and the default is 0"
-                found(
+                report(
                     f"{called(task)} {what}: it is not tracked",
                     task,
                     tag="weight",
@@ -70,7 +70,7 @@ def task_weight(setup: Setup, found: FindingSink) -> None:
                 and task.value_type == "manual_value"
                 and abs(task.value) > 6.3
             ):
-                found(
+                report(
                     f"the value of {called(task)} is {task.value:g}, and is in radians or metres",
                     task,
                     tag="value",
@@ -79,7 +79,7 @@ def task_weight(setup: Setup, found: FindingSink) -> None:
 
 
 @rule("OSIM854", "unreachable-task", severity=WARNING, about="document")
-def unreachable_task(setup: Setup, found: FindingSink) -> None:
+def unreachable_task(setup: Setup, report: FindingSink) -> None:
     """A coordinate that is to be fitted cannot move, or cannot reach its value.
 
     Looks for tasks of locked coordinates, for values of which most are outside the range of a
@@ -128,13 +128,13 @@ def unreachable_task(setup: Setup, found: FindingSink) -> None:
             low, high = coordinate.range
             outside = sum(not low - 0.01 <= value <= high + 0.01 for value in values)
             if coordinate.locked:
-                found(
+                report(
                     f"{called(coordinate)} is locked: the task moves nothing",
                     task,
                     attribute="name",
                 )
             elif coordinate.clamped and 2 * outside > len(values):
-                found(
+                report(
                     f"most values for {called(coordinate)} are outside the range from {low:.4g} to {high:.4g} that it "
                     "is clamped to",
                     task,
@@ -149,7 +149,7 @@ def unreachable_task(setup: Setup, found: FindingSink) -> None:
             and max(values) - min(values) > 0.1
         ]
         if still:
-            found(
+            report(
                 f"{listed(still)} {'is' if len(still) == 1 else 'are'} locked in the model, and moves in "
                 f"'{user.coordinate_file}'",
                 user,

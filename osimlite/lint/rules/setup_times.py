@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.io.tables.headers import MarkerHeader
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.posture import angles_of, coordinate_of
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.rules.setup_columns import motions
 from osimlite.lint.setup import Setup, is_given, members
 from osimlite.lint.table import Table
@@ -78,7 +78,7 @@ others before, as a spline does.
     "OSIM844", "time-outside-data", severity=WARNING, about="document", faults=_FAULTS,
     frames={name: f"```setup\n{frame}\n```" for name, frame in _FRAMES.items()},
 )  # fmt: skip
-def time_outside_data(setup: Setup, found: FindingSink) -> None:
+def time_outside_data(setup: Setup, report: FindingSink) -> None:
     """A tool runs over times that its data do not have, or that make no sense.
 
     Compares the times of a tool with those of the tables that it reads: markers, coordinates,
@@ -93,7 +93,7 @@ def time_outside_data(setup: Setup, found: FindingSink) -> None:
         count = len(item.time_range)
         if count != 2 and getattr(item, "apply", True):
             fate, severity = ("fails", ERROR) if count < 2 else ("takes the first two", WARNING)
-            found(
+            report(
                 f"a range has two times, this one {count}: OpenSim {fate}",
                 item,
                 tag="time_range",
@@ -102,7 +102,7 @@ def time_outside_data(setup: Setup, found: FindingSink) -> None:
             )
     for item, tag, motion in motions(setup):
         if 0 < motion.rows.count < 6:
-            found(
+            report(
                 f"'{getattr(item, tag)}' has {motion.rows.count} rows: OpenSim lays a spline through six at least",
                 item,
                 tag=tag,
@@ -116,7 +116,7 @@ def time_outside_data(setup: Setup, found: FindingSink) -> None:
                 else ("refuses it", ERROR)
             )
             tag = tags[0] if first != first else tags[-1]
-            found(
+            report(
                 f"a time of {called(item)} is no number: OpenSim {fate}",
                 item,
                 tag=tag,
@@ -134,7 +134,7 @@ def time_outside_data(setup: Setup, found: FindingSink) -> None:
                 else ("fails", ERROR)
             )
             for tag in tags:
-                found(
+                report(
                     f"{called(item)} begins at {first:g} s and ends at {last:g} s: OpenSim {fate}",
                     item,
                     tag=tag,
@@ -144,7 +144,7 @@ def time_outside_data(setup: Setup, found: FindingSink) -> None:
             continue
         window = getattr(item, "cmc_time_window", math.nan)
         if last - first < _FIRST_STATES + window:
-            found(
+            report(
                 f"{called(item)} runs for {last - first:.4g} s and needs {_FIRST_STATES + window:g} s for its first "
                 "controls: OpenSim fails",
                 item,
@@ -158,7 +158,7 @@ def time_outside_data(setup: Setup, found: FindingSink) -> None:
                 continue
             slack = max(table.step, 1e-9) * 1.01
             if first > span[1] + slack or last < span[0] - slack:
-                found(
+                report(
                     f"{called(item)} runs from {first:g} to {last:g} s, '{name}' has {span[0]:g} to {span[1]:g} s",
                     item,
                     tag=tags[0] if first > span[1] else tags[-1],
@@ -171,7 +171,7 @@ def time_outside_data(setup: Setup, found: FindingSink) -> None:
                 for tag in tags
             ]
             if not said[-1] and last < span[1] - slack:
-                found(
+                report(
                     f"{called(item)} has no {tags[-1]}: OpenSim stops at {last:g} s, and '{name}' goes on to "
                     f"{span[1]:g} s",
                     item,
@@ -179,14 +179,14 @@ def time_outside_data(setup: Setup, found: FindingSink) -> None:
                     fault="stops-at-default",
                 )
             if said[-1] and math.isfinite(last) and last > span[1] + slack:
-                found(
+                report(
                     f"'{name}' ends at {span[1]:g} s, before {last:g} s{kind}",
                     item,
                     tag=tags[-1],
                     fault="data-end-early",
                 )
             if said[0] and math.isfinite(first) and first < span[0] - slack:
-                found(
+                report(
                     f"'{name}' begins at {span[0]:g} s, after {first:g} s{kind}",
                     item,
                     tag=tags[0],
@@ -225,7 +225,7 @@ def _data_of(item: Any) -> Iterator[tuple[str, str]]:
 
 
 @rule("OSIM845", "loads-end-early", severity=WARNING, about="document")
-def loads_end_early(setup: Setup, found: FindingSink) -> None:
+def loads_end_early(setup: Setup, report: FindingSink) -> None:
     """Measured loads do not last as long as the run of the tool.
 
     Compares the times of the data of external loads with those of the tool, or of the motion that
@@ -265,7 +265,7 @@ def loads_end_early(setup: Setup, found: FindingSink) -> None:
         if (math.isfinite(last) and last > span[1] + slack) or (
             math.isfinite(first) and first < span[0] - slack
         ):
-            found(
+            report(
                 f"the loads are measured from {span[0]:g} to {span[1]:g} s, the tool runs from {first:g} to {last:g} s",
                 item,
                 tag="external_loads_file",
@@ -273,7 +273,7 @@ def loads_end_early(setup: Setup, found: FindingSink) -> None:
 
 
 @rule("OSIM846", "filter-frequency", severity=WARNING, about="document")
-def filter_frequency(setup: Setup, found: FindingSink) -> None:
+def filter_frequency(setup: Setup, report: FindingSink) -> None:
     """A filter does not fit how often the data were measured.
 
     Compares the cut-off frequency with half the frequency of the rows, and points out a cut-off of
@@ -295,9 +295,9 @@ def filter_frequency(setup: Setup, found: FindingSink) -> None:
         for filter_tag in ("lowpass_cutoff_frequency_for_coordinates", "lowpass_cutoff_frequency"):
             cutoff = getattr(item, filter_tag, -1.0)
             if cutoff == 0.0:
-                found(f"{called(item)} filters the motion at 0 Hz", item, tag=filter_tag)
+                report(f"{called(item)} filters the motion at 0 Hz", item, tag=filter_tag)
             elif table.step > 0.0 and cutoff > 0.5 / table.step:
-                found(
+                report(
                     f"{called(item)} filters at {cutoff:g} Hz, and '{getattr(item, tag)}' has {1.0 / table.step:.4g} "
                     f"rows a second, of which {0.5 / table.step:.4g} Hz is the highest that can be filtered",
                     item,
@@ -306,7 +306,7 @@ def filter_frequency(setup: Setup, found: FindingSink) -> None:
 
 
 @rule("OSIM847", "motion-in-degrees", severity=WARNING, about="document")
-def motion_in_degrees(setup: Setup, found: FindingSink) -> None:
+def motion_in_degrees(setup: Setup, report: FindingSink) -> None:
     """Angles of a motion are in degrees, and OpenSim takes them for radians, or the other way round.
 
     Looks at the columns of rotational coordinates of a motion without `inDegrees=yes`: an angle of
@@ -336,13 +336,13 @@ def motion_in_degrees(setup: Setup, found: FindingSink) -> None:
         largest, place = _largest(table, places)
         label = table.labels[place].text
         if header.in_degrees and 0.0 < largest < math.pi and len(places) >= _SEVERAL:
-            found(
+            report(
                 f"'{getattr(item, tag)}' has inDegrees=yes, and its largest angle is {largest:.3g}: is it in radians?",
                 item,
                 tag=tag,
             )
         elif largest > 10.0 and not header.in_degrees:
-            found(
+            report(
                 f"'{getattr(item, tag)}' does not say inDegrees=yes, and '{label}' is {largest:.4g} in it: OpenSim "
                 "takes it for radians",
                 item,
@@ -362,7 +362,7 @@ def motion_in_degrees(setup: Setup, found: FindingSink) -> None:
             values, [k for k, column in enumerate(values.columns, 1) if column in read]
         )
         if 0.0 < largest < math.pi:
-            found(
+            report(
                 f"'{user.coordinate_file}' does not say inDegrees=yes, and '{values.labels[place].text}' is at most "
                 f"{largest:.3g} in it: inverse kinematics takes it for degrees, whatever the header says",
                 user,

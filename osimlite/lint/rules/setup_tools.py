@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from osimlite.base.text import listed
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, is_given, members
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.tree import is_a
@@ -176,7 +176,7 @@ that.
 
 
 @rule("OSIM852", "tool-setting", severity=ERROR, about="document", faults=_FAULTS, frames=FRAMES)
-def tool_setting(setup: Setup, found: FindingSink) -> None:
+def tool_setting(setup: Setup, report: FindingSink) -> None:
     """A tool has a setting with which it cannot work.
 
     Looks at accuracies and tolerances, steps, analyses, forces that are left out or replaced, and
@@ -188,10 +188,10 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
         for item in setup.named(of_class):
             value = getattr(item, tag)
             if is_wrong(value):
-                found(told.format(value), item, fault=fault, tag=tag)
+                report(told.format(value), item, fault=fault, tag=tag)
     for tool in setup.named("AbstractTool"):
         if not (tool.integrator_error_tolerance > 0.0 or is_a(tool, "AnalyzeTool")):
-            found(
+            report(
                 f"an error tolerance of {tool.integrator_error_tolerance:g} is never met: OpenSim runs for ever",
                 tool,
                 tag="integrator_error_tolerance",
@@ -199,21 +199,21 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
                 fault="integrator-error-tolerance",
             )
         if is_a(tool, "RRATool") and not tool.force_set_files:
-            found(
+            report(
                 f"{called(tool)} is given no forces that it could control: OpenSim fails",
                 tool,
                 tag="force_set_files",
                 fault="no-residual-forces",
             )
         if tool.replace_force_set and not is_a(tool, "RRATool"):
-            found(
+            report(
                 "the forces of force_set_files replace those of the model: its muscles are gone",
                 tool,
                 tag="replace_force_set",
                 fault="replaced-forces",
             )
         if is_a(tool, "RRATool") and not tool.replace_force_set and setup.names_of("Muscle"):
-            found(
+            report(
                 "the muscles of the model are left in it, and OpenSim crashes: the forces of force_set_files are to "
                 "replace them",
                 tool,
@@ -225,21 +225,21 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
             and tool.adjust_com_to_reduce_residuals
             and not str(tool.adjusted_com_body).strip()
         ):
-            found(
+            report(
                 f"{called(tool)} is to move a center of mass, and adjusted_com_body names no body: OpenSim refuses it",
                 tool,
                 tag="adjusted_com_body",
                 fault="no-adjusted-body",
             )
         if is_a(tool, "AnalyzeTool") and not tool.analysis_set.objects:
-            found(f"{called(tool)} has no analysis: OpenSim refuses it", tool, fault="no-analysis")
+            report(f"{called(tool)} has no analysis: OpenSim refuses it", tool, fault="no-analysis")
     names = Counter(item.name for item in setup.named("Analysis"))
     for analysis in setup.named("Analysis"):
         if not analysis.on:
-            found(f"{called(analysis)} is off", analysis, tag="on", fault="analysis-off")
+            report(f"{called(analysis)} is off", analysis, tag="on", fault="analysis-off")
         if names[analysis.name] > 1:
             names[analysis.name] = 0
-            found(
+            report(
                 f"two analyses are called '{analysis.name}', and write to the same files",
                 analysis,
                 attribute="name",
@@ -248,14 +248,14 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
         if is_a(analysis, "StaticOptimization"):
             carrying = _carried_by_none(setup)
             if carrying:
-                found(
+                report(
                     f"no actuator moves {listed(carrying)}: without residual actuators the optimizer fails",
                     analysis,
                     fault="unactuated-root",
                 )
         for tag, what in (("bodies", "body"), ("coordinates", "coordinate")):
             if getattr(analysis, tag, None) == ():
-                found(
+                report(
                     f"{called(analysis)} names no {what}: nothing is written",
                     analysis,
                     tag=tag,
@@ -267,7 +267,7 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
                     is_given(tool.coordinates_file)
                     and not tool.solve_for_equilibrium_for_auxiliary_states
                 ):
-                    found(
+                    report(
                         "coordinates tell nothing of fibers, which stay at their default lengths: "
                         "solve_for_equilibrium_for_auxiliary_states is false",
                         tool,
@@ -279,7 +279,7 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
             and analysis.compute_moments
             and not analysis.moment_arm_coordinate_list
         ):
-            found(
+            report(
                 "no coordinate for moment arms: OpenSim fails",
                 analysis,
                 tag="moment_arm_coordinate_list",
@@ -288,7 +288,7 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
         if is_a(analysis, "JointReaction"):
             for word in analysis.apply_on_bodies:
                 if word.lower() not in ("child", "parent"):
-                    found(
+                    report(
                         f"'{word}' is neither child nor parent: OpenSim refuses it",
                         analysis,
                         tag="apply_on_bodies",
@@ -297,7 +297,7 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
                         fault="reaction-on-neither",
                     )
             if len(analysis.apply_on_bodies) not in (0, 1, len(analysis.joint_names)):
-                found(
+                report(
                     f"{len(analysis.apply_on_bodies)} words for {len(analysis.joint_names)} joints: OpenSim refuses it",
                     analysis,
                     tag="apply_on_bodies",
@@ -308,7 +308,7 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
         present = {force.name for force in setup.tree.model.force_set.objects}
         for force in (force for forces in setup.named("ForceSet") for force in forces.objects):
             if force.name in present:
-                found(
+                report(
                     f"the model has a force '{force.name}' already, whose place this one takes",
                     force,
                     attribute="name",
@@ -317,10 +317,14 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
     for forces in setup.named("ForceSet"):
         for force in members(forces, "Force"):
             if not force.appliesForce:
-                found(f"{called(force)} does not act", force, tag="appliesForce", fault="force-off")
+                report(
+                    f"{called(force)} does not act", force, tag="appliesForce", fault="force-off"
+                )
     for controller in setup.named("Controller") if setup.tool is not None else ():
         if not controller.enabled:
-            found(f"{called(controller)} is off", controller, tag="enabled", fault="controller-off")
+            report(
+                f"{called(controller)} is off", controller, tag="enabled", fault="controller-off"
+            )
 
 
 def _carried_by_none(setup: Setup) -> list[str]:

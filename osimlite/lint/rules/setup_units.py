@@ -9,9 +9,9 @@ from typing import Any
 
 from osimlite.base.text import listed
 from osimlite.io.tables.headers import METRES
-from osimlite.lint.engine import WARNING, FindingSink, rule
 from osimlite.lint.placement import on_base
 from osimlite.lint.posture import marker_places, model_subject
+from osimlite.lint.registry import WARNING, FindingSink, rule
 from osimlite.lint.rules.setup_markers import cells_of, rows_between
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
@@ -31,7 +31,7 @@ _WEIGHTS = 0.2, 10.0
 
 
 @rule("OSIM857", "marker-size", severity=WARNING, about="document")
-def marker_size(setup: Setup, found: FindingSink) -> None:
+def marker_size(setup: Setup, report: FindingSink) -> None:
     """The measured markers are spread over another size than those of the model.
 
     Compares the box around the markers of a frame, in the units that the file declares, with the
@@ -77,7 +77,7 @@ def marker_size(setup: Setup, found: FindingSink) -> None:
         low, high = _ALIKE
         better = [name for name in ("m", "cm", "mm") if low <= ratio * METRES[name] <= high]
         if better and not low <= ratio * unit <= high:
-            found(
+            report(
                 f"the markers of '{user.marker_file}' are spread over {ratio * unit:.3g} of the size that they have in "
                 f"the model if the units are '{units.value.text}', as the file says: are they in {better[0]}?",
                 user,
@@ -91,7 +91,7 @@ def _size(points: Sequence[Sequence[float]]) -> float:
 
 
 @rule("OSIM858", "load-units", severity=WARNING, about="document")
-def load_units(setup: Setup, found: FindingSink) -> None:
+def load_units(setup: Setup, report: FindingSink) -> None:
     """Measured loads are too small for the model, as if they were in kilonewtons.
 
     Adds up the sizes of all measured forces in each row, and compares the largest sum with the
@@ -126,7 +126,7 @@ def load_units(setup: Setup, found: FindingSink) -> None:
         )
         low, high = _WEIGHTS
         if 0.0 < largest < _SLIGHT * weight and low <= 1000.0 * largest / weight <= high:
-            found(
+            report(
                 f"the forces of '{loads.datafile}' are never larger than {largest:.3g} N together, and the model "
                 f"weighs {weight:.0f} N: are they in kilonewtons?",
                 loads,
@@ -151,7 +151,7 @@ def _largest_load(forces: Sequence[Any], table: Table) -> float:
 
 
 @rule("OSIM859", "ground-twice", severity=WARNING, about="document")
-def ground_twice(setup: Setup, found: FindingSink) -> None:
+def ground_twice(setup: Setup, report: FindingSink) -> None:
     """A contact of the model and a measured load both push a body from the ground.
 
     Looks for measured forces on bodies that have contact surfaces, and for contact forces of the
@@ -197,7 +197,7 @@ def ground_twice(setup: Setup, found: FindingSink) -> None:
             tag = (
                 "forces_to_exclude" if hasattr(tool, "forces_to_exclude") else "external_loads_file"
             )
-            found(
+            report(
                 f"{names} of the model and the loads of '{tool.external_loads_file}' both push {bodies} from the "
                 "ground: exclude the contact forces, or the ground counts twice",
                 tool,

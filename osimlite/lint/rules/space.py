@@ -8,9 +8,8 @@ from functools import cache
 from itertools import combinations
 
 from osimlite.base.text import listed
-from osimlite.lint.config import Threshold
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.placement import Pose, default_poses, fixed, on_base
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, Threshold, rule
 from osimlite.lint.skeleton import base_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
@@ -28,7 +27,7 @@ POINTS = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_p
 
 
 @rule("OSIM411", "degenerate-frame", severity=ERROR)
-def degenerate_frame(subject: Subject, found: FindingSink) -> None:
+def degenerate_frame(subject: Subject, report: FindingSink) -> None:
     """The points of a frame do not make a frame.
 
     Reports frames laid through stations of which two of the three that give the axes are in the
@@ -70,12 +69,12 @@ def degenerate_frame(subject: Subject, found: FindingSink) -> None:
         circle = list(way.values())[list(way).index(id(here)) :] if id(here) in way else []
         consequence = _fate_of_circle(subject, circle) if circle else ""
         for link in circle:
-            found(f"{called(link)} is fixed to {consequence}", link, tag="socket_parent")
+            report(f"{called(link)} is fixed to {consequence}", link, tag="socket_parent")
     laid = list(subject.each(StationDefinedFrame))
     circles = _on_circles(subject, laid)
     for frame in laid:
         if id(frame) in circles:
-            found(
+            report(
                 f"{called(frame)} is laid through a point on itself: OpenSim never comes to an end",
                 frame,
             )
@@ -97,7 +96,7 @@ def degenerate_frame(subject: Subject, found: FindingSink) -> None:
             None,
         )
         if fixed_to[0] is not None and stray is not None:
-            found(
+            report(
                 f"{called(stations[stray])} of {called(frame)} is fixed to {called(fixed_to[stray] or frame)}, "
                 f"{called(stations[0])} to {called(fixed_to[0])}: OpenSim refuses the model",
                 frame,
@@ -110,7 +109,7 @@ def degenerate_frame(subject: Subject, found: FindingSink) -> None:
         ]
         for one, other in combinations(range(3), 2):
             if spots[one] is not None and spots[one] == spots[other]:
-                found(
+                report(
                     f"{POINTS[one]} and {POINTS[other]} of {called(frame)} are in the same place: OpenSim refuses "
                     "the model",
                     frame,
@@ -146,7 +145,7 @@ LENGTH = Threshold("largest-length", 10.0, "m", "nothing on a body is longer")
 
 
 @rule("OSIM521", "starts-in-contact", severity=INFO, thresholds=(DEPTH, DEPTH_SHARE))
-def starts_in_contact(subject: Subject, found: FindingSink) -> None:
+def starts_in_contact(subject: Subject, report: FindingSink) -> None:
     """Contact surfaces are inside each other in the default pose.
 
     Puts the model in its default pose and reports balls that start inside a half-space or another
@@ -175,7 +174,7 @@ def starts_in_contact(subject: Subject, found: FindingSink) -> None:
             if depth is None or not depth > max(deep, share * ball.radius):
                 continue
             sunk = isinstance(against, ContactHalfSpace) and depth > ball.radius
-            found(
+            report(
                 f"{called(ball)} starts {quantity(1000 * depth, 'mm')} deep in {called(against)} of {called(force)}"
                 + (
                     f"; its middle is inside, its radius is {quantity(1000 * ball.radius, 'mm')}"
@@ -189,7 +188,7 @@ def starts_in_contact(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM522", "lengths-in-millimetres", severity=WARNING, thresholds=(LENGTH,))
-def lengths_in_millimetres(subject: Subject, found: FindingSink) -> None:
+def lengths_in_millimetres(subject: Subject, report: FindingSink) -> None:
     """A length on a body is longer than ten metres.
 
     Reports lengths and places, given in the frame of a body, beyond 10 m. What is fixed to ground
@@ -226,7 +225,7 @@ def lengths_in_millimetres(subject: Subject, found: FindingSink) -> None:
                 ):
                     continue
                 better = " ".join(f"{number / 1000:.6g}" for number in numbers)
-                found(
+                report(
                     f"{subject.titled(item, spec)} is {quantity(value, 'm')}; in millimetres?",
                     item,
                     tag=spec.tag,
@@ -245,7 +244,7 @@ def _lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
 
 
 @rule("OSIM415", "no-direction", severity=ERROR)
-def no_direction(subject: Subject, found: FindingSink) -> None:
+def no_direction(subject: Subject, report: FindingSink) -> None:
     """A direction has no length.
 
     Reports lines, axes and directions of constraints and actuators that are 0 0 0. The line of a
@@ -273,7 +272,7 @@ def no_direction(subject: Subject, found: FindingSink) -> None:
                 fate = (
                     "it does not act" if is_off else "accelerations become NaN, without a message"
                 )
-                found(
+                report(
                     f"{subject.titled(item, type(item).field_specs()[tag])} is 0 0 0: {fate}",
                     item,
                     tag=tag,

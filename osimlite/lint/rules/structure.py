@@ -12,9 +12,9 @@ from osimlite.io.document.lexical import reads_as
 from osimlite.io.document.notes import Note
 from osimlite.io.document.source import Source
 from osimlite.lint.diagnostic import Fix, Severity
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import as_comment, renamed, without_element
 from osimlite.lint.old_tags import Successor, is_comment, reason_unused, successor
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.rules.classes import part_for, set_for, wrapper_for
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called, shown
@@ -26,7 +26,7 @@ from osimlite.schema.specs import FieldSpec, field_specs
 
 
 @rule("OSIM101", "unknown-tag", severity=ERROR, mends="both")
-def unknown_tag(subject: Subject, found: FindingSink) -> None:
+def unknown_tag(subject: Subject, report: FindingSink) -> None:
     """An element is no property of the object it stands in.
 
     Reports child elements that their class does not have: misspelt, in the wrong case, of another
@@ -54,13 +54,13 @@ def unknown_tag(subject: Subject, found: FindingSink) -> None:
             continue
         old = successor(type(owner), note.word)
         if old is not None:
-            _report_old(subject, found, note, owner, old)
+            _report_old(subject, report, note, owner, old)
             continue
         item = _describe_unknown(subject, note, owner)
         groups.setdefault((note.word, item.suggestion, item.severity), []).append(item)
     for first, *others in groups.values():
         more = f"; {counted(len(others), 'more element')} <{first.note.word}>" if others else ""
-        found(
+        report(
             first.message + more,
             first.owner,
             number=first.note.number,
@@ -172,13 +172,13 @@ def _is_said_again(subject: Subject, owner: Object, number: int) -> bool:
 
 
 def _report_old(
-    subject: Subject, found: FindingSink, note: Note, owner: Object, old: Successor
+    subject: Subject, report: FindingSink, note: Note, owner: Object, old: Successor
 ) -> None:
     """Say that a tag is one of an older format."""
     instead = f"write <{old.tag}>" if old.tag is not None else ""
     words = "; " + ", ".join(part for part in (instead, old.hint) if part)
     version = subject.version or CURRENT_VERSION
-    found(
+    report(
         f"<{note.word}> of {called(owner)} belongs to files before version {old.since}; in one of version {version} "
         f"OpenSim ignores it{words}",
         owner,
@@ -188,7 +188,7 @@ def _report_old(
 
 
 @rule("OSIM104", "duplicate-tag", severity=ERROR, mends="safe")
-def duplicate_tag(subject: Subject, found: FindingSink) -> None:
+def duplicate_tag(subject: Subject, report: FindingSink) -> None:
     """A property is given twice.
 
     Reports every element after the first of the same property in one object.
@@ -206,7 +206,7 @@ def duplicate_tag(subject: Subject, found: FindingSink) -> None:
         value = getattr(owner, note.spec.name)
         taken = "" if isinstance(note.spec.kind, Held) else f", {shown(value)},"
         if note.word != note.spec.tag:
-            found(
+            report(
                 f"<{note.spec.tag}> of {called(owner)} holds one object; OpenSim takes the first and ignores this "
                 f"{note.word}",
                 owner,
@@ -214,7 +214,7 @@ def duplicate_tag(subject: Subject, found: FindingSink) -> None:
                 fix=without_element(subject.source, note.number),
             )
             continue
-        found(
+        report(
             f"{called(owner)} has <{note.word}> more than once; OpenSim takes the first{taken} and ignores this one",
             owner,
             number=note.number,
@@ -224,7 +224,7 @@ def duplicate_tag(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM107", "element-in-value", severity=ERROR)
-def element_in_value(subject: Subject, found: FindingSink) -> None:
+def element_in_value(subject: Subject, report: FindingSink) -> None:
     """A value has an element inside.
 
     Reports elements inside a number, a switch, a text or a reference, and comments, instructions
@@ -244,13 +244,13 @@ def element_in_value(subject: Subject, found: FindingSink) -> None:
             what = _interrupting(subject, note.number)
             if not what:
                 continue
-            found(
+            report(
                 f"there is {what} in the middle of {subject.titled(owner, note.spec)}: OpenSim refuses the file",
                 owner,
                 number=note.number,
             )
             continue
-        found(
+        report(
             f"<{note.spec.tag}> of {called(owner)} is a value and cannot hold <{note.word}>: OpenSim refuses the file",
             owner,
             number=note.number,
@@ -258,7 +258,7 @@ def element_in_value(subject: Subject, found: FindingSink) -> None:
     source = subject.source
     if source is not None and "<![CDATA[" in source.text:
         for number in _holders_of_cdata(source):
-            _report_cdata(subject, source, number, found)
+            _report_cdata(subject, source, number, report)
 
 
 def _interrupting(subject: Subject, number: int) -> str:

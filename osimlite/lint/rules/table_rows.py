@@ -8,12 +8,12 @@ from itertools import pairwise
 from osimlite.base.text import counted
 from osimlite.io.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.table import Table
 
 
 @rule("OSIM805", "no-rows", severity=ERROR, about="table")
-def no_rows(table: Table, found: FindingSink) -> None:
+def no_rows(table: Table, report: FindingSink) -> None:
     """A table has no rows.
 
     Reports tables without any row.
@@ -39,11 +39,11 @@ def no_rows(table: Table, found: FindingSink) -> None:
         and not table.rows.faults
     ):
         fate = "looks for one for ever" if table.is_markers else "refuses the table"
-        found(f"there are no rows: OpenSim {fate}", at=Position(table.header.label_line, 1))
+        report(f"there are no rows: OpenSim {fate}", at=Position(table.header.label_line, 1))
 
 
 @rule("OSIM806", "ragged-row", severity=ERROR, mends="safe", about="table")
-def ragged_row(table: Table, found: FindingSink) -> None:
+def ragged_row(table: Table, report: FindingSink) -> None:
     """A row of a table is no row of numbers, or has too many or too few.
 
     Compares the cells of each row with the labels, and points out lines between the rows that are
@@ -76,23 +76,23 @@ def ragged_row(table: Table, found: FindingSink) -> None:
                 else None
             )
             has = counted(fault.number, "cell")
-            found(
+            report(
                 f"the row has {has} and needs {rows.cells}{fault.text}{fault.more()}",
                 at=at,
                 fix=fix,
             )
         elif fault.kind == "comment":
-            found(f"OpenSim knows no remarks among the rows{fault.more('line')}", at=at)
+            report(f"OpenSim knows no remarks among the rows{fault.more('line')}", at=at)
         elif rows.count and fault.line <= rows.line_of(rows.count - 1):
             if table.is_markers or table.is_strict:
                 lost = rows.line_of(rows.count - 1) - fault.line
-                found(
+                report(
                     f"a blank line ends the table for OpenSim: {counted(lost, 'row')} behind it are lost",
                     at=at,
                     fix=_without_blank_lines(table, fault.line),
                 )
             else:
-                found(
+                report(
                     f"there is a blank line among the rows{fault.more('line')}",
                     at=at,
                     severity=INFO,
@@ -121,7 +121,7 @@ def _without_blank_lines(table: Table, first: int) -> Fix:
 
 
 @rule("OSIM807", "not-a-number", severity=ERROR, about="table")
-def not_a_number(table: Table, found: FindingSink) -> None:
+def not_a_number(table: Table, report: FindingSink) -> None:
     """A cell of a table is no number.
 
     Finds words, NaN, infinity, decimal commas and whatever else is no number: once for each column,
@@ -157,7 +157,7 @@ def not_a_number(table: Table, found: FindingSink) -> None:
             lost = max(0, end - fault.line)
             fate = f"OpenSim takes it for 0 and loses the rest of the table without a word, {counted(lost, 'row')}"
         what = f"'{fault.text}' is no number" if fault.text else "there is no number"
-        found(
+        report(
             f"{what} (column '{label}'): {fate}{fault.more()}",
             at=Position(fault.line, fault.column, max(1, fault.length)),
             severity=WARNING
@@ -167,7 +167,7 @@ def not_a_number(table: Table, found: FindingSink) -> None:
 
 
 @rule("OSIM808", "time-order", severity=ERROR, about="table")
-def time_order(table: Table, found: FindingSink) -> None:
+def time_order(table: Table, report: FindingSink) -> None:
     """A time of a table is not after the one before it.
 
     Finds rows with the time of the row before, and rows that go back in time.
@@ -205,11 +205,11 @@ def time_order(table: Table, found: FindingSink) -> None:
             None if fault.number or table.is_markers else INFO if fault.line == last else WARNING
         )
         at = Position(fault.line, fault.column, fault.length)
-        found(f"the time {what}{fault.more()}", at=at, severity=severity)
+        report(f"the time {what}{fault.more()}", at=at, severity=severity)
 
 
 @rule("OSIM809", "time-gap", severity=WARNING, about="table")
-def time_gap(table: Table, found: FindingSink) -> None:
+def time_gap(table: Table, report: FindingSink) -> None:
     """Rows are missing in a table of even times.
 
     Finds steps that are at least half as long again as the usual one, in tables in which nearly all
@@ -253,7 +253,7 @@ def time_gap(table: Table, found: FindingSink) -> None:
                 if 0.5 <= missing < 1e9
                 else ""
             )
-            found(
+            report(
                 f"from one row to the next {steps[row - 1]:.6g} s pass, usually {table.step:.6g} s{lost}",
                 at=table.time_at(rows.line_of(row)),
             )

@@ -9,7 +9,7 @@ from osimlite.base.text import counted, nearest
 from osimlite.io.document.source import Position
 from osimlite.io.tables.headers import COUNTS, MARKER_KEYS, SUFFIXES, Entry, MarkerHeader
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.table import Table
 
 _WHOLE = re.compile(r"\+?[0-9]+")
@@ -18,7 +18,7 @@ _TO_THE_END = 1_000_000
 
 
 @rule("OSIM801", "table-header", severity=ERROR, mends="safe", about="table")
-def table_header(table: Table, found: FindingSink) -> None:
+def table_header(table: Table, report: FindingSink) -> None:
     """The header of a table is not as OpenSim needs it.
 
     Looks for the line `endheader` of a storage file, in small letters, and for `nRows` and
@@ -42,31 +42,31 @@ def table_header(table: Table, found: FindingSink) -> None:
     """
     start, header = Position(1, 1), table.header
     if not table.data or table.data.isspace():
-        found("the file is empty: OpenSim refuses it", at=start)
+        report("the file is empty: OpenSim refuses it", at=start)
     elif isinstance(header, MarkerHeader):
-        _marker_header(table, header, found)
+        _marker_header(table, header, report)
     elif header.end.text != "endheader":
         words = table.data[:100].lstrip()
         if words.startswith(b"PathFileType"):
-            found("these are markers over time; a file of them is called .trc", at=start)
+            report("these are markers over time; a file of them is called .trc", at=start)
         elif header.end.at.line == 1:
             ends = (
                 "; its lines end with CR alone"
                 if b"\r" in table.data[:1000] and b"\n" not in table.data
                 else ""
             )
-            found(
+            report(
                 f"there is no line 'endheader' in this file, so it is no storage file: OpenSim refuses it{ends}",
                 at=start,
             )
         elif header.end.text:
-            found(
+            report(
                 "the header must end with 'endheader' in small letters: OpenSim takes all that follows for header",
                 at=header.end.at,
                 suggestion="endheader",
             )
         else:
-            found(
+            report(
                 "no line 'endheader' stands before the labels: OpenSim refuses the table",
                 at=header.end.at,
                 fix=table.inserting(header.label_line, "endheader"),
@@ -82,7 +82,7 @@ def table_header(table: Table, found: FindingSink) -> None:
                     if entry
                     else table.inserting(at.line, f"{key}={count}")
                 )
-                found(
+                report(
                     f"the header does not say '{key}': OpenSim refuses the table",
                     at=at,
                     suggestion=near and key,
@@ -101,7 +101,7 @@ def _saying(table: Table, entry: Entry, key: str, count: int) -> Fix | None:
     )
 
 
-def _marker_header(table: Table, header: MarkerHeader, found: FindingSink) -> None:
+def _marker_header(table: Table, header: MarkerHeader, report: FindingSink) -> None:
     if not table.data.startswith(b"PathFileType"):
         mark = table.data.startswith(b"\xef\xbb\xbf")
         why = (
@@ -109,14 +109,14 @@ def _marker_header(table: Table, header: MarkerHeader, found: FindingSink) -> No
             if mark
             else "must start with PathFileType"
         )
-        found(
+        report(
             f"a marker file {why}: OpenSim refuses it",
             at=Position(1, 1),
             fix=Fix((Edit(0, 3, ""),)) if mark else None,
         )
     if len(header.lines) < 4:
         ends = ": its lines end with CR alone" if b"\r" in table.data else ""
-        found(
+        report(
             f"a marker file has five lines before its rows, this has {len(header.lines)}{ends}",
             at=Position(1, 1),
         )
@@ -125,7 +125,7 @@ def _marker_header(table: Table, header: MarkerHeader, found: FindingSink) -> No
     for key, right in zip(keys, MARKER_KEYS, strict=False):
         if key.text != right:
             meant = right if len(keys) == len(MARKER_KEYS) else None
-            found(
+            report(
                 f"the header says '{key.text}' where OpenSim wants '{right}'",
                 at=key.at,
                 suggestion=meant,
@@ -134,12 +134,12 @@ def _marker_header(table: Table, header: MarkerHeader, found: FindingSink) -> No
             break
     else:
         if len(keys) < len(MARKER_KEYS):
-            found(
+            report(
                 f"the header does not say '{MARKER_KEYS[len(keys)]}': OpenSim refuses the file",
                 at=Position(2, 1),
             )
         elif len(values) != len(keys):
-            found(
+            report(
                 f"there are {len(values)} values of the {len(keys)} keys above them: OpenSim refuses the file",
                 at=Position(3, 1),
             )
@@ -158,7 +158,7 @@ def _marker_header(table: Table, header: MarkerHeader, found: FindingSink) -> No
             str(count)
         ]:
             fix = table.inserting(5, line)
-        found(
+        report(
             f"the fifth line must say '{wanted[wrong]}' here: OpenSim refuses the file",
             at=place,
             fix=fix,
@@ -166,7 +166,7 @@ def _marker_header(table: Table, header: MarkerHeader, found: FindingSink) -> No
 
 
 @rule("OSIM802", "table-count", severity=ERROR, mends="safe", about="table")
-def table_count(table: Table, found: FindingSink) -> None:
+def table_count(table: Table, report: FindingSink) -> None:
     """A count in the header of a table is not that of the table.
 
     Compares `nRows` and `nColumns`, or `NumFrames` and `NumMarkers`, with the rows and the labels
@@ -222,7 +222,7 @@ def table_count(table: Table, found: FindingSink) -> None:
         # Where a row has as many cells as the header says, it is a label that is wrong.
         in_rows = {"nColumns": rows.cells, "NumMarkers": (rows.cells - 2) // 3}.get(key, count)
         is_right = not odd_rows and rows.count > 0 and in_rows == count
-        found(
+        report(
             f"'{entry.key.text}' is '{said}', and there are {count} {what}{fate}",
             at=entry.value.at,
             severity=severity,
@@ -233,7 +233,7 @@ def table_count(table: Table, found: FindingSink) -> None:
 
 
 @rule("OSIM803", "table-setting", severity=ERROR, mends="safe", about="table")
-def table_setting(table: Table, found: FindingSink) -> None:
+def table_setting(table: Table, report: FindingSink) -> None:
     """A setting in the header of a table has a value that OpenSim does not know.
 
     Looks at `inDegrees`, which is `yes` or `no`, at the letters that keys are written in, at
@@ -268,7 +268,7 @@ def table_setting(table: Table, found: FindingSink) -> None:
                 "centimeter": "cm",
             }
             right = near.get(units.value.text.lower().rstrip("s"), units.value.text.lower())
-            found(
+            report(
                 f"OpenSim does not know the units '{units.value.text}' and refuses the file",
                 at=units.value.at,
                 suggestion=right if right in ("m", "mm", "cm") else None,
@@ -276,7 +276,7 @@ def table_setting(table: Table, found: FindingSink) -> None:
             )
         rate = entries.get("DataRate")
         if rate is not None and not _is_positive(rate.value.text):
-            found(
+            report(
                 f"'DataRate' is '{rate.value.text}' and no frequency",
                 at=rate.value.at,
                 severity=WARNING,
@@ -286,7 +286,7 @@ def table_setting(table: Table, found: FindingSink) -> None:
             and table.step > 0
             and not 0.9 < float(rate.value.text) * table.step < 1.1
         ):
-            found(
+            report(
                 f"'DataRate' is '{rate.value.text}', and by the times of the frames it is {1 / table.step:.6g}",
                 at=rate.value.at,
                 severity=INFO,
@@ -300,7 +300,7 @@ def table_setting(table: Table, found: FindingSink) -> None:
         if right != key and right not in entries:
             # Without a version a table is read as one of version 1.
             severity = WARNING if right == "version" else None
-            found(
+            report(
                 f"OpenSim does not know '{key}' and leaves it out",
                 at=entry.key.at,
                 suggestion=right,
@@ -312,28 +312,28 @@ def table_setting(table: Table, found: FindingSink) -> None:
             degrees.value.text.lower()
         )
         harmless = meant == "no"
-        found(
+        report(
             f"'inDegrees' is 'yes' or 'no'; of '{degrees.value.text}' OpenSim makes no: it takes angles for radians",
             at=degrees.value.at,
             suggestion=meant,
             certain=True,
             severity=WARNING if harmless else None,
         )
-    _cells(table, found)
+    _cells(table, report)
     version = entries.get("version")
     if version is not None and not version.value.text.isdecimal():
-        found(
+        report(
             f"the version is a whole number, not '{version.value.text}'",
             at=version.value.at,
             severity=WARNING,
         )
 
 
-def _cells(table: Table, found: FindingSink) -> None:
+def _cells(table: Table, report: FindingSink) -> None:
     """What the newer reader of storage files makes of the type of the cells, and of blanks around keys."""
     kind = table.entries.get("DataType")
     if kind is not None and kind.value.text and kind.value.text not in SUFFIXES:
-        found(
+        report(
             f"OpenSim knows no tables of '{kind.value.text}', and refuses the file",
             at=kind.value.at,
             suggestion=nearest(kind.value.text, SUFFIXES),
@@ -344,7 +344,7 @@ def _cells(table: Table, found: FindingSink) -> None:
             entry.key.at.column - 1 + entry.key.at.length :
         ]
         if key != "version" and "=" in behind and not behind.startswith(f"={entry.value.text}"):
-            found(
+            report(
                 f"OpenSim's newer reader takes the blanks beside '=' for parts of '{key}' and of its value",
                 at=entry.key.at,
                 severity=ERROR if key == "DataType" else WARNING,
@@ -423,7 +423,7 @@ refuses the file.
 
 
 @rule("OSIM804", "column-label", severity=ERROR, about="table", faults=_FAULTS, frames=_FRAMES)
-def column_label(table: Table, found: FindingSink) -> None:
+def column_label(table: Table, report: FindingSink) -> None:
     """A label of a table is missing, stands there twice, or is not as OpenSim needs it.
 
     The first column of a storage file is `time`, in small letters. Every column has a label of its
@@ -439,7 +439,7 @@ def column_label(table: Table, found: FindingSink) -> None:
     if isinstance(header, MarkerHeader):
         for word, right in zip(header.words(4), ("Frame#", "Time"), strict=False):
             if word.text != right:
-                found(
+                report(
                     f"the label '{word.text}' must be '{right}': OpenSim refuses the file",
                     at=word.at,
                     suggestion=nearest(word.text, [right], cutoff=60),
@@ -449,33 +449,33 @@ def column_label(table: Table, found: FindingSink) -> None:
         cells = header.lines[3].split("\t") if header.lines[3:] else []
         empty = [index for index in range(2, len(cells) - 2, 3) if not cells[index].strip()]
         if empty and len(labels) < len(cells[2:]) // 3:
-            found(
+            report(
                 "a marker has no label: OpenSim refuses the file",
                 at=Position(4, len("\t".join(cells[: empty[0]])) + 2),
                 fault="marker-label",
             )
         for label in labels:
             if " " in label.text:
-                found(
+                report(
                     f"the marker '{label.text}' has a blank in its name, which no marker of a model has",
                     at=label.at,
                     fault="marker-label",
                 )
     elif not labels:
         if header.end.text:
-            found("the table ends before its labels", at=header.end.at, fault="no-labels")
+            report("the table ends before its labels", at=header.end.at, fault="no-labels")
         return
     elif labels[0].text != "time":
         first, at = labels[0]
         near = "time" if first.lower() in ("time", "t", "times", "time(s)") else None
         if "," in first:
-            found(
+            report(
                 "tabs or blanks separate the columns of a storage file, not commas: OpenSim refuses it",
                 at=at,
                 fault="commas-between-labels",
             )
         elif all(label.text not in ("time", "range") for label in labels):
-            found(
+            report(
                 f"the first column is '{first}': OpenSim needs one called 'time'",
                 at=at,
                 suggestion=near,
@@ -483,13 +483,13 @@ def column_label(table: Table, found: FindingSink) -> None:
                 fault="no-time-column",
             )
         else:
-            found(
+            report(
                 f"the first column is '{first}': OpenSim takes it for the time",
                 at=at,
                 fault="time-not-first",
             )
     elif header.is_strict and labels[1:] and not header.has_tabs:
-        found(
+        report(
             f"blanks separate the columns of a table of version {header.form}: OpenSim's newer tools refuse it",
             at=labels[1].at,
             fault="blanks-between-labels",
@@ -506,7 +506,7 @@ def column_label(table: Table, found: FindingSink) -> None:
                 else ""
             )
             severity = ERROR if table.is_markers else None
-            found(
+            report(
                 f"a column is called '{name}' already: OpenSim {fate}{more}",
                 at=again[0],
                 severity=severity,

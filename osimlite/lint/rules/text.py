@@ -7,8 +7,8 @@ from typing import Final
 
 from osimlite.errors import NotWellFormedError, VersionError
 from osimlite.io.document.source import Source
-from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import renamed
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.schema.model import CURRENT_VERSION
 
@@ -34,7 +34,7 @@ _LATE: Final = (
 
 
 @rule("OSIM001", "syntax-error", severity=ERROR)
-def syntax_error(subject: Subject, found: FindingSink) -> None:
+def syntax_error(subject: Subject, report: FindingSink) -> None:
     """The text is not well-formed XML.
 
     Reports where the XML parser gave up: a tag that is not closed, a stray `<` or `&`, a file that
@@ -55,7 +55,7 @@ def syntax_error(subject: Subject, found: FindingSink) -> None:
         if isinstance(fault, NotWellFormedError):
             _found_at(
                 subject.source,
-                found,
+                report,
                 f"{fault.message}; {_checked(subject)}",
                 fault.line,
                 fault.column,
@@ -70,7 +70,7 @@ def _checked(subject: Subject) -> str:
 
 
 @rule("OSIM010", "unused-ignore", severity=INFO)
-def unused_ignore(subject: Subject, found: FindingSink) -> None:
+def unused_ignore(subject: Subject, report: FindingSink) -> None:
     """A comment ignores what is not there.
 
     Reports `<!-- osimlite: ignore CODE -->` for each code of which nothing is found in its place.
@@ -92,7 +92,7 @@ def unused_ignore(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM002", "encoding", severity=WARNING)
-def encoding(subject: Subject, found: FindingSink) -> None:
+def encoding(subject: Subject, report: FindingSink) -> None:
     """The bytes are not in the encoding that the file declares.
 
     Reports the first byte that is no UTF-8 (or whatever the XML declaration says). The file is then
@@ -112,7 +112,7 @@ def encoding(subject: Subject, found: FindingSink) -> None:
     """
     source = subject.source
     if source is not None and source.encoding in ("utf-16", "utf-32"):
-        found(
+        report(
             f"the file is in {source.encoding.upper()}: OpenSim cannot load it; save it as UTF-8",
             at=source.position(0),
             severity=ERROR,
@@ -125,19 +125,19 @@ def encoding(subject: Subject, found: FindingSink) -> None:
         source.data.decode(name)
     except UnicodeDecodeError as error:
         before = source.data[: error.start].decode(name).removeprefix("\ufeff")
-        found(
+        report(
             f"byte 0x{source.data[error.start]:02X} is not {name}; the text is read as {source.encoding}",
             at=source.position(len(before)),
         )
     except LookupError:
-        found(
+        report(
             f"the encoding '{name}' is not known; the text is read as {source.encoding}",
             at=source.position(0),
         )
 
 
 @rule("OSIM003", "not-a-model", severity=ERROR, mends="unsafe")
-def not_a_model(subject: Subject, found: FindingSink) -> None:
+def not_a_model(subject: Subject, report: FindingSink) -> None:
     """The document is XML, but no OpenSim model.
 
     Reports a root element other than `<OpenSimDocument>`, with the right spelling where that is
@@ -163,16 +163,16 @@ def not_a_model(subject: Subject, found: FindingSink) -> None:
             continue
         message = fault.message.removesuffix(f"; did you mean '{fault.meant}'?")
         if fault.meant is None or not subject.source.well_formed:
-            _found_at(subject.source, found, message, fault.line, fault.column)
+            _found_at(subject.source, report, message, fault.line, fault.column)
             continue
         root = subject.source.of_tag(0)
         number = int((root.line, root.column) != (fault.line, fault.column))
         fix = renamed(subject.source, number, fault.meant, safe=False)
-        found(message, at=subject.source.of_tag(number), suggestion=fault.meant, fix=fix)
+        report(message, at=subject.source.of_tag(number), suggestion=fault.meant, fix=fix)
 
 
 @rule("OSIM004", "document-version", severity=ERROR)
-def document_version(subject: Subject, found: FindingSink) -> None:
+def document_version(subject: Subject, report: FindingSink) -> None:
     """The document has no version, or none that is read.
 
     Reports a `Version` that is missing, no whole number, too old to be read here, newer than
@@ -194,14 +194,14 @@ def document_version(subject: Subject, found: FindingSink) -> None:
     for fault in subject.faults:
         if isinstance(fault, VersionError):
             wanted = None if fault.version is not None else str(CURRENT_VERSION)
-            found(fault.message, number=0, attribute="Version", suggestion=wanted)
+            report(fault.message, number=0, attribute="Version", suggestion=wanted)
     spans = subject.source.spans
     has_root = bool(spans) and spans[0].tag != "Model"
     late = ""
     if subject.version is not None and subject.version < _SOCKETS:
         late = _late_socket(subject.source)
     if not has_root and late:
-        found(
+        report(
             f"the <Model> does not stand in an <OpenSimDocument>: OpenSim takes it for version {subject.version} and "
             f'refuses it; put it into <OpenSimDocument Version="{CURRENT_VERSION}">, as `osimlite upgrade` does',
             number=0,
@@ -209,13 +209,13 @@ def document_version(subject: Subject, found: FindingSink) -> None:
         return
     if subject.version is not None and subject.version < _OLDEST_FOR_OPENSIM:
         advice = "; `osimlite upgrade` writes the model in the current format" if not late else ""
-        found(
+        report(
             f"version {subject.version} is too old for OpenSim 4.6, which refuses it{advice}",
             number=0,
             attribute="Version",
         )
     if late:
-        found(
+        report(
             f"the document says version {subject.version} and holds {late}, which came later: OpenSim reads it by "
             "the rules of the old format and does not find it",
             number=0,
@@ -223,7 +223,7 @@ def document_version(subject: Subject, found: FindingSink) -> None:
             suggestion=str(CURRENT_VERSION),
         )
     if subject.version is not None and subject.version > CURRENT_VERSION:
-        found(
+        report(
             f"version {subject.version} is newer than {CURRENT_VERSION}, the format of OpenSim 4.6: "
             "what was added since is passed over in silence",
             number=0,
@@ -248,7 +248,7 @@ def _late_socket(source: Source) -> str:
 
 
 @rule("OSIM005", "merge-conflict", severity=ERROR)
-def merge_conflict(subject: Subject, found: FindingSink) -> None:
+def merge_conflict(subject: Subject, report: FindingSink) -> None:
     """The file holds the marks of a merge that was not finished.
 
     Reports every line that begins with seven `<` or seven `>`.
@@ -266,14 +266,14 @@ def merge_conflict(subject: Subject, found: FindingSink) -> None:
     """
     if subject.source is not None:
         for start, end in _conflicts(subject.source):
-            found(
+            report(
                 "unfinished merge: keep one side and take the marks out",
                 at=subject.source.position(start, end - start),
             )
 
 
 @rule("OSIM006", "duplicate-attribute", severity=ERROR)
-def duplicate_attribute(subject: Subject, found: FindingSink) -> None:
+def duplicate_attribute(subject: Subject, report: FindingSink) -> None:
     """An element has the same attribute twice.
 
     Reports two attributes with the same name.
@@ -287,14 +287,14 @@ def duplicate_attribute(subject: Subject, found: FindingSink) -> None:
     """
     for note in subject.notes:
         if note.kind == "duplicate-attribute":
-            found(
+            report(
                 f"the attribute '{note.word}' stands here twice; OpenSim takes the last one",
                 at=subject.attribute_name(note.number, note.word),
             )
 
 
 @rule("OSIM007", "second-object", severity=ERROR)
-def second_object(subject: Subject, found: FindingSink) -> None:
+def second_object(subject: Subject, report: FindingSink) -> None:
     """The document holds more than one object.
 
     Reports every element of the document after the first.
@@ -310,7 +310,7 @@ def second_object(subject: Subject, found: FindingSink) -> None:
     """
     for note in subject.notes:
         if note.kind == "second-object":
-            found(
+            report(
                 f"OpenSim reads one object of a document and ignores this <{note.word}>",
                 number=note.number,
             )
@@ -327,9 +327,9 @@ def _conflicts(source: Source) -> list[tuple[int, int]]:
 
 
 def _found_at(
-    source: Source, found: FindingSink, message: str, line: int | None, column: int | None
+    source: Source, report: FindingSink, message: str, line: int | None, column: int | None
 ) -> None:
-    found(message, at=source.position(_offset(source, line, column)))
+    report(message, at=source.position(_offset(source, line, column)))
 
 
 def _offset(source: Source, line: int | None, column: int | None) -> int:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from osimlite.base.text import listed
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.skeleton import Link, Skeleton, growth, has_unknown_joints, skeleton
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -17,7 +17,7 @@ from osimlite.schema.joints import FreeJoint, Joint, WeldJoint
 
 
 @rule("OSIM401", "unconnected-body", severity=ERROR)
-def unconnected_body(subject: Subject, found: FindingSink) -> None:
+def unconnected_body(subject: Subject, report: FindingSink) -> None:
     """A body is not connected to ground.
 
     Reports bodies that no chain of joints connects to ground.
@@ -60,7 +60,7 @@ def unconnected_body(subject: Subject, found: FindingSink) -> None:
         elif bones.of(body):
             message = f"{called(body)} is not connected to ground, only with itself"
         fate = "adds a FreeJoint to ground" if not fails else "refuses the model"
-        found(
+        report(
             f"{message}; OpenSim {fate}",
             body,
             attribute="name",
@@ -69,7 +69,7 @@ def unconnected_body(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM403", "closed-loop", severity=ERROR)
-def closed_loop(subject: Subject, found: FindingSink) -> None:
+def closed_loop(subject: Subject, report: FindingSink) -> None:
     """Joints form a closed loop.
 
     Reports each joint that connects bodies which earlier joints have connected already.
@@ -102,7 +102,7 @@ def closed_loop(subject: Subject, found: FindingSink) -> None:
             )
             before = next(others, None)
             other = f", which {called(before)} has placed already" if before is not None else ""
-            found(
+            report(
                 f"{called(link.joint)} closes a loop at {called(link.child_base)}{other}; {_fate_of_loop(bones, link)}",
                 link.joint,
                 tag="socket_child_frame",
@@ -110,7 +110,7 @@ def closed_loop(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM404", "parallel-joints", severity=ERROR)
-def parallel_joints(subject: Subject, found: FindingSink) -> None:
+def parallel_joints(subject: Subject, report: FindingSink) -> None:
     """Two joints connect the same two bodies.
 
     Reports the second joint between one pair of bodies.
@@ -141,7 +141,7 @@ def parallel_joints(subject: Subject, found: FindingSink) -> None:
             first.setdefault(_ends(link), link.joint)
     for link in loops:
         if (before := first.setdefault(_ends(link), link.joint)) is not link.joint:
-            found(
+            report(
                 f"{called(link.joint)} connects the same two bodies as {called(before)}; {_fate_of_loop(bones, link)}",
                 link.joint,
                 attribute="name",
@@ -149,7 +149,7 @@ def parallel_joints(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM407", "massless-leaf", severity=ERROR)
-def massless_leaf(subject: Subject, found: FindingSink) -> None:
+def massless_leaf(subject: Subject, report: FindingSink) -> None:
     """A body without mass is the last of its chain.
 
     Reports bodies of mass 0 that move and carry nothing with mass.
@@ -173,7 +173,7 @@ def massless_leaf(subject: Subject, found: FindingSink) -> None:
             else ""
         )
         fate = "computes NaN" if isinstance(joint, CustomJoint) else "refuses the model"
-        found(
+        report(
             f"{called(body)}{welded} is massless and the end of its chain: OpenSim {fate}",
             body,
             tag="mass",

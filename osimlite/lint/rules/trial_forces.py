@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.lint.config import Threshold
-from osimlite.lint.engine import WARNING, FindingSink, rule
+from osimlite.lint.registry import WARNING, FindingSink, Threshold, rule
 from osimlite.lint.trial import CHECKLIST, HICKS, OPENSIM, OURS, TRIAL, Trial
 
 _BOTH = f"{OPENSIM}; {HICKS}"
@@ -51,7 +50,7 @@ PASSIVE_BAD = Threshold("passive-force-bad", 100.0, "%", "and from which on that
     "OSIM911", "residual-force", severity=WARNING, about=TRIAL,
     thresholds=(FORCE_SHARE, FORCE_GOOD, FORCE_BAD, FORCE_RMS_GOOD, FORCE_RMS_BAD),
 )  # fmt: skip
-def residual_force(trial: Trial, found: FindingSink) -> None:
+def residual_force(trial: Trial, report: FindingSink) -> None:
     """A force that nothing gives a body in life pushes the model.
 
     Looks at the forces at the joint to ground: those of inverse dynamics, and of the residual
@@ -71,15 +70,15 @@ def residual_force(trial: Trial, found: FindingSink) -> None:
     ```
     """
     advice = "look at mass and mass centres, the filter, and that loads and motion have the same times and feet"
-    trial.judge(found, [FORCE_GOOD, FORCE_SHARE, FORCE_BAD], _BOTH, advice, "peak")
-    trial.judge(found, [FORCE_RMS_GOOD, FORCE_RMS_BAD], OPENSIM, advice, "rms")
+    trial.judge(report, [FORCE_GOOD, FORCE_SHARE, FORCE_BAD], _BOTH, advice, "peak")
+    trial.judge(report, [FORCE_RMS_GOOD, FORCE_RMS_BAD], OPENSIM, advice, "rms")
 
 
 @rule(
     "OSIM912", "residual-moment", severity=WARNING, about=TRIAL,
     thresholds=(MOMENT_SHARE, MOMENT_GOOD, MOMENT_BAD, MOMENT_RMS_GOOD, MOMENT_RMS_BAD),
 )  # fmt: skip
-def residual_moment(trial: Trial, found: FindingSink) -> None:
+def residual_moment(trial: Trial, report: FindingSink) -> None:
     """A moment that nothing gives a body in life turns the model.
 
     As residual-force. A peak of up to 50 N m is good and one of more than 75 N m bad, a root mean
@@ -98,8 +97,8 @@ def residual_moment(trial: Trial, found: FindingSink) -> None:
     ```
     """
     advice = "look at the mass centre of the trunk (RRA adjusts it), and at where the loads act"
-    trial.judge(found, [MOMENT_SHARE, MOMENT_GOOD, MOMENT_BAD], _BOTH, advice, "peak")
-    trial.judge(found, [MOMENT_RMS_GOOD, MOMENT_RMS_BAD], OPENSIM, advice, "rms")
+    trial.judge(report, [MOMENT_SHARE, MOMENT_GOOD, MOMENT_BAD], _BOTH, advice, "peak")
+    trial.judge(report, [MOMENT_RMS_GOOD, MOMENT_RMS_BAD], OPENSIM, advice, "rms")
 
 
 @rule(
@@ -109,7 +108,7 @@ def residual_moment(trial: Trial, found: FindingSink) -> None:
     thresholds=(RESERVE_GOOD, RESERVE_BAD),
     about=TRIAL,
 )
-def reserve_moment(trial: Trial, found: FindingSink) -> None:
+def reserve_moment(trial: Trial, report: FindingSink) -> None:
     """Reserve actuators do what muscles cannot.
 
     Compares the reserve actuators of CMC and StaticOptimization, of coordinates that muscles cross,
@@ -129,7 +128,7 @@ def reserve_moment(trial: Trial, found: FindingSink) -> None:
     """
     advice = "look at strength and paths of the muscles there, at passive forces of those against them, and at the moment"
     for kind in ("peak", "rms"):
-        trial.judge(found, [RESERVE_GOOD, RESERVE_BAD], f"{HICKS}; {CHECKLIST}", advice, kind)
+        trial.judge(report, [RESERVE_GOOD, RESERVE_BAD], f"{HICKS}; {CHECKLIST}", advice, kind)
 
 
 @rule(
@@ -139,7 +138,7 @@ def reserve_moment(trial: Trial, found: FindingSink) -> None:
     thresholds=(ERROR_GOOD, ERROR_BAD, ERROR_RMS_BAD),
     about=TRIAL,
 )
-def tracking_error(trial: Trial, found: FindingSink) -> None:
+def tracking_error(trial: Trial, report: FindingSink) -> None:
     """RRA or CMC misses the motion that it was to follow.
 
     Looks at the errors that both tools write (`_pErr.sto`): up to 2 degrees or 2 cm are good, more
@@ -154,13 +153,13 @@ def tracking_error(trial: Trial, found: FindingSink) -> None:
     ```
     """
     advice = "give the task of this coordinate more weight, or its actuator more strength"
-    trial.judge(found, [ERROR_GOOD, ERROR_BAD], OPENSIM, advice, "peak")
-    trial.judge(found, [ERROR_GOOD, ERROR_BAD], OPENSIM, advice, "rms")
-    trial.judge(found, [ERROR_GOOD, ERROR_RMS_BAD], OPENSIM, advice, "rms-translation")
+    trial.judge(report, [ERROR_GOOD, ERROR_BAD], OPENSIM, advice, "peak")
+    trial.judge(report, [ERROR_GOOD, ERROR_BAD], OPENSIM, advice, "rms")
+    trial.judge(report, [ERROR_GOOD, ERROR_RMS_BAD], OPENSIM, advice, "rms-translation")
 
 
 @rule("OSIM915", "full-activation", severity=WARNING, thresholds=(FULL_GOOD, FULL_BAD), about=TRIAL)
-def full_activation(trial: Trial, found: FindingSink) -> None:
+def full_activation(trial: Trial, report: FindingSink) -> None:
     """A muscle is fully active for long.
 
     Looks in the activations of StaticOptimization and CMC for muscles of 0.99 and more.
@@ -176,7 +175,7 @@ def full_activation(trial: Trial, found: FindingSink) -> None:
     ```
     """
     advice = "look at its max_isometric_force, its fibers' length in this pose, and at muscles that pull against it"
-    trial.judge(found, [FULL_GOOD, FULL_BAD], OURS, advice, "share")
+    trial.judge(report, [FULL_GOOD, FULL_BAD], OURS, advice, "share")
 
 
 @rule(
@@ -186,7 +185,7 @@ def full_activation(trial: Trial, found: FindingSink) -> None:
     thresholds=(PASSIVE_GOOD, PASSIVE_BAD),
     about=TRIAL,
 )
-def passive_force(trial: Trial, found: FindingSink) -> None:
+def passive_force(trial: Trial, report: FindingSink) -> None:
     """The passive fibers of a muscle pull hard.
 
     Computes the passive forces of the muscles along the states of CMC, or along the motion of a
@@ -204,4 +203,4 @@ def passive_force(trial: Trial, found: FindingSink) -> None:
     ```
     """
     advice = "its fibers are too long in this pose: look at tendon_slack_length, optimal_fiber_length and its path"
-    trial.judge(found, [PASSIVE_GOOD, PASSIVE_BAD], OURS, advice, "peak")
+    trial.judge(report, [PASSIVE_GOOD, PASSIVE_BAD], OURS, advice, "peak")

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.lint.config import Threshold
-from osimlite.lint.engine import WARNING, FindingSink, rule
+from osimlite.lint.registry import WARNING, FindingSink, Threshold, rule
 from osimlite.lint.trial import CHECKLIST, HICKS, OPENSIM, OURS, TRIAL, Trial
 
 SCALE_RMS = Threshold(
@@ -47,7 +46,7 @@ WRONG_WEIGHT = Threshold("wrong-weight", 5.0, "%", "from here on that is bad")
     thresholds=(SCALE_RMS, SCALE_PEAK),
     about=TRIAL,
 )
-def scale_marker_error(trial: Trial, found: FindingSink) -> None:
+def scale_marker_error(trial: Trial, report: FindingSink) -> None:
     """A scaled model does not fit the static trial.
 
     Does what the setup of the ScaleTool says, and compares the markers that pose the scaled model,
@@ -65,12 +64,12 @@ def scale_marker_error(trial: Trial, found: FindingSink) -> None:
     ```
     """
     advice = "look at the markers on bones, the pairs that measure their segment, and the pose of the static trial"
-    trial.judge(found, [SCALE_RMS], CHECKLIST, advice, "rms")
-    trial.judge(found, [SCALE_PEAK], CHECKLIST, advice, "peak")
+    trial.judge(report, [SCALE_RMS], CHECKLIST, advice, "rms")
+    trial.judge(report, [SCALE_PEAK], CHECKLIST, advice, "peak")
 
 
 @rule("OSIM902", "marker-error", severity=WARNING, thresholds=(RMS, PEAK), about=TRIAL)
-def marker_error(trial: Trial, found: FindingSink) -> None:
+def marker_error(trial: Trial, report: FindingSink) -> None:
     """A motion does not fit the measured markers.
 
     Puts the model into the poses of a motion that an InverseKinematicsTool has made, and compares
@@ -89,12 +88,12 @@ def marker_error(trial: Trial, found: FindingSink) -> None:
     ```
     """
     advice = "look where this marker is on the model, whether it was taken for another, and what it weighs"
-    trial.judge(found, [RMS], OPENSIM, advice, "rms")
-    trial.judge(found, [PEAK], OPENSIM, advice, "peak")
+    trial.judge(report, [RMS], OPENSIM, advice, "rms")
+    trial.judge(report, [PEAK], OPENSIM, advice, "peak")
 
 
 @rule("OSIM903", "swapped-markers", severity=WARNING, thresholds=(SWAPPED,), about=TRIAL)
-def swapped_markers(trial: Trial, found: FindingSink) -> None:
+def swapped_markers(trial: Trial, report: FindingSink) -> None:
     """Two markers were taken for each other.
 
     Where a marker is more than 4 cm off, it exchanges every two markers of the frame that fits
@@ -111,7 +110,7 @@ def swapped_markers(trial: Trial, found: FindingSink) -> None:
     ```
     """
     trial.judge(
-        found,
+        report,
         [SWAPPED],
         OURS,
         "exchange their names in the file of markers, from where to where it says",
@@ -120,7 +119,7 @@ def swapped_markers(trial: Trial, found: FindingSink) -> None:
 
 
 @rule("OSIM904", "beyond-range", severity=WARNING, thresholds=(BEYOND, FAR_BEYOND), about=TRIAL)
-def beyond_range(trial: Trial, found: FindingSink) -> None:
+def beyond_range(trial: Trial, report: FindingSink) -> None:
     """A motion leaves the range of a coordinate.
 
     Compares the motions of inverse kinematics, RRA and CMC with the `range` of each coordinate of
@@ -137,7 +136,7 @@ def beyond_range(trial: Trial, found: FindingSink) -> None:
     ```
     """
     trial.judge(
-        found,
+        report,
         [BEYOND, FAR_BEYOND],
         OURS,
         "widen the range if the joint goes there, else look at the markers",
@@ -146,7 +145,7 @@ def beyond_range(trial: Trial, found: FindingSink) -> None:
 
 
 @rule("OSIM905", "filter-content", severity=WARNING, thresholds=(LOST, NOISE), about=TRIAL)
-def filter_content(trial: Trial, found: FindingSink) -> None:
+def filter_content(trial: Trial, report: FindingSink) -> None:
     """A filter takes motion away, or leaves noise.
 
     Runs the motion that a tool is given through the filter that its setup asks for. Looks by how
@@ -167,14 +166,14 @@ def filter_content(trial: Trial, found: FindingSink) -> None:
     ```
     """
     trial.judge(
-        found,
+        report,
         [LOST],
         OPENSIM,
         "take a higher lowpass_cutoff_frequency; 6 Hz are usual for walking",
         "change",
     )
     trial.judge(
-        found,
+        report,
         [NOISE],
         OURS,
         "take a lowpass_cutoff_frequency that leaves the motion; 6 Hz are usual for walking",
@@ -183,7 +182,7 @@ def filter_content(trial: Trial, found: FindingSink) -> None:
 
 
 @rule("OSIM906", "swapped-feet", severity=WARNING, thresholds=(SWAPPED_FEET,), about=TRIAL)
-def swapped_feet(trial: Trial, found: FindingSink) -> None:
+def swapped_feet(trial: Trial, report: FindingSink) -> None:
     """A force plate was taken for that of the other foot.
 
     Puts the model into poses of its motion in which a measured force is large, and looks whether it
@@ -199,14 +198,14 @@ def swapped_feet(trial: Trial, found: FindingSink) -> None:
     ```
     """
     trial.judge(
-        found, [SWAPPED_FEET], OURS, "exchange the bodies (applied_to_body) or the plates", "share"
+        report, [SWAPPED_FEET], OURS, "exchange the bodies (applied_to_body) or the plates", "share"
     )
 
 
 @rule(
     "OSIM907", "measured-weight", severity=WARNING, thresholds=(WEIGHT, WRONG_WEIGHT), about=TRIAL
 )
-def measured_weight(trial: Trial, found: FindingSink) -> None:
+def measured_weight(trial: Trial, report: FindingSink) -> None:
     """The model weighs something else than what the force plates carry.
 
     Compares the mass of the model with the mean vertical force of all loads, divided by gravity and
@@ -223,7 +222,7 @@ def measured_weight(trial: Trial, found: FindingSink) -> None:
     ```
     """
     trial.judge(
-        found,
+        report,
         [WEIGHT, WRONG_WEIGHT],
         HICKS,
         "give the mass of the subject to the ScaleTool, and look whether all plates are in the loads",

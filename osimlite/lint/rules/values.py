@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from osimlite.base.text import listed, nearest
 from osimlite.io.document.lexical import Unclean, flag, reads_as, real, split, whole
 from osimlite.io.document.notes import Note
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, shown
 from osimlite.schema.base import Object
@@ -21,7 +21,7 @@ KEEPS_DEFAULT = "OpenSim keeps the default"
 
 
 @rule("OSIM201", "unreadable-value", severity=ERROR, mends="safe")
-def unreadable_value(subject: Subject, found: FindingSink) -> None:
+def unreadable_value(subject: Subject, report: FindingSink) -> None:
     """A value is no number, no switch, or not written as OpenSim reads it.
 
     Reports text that OpenSim cannot read: words where a number belongs, `yes` for a switch, commas
@@ -45,7 +45,7 @@ def unreadable_value(subject: Subject, found: FindingSink) -> None:
         text = _text(owner, spec)
         better = _readable(text, kind)
         taken = spec.default if note.value is None and not kind.legacy else note.value
-        found(
+        report(
             f"{subject.titled(owner, spec)} is '{text}', not {kind.words()}{_foreign(text)}: "
             f"{_kept(note, owner, spec, kind)}",
             owner,
@@ -60,7 +60,7 @@ def unreadable_value(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM202", "wrong-count", severity=ERROR)
-def wrong_count(subject: Subject, found: FindingSink) -> None:
+def wrong_count(subject: Subject, report: FindingSink) -> None:
     """A value has too many or too few numbers.
 
     Reports vectors and lists with another count than the property has.
@@ -77,7 +77,7 @@ def wrong_count(subject: Subject, found: FindingSink) -> None:
         if not _all_read(note.word, kind):
             continue
         count = len(split(note.word))
-        found(
+        report(
             f"{subject.titled(owner, spec)} takes {kind.words()}, not {count}: {_kept(note, owner, spec, kind)}",
             owner,
             tag=spec.tag,
@@ -85,7 +85,7 @@ def wrong_count(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM203", "cut-number", severity=ERROR, mends="unsafe")
-def cut_number(subject: Subject, found: FindingSink) -> None:
+def cut_number(subject: Subject, report: FindingSink) -> None:
     """OpenSim reads only the beginning of a number.
 
     Reports numbers with something behind them: a decimal comma (`1,5`), a unit (`5kg`), a fraction
@@ -100,7 +100,7 @@ def cut_number(subject: Subject, found: FindingSink) -> None:
     ```
     """
     for note, owner, spec, _ in _value_notes(subject, "cut"):
-        found(
+        report(
             f"{subject.titled(owner, spec)}: OpenSim reads '{note.word}' as {shown(_beginning(note.word))}",
             owner,
             number=note.number,
@@ -116,7 +116,7 @@ def cut_number(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM204", "empty-value", severity=ERROR)
-def empty_value(subject: Subject, found: FindingSink) -> None:
+def empty_value(subject: Subject, report: FindingSink) -> None:
     """An element that should hold a value is empty.
 
     Reports empty numbers, vectors and switches, and elements in which an object should stand.
@@ -136,7 +136,7 @@ def empty_value(subject: Subject, found: FindingSink) -> None:
     """
     for note, owner, spec, kind in _value_notes(subject, "empty"):
         if kind.shape != "optional":
-            found(
+            report(
                 f"{subject.titled(owner, spec)} is empty, not {kind.words()}: {_kept(note, owner, spec, kind)}",
                 owner,
                 number=note.number,
@@ -150,7 +150,7 @@ def empty_value(subject: Subject, found: FindingSink) -> None:
             and held is not None
             and held.accepts is not None
         ):
-            found(
+            report(
                 f"<{held.tag}> of {called(note.owner)} is empty: OpenSim then has no {held.accepts.tag} there, not "
                 "even the default, and fails where it needs one; leave the element out",
                 note.owner,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from osimlite.lint.engine import ERROR, INFO, FindingSink, rule
 from osimlite.lint.history import NEWEST, later_than, new_properties
+from osimlite.lint.registry import ERROR, INFO, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
 from osimlite.schema.base import Object
@@ -12,7 +12,7 @@ from osimlite.schema.specs import FieldSpec
 
 
 @rule("OSIM113", "newer-class", severity=ERROR)
-def newer_class(subject: Subject, found: FindingSink) -> None:
+def newer_class(subject: Subject, report: FindingSink) -> None:
     """OpenSim has a class or a property only after the version that is aimed at.
 
     Reports objects of classes, and properties, that OpenSim has only after 4.6, or after the
@@ -38,7 +38,7 @@ def newer_class(subject: Subject, found: FindingSink) -> None:
     later = later_than(target)
     # What is newer than all is told by OSIM004.
     if subject.source is not None and later.format < (subject.version or 0) <= CURRENT_VERSION:
-        found(
+        report(
             f"the file has the format {subject.version}, OpenSim {target} writes {later.format} and takes it for that",
             number=0,
             attribute="Version",
@@ -50,7 +50,7 @@ def newer_class(subject: Subject, found: FindingSink) -> None:
             for item in items:
                 # What is there by default stands in no file.
                 if subject.source is None or item._index is not None:
-                    found(
+                    report(
                         f"{called(item)}: OpenSim has {a(cls.tag)} from version {first} on; {target} refuses it",
                         item,
                     )
@@ -61,7 +61,7 @@ def newer_class(subject: Subject, found: FindingSink) -> None:
                 if not _is_given(subject, item, spec):
                     continue
                 is_default = spec.factory is None and getattr(item, spec.name) == spec.default
-                found(
+                report(
                     f"{called(item)}: OpenSim has {spec.tag} from version {version} on; {target} drops it{was}",
                     item,
                     tag=spec.tag,

@@ -6,8 +6,8 @@ import re
 from typing import NamedTuple
 
 from osimlite.base.text import counted, nearest
-from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.fixes import replaced
+from osimlite.lint.registry import ERROR, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
 from osimlite.schema.base import Component, Unknown
@@ -18,7 +18,7 @@ from osimlite.schema.tree import Use, normalised
 
 
 @rule("OSIM331", "control-function-count", severity=ERROR)
-def control_function_count(subject: Subject, found: FindingSink) -> None:
+def control_function_count(subject: Subject, report: FindingSink) -> None:
     """A prescribed controller has not one function for each of its actuators.
 
     Compares the number of control functions with the number of actuators. Controllers that read
@@ -53,7 +53,7 @@ def control_function_count(subject: Subject, found: FindingSink) -> None:
                 if use.holder is controller and subject.resolution(use).target is not None
             )
         if controller.controls_file is None and functions != actuators:
-            found(
+            report(
                 f"{called(controller)} has {counted(functions, 'control function')} for "
                 f"{counted(actuators, 'actuator')}: OpenSim refuses the model",
                 controller.ControlFunctions if functions else controller,
@@ -61,7 +61,7 @@ def control_function_count(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM332", "broken-input", severity=ERROR, mends="unsafe")
-def broken_input(subject: Subject, found: FindingSink) -> None:
+def broken_input(subject: Subject, report: FindingSink) -> None:
     """An input names an output that does not exist.
 
     Follows the inputs of reporters, controllers and geometry: the path of a component, a bar, and
@@ -88,7 +88,7 @@ def broken_input(subject: Subject, found: FindingSink) -> None:
         value = getattr(use.holder, use.spec.name)
         nth = value[: use.position].count(use.value) if isinstance(value, tuple) else 0
         place = subject.position(use.holder, tag=use.spec.tag, word=use.value, nth=nth)
-        found(
+        report(
             f"{called(use.holder)}: {use.spec.tag} names '{use.value}'{fault.message}",
             use.holder,
             at=place,
@@ -98,7 +98,7 @@ def broken_input(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM333", "connected-twice", severity=ERROR)
-def connected_twice(subject: Subject, found: FindingSink) -> None:
+def connected_twice(subject: Subject, report: FindingSink) -> None:
     """A list of sockets names the same component twice.
 
     Reports every mention of an actuator after the first in the list of one controller.
@@ -127,7 +127,7 @@ def connected_twice(subject: Subject, found: FindingSink) -> None:
         text = use.text
         known = seen.setdefault((id(use.holder), use.spec.tag), [])
         if any(other is target for other, _ in known):
-            found(
+            report(
                 f"{called(use.holder)} lists {called(target)} again: OpenSim refuses the model",
                 use.holder,
                 tag=use.spec.tag,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from osimlite.base.text import counted
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.placement import Pose, fixed, on_base
+from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.mechanics.laws.vectors import Vector
@@ -21,7 +21,7 @@ def _wraps(path: GeometryPath) -> list[PathWrap]:
 
 
 @rule("OSIM616", "swallowed-point", severity=WARNING)
-def swallowed_point(subject: Subject, found: FindingSink) -> None:
+def swallowed_point(subject: Subject, report: FindingSink) -> None:
     """A point of a path lies inside a surface that the path wraps around.
 
     Reports points fixed to the body of a cylinder (which has no ends here), a sphere or an
@@ -58,7 +58,7 @@ def swallowed_point(subject: Subject, found: FindingSink) -> None:
                 depth = _depth(surface, pose.inverse().of(placed[1].of(point.location)))
                 if depth > 0:
                     owner = subject.tree.parent_of(path)
-                    found(
+                    report(
                         f"{called(point)} of {called(owner or path)} is {1000 * depth:.3g} mm inside "
                         f"{called(surface)}: the path does not wrap between it and its neighbours",
                         point,
@@ -67,7 +67,7 @@ def swallowed_point(subject: Subject, found: FindingSink) -> None:
 
 
 @rule("OSIM617", "wrap-range", severity=WARNING)
-def wrap_range(subject: Subject, found: FindingSink) -> None:
+def wrap_range(subject: Subject, report: FindingSink) -> None:
     """The range of a wrap holds no piece of the path.
 
     Reports wraps whose `range` ends at the point where it begins, or before it. A range that ends
@@ -97,7 +97,7 @@ def wrap_range(subject: Subject, found: FindingSink) -> None:
             if end > count and start <= end and not (is_left or is_off):
                 fate = "OpenSim fails when it computes its length"
                 fate += ", unless an earlier wrap has no points there" if may_leave else ""
-                found(
+                report(
                     f"{tells} ends beyond the {counted(count, 'point')} of the path: {fate}",
                     wrap,
                     tag="range",
@@ -112,7 +112,7 @@ def wrap_range(subject: Subject, found: FindingSink) -> None:
                     if start > end and not is_off
                     else ""
                 )
-                found(
+                report(
                     f"{tells} holds no piece of the path: it never wraps{others}", wrap, tag="range"
                 )
             is_left = is_left or (start > end and not is_off)

@@ -18,7 +18,7 @@ from osimlite.io.document.part import read_object
 from osimlite.io.document.reader import read_any
 from osimlite.io.document.source import Position, Source
 from osimlite.io.tables.storage import StoTable, read_sto
-from osimlite.lint.suffixes import begins_as_ours
+from osimlite.lint.project_files import begins_as_ours
 from osimlite.lint.table import Table
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism

@@ -1,0 +1,324 @@
+"""The registry of rules: what a rule is, how it is registered, and where all rules are.
+
+A rule is a function of a subject and of `report`, which it calls once per finding. Its docstring is
+the page that ``osimlite rule CODE`` prints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib import import_module
+from inspect import cleandoc
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack
+
+from osimlite.base.records import dataclass, replace
+from osimlite.base.text import brief
+from osimlite.lint.diagnostic import Finding, Fix, Severity
+from osimlite.lint.faults import Fault, faults_in
+
+if TYPE_CHECKING:
+    from osimlite.io.document.source import Position
+    from osimlite.lint.checked import Checked, Where
+    from osimlite.schema.base import Object
+
+ERROR, WARNING, INFO = Severity.ERROR, Severity.WARNING, Severity.INFO
+
+FAMILIES = {
+    "0": "text",
+    "1": "structure",
+    "2": "values",
+    "3": "references",
+    "4": "topology",
+    "5": "physics",
+    "6": "paths",
+    "7": "files",
+    "8": "data",
+    "9": "trials",
+}
+"""The families of rules by the first digit of their codes."""
+
+
+class Threshold(NamedTuple):
+    """A limit at which a rule starts to report, which a project can change.
+
+    `name` is its key under ``[tool.osimlite.thresholds]``, `meaning` one phrase for the rule's page.
+    """
+
+    name: str
+    default: float
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True, slots=True)
+class FindingSink:
+    """What a rule calls for each finding of a subject."""
+
+    rules: dict[str, Rule]
+    subject: Checked
+    findings: list[Finding]
+
+    def __call__(
+        self,
+        message: str,
+        item: Object | None = None,
+        *,
+        fault: str = "",
+        at: Position | None = None,
+        severity: Severity | None = None,
+        suggestion: str | None = None,
+        certain: bool = False,
+        fix: Fix | None = None,
+        **where: Unpack[Where],
+    ) -> None:
+        """Note one finding; where it is, is said as in :meth:`Subject.position`, or by `at`.
+
+        A rule that tells faults apart says which it is, by its name; what nobody wants to hear of
+        is passed over.
+
+        Of a rule about tables or documents that mends, a suggestion is a mend: safe if it is
+        `certain` or differs in letter case alone.
+        """
+        rule, subject = self.rules.get(fault), self.subject
+        if rule is None:
+            return
+        if at is None and (item is not None or where.get("number") is not None):
+            at = subject.position(item, **where)
+        line, column, length = at if at is not None else (None, None, 1)
+        if rule.mends and rule.about != "model" and suggestion is not None and at is not None:
+            named = where.get("word") or (
+                item and getattr(item, where.get("attribute") or where.get("tag") or "name")
+            )
+            fix = fix or subject.replacing(at, named, suggestion, certain=certain)
+        elif subject.upgraded:
+            # What is said of an upgraded document need not be said of its text.
+            fix = None
+        self.findings.append(
+            Finding(
+                rule.code,
+                rule.name,
+                subject.config.severity_of(rule, severity or rule.severity_in(subject.version)),
+                brief(message),
+                subject.file,
+                line,
+                column,
+                max(1, length),
+                subject.path(item),
+                suggestion,
+                # Nor need what is said of one that was guessed at.
+                None if subject.sure_until is not None else fix,
+            )
+        )
+
+
+Check = Callable[[Any, FindingSink], None]
+Mends = Literal["", "safe", "unsafe", "both"]
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One registered rule.
+
+    `severity` is that of its findings unless it says otherwise of one; `before` has another for
+    documents older than a version, where OpenSim does something else with them. `mends` says of
+    what kind its mends are, `about` what it looks
+    at: ``model``, ``table``, ``document`` (a setup, or a part of one), ``measures`` (of the model's
+    paths and muscles), ``construction`` (what stops the computation of a model), ``trial`` (what
+    was measured of a finished one). A rule that tells faults apart is a `group`: there is a rule
+    for each `fault`, all with the same `check`.
+    """
+
+    code: str
+    name: str
+    severity: Severity
+    check: Check
+    before: tuple[int, Severity] | None = None
+    thresholds: tuple[Threshold, ...] = ()
+    mends: Mends = ""
+    about: str = "model"
+    fault: Fault | None = None
+    group: str = ""
+
+    @property
+    def family(self) -> str:
+        """The family the code belongs to."""
+        return FAMILIES[self.code[4]]
+
+    @property
+    def page(self) -> str:
+        """What it does, why that is bad, an example and the same mended: the paragraphs of the docstring.
+
+        The example stands there once, its lines marked as in a diff: `-` what fails, `+` what mends
+        it.
+        """
+        if self.fault is not None:
+            return self.fault.page(f"{self.code[:-2]} {self.group}")
+        summary, what, why, example = cleandoc(self.check.__doc__ or "").split("\n\n", 3)
+        fence, *lines, end = example.splitlines()
+        fails, mended = (
+            "\n".join(line[2:] for line in lines if line[:1] != left_out) for left_out in "+-"
+        )
+        return (
+            f"{summary}\n\n## What it does\n{what}\n\n## Why is this bad\n{why}\n\n"
+            f"## Example\n{fence}\n{fails}\n{end}\n\n## Use instead\n{fence}\n{mended}\n{end}"
+        )
+
+    @property
+    def summary(self) -> str:
+        """The first line of the page."""
+        told = (
+            self.fault.summary
+            if self.fault is not None
+            else (self.check.__doc__ or "").partition("\n")[0]
+        )
+        return told.rstrip(".")
+
+    def severity_in(self, version: int | None) -> Severity:
+        """The severity of its findings in a document of a version; None stands for the current one."""
+        if self.before is not None and version is not None and version < self.before[0]:
+            return self.before[1]
+        return self.severity
+
+    def is_called(self, word: str) -> bool:
+        """Whether `word` is this rule's code, the beginning of it, its name or that of its group."""
+        return bool(word) and (
+            self.code.startswith(word.upper()) or word in (self.name, self.group)
+        )
+
+    def matches(self, word: str) -> bool:
+        """Whether the rule is called so, or `word` is its family."""
+        return self.is_called(word) or word in (self.family, "ALL")
+
+
+_RULES: dict[str, Rule] = {}
+_GROUPS: dict[str, Rule] = {}
+_NAMES: set[str] = set()
+
+
+def rule(
+    code: str,
+    name: str,
+    *,
+    severity: Severity,
+    before: tuple[int, Severity] | None = None,
+    thresholds: tuple[Threshold, ...] = (),
+    mends: Mends = "",
+    about: str = "model",
+    faults: str = "",
+    frames: Mapping[str, str] | None = None,
+) -> Callable[[Check], Check]:
+    """Register a function as the rule `code`; the other arguments are those of :class:`Rule`.
+
+    With `faults` it is a group: these are listed as :mod:`osimlite.lint.faults` says, with examples
+    that stand in `frames`.
+    """
+
+    def register(check: Check) -> Check:
+        whole = Rule(code, name, severity, check, before, thresholds, mends, about)
+        if not faults:
+            _add(_RULES, whole)
+            return check
+        _add(_GROUPS, whole)
+        for fault in faults_in(faults, frames or {}):
+            own: Any = {
+                "code": code + fault.number,
+                "name": fault.name,
+                "mends": fault.mends,
+                "group": name,
+            }
+            _add(_RULES, replace(whole, severity=Severity(fault.severity), fault=fault, **own))
+        return check
+
+    return register
+
+
+def _add(table: dict[str, Rule], rule: Rule) -> None:
+    if not _NAMES.isdisjoint((rule.code, rule.name)):
+        raise ValueError(f"rule {rule.code} {rule.name} is registered twice")
+    _NAMES.update((rule.code, rule.name))
+    table[rule.code] = rule
+
+
+RULE_MODULES: Mapping[str, tuple[str, ...]] = {
+    "model": (
+        "bodies",
+        "classes",
+        "construction",
+        "contact",
+        "coordinates",
+        "custom_joints",
+        "domains",
+        "ends",
+        "expressions",
+        "files",
+        "functions",
+        "joints",
+        "leftovers",
+        "markup",
+        "measured_muscles",
+        "measured_paths",
+        "muscles",
+        "names",
+        "paths",
+        "physics",
+        "references",
+        "relations",
+        "space",
+        "structure",
+        "text",
+        "topology",
+        "values",
+        "versions",
+        "wiring",
+        "wraps",
+    ),
+    "document": (
+        "moco",
+        "setup_columns",
+        "setup_files",
+        "setup_geometry",
+        "setup_loads",
+        "setup_markers",
+        "setup_names",
+        "setup_scaling",
+        "setup_sensors",
+        "setup_tasks",
+        "setup_times",
+        "setup_tools",
+        "setup_units",
+    ),
+    "table": ("marker_tables", "table_rows", "tables"),
+    "trial": ("trial_forces", "trial_motion"),
+}
+"""Modules of `osimlite.lint.rules` by what their rules are about.
+
+Modules under "model" are always loaded: their rules on text and files apply to every document.
+The others are loaded only for subjects of their kind.
+"""
+
+
+@cache
+def all_rules(about: str = "") -> tuple[Rule, ...]:
+    """Return every rule, sorted by code.
+
+    Args:
+        about: what the rules must be about; modules about something else alone are not loaded, and
+            their rules may be missing. Empty for all.
+    """
+    for subject, modules in RULE_MODULES.items():
+        if about in ("", subject) or subject == "model":
+            for module in modules:
+                import_module(f"osimlite.lint.rules.{module}")
+    return tuple(_RULES[code] for code in sorted(_RULES))
+
+
+def groups() -> tuple[Rule, ...]:
+    """What rules with one beginning of their codes have in common, by code."""
+    all_rules()
+    return tuple(_GROUPS[code] for code in sorted(_GROUPS))
+
+
+def get_rule(code: str) -> Rule:
+    """Return the rule with a code; its module must be loaded."""
+    return _RULES[code]

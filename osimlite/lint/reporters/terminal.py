@@ -1,0 +1,351 @@
+"""Reports for people: one line per finding (concise), or the source line with a caret (full).
+
+Findings that say the same are fold_findings: one stands for all, and the others are only counted.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import textwrap
+from collections.abc import Callable, Hashable, Iterable
+from itertools import groupby
+from typing import NamedTuple, TypeVar
+
+from osimlite.base.text import listed, visible
+from osimlite.lint.diagnostic import Finding, Report, Severity
+
+_CODES = {
+    Severity.ERROR: "1;31",
+    Severity.WARNING: "1;33",
+    Severity.INFO: "1;34",
+    "strong": "1",
+    "dim": "2",
+    "good": "32",
+    "hint": "36",
+}
+
+
+def paint(text: str, style: Severity | str, colour: bool) -> str:
+    """Return a text in the colour of a style; unchanged without `colour`."""
+    return f"\033[{_CODES[style]}m{text}\033[0m" if colour and text else text
+
+
+def format_summary(report: Report, colour: bool = False) -> str:
+    """Return the closing line: ``Found 3 errors, 1 warning in 2 files.``"""
+    counts = (
+        (Severity.ERROR, len(report.errors)),
+        (Severity.WARNING, len(report.warnings)),
+        (Severity.INFO, len(report.infos)),
+    )
+    parts = [
+        paint(f"{count} {_pluralize(severity.value, count)}", severity, colour)
+        for severity, count in counts
+        if count
+    ]
+    files = f"{report.checked} {_pluralize('file', report.checked)}"
+    known = f" ({report.known} more in the baseline)" if report.known else ""
+    if not parts:
+        return paint(f"Nothing found in {files}{known}.", "good", colour)
+    return f"Found {', '.join(parts)} in {files}{known}."
+
+
+def describe_unmeasured(report: Report) -> str:
+    """Return the sentence about rules that did not run and why; empty if all ran."""
+    if not report.unmeasured:
+        return ""
+    count = len(report.unmeasured) - 1
+    more = f" (and {count} more {_pluralize('file', count)})" if count else ""
+    return visible(f"{report.unmeasured[0]}{more}.")
+
+
+def describe_skipped(report: Report, everything: bool) -> str:
+    """Return the sentence about skipped files that are not OpenSim's; empty if there are none.
+
+    Args:
+        report: the report.
+        everything: whether to name the files rather than to count them.
+
+    Returns:
+        The sentence.
+    """
+    if not report.passed:
+        return ""
+    if everything:
+        return visible(f"Skipped, not OpenSim files: {', '.join(report.passed)}.")
+    count = len(report.passed)
+    return f"{count} {_pluralize('file', count)} skipped ({'not an OpenSim file' if count == 1 else 'not OpenSim files'})."
+
+
+def _pluralize(noun: str, count: int) -> str:
+    return noun if count == 1 or noun == "info" else f"{noun}s"
+
+
+T = TypeVar("T")
+
+MIN_FOLD_SIZE = 4
+"""Number of similar findings, or of files with the same finding, from which they are fold_findings."""
+
+_ONE_CAUSE_RULES = {"OSIM701"}
+"""Rules whose findings are fixed together: two of them are fold_findings already."""
+
+# Names are in quotes or are tags. A number includes its unit; paths count as numbers.
+_NAME_PATTERN = re.compile(r"'[^']*'|<\w+>")
+_NUMBER_PATTERN = re.compile(r"(?<!\S)[^\s']*/[^\s']*|(?<!\w)[-+]?[\d.][\w.+-]*")
+
+
+class Fold(NamedTuple):
+    """A finding with similar findings of the same file (`more`) and of other files (`elsewhere`)."""
+
+    first: Finding
+    more: list[Finding]
+    elsewhere: list[Finding]
+
+    @property
+    def remarks(self) -> list[str]:
+        """Notes on the fold_findings findings, such as ``91 more like this, on lines 12, 40 and 88 more``."""
+        result = []
+        if self.more:
+            lines = list(
+                dict.fromkeys(
+                    str(finding.line) for finding in self.more if finding.line is not None
+                )
+            )
+            places = f", on line{'s' * (len(lines) > 1)} {listed(lines, most=4)}" if lines else ""
+            result.append(f"{len(self.more)} more like this{places}")
+        if self.elsewhere:
+            files = dict.fromkeys(
+                os.path.basename(finding.file or "") for finding in self.elsewhere
+            )
+            result.append(f"{len(self.elsewhere)} more in other files: {listed(files, most=3)}")
+        return result
+
+
+def fold_findings(findings: Iterable[Finding], *, everything: bool = False) -> list[Fold]:
+    """Fold similar findings under the first of them, and keep the order.
+
+    Args:
+        findings: the findings.
+        everything: whether to fold none.
+
+    Returns:
+        A fold for each finding that is shown.
+    """
+    every = list(findings)
+    if everything:
+        return [Fold(finding, [], []) for finding in every]
+    parts = [
+        part
+        for group in _group_by(
+            every, lambda finding: (finding.file, *_fold_key(finding, names=False))
+        )
+        for part in (
+            [group] if len(group) >= _min_fold_size(group[0]) else [[finding] for finding in group]
+        )
+    ]
+    result: list[Fold] = []
+    # Findings of other files are the same only if names agree, unless they have one cause.
+    for alike in _group_by(
+        parts, lambda part: _fold_key(part[0], names=part[0].code not in _ONE_CAUSE_RULES)
+    ):
+        first, *rest = [finding for part in alike for finding in part]
+        if len({part[0].file for part in alike}) < _min_fold_size(first):
+            result += [Fold(part[0], part[1:], []) for part in alike]
+        else:
+            here = [finding for finding in rest if finding.file == first.file]
+            result.append(
+                Fold(first, here, [finding for finding in rest if finding.file != first.file])
+            )
+    place = {id(finding): number for number, finding in enumerate(every)}
+    return sorted(result, key=lambda fold: place[id(fold.first)])
+
+
+def _min_fold_size(finding: Finding) -> int:
+    return 2 if finding.code in _ONE_CAUSE_RULES else MIN_FOLD_SIZE
+
+
+def _fold_key(finding: Finding, *, names: bool) -> tuple[object, ...]:
+    """Return what similar findings have in common: the words of the message without numbers and, unless `names`, names."""
+    words = finding.message if names else _NAME_PATTERN.sub("", finding.message)
+    return finding.code, finding.severity, _NUMBER_PATTERN.sub("", words)
+
+
+def _group_by(items: Iterable[T], key: Callable[[T], Hashable]) -> list[list[T]]:
+    groups: dict[Hashable, list[T]] = {}
+    for item in items:
+        groups.setdefault(key(item), []).append(item)
+    return list(groups.values())
+
+
+def hint_at_folds(folds: Iterable[Fold]) -> str:
+    """Return the hint how to print fold_findings findings; empty if there are none."""
+    return "--all prints every finding." if any(fold.remarks for fold in folds) else ""
+
+
+def render_concise(report: Report, *, colour: bool = False, everything: bool = False) -> str:
+    """Return ``file:line:column: severity code message`` for each finding, and a closing line."""
+    folds = fold_findings(report.findings, everything=everything)
+    closing = " ".join(
+        filter(
+            None,
+            (
+                format_summary(report, colour),
+                hint_at_folds(folds),
+                describe_skipped(report, everything),
+                describe_unmeasured(report),
+            ),
+        )
+    )
+    return "\n".join([*(_format_line(fold, colour) for fold in folds), closing]) + "\n"
+
+
+def _format_line(fold: Fold, colour: bool) -> str:
+    finding = fold.first
+    counts = (("like this", fold.more), ("in other files", fold.elsewhere))
+    more = "".join(f"; {len(result)} more {what}" for what, result in counts if result)
+    hint = f" (did you mean '{finding.suggestion}'?)" if finding.suggestion is not None else ""
+    words = visible(f"{finding.message}{hint}{more}")
+    severity = paint(finding.severity.value, finding.severity, colour)
+    place = paint(visible(finding.place), "strong", colour)
+    return f"{place}: {severity} {finding.code} {words}"
+
+
+_ELLIPSIS = "..."
+
+
+def render_full(
+    report: Report, *, colour: bool = False, width: int = 80, everything: bool = False
+) -> str:
+    """Return the report as text of at most `width` columns; file positions are never broken.
+
+    Args:
+        report: the report.
+        colour: whether to write terminal colours.
+        width: number of columns.
+        everything: whether to show every finding instead of folding similar ones.
+
+    Returns:
+        The text.
+    """
+    blocks: list[str] = []
+    every = fold_findings(report.findings, everything=everything)
+    for file, result in groupby(every, key=lambda fold: fold.first.file):
+        folds = list(result)
+        lines = _split_lines(report, file, max(fold.first.line or 0 for fold in folds))
+        blocks += [_format_block(fold, lines, colour, width) for fold in folds]
+    closing, length = format_summary(report, colour), len(format_summary(report))
+    for more in filter(
+        None,
+        (
+            _describe_fixes(report),
+            hint_at_folds(every),
+            describe_skipped(report, everything),
+            describe_unmeasured(report),
+        ),
+    ):
+        fits = length + 1 + len(more) <= width
+        closing, length = (
+            f"{closing}{' ' if fits else chr(10)}{more}",
+            (length + 1 if fits else 0) + len(more),
+        )
+    return "\n\n".join([*blocks, closing]) + "\n"
+
+
+def _describe_fixes(report: Report) -> str:
+    """Return how many findings ``--fix`` fixes, and how many more ``--unsafe-fixes`` does."""
+    safe = sum(finding.fixable for finding in report.findings)
+    rest = sum(finding.fix is not None for finding in report.findings) - safe
+    parts = [f"{safe} can be fixed with --fix"] if safe else []
+    if rest:
+        some = f"{rest} more" if safe else f"{rest} can be fixed"
+        parts.append(f"{some} with --unsafe-fixes")
+    return f"{', '.join(parts)}." if parts else ""
+
+
+def _split_lines(report: Report, file: str | None, last: int) -> list[str] | None:
+    """Return the lines of a file up to line `last`: a table may have a million more."""
+    try:
+        return None if file is None else re.split(r"\n|\r\n?", report.texts[file], maxsplit=last)
+    except KeyError:
+        return None
+
+
+def _format_block(fold: Fold, lines: list[str] | None, colour: bool, width: int) -> str:
+    finding = fold.first
+    head = (
+        f"{paint(finding.severity.value, finding.severity, colour)} {finding.code} {finding.name}"
+    )
+    place = paint(visible(finding.place), "strong", colour)
+    rows = [f"{place}: {head}" if finding.place else head]
+    if (
+        len(f"{visible(finding.place)}: {finding.severity.value} {finding.code} {finding.name}")
+        > width
+    ):
+        # Break after the position, before the terminal breaks the line anywhere.
+        rows = [f"{place}:", f"  {head}"]
+    rows += [
+        f"  {row}"
+        for row in textwrap.wrap(visible(finding.message), width - 4, break_on_hyphens=False)
+    ]
+    if finding.line is not None and lines is not None and finding.line <= len(lines):
+        rows += _format_snippet(finding, lines[finding.line - 1], colour, width)
+    notes: list[tuple[str, str]] = []
+    if finding.suggestion is not None:
+        question = f"did you mean '{finding.suggestion}'?"
+        notes.append((question if "\n" not in finding.suggestion else finding.suggestion, "hint"))
+    # The path "/" of the model itself would not help.
+    if finding.component not in ("", "/") and finding.line is not None:
+        notes.append((f"in {finding.component}", "dim"))
+    margin = " " * len(str(finding.line or ""))
+    notes += [
+        (textwrap.shorten(it, width - len(margin) - 3, placeholder=" ..."), "strong")
+        for it in fold.remarks
+    ]
+    for note, style in notes:
+        rows.append(f"{margin} {paint('=', 'dim', colour)} {paint(visible(note), style, colour)}")
+    return "\n".join(rows)
+
+
+def _format_snippet(finding: Finding, line: str, colour: bool, width: int) -> list[str]:
+    """Return the source line and the caret under it; a long line is cut around the caret."""
+    assert finding.line is not None and finding.column is not None
+    start = min(finding.column - 1, len(line))
+    indent = len(line) - len(line.lstrip())
+    # The indentation of a deep file would push the text out of sight.
+    skipped = min(indent, start)
+    shown = line[skipped:].replace("\t", " ").rstrip()
+    start -= skipped
+    length = max(1, min(finding.length, len(shown) - start))
+    margin = len(str(finding.line))
+    room = max(20, width - margin - 3)
+    before, marked, after = map(
+        visible, (shown[:start], shown[start : start + length], shown[start + length :])
+    )
+    shown, start, length = before + marked + after, len(before), max(1, len(marked))
+    if len(shown) > room:
+        shown, start, length = _cut_line(shown, start, length, room)
+    bar = paint("|", "dim", colour)
+    caret = paint("^" * length, finding.severity, colour)
+    return [
+        f"{' ' * margin} {bar}",
+        f"{paint(str(finding.line), 'dim', colour)} {bar} {shown}",
+        f"{' ' * margin} {bar} {' ' * start}{caret}",
+    ]
+
+
+def _cut_line(shown: str, start: int, length: int, room: int) -> tuple[str, int, int]:
+    """Return the part of a long line around the caret, with dots where it is cut, and the caret's start and length."""
+    first = 0
+    if start + length > room - len(_ELLIPSIS):
+        first = min(start, max(0, start + min(length, room // 2) - room // 2))
+    part = shown[first:]
+    if first:
+        part = (
+            _ELLIPSIS + part[len(_ELLIPSIS) :]
+            if start - first >= len(_ELLIPSIS)
+            else _ELLIPSIS + part
+        )
+        start = start - first if start - first >= len(_ELLIPSIS) else start - first + len(_ELLIPSIS)
+    if len(part) > room:
+        part = part[: room - len(_ELLIPSIS)] + _ELLIPSIS
+    return part, start, max(1, min(length, room - start))
