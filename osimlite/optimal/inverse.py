@@ -13,13 +13,13 @@ from osimlite.fitting.modifying.operators import processed
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.optimal.asked import StudyContext
-from osimlite.optimal.given_motion import PrescribedMotion
 from osimlite.optimal.ipopt import Progress
+from osimlite.optimal.prescribed_motion import PrescribedMotion
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
 from osimlite.optimal.refinement import Refinement
 from osimlite.optimal.solution import MocoSolution, solve_program
+from osimlite.optimal.study_context import StudyContext
 from osimlite.optimal.tables import SplineCurves, check_columns, process_table
 from osimlite.optimal.tool_study import make_study, set_time_range
 from osimlite.schema.moco.goals import (

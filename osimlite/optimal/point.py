@@ -6,12 +6,16 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from osimlite.base.records import dataclass, field, replace
 from osimlite.derivatives.symbols import casadi
 from osimlite.mechanics.multibody.spatial import Array
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
+    from osimlite.schema.moco.path_constraints import MocoFrameDistanceConstraint
+    from osimlite.schema.moco.tracking import MocoContactTrackingGoal
 
 Formula = Any
 """An ``SX`` of CasADi."""
@@ -194,3 +198,32 @@ def make_integral_terms(
 ) -> GoalTerms:
     """The terms of a goal that is the integral of something over time."""
     return GoalTerms(lambda ends: ends.integral, integrand, modes)
+
+
+def make_projection(
+    part: MocoContactTrackingGoal | MocoFrameDistanceConstraint, problem: Problem
+) -> Callable[[Formula], Formula]:
+    """Return the function that projects vectors in ground (3, 1) as the property ``projection`` says.
+
+    Args:
+        part: goal or constraint with the property.
+        problem: problem of the study, for messages.
+
+    Returns:
+        Projection onto the line of ``projection_vector`` or onto the plane normal to it; the
+        identity for "none".
+
+    Raises:
+        DocumentError: the projection has no direction.
+    """
+    if part.projection == "none":
+        return lambda vector: vector
+    if part.projection_vector is None or not any(part.projection_vector):
+        raise problem.invalid_error(part, "a projection needs a projection_vector")
+    direction = casadi.DM(np.array(part.projection_vector) / np.linalg.norm(part.projection_vector))
+
+    def project(vector: Formula) -> Formula:
+        on_line = casadi.dot(vector, direction) * direction
+        return on_line if part.projection == "vector" else vector - on_line
+
+    return project

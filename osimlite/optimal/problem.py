@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from osimlite.base.load import module_name
 from osimlite.base.records import replace
 from osimlite.derivatives.functions import CasadiModel
 from osimlite.derivatives.symbols import casadi
@@ -19,7 +16,6 @@ from osimlite.errors import SettingError
 from osimlite.fitting.modifying.operators import processed
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.optimal.asked import MAX_MESH_INTERVALS, MAX_MESH_VALUES, StudyContext
 from osimlite.optimal.bounds import (
     FREE,
     Range,
@@ -29,13 +25,9 @@ from osimlite.optimal.bounds import (
     read_range,
 )
 from osimlite.optimal.dynamics import Dynamics
-from osimlite.optimal.given_motion import (
-    Motion,
-    PrescribedDynamics,
-    PrescribedMotion,
-    read_position_motion,
-)
+from osimlite.optimal.goals import GOAL_BUILDERS
 from osimlite.optimal.layout import PROJECTION_SUFFIX
+from osimlite.optimal.path_constraints import PATH_CONSTRAINT_BUILDERS
 from osimlite.optimal.point import (
     ConstraintRows,
     Formula,
@@ -44,13 +36,21 @@ from osimlite.optimal.point import (
     TimeFunction,
     make_integral_terms,
 )
+from osimlite.optimal.prescribed_motion import (
+    Motion,
+    PrescribedDynamics,
+    PrescribedMotion,
+    read_position_motion,
+)
 from osimlite.optimal.schemes import Grid, make_scheme
+from osimlite.optimal.study_context import MAX_MESH_INTERVALS, MAX_MESH_VALUES, StudyContext
 from osimlite.optimal.tables import sample_function
 from osimlite.schema.base import Component, Object
 from osimlite.schema.controllers import Controller
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.moco.goals import MocoControlGoal, MocoGoal
 from osimlite.schema.moco.parts import MocoParameter, MocoWeightSet
+from osimlite.schema.moco.path_constraints import MocoPathConstraint
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoStudy
 from osimlite.schema.model import Model
 from osimlite.schema.motions import PositionMotion
@@ -150,13 +150,10 @@ class Problem(StudyContext):
         self.dynamics = Dynamics(self) if motion is None else PrescribedDynamics(self)
         self._check_settings()
         self.goals: list[tuple[MocoGoal, GoalTerms]] = [
-            *((goal, self._terms(goal)) for goal in self.phase.goals if goal.enabled),
+            *((goal, self._build_terms(goal)) for goal in self.phase.goals if goal.enabled),
             *self._make_solver_costs(),
         ]
-        self.path_rows: list[ConstraintRows] = [
-            self._found(constraint, "constraints", "path constraints").rows(constraint, self)
-            for constraint in self.phase.path_constraints
-        ]
+        self.path_rows = [*map(self._build_rows, self.phase.path_constraints)]
 
     # --------------------------------------------------------------------------------------- for goals and tools
     def find_weights(
@@ -382,18 +379,13 @@ class Problem(StudyContext):
             raise self.invalid_error(solver, "the mesh has to rise from 0 to 1")
         return mesh
 
-    def _found(self, part: Object, package: str, what: str) -> Any:
-        """The module of a class of goals or constraints."""
-        place = f"{__package__}.{package}.{module_name(type(part).tag)}"
-        if find_spec(place) is None:
-            raise self.unsupported_error(part, f"{what} of this class are not solved here yet")
-        return import_module(place)
-
-    def _terms(self, goal: MocoGoal) -> GoalTerms:
-        module = self._found(goal, "goals", "goals")
+    def _build_terms(self, goal: MocoGoal) -> GoalTerms:
+        build = GOAL_BUILDERS.get(type(goal))
+        if build is None:
+            raise self.unsupported_error(goal, "goals of this class are not solved here yet")
         self._factors = {self._scaled[factor.name]: factor.name for factor in goal.scale_factors}
         first = len(self.time_functions)
-        terms: GoalTerms = module.terms(goal, self)
+        terms = build(goal, self)
         used = [item.factor for item in self.time_functions[first:]]
         for factor in goal.scale_factors:
             if [*self.parameters].index(factor.name) not in used:
@@ -406,6 +398,15 @@ class Problem(StudyContext):
                 goal, f"it cannot be of mode '{goal.mode}', as in Moco; it is a {terms.modes[0]}"
             )
         return terms
+
+    def _build_rows(self, constraint: MocoPathConstraint) -> ConstraintRows:
+        """Return the rows of a path constraint."""
+        build = PATH_CONSTRAINT_BUILDERS.get(type(constraint))
+        if build is None:
+            raise self.unsupported_error(
+                constraint, "path constraints of this class are not solved here yet"
+            )
+        return build(constraint, self)
 
     def _add_scale_factors(self) -> None:
         """The scale factors of goals, which are parameters, too."""
@@ -421,6 +422,12 @@ class Problem(StudyContext):
             if factor.name in self.parameters:
                 raise self.invalid_error(factor, "there is another parameter of its name")
             self.parameters[factor.name] = read_range(factor) or FREE
+
+    @property
+    def model_weight(self) -> float:
+        """Weight of the model, N; its mass where there is no gravity, as in OpenSim."""
+        mechanism = self.functions.mechanism
+        return float(mechanism.total_mass * (float(np.linalg.norm(mechanism.gravity)) or 1.0))
 
     @property
     def has_constraints(self) -> bool:

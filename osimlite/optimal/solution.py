@@ -6,19 +6,21 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.io.tables.storage import StoTable
-from osimlite.optimal.asked import name_file_in_errors
 from osimlite.optimal.ipopt import Progress, Violation, find_violations
 from osimlite.optimal.ipopt import run_ipopt as search
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
 from osimlite.optimal.refinement import Refinement, Round, solve_with_refinement
-from osimlite.optimal.stride import append_next_period
+from osimlite.optimal.study_context import name_file_in_errors
 from osimlite.optimal.trajectory import MocoTrajectory
+from osimlite.schema.moco.goals import MocoPeriodicityGoal
 from osimlite.schema.moco.studies import MocoStudy
 
 
@@ -226,3 +228,37 @@ def evaluate(
     costs, rows = program.compute_values(w)
     terms = dict(zip(program.costs, costs.tolist(), strict=True))
     return Evaluation(terms, find_violations(program, w, rows))
+
+
+def append_next_period(problem: Problem, trajectory: MocoTrajectory) -> MocoTrajectory | None:
+    """Return the motion and its next period, if a MocoPeriodicityGoal says how the motion continues.
+
+    A goal of half a stride thus gives the complete stride. A variable whose final value equals
+    another's initial value (or its negative) continues as that one did. Variables without a pair,
+    such as the distance travelled, continue from their final value. Multipliers, slacks and
+    derivatives are left out.
+
+    Args:
+        problem: problem with the goals.
+        trajectory: motion of one period.
+
+    Returns:
+        Motion of two periods; None without a pair in any MocoPeriodicityGoal.
+    """
+    goals = [goal for goal, _ in problem.goals if isinstance(goal, MocoPeriodicityGoal)]
+    pairs = [pair for goal in goals for pair in (*goal.state_pairs, *goal.control_pairs)]
+    if not pairs:
+        return None
+    start, end = trajectory.times[[0, -1]]
+    follows = {pair.final_variable: pair for pair in pairs}
+    names = {kind: trajectory.names[kind] for kind in ("states", "controls")}
+    columns = {}
+    for name in (*names["states"], *names["controls"]):
+        column, pair = trajectory.columns[name], follows.get(name)
+        if pair is None:
+            more = column + (column[-1] - column[0])
+        else:
+            more = (-1.0 if pair.negate else 1.0) * trajectory.columns[pair.initial_variable]
+        columns[name] = np.concatenate([column, more[1:]])
+    times = np.concatenate([trajectory.times, trajectory.times[1:] + (end - start)])
+    return MocoTrajectory(times, columns, names, trajectory.parameters)

@@ -19,9 +19,9 @@ from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import SampledCurves
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.optimal.asked import StudyContext
 from osimlite.optimal.layout import MIN_SPLINE_TIMES
 from osimlite.optimal.point import TimeFunction
+from osimlite.optimal.study_context import StudyContext
 from osimlite.schema.base import Object
 from osimlite.schema.tools.processors import (
     TableProcessor,

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from osimlite.io.tables.storage import StoTable
-from osimlite.optimal.asked import MAX_MESH_INTERVALS, StudyContext
+from osimlite.optimal.study_context import MAX_MESH_INTERVALS, StudyContext
 from osimlite.schema.moco.parts import MocoFinalBounds, MocoInitialBounds
 from osimlite.schema.moco.studies import (
     MocoCasADiSolver,

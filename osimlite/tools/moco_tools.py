@@ -71,7 +71,7 @@ def report_solution(job: Job, problem: Problem, solution: MocoSolution, outcome:
         outcome.tell("largest violation" if solution.success else "not fulfilled", str(violation))
     outcome.evidence = _collect_evidence(job, problem, solution)
     if job.simulates:
-        from osimlite.optimal.simulated import check_by_simulation
+        from osimlite.optimal.simulation_check import check_by_simulation
 
         try:
             outcome.tell("simulated", str(check_by_simulation(problem, solution.trajectory)))

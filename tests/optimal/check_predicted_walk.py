@@ -11,7 +11,7 @@ import pytest
 import osimlite
 from osimlite.base.records import replace
 from osimlite.cli import main
-from osimlite.optimal.simulated import check_by_simulation
+from osimlite.optimal.simulation_check import check_by_simulation
 from osimlite.tools.job import Job
 from osimlite.tools.moco_tools import report_solution
 from osimlite.tools.outcome import Outcome

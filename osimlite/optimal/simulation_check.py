@@ -7,7 +7,7 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.optimal.given_motion import PrescribedMotion
+from osimlite.optimal.prescribed_motion import PrescribedMotion
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.trajectory import MocoTrajectory
 from osimlite.simulation.run import simulate

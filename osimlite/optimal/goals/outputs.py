@@ -1,47 +1,75 @@
-"""Outputs of components, by OpenSim's names, and the numbers that goals and constraints make of them."""
+"""Outputs of components by OpenSim's names, and the goals on them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from osimlite.base.text import did_you_mean
 from osimlite.derivatives.symbols import casadi
-from osimlite.optimal.point import Formula, Point
-from osimlite.optimal.problem import Problem
+from osimlite.optimal.point import COST_FIRST, Formula, GoalTerms, Point, make_integral_terms
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Frame
 from osimlite.schema.markers import Station
-from osimlite.schema.moco.goals import MocoOutputBase
+from osimlite.schema.moco.goals import (
+    MocoFinalOutputGoal,
+    MocoInitialOutputGoal,
+    MocoOutputBase,
+    MocoOutputGoal,
+)
 from osimlite.schema.moco.path_constraints import MocoOutputBoundConstraint
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.kind import DeclaredForce
 
+if TYPE_CHECKING:
+    from osimlite.optimal.problem import Problem
+
 MIN_SQUARED_LENGTH = 1e-32
-"""Squares of lengths below which a root has no slope."""
+"""Squared length that replaces smaller ones, as the square root has no slope at zero."""
 OPERATIONS: dict[str, Callable[[Formula, Formula], Formula]] = {
-    "addition": lambda one, two: one + two,
-    "subtraction": lambda one, two: one - two,
-    "multiplication": lambda one, two: one * two,
-    "division": lambda one, two: one / two,
+    "addition": lambda first, second: first + second,
+    "subtraction": lambda first, second: first - second,
+    "multiplication": lambda first, second: first * second,
+    "division": lambda first, second: first / second,
 }
+"""Operations on two outputs, by the words of the property ``operation``."""
+
+
+def build_output_goal(goal: MocoOutputGoal, problem: Problem) -> GoalTerms:
+    """Return the integral over time of an output."""
+    return make_integral_terms(build_output_formula(goal, problem), COST_FIRST)
+
+
+def build_initial_output_goal(goal: MocoInitialOutputGoal, problem: Problem) -> GoalTerms:
+    """Return the value of an output at the start."""
+    value = build_output_formula(goal, problem)
+    return GoalTerms(lambda ends: value(ends.start), modes=COST_FIRST)
+
+
+def build_final_output_goal(goal: MocoFinalOutputGoal, problem: Problem) -> GoalTerms:
+    """Return the value of an output at the end."""
+    value = build_output_formula(goal, problem)
+    return GoalTerms(lambda ends: value(ends.end), modes=COST_FIRST)
 
 
 def _differentiate(point: Point, column: Formula) -> Formula:
-    """By time, of what depends on the state alone."""
+    """Return the time derivative of a formula that depends on the state alone."""
     return casadi.jtimes(column, point.x, point.rates)
 
 
 def _stack_vector(point: Point, group: str, path: str) -> Formula:
-    found = point.output(group)
-    return casadi.vertcat(*(found[f"{path}|{axis}"] for axis in "xyz"))
+    """Return the vector (3, 1) of a component in a group of outputs."""
+    values = point.output(group)
+    return casadi.vertcat(*(values[f"{path}|{axis}"] for axis in "xyz"))
 
 
 def _stack_mass_center_velocity(point: Point, path: str) -> Formula:
+    """Return the velocity of the model's mass centre in ground (3, 1), m/s."""
     return casadi.vertcat(*point.output("mass_center_velocity").values())
 
 
 def _get_acceleration(point: Point, path: str) -> Formula:
+    """Return the acceleration of a coordinate."""
     return point.accelerations[point.problem.functions.coordinates.index(path)]
 
 
@@ -77,25 +105,28 @@ OUTPUT_FORMULAS: dict[type[Any], dict[str, Callable[[Point, str], Formula]]] = {
         "acceleration": _get_acceleration,
     },
 }
-"""By classes of components, their outputs that are formulas here, besides what forces record of themselves."""
+"""Formulas of outputs by component class and output name; outputs of forces come from their records."""
 
 
 def build_output_formula(
     part: MocoOutputBase | MocoOutputBoundConstraint, problem: Problem
 ) -> Callable[[Point], Formula]:
-    """What a goal or a constraint makes of one output or of two.
+    """Build the formula that a goal or a constraint makes of one or two outputs.
 
     Args:
-        part: that names them.
-        problem: with the components.
+        part: goal or constraint with the paths of the outputs.
+        problem: problem with the components.
 
-    Returns: A number at a point: the component of the index or the length of what comes of the
-        operation, to the exponent.
+    Returns:
+        Function of a point that returns a number: the component of `output_index`, or the length,
+        of the result of `operation`, raised to `exponent`.
 
-    Raises: DocumentError: there is no such component, or index, operation and exponent do not go
-        with it. UnsupportedError: the output has no formula.
+    Raises:
+        DocumentError: there is no such component, or index, operation and exponent do not fit it.
+        UnsupportedError: the output has no formula.
     """
-    index, exponent = part.output_index, part.exponent
+    index = part.output_index
+    exponent = part.exponent
     if exponent < 1:
         raise problem.invalid_error(part, f"its exponent is {exponent}, and has to be 1 at least")
     if bool(part.second_output_path) != bool(part.operation):
@@ -114,24 +145,19 @@ def build_output_formula(
         raise problem.invalid_error(part, f"its output has no component of output_index {index}")
 
     def value(point: Point) -> Formula:
-        found = [formula(point, path) for _, (formula, path) in outputs]
+        values = [formula(point, path) for _, (formula, path) in outputs]
         if index >= 0:
-            found = [column[index] for column in found]
-        result = OPERATIONS[part.operation](*found) if part.operation else found[0]
+            values = [column[index] for column in values]
+        result = OPERATIONS[part.operation](*values) if part.operation else values[0]
         if result.numel() > 1:
             square = casadi.sumsqr(result)
-            return (
-                square
-                if exponent == 2
-                else casadi.sqrt(casadi.fmax(square, MIN_SQUARED_LENGTH)) ** exponent
-            )
-        return (
-            result
-            if exponent == 1
-            else result**exponent
-            if exponent % 2 == 0
-            else casadi.fabs(result) ** exponent
-        )
+            if exponent == 2:
+                return square
+            return casadi.sqrt(casadi.fmax(square, MIN_SQUARED_LENGTH)) ** exponent
+        if exponent == 1:
+            return result
+        # Odd powers take the absolute value, as in OpenSim.
+        return result**exponent if exponent % 2 == 0 else casadi.fabs(result) ** exponent
 
     return value
 
@@ -139,7 +165,11 @@ def build_output_formula(
 def _find_output(
     part: Any, problem: Problem, text: str
 ) -> tuple[int, tuple[Callable[[Point, str], Formula], str]]:
-    """Count of the numbers of an output, what gives it, and the path of its component."""
+    """Find the formula of an output by its path.
+
+    Returns:
+        Size of the output, and its formula with the path of the component.
+    """
     path, _, name = text.strip().rpartition("|")
     path = f"/{path.strip('/')}"
     component: Any = problem.model if path == "/" else problem.components.get(path)
@@ -147,19 +177,19 @@ def _find_output(
         raise problem.invalid_error(
             part, f"the model has no component '{path}'{did_you_mean(path, problem.components)}"
         )
-    for kind, known in OUTPUT_FORMULAS.items():
-        if isinstance(component, kind) and name in known:
-            return 1 if kind is Coordinate else 3, (known[name], path)
-    # Motions that are given have no outputs, and say so.
+    for component_class, formulas in OUTPUT_FORMULAS.items():
+        if isinstance(component, component_class) and name in formulas:
+            return 1 if component_class is Coordinate else 3, (formulas[name], path)
+    # Prescribed motions have no outputs: the property raises the error that says so.
     problem.functions.outputs  # noqa: B018
     forces: Any = problem.functions.forces.elements
     law = next(
         (each.kind for each in forces if each.path == path and isinstance(each, DeclaredForce)),
         None,
     )
-    place = law.known_of.get(name) if law is not None else None
-    if law is None or place is None:
+    index = law.known_of.get(name) if law is not None else None
+    if law is None or index is None:
         raise problem.unsupported_error(part, f"the output '{name}' of {path} has no formula here")
-    # What it is called in the record.
-    label = f"{path}|{next(own for own, at in law.recorded.items() if at == place)}"
+    # The record of the force may have another label for the output.
+    label = f"{path}|{next(label for label, at in law.recorded.items() if at == index)}"
     return 1, (lambda point, path: point.output("forces")[label], path)

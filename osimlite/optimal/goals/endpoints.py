@@ -1,0 +1,172 @@
+"""Goals on the start and the end of a motion: time, speed, equilibrium, periodicity, markers, parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from osimlite.derivatives.symbolic import on_symbols
+from osimlite.derivatives.symbols import Vector, casadi
+from osimlite.errors import ModelError, SettingError
+from osimlite.mechanics.kernels.programs import compute
+from osimlite.mechanics.multibody import formula as expressions
+from osimlite.optimal.point import CONSTRAINT_FIRST, COST_FIRST, Endpoints, Formula, GoalTerms
+from osimlite.optimal.tendons import EXPLICIT, IMPLICIT, TendonEquations
+from osimlite.schema.moco.goals import (
+    MocoAverageSpeedGoal,
+    MocoExpressionBasedParameterGoal,
+    MocoFinalTimeGoal,
+    MocoInitialActivationGoal,
+    MocoInitialForceEquilibriumDGFGoal,
+    MocoInitialVelocityEquilibriumDGFGoal,
+    MocoMarkerFinalGoal,
+    MocoPeriodicityGoal,
+)
+from osimlite.simulation.properties import places
+
+if TYPE_CHECKING:
+    from osimlite.optimal.problem import Problem
+
+
+def build_final_time_goal(goal: MocoFinalTimeGoal, problem: Problem) -> GoalTerms:
+    """Return the final time, s."""
+    return GoalTerms(lambda ends: ends.end.t[0])
+
+
+def build_average_speed_goal(goal: MocoAverageSpeedGoal, problem: Problem) -> GoalTerms:
+    """Return the desired speed less the average speed of the mass centre, m/s.
+
+    The average speed is the distance between the mass centre's first and last position over the
+    duration.
+    """
+
+    def value(ends: Endpoints) -> Formula:
+        distance = casadi.norm_2(ends.end.mass_center() - ends.start.mass_center())
+        return goal.desired_average_speed - distance / ends.duration
+
+    return GoalTerms(value, modes=CONSTRAINT_FIRST)
+
+
+def build_initial_activation_goal(goal: MocoInitialActivationGoal, problem: Problem) -> GoalTerms:
+    """Return excitation less activation at the start, for each muscle that has an activation."""
+    muscles = [
+        name for name in problem.controls if f"{name}/activation" in problem.functions.states
+    ]
+
+    def value(ends: Endpoints) -> Formula:
+        start = ends.start
+        differences = [start.control(name) - start.state(f"{name}/activation") for name in muscles]
+        return casadi.vertcat(*differences) if differences else casadi.SX(0, 1)
+
+    return GoalTerms(value, modes=CONSTRAINT_FIRST)
+
+
+def build_initial_force_equilibrium_goal(
+    goal: MocoInitialForceEquilibriumDGFGoal, problem: Problem
+) -> GoalTerms:
+    """Return tendon force less fiber force at the start for muscles with explicit tendon dynamics.
+
+    The rate of the tendon force is zero there. The force is relative to the muscle's strength.
+    """
+
+    def value(ends: Endpoints) -> Formula:
+        tendons = TendonEquations(problem, problem.dynamics.list_forces(), EXPLICIT)
+        return tendons.compute_residuals(ends.start, casadi.SX.zeros(len(tendons.paths)))[1]
+
+    return GoalTerms(value, modes=CONSTRAINT_FIRST)
+
+
+def build_initial_velocity_equilibrium_goal(
+    goal: MocoInitialVelocityEquilibriumDGFGoal, problem: Problem
+) -> GoalTerms:
+    """Return the rate of the fiber force less that of the tendon force at the start, N/s, for each muscle."""
+    both = [
+        TendonEquations(problem, problem.dynamics.list_forces(), mode)
+        for mode in (IMPLICIT, EXPLICIT)
+    ]
+
+    def value(ends: Endpoints) -> Formula:
+        return casadi.vertcat(*(tendons.compute_rate_errors(ends.start) for tendons in both))
+
+    return GoalTerms(value, modes=CONSTRAINT_FIRST)
+
+
+def build_periodicity_goal(goal: MocoPeriodicityGoal, problem: Problem) -> GoalTerms:
+    """Return the initial value less the final value of each pair of variables; their sum for negated pairs."""
+    functions = problem.functions
+    pairs = []
+    for goal_pairs, known, what in (
+        (goal.state_pairs, functions.states, "state"),
+        (goal.control_pairs, problem.controls, "control"),
+    ):
+        for pair in goal_pairs:
+            first = pair.initial_variable
+            last = pair.final_variable
+            for name in (first, last):
+                problem.check_name(pair, name, known, what)
+            pairs.append((what, first, last, -1.0 if pair.negate else 1.0))
+
+    def value(ends: Endpoints) -> Formula:
+        differences = [
+            sign * getattr(ends.start, what)(first) - getattr(ends.end, what)(last)
+            for what, first, last, sign in pairs
+        ]
+        return casadi.vertcat(*differences) if differences else casadi.SX(0, 1)
+
+    return GoalTerms(value, modes=CONSTRAINT_FIRST)
+
+
+def build_marker_final_goal(goal: MocoMarkerFinalGoal, problem: Problem) -> GoalTerms:
+    """Return the squared distance, m², of a marker or station from a fixed position in ground at the end."""
+    name = str(goal.point_name)
+    problem.check_name(goal, name, problem.functions.mechanism.stations, "marker or station")
+
+    def value(ends: Endpoints) -> Formula:
+        positions = ends.end.output("stations")
+        pairs = zip("xyz", goal.reference_location, strict=True)
+        return sum((positions[f"{name}|{axis}"] - target) ** 2 for axis, target in pairs)
+
+    return GoalTerms(value)
+
+
+def build_expression_based_parameter_goal(
+    goal: MocoExpressionBasedParameterGoal, problem: Problem
+) -> GoalTerms:
+    """Return the value of an expression of parameters.
+
+    A property that is no parameter of the study enters with the model's number.
+    """
+    if not goal.expression.strip():
+        raise problem.invalid_error(goal, "it has no expression")
+    if len(goal.variables) != len(goal.parameters):
+        raise problem.invalid_error(
+            goal, f"it has {len(goal.parameters)} parameters and {len(goal.variables)} variables"
+        )
+    try:
+        formula = expressions.Formula.parse(goal.expression, goal.variables, "expression")
+    except ModelError as error:
+        raise problem.invalid_error(goal, error.message) from None
+    steps, constants = expressions.program(formula)
+    known = problem.functions.parameters
+    # OpenSim takes the first of the components, which all have one value.
+    paths = [problem.list_parameter_paths(parameter)[0] for parameter in goal.parameters]
+    numbers = {path: _read_number(goal, problem, path) for path in paths if path not in known}
+
+    def value(ends: Endpoints) -> Formula:
+        arguments = [
+            numbers[path] if path in numbers else ends.start.p[known.index(path)] for path in paths
+        ]
+        registers = Vector([*arguments, *[0.0] * len(formula.steps)])
+        return on_symbols(compute)(
+            Vector(steps), len(formula.steps), Vector(constants), registers, len(arguments)
+        )
+
+    return GoalTerms(value, modes=COST_FIRST)
+
+
+def _read_number(goal: MocoExpressionBasedParameterGoal, problem: Problem, path: str) -> float:
+    """Return the number that the model has at the path of a property."""
+    matches = places(problem.model, path)
+    try:
+        return matches[0].setter(problem.model).get()
+    except (IndexError, SettingError):
+        raise problem.invalid_error(goal, f"the model has no number '{path}'") from None

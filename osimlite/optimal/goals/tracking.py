@@ -1,0 +1,198 @@
+"""Goals that track columns of a table: states, controls, markers and generalized forces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from osimlite.derivatives.symbols import casadi
+from osimlite.optimal.point import Formula, GoalTerms, Point, make_integral_terms
+from osimlite.optimal.tables import fit_splines, read_reference, read_table
+from osimlite.schema.constraint_types import CoordinateCouplerConstraint
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.forces import Force
+from osimlite.schema.markers import Marker
+from osimlite.schema.moco.tracking import (
+    MocoControlTrackingGoal,
+    MocoGeneralizedForceTrackingGoal,
+    MocoMarkerTrackingGoal,
+    MocoStateTrackingGoal,
+)
+from osimlite.schema.states import variables
+
+if TYPE_CHECKING:
+    from osimlite.optimal.problem import Problem
+
+
+def build_state_tracking_goal(goal: MocoStateTrackingGoal, problem: Problem) -> GoalTerms:
+    """Return the integral of the weighted squared errors of states from splines through a table."""
+    states = problem.functions.states
+    table = read_reference(problem, goal, goal.reference)
+    state_weights = problem.find_weights(goal, goal.state_weights, None, states, "state")
+    weights = dict(zip(states, state_weights, strict=True))
+    matches = problem.compile_pattern(goal, goal.pattern if goal.pattern is not None else ".*")
+    tracked = [name for name in table.columns if name in states and matches(name)]
+    for name in table.columns:
+        if name not in tracked and not goal.allow_unused_references:
+            problem.check_name(goal, name, states, "state")
+            raise problem.invalid_error(
+                goal, f"the column '{name}' does not match the pattern; set allow_unused_references"
+            )
+    if goal.scale_weights_with_range:
+        weights |= {name: weights[name] / float(np.ptp(table[name])) for name in tracked}
+    pairs = [*zip(tracked, fit_splines(problem, table, tracked), strict=True)]
+
+    def integrand(point: Point) -> Formula:
+        return sum(
+            weights[name] * (point.state(name) - point.evaluate(series)) ** 2
+            for name, series in pairs
+        )
+
+    return make_integral_terms(integrand)
+
+
+def build_control_tracking_goal(goal: MocoControlTrackingGoal, problem: Problem) -> GoalTerms:
+    """Return the integral of the weighted squared errors of controls from splines through a table."""
+    controls = [*problem.controls]
+    table = read_reference(problem, goal, goal.reference)
+    columns = {item.name: item.reference for item in goal.reference_labels}
+    if not columns:
+        columns = {
+            name: name
+            for name in table.columns
+            if name in controls or not goal.allow_unused_references
+        }
+    for name, label in columns.items():
+        problem.check_name(goal, name, controls, "control")
+        if label not in table.columns:
+            raise problem.invalid_error(
+                goal, f"its reference has no column '{label}', which '{name}' is to follow"
+            )
+    control_weights = problem.find_weights(goal, goal.control_weights, None, controls, "control")
+    weights = dict(zip(controls, control_weights, strict=True))
+    pairs = [*zip(columns, fit_splines(problem, table, [*columns.values()]), strict=True)]
+
+    def integrand(point: Point) -> Formula:
+        return sum(
+            weights[name] * (point.control(name) - point.evaluate(series)) ** 2
+            for name, series in pairs
+        )
+
+    return make_integral_terms(integrand)
+
+
+def build_marker_tracking_goal(goal: MocoMarkerTrackingGoal, problem: Problem) -> GoalTerms:
+    """Return the integral of the weighted squared distances, m² s, of markers from measured ones."""
+    reference = goal.markers_reference
+    table = problem.tables.get(goal.name)
+    if table is None:
+        if not reference.marker_file.strip():
+            raise problem.invalid_error(goal, "its markers_reference names no marker_file")
+        table = read_table(problem.locate_file(reference.marker_file))
+    measured = [*dict.fromkeys(label[:-2] for label in table.columns)]
+    paths = {
+        part.name: path for path, part in problem.components.items() if isinstance(part, Marker)
+    }
+    paths |= {path: path for path in paths.values()}
+    tracked = [name for name in measured if name in paths or not goal.allow_unused_references]
+    for name in tracked:
+        problem.check_name(goal, name, paths, "marker")
+    given_weights = {item.name: item.weight for item in reference.marker_weights.objects}
+    weights = [given_weights.get(name, reference.default_weight) for name in tracked]
+    labels = [f"{name}_{k}" for name in tracked for k in (1, 2, 3)]
+    series = fit_splines(problem, table, labels)
+
+    def integrand(point: Point) -> Formula:
+        positions = point.output("stations")
+        total = casadi.SX(0.0)
+        for number, (name, weight) in enumerate(zip(tracked, weights, strict=True)):
+            for axis, target in zip("xyz", series[3 * number : 3 * number + 3], strict=True):
+                error = positions[f"{paths[name]}|{axis}"] - point.evaluate(target)
+                total += weight * error**2
+        return total
+
+    return make_integral_terms(integrand)
+
+
+def build_generalized_force_tracking_goal(
+    goal: MocoGeneralizedForceTrackingGoal, problem: Problem
+) -> GoalTerms:
+    """Return the integral of the weighted squared errors of generalized forces from splines through a table.
+
+    The generalized forces (N, N m) are those that the motion needs beyond gravity and the forces of
+    `force_paths`.
+    """
+    applied_forces = _match_forces(goal, problem)
+    coordinates: dict[str, Any] = {**variables(problem.model.tree(), "generalized force")}
+    paths = {
+        label: coordinate.path
+        for label, coordinate in coordinates.items()
+        if not (goal.ignore_constrained_coordinates and _is_constrained(problem, coordinate))
+    }
+    table = read_reference(problem, goal, goal.reference)
+    tracked = [name for name in table.columns if name in paths or not goal.allow_unused_references]
+    for name in tracked:
+        problem.check_name(goal, name, paths, "free generalized force")
+    force_weights = problem.find_weights(
+        goal,
+        goal.generalized_force_weights,
+        goal.generalized_force_weights_pattern,
+        [*paths],
+        "free generalized force",
+    )
+    weights = dict(zip(paths, force_weights, strict=True))
+    rows: list[Any] = []
+    for name, series in zip(tracked, fit_splines(problem, table, tracked), strict=True):
+        if weights[name] < 0.0:
+            raise problem.invalid_error(
+                goal, f"the weight of '{name}' is negative, which OpenSim refuses, too"
+            )
+        greatest = float(np.abs(table[name]).max()) if goal.normalize_tracking_error else 1.0
+        if not greatest:
+            raise problem.invalid_error(
+                goal,
+                f"the column '{name}' is zero, so that no error can be divided by its greatest",
+            )
+        rows.append((series, weights[name] / greatest**2))
+    needed_forces = problem.dynamics.make_generalized_forces(
+        applied_forces, [paths[name] for name in tracked]
+    )
+
+    def integrand(point: Point) -> Formula:
+        values = needed_forces(point)
+        return sum(
+            weight * (values[k] - point.evaluate(series)) ** 2
+            for k, (series, weight) in enumerate(rows)
+        )
+
+    return make_integral_terms(integrand)
+
+
+def _match_forces(goal: MocoGeneralizedForceTrackingGoal, problem: Problem) -> list[str]:
+    """Return the paths of forces that the patterns match; OpenSim refuses to match one twice."""
+    forces = [path for path, part in problem.components.items() if isinstance(part, Force)]
+    result: list[str] = []
+    for pattern in map(str, goal.force_paths):
+        matched = [*filter(problem.compile_pattern(goal, pattern), forces)]
+        if not matched:
+            problem.check_name(goal, pattern, forces, "force")
+        if twice := [path for path in matched if path in result]:
+            raise problem.invalid_error(goal, f"its force_paths match '{twice[0]}' twice")
+        result += matched
+    return result
+
+
+def _is_constrained(problem: Problem, coordinate: Coordinate) -> bool:
+    """Return whether a coordinate's motion is prescribed or depends on other coordinates."""
+    couplers = (
+        part
+        for part in problem.components.values()
+        if isinstance(part, CoordinateCouplerConstraint)
+    )
+    dependent = {str(part.dependent_coordinate_name) for part in couplers if part.isEnforced}
+    return (
+        coordinate.prescribed
+        or coordinate.is_free_to_satisfy_constraints
+        or coordinate.name in dependent
+    )
