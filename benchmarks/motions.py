@@ -38,7 +38,7 @@ from osimlite.schema.forces import Force
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation import Simulation
-from osimlite.simulation.elements.kind import kind_of_class
+from osimlite.simulation.elements.registry import FORCE_TYPES
 from simulate import run_opensim, run_ours
 
 CORPUS = Path(__file__).resolve().parents[2] / "shared" / "corpus" / "converted"
@@ -102,7 +102,7 @@ def models(folder: Path) -> Iterator[tuple[str, Path]]:
                 found.append((name, osimlite.read_text(gzip.decompress(path.read_bytes()))))
     for number, (name, model) in enumerate(found):
         for force in model.components(Force):
-            known = kind_of_class(type(force)) is not None
+            known = FORCE_TYPES.find(type(force)) is not None
             if not known or isinstance(force, PathSpring | Muscle):
                 force.appliesForce = False
         path = folder / f"{number}.osim"

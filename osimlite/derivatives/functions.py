@@ -22,7 +22,7 @@ from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model, expect_model
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.probe import DeclaredProbe
+from osimlite.simulation.elements.probe_type import DeclaredProbe
 from osimlite.simulation.pack import Packed, pack
 from osimlite.simulation.states import in_model_order
 

@@ -25,9 +25,9 @@ from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.force_records import ForceRecord
+from osimlite.simulation.elements.force_type import DeclaredForce
 from osimlite.simulation.elements.geometries.path import PATH
-from osimlite.simulation.elements.items import Item
-from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.path_system import MeasuredPath, PathSystem
 
 STEP = 1e-4
@@ -58,7 +58,7 @@ class GivenPath:
         """How many symbols there are."""
         return 1 + 2 * len(self.coordinates)
 
-    def items(self, places: Places) -> list[Item]:
+    def items(self, places: Places) -> list[ForceRecord]:
         """As of a path that is a function of coordinates; see :mod:`osimlite.mechanics.kernels.function_paths`."""
         freedoms = [places.freedom(coordinate) for coordinate in self.coordinates]
         count = len(freedoms)
@@ -79,12 +79,12 @@ class GivenPath:
             return OUTCOME.OK
 
         law.takes_symbols = speed_law.takes_symbols = True  # type: ignore[attr-defined]
-        given = Item("", room=DERIVATIVES + count, is_part=True, python=taken(law))
-        speed = Item("", room=1, is_part=True, python=taken(speed_law))
-        before = [Item("pull_coordinates", is_part=True), given, speed]
+        given = ForceRecord("", room=DERIVATIVES + count, is_part=True, python=taken(law))
+        speed = ForceRecord("", room=1, is_part=True, python=taken(speed_law))
+        before = [ForceRecord("pull_coordinates", is_part=True), given, speed]
         backs = [sum(ITEM.OWN + len(item.ints) for item in before[first:]) for first in range(3)]
         ints = backs[0], count, backs[1], backs[2], *freedoms, *[0] * count
-        return [*before, Item("function_path", ints, room=ARMS + count, is_part=True)]
+        return [*before, ForceRecord("function_path", ints, room=ARMS + count, is_part=True)]
 
 
 class SearchedPaths:
@@ -230,7 +230,7 @@ def _apart(paths: Sequence[Sequence[int]]) -> list[list[int]]:
 
 def _is_searched(element: Any) -> bool:
     if (
-        not (isinstance(element, DeclaredForce) and element.kind.geometry is PATH)
+        not (isinstance(element, DeclaredForce) and element.force_type.geometry is PATH)
         or element.place is None
     ):
         return False

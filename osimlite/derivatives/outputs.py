@@ -22,10 +22,10 @@ from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
+from osimlite.simulation.elements.force_type import DeclaredForce
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PLANE
-from osimlite.simulation.elements.kind import DeclaredForce
-from osimlite.simulation.elements.probe import DeclaredProbe
+from osimlite.simulation.elements.probe_type import DeclaredProbe
 from osimlite.simulation.engines.dual_numbers import Carrying
 from osimlite.simulation.pack import Packed
 
@@ -123,7 +123,7 @@ def output_columns(
         (f"{element.path}|{name}", found.data[items[-1][0] + place])
         for element, items in zip(forces.elements, packed.items, strict=True)
         if isinstance(element, DeclaredForce) and items
-        for name, place in element.kind.recorded.items()
+        for name, place in element.force_type.recorded.items()
     ]
     probed = [
         (f"{probe.path}|{label}", probe.gain * found.data[items[-1][0] + place])
@@ -188,10 +188,10 @@ def _contacts(packed: Packed, forces: Forces, found: Found) -> list[tuple[str, A
             ]
         elif (
             isinstance(element, DeclaredForce)
-            and element.kind.geometry is SPHERE_ON_PLANE
+            and element.force_type.geometry is SPHERE_ON_PLANE
             and items
         ):
-            pairs.append((element.path, items[-1][0] + len(element.kind.recorded)))
+            pairs.append((element.path, items[-1][0] + len(element.force_type.recorded)))
     return [
         (f"{name}|{what}_{axis}", found.data[place + 3 * part + k])
         for name, place in pairs
@@ -204,7 +204,11 @@ def path_entries(packed: Packed, forces: Forces, found: Evaluated) -> tuple[list
     """Names, lengths and lengthening speeds of all paths along which something pulls."""
     names, lengths, speeds = list[str](), list[Any](), list[Any]()
     for element, items in zip(forces.elements, packed.items, strict=True):
-        if isinstance(element, DeclaredForce) and element.kind.geometry is PATH and len(items) > 1:
+        if (
+            isinstance(element, DeclaredForce)
+            and element.force_type.geometry is PATH
+            and len(items) > 1
+        ):
             record = items[-2][0]
             names.append(element.path)
             lengths.append(found.data[record + LENGTH])

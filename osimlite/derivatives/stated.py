@@ -16,7 +16,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.constrained import kept_state
 from osimlite.simulation.elements import Forces, force_elements
-from osimlite.simulation.elements.probe import DeclaredProbe
+from osimlite.simulation.elements.probe_type import DeclaredProbe
 from osimlite.simulation.pack import Packed, pack
 from osimlite.simulation.states import StateLayout, in_model_order
 
@@ -91,7 +91,11 @@ class StatedModel:
         forces = force_elements(model, mechanism, folder=self._folder)
         # Probes are outputs, whatever they make of their results over time; some look at more than
         # the kernels.
-        kept = (e for e in forces.elements if not (isinstance(e, DeclaredProbe) and e.kind.measure))
+        kept = (
+            e
+            for e in forces.elements
+            if not (isinstance(e, DeclaredProbe) and e.probe_type.measure)
+        )
         elements = (
             replace(e, operation="value") if isinstance(e, DeclaredProbe) else e for e in kept
         )

@@ -24,7 +24,7 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.gather import OPENSIM
+from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.engines.protocol import Engine
 from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, NO_BOUNDS, check_integrator
 

@@ -23,9 +23,9 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements import Forces, force_elements
+from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.elements.gather import OPENSIM
-from osimlite.simulation.elements.kind import DeclaredForce
+from osimlite.simulation.elements.force_type import DeclaredForce
 from osimlite.simulation.paths import Paths
 from osimlite.simulation.system import System
 
@@ -228,7 +228,7 @@ class _Muscle(NamedTuple):
             is_settled = False
         known = {
             name: system.recorded(element.path, place)
-            for name, place in element.kind.recorded.items()
+            for name, place in element.force_type.recorded.items()
         }
         result = {"length": known["length"]}
         if is_settled:

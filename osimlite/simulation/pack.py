@@ -16,7 +16,7 @@ from osimlite.mechanics.multibody.links import LinkPacker, Placement, Tree, tree
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.constrained import constraints_on, free_coordinates
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.items import CONTROLS, ForceElement, Response
+from osimlite.simulation.elements.force_records import CONTROLS, ForceElement, Response
 from osimlite.simulation.states import StateLayout
 
 if TYPE_CHECKING:

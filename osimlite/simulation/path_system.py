@@ -16,9 +16,9 @@ from osimlite.mechanics.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PL
 from osimlite.mechanics.kernels.wrapping import SURFACE_LENGTH
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.spatial import Array
+from osimlite.simulation.elements.force_records import ForceRecord, Silent
 from osimlite.simulation.elements.geometries.path import Path as Along
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
-from osimlite.simulation.elements.items import Item, Silent
 from osimlite.simulation.states import StateVariable
 from osimlite.simulation.system import System
 
@@ -43,7 +43,7 @@ class MeasuredPath(Silent):
         """What is said of it in a pose in which it has no length."""
         return f"'{self.path}': the path has no length in this pose"
 
-    def items(self, places: Places) -> list[Item]:
+    def items(self, places: Places) -> list[ForceRecord]:
         """Its parts, of which the path is no part of another item."""
         *parts, last = self.along.items(places)
         return [*parts, replace(last, is_part=False)]

@@ -22,7 +22,7 @@ from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.schema.paths import AbstractGeometryPath
 from osimlite.simulation.elements import ElementBuilder, Forces
-from osimlite.simulation.elements.gather import OPENSIM
+from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.engines.linking import Code

@@ -15,7 +15,7 @@ from osimlite.mechanics.multibody.constraints import Lock
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.elements.items import Item
+from osimlite.simulation.elements.force_records import ForceRecord
 from osimlite.simulation.engines.linking import Code, best
 
 OF_MOTIONS = "evaluate", "constrained_dynamics", "project"
@@ -46,7 +46,7 @@ class Course(Protocol):
     def start(self) -> tuple[int, Array]:
         """The body that it starts in, and where there (3,)."""
 
-    def items(self, places: Places) -> list[Item]:
+    def items(self, places: Places) -> list[ForceRecord]:
         """Parts, of which the last is the path's own."""
 
 

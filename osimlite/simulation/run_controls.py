@@ -30,7 +30,7 @@ from osimlite.schema.base import Object
 from osimlite.simulation.elements.control_sets import ControlCurves
 from osimlite.simulation.elements.control_tables import read_controls
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.elements.signals import TableColumn
+from osimlite.simulation.elements.synergies import TableColumn
 
 PRINTED_S = 1e-6
 """Tolerance of the ends of a table, s: its times were printed with few digits, those of the motion were not."""

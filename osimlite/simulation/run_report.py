@@ -8,7 +8,7 @@ from math import inf, sqrt
 from typing import Any, NamedTuple
 
 from osimlite.base.records import dataclass
-from osimlite.simulation.elements.probe import INTEGRATE, DeclaredProbe
+from osimlite.simulation.elements.probe_type import INTEGRATE, DeclaredProbe
 from osimlite.simulation.engines.protocol import Engine
 from osimlite.simulation.stepper import Stepper
 

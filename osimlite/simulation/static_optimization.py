@@ -38,7 +38,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.simulation.elements import Forces, force_elements
-from osimlite.simulation.elements.gather import OPENSIM
+from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.engines.linking import best
 from osimlite.simulation.system import System
 from osimlite.simulation.trajectory import label_as_opensim

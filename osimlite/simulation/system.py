@@ -32,9 +32,9 @@ from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.elements.items import CONTROLS, ForceElement
+from osimlite.simulation.elements.force_records import CONTROLS, ForceElement
 from osimlite.simulation.elements.muscle import STRENGTH
-from osimlite.simulation.elements.probe import DeclaredProbe
+from osimlite.simulation.elements.probe_type import DeclaredProbe
 from osimlite.simulation.engines.linking import Code, Program, best
 from osimlite.simulation.link_motion import Moments, moving
 from osimlite.simulation.pack import pack
@@ -321,13 +321,13 @@ class System:
     def _told(self, item: int) -> str:
         """What an item is that has no solution."""
         from osimlite.mechanics.kernels.paths import LENGTH
+        from osimlite.simulation.elements.force_type import DeclaredForce
         from osimlite.simulation.elements.geometries.path import PATH
-        from osimlite.simulation.elements.kind import DeclaredForce
 
         owner = self._owners[item]
         element: Any = self.forces.elements[owner]
         *parts, (place, room) = self._items[owner]
-        on_path = isinstance(element, DeclaredForce) and element.kind.geometry is PATH
+        on_path = isinstance(element, DeclaredForce) and element.force_type.geometry is PATH
         if on_path and isnan(self._w[parts[-1][0] + LENGTH]):
             return f"'{element.path}', whose path has no length in this pose"
         return element.told(self._w[place : place + room].tolist())
@@ -373,7 +373,7 @@ class System:
     def kind_at(self, path: str) -> Any:
         """Return the declaration of the force at this path."""
         element: Any = next(item for item in self.forces.elements if item.path == path)
-        return element.kind
+        return element.force_type
 
     @property
     def work_vector(self) -> Floats:
@@ -480,10 +480,10 @@ class System:
         self.applied(t, y)
         result = []
         for probe, place in zip(self.probes, self._probe_places, strict=True):
-            if probe.kind.measure is not None:
-                result.append(list(probe.kind.measure(probe, self, t, y)))
+            if probe.probe_type.measure is not None:
+                result.append(list(probe.probe_type.measure(probe, self, t, y)))
                 continue
-            self.program.code.entry(probe.kind.name)(
+            self.program.code.entry(probe.probe_type.name)(
                 self.program.ints, self.numbers, self._w, self._y, self._f, place
             )
             first = self.structure[place + ITEM.RECORD]

@@ -16,7 +16,7 @@ from osimlite.io.meshes.folders import MeshFolders
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.simulation.elements.gather import OPENSIM
+from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.view.collect import build_scene
 from osimlite.view.motion import Motion, activity, activity_color, at_times, moving, values_of
 from osimlite.view.picture import FORCE, INK, SKY, Arrow, Camera, Style, draw

@@ -29,7 +29,7 @@ from osimlite.schema.muscles import Muscle
 from osimlite.schema.paths import AbstractGeometryPath, GeometryPath
 from osimlite.schema.specs import field_specs
 from osimlite.schema.tree import Use
-from osimlite.simulation.elements.gather import OPENSIM, ElementBuilder
+from osimlite.simulation.elements.builder import OPENSIM, ElementBuilder
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.polylines import Course
 from osimlite.simulation.robot.visuals import frame_of

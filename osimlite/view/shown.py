@@ -16,7 +16,7 @@ from osimlite.lint import Config, Finding, validate
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.simulation.elements.gather import OPENSIM
+from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.view.collect import build_scene
 from osimlite.view.glb import write_glb
 from osimlite.view.incomplete import build_showable, describe_left_out

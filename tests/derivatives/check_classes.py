@@ -32,8 +32,9 @@ from osimlite.schema.metabolics import (
 from osimlite.schema.path_actuators import ClutchedPathSpring
 from osimlite.schema.probe_types import ActuatorForceProbe, ActuatorPowerProbe, SystemEnergyProbe
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.kind import Kind, kinds
+from osimlite.simulation.elements.force_type import ForceType
 from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.elements.registry import FORCE_TYPES
 from osimlite.simulation.pack import pack
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
@@ -110,7 +111,7 @@ def test_no_class_of_forces_is_left_out():
         hung(muscle(case)) for case in CONFIGURATIONS
     ]
     seen = {type(component) for model in models for component in model.force_set.objects}
-    rest = {kind.component.__name__ for kind in kinds()} - {kind.__name__ for kind in seen}
+    rest = {kind.component.__name__ for kind in FORCE_TYPES} - {kind.__name__ for kind in seen}
     assert rest == LEFT
 
 
@@ -126,7 +127,7 @@ def test_paths_over_obstacles():
 
 
 def test_every_kernel_is_written_for_symbols():
-    names = [*LAW_MODULES, *(kind.name for kind in kinds() if isinstance(kind, Kind))]
+    names = [*LAW_MODULES, *(kind.name for kind in FORCE_TYPES if isinstance(kind, ForceType))]
     parts = {part for name in names for part in collect_functions(law_function(name))}
     assert len(parts) > 500 and all(map(on_symbols, parts))
 
@@ -173,7 +174,9 @@ def test_probes():
         engine.derivative(0.3, y)
         found = functions.outputs(0.3, x, engine.controls(), functions.p)[place]
         results = zip(engine.probes, engine.probe_results(0.3, y), strict=True)
-        wanted = [probe.gain * value for probe, row in results if probe.kind.law for value in row]
+        wanted = [
+            probe.gain * value for probe, row in results if probe.probe_type.law for value in row
+        ]
         assert len(wanted) == len(functions.output_names["probes"]) >= 10
         assert off(np.array(found.full())[:, 0], np.array(wanted)) < 1e-9
 

@@ -41,8 +41,9 @@ from osimlite.mechanics.kernels.table import LAW_MODULES
 from osimlite.mechanics.laws.dual_numbers import is_nothing, settled
 from osimlite.models.jumper import jumper
 from osimlite.models.walkers import furthest_walker
-from osimlite.simulation.elements.kind import Kind, kinds
+from osimlite.simulation.elements.force_type import ForceType
 from osimlite.simulation.elements.laws import ALONG, DIRECTIONS, RIGID, WITHOUT_DERIVATIVES
+from osimlite.simulation.elements.registry import FORCE_TYPES
 from osimlite.simulation.engines.compiled_laws import compile_function
 from osimlite.simulation.engines.machine_code import make_ready
 from osimlite.simulation.pack import pack
@@ -176,8 +177,8 @@ def test_a_root_has_the_derivatives_of_its_equation():
 OF_RATES = [name for name in LAW_MODULES if name not in WITHOUT_DERIVATIVES]
 OF_RATES += [
     kind.name + form
-    for kind in kinds()
-    if isinstance(kind, Kind)
+    for kind in FORCE_TYPES
+    if isinstance(kind, ForceType)
     for form in ("", RIGID)[: 1 + bool(kind.rigid)]
 ]
 

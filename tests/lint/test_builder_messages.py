@@ -12,7 +12,7 @@ from osimlite.io.document.source import Source
 from osimlite.lint import construction as remembering
 from osimlite.lint import validate
 from osimlite.lint.measuring import construction
-from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.builder import ElementBuilder
 from tests.lint.builder_messages import Message, read_messages
 from tests.lint.verdict_cases import CASES, path_of, small_model
 
@@ -105,25 +105,23 @@ MODELS = {
 """Models for messages that no case and no fixture gives."""
 
 WITHOUT_MODEL = {
+    "simulation/elements/builder.py": "the sum of all that is left out",
+    "simulation/elements/contact.py": "frames that are none of a body, and an option",
     "simulation/elements/control_sets.py": "a file of controls beside the model",
     "simulation/elements/control_tables.py": "a file of controls beside the model",
-    "simulation/elements/signals.py": "a table beside the model",
-    "simulation/elements/triangle_mesh.py": "a mesh beside the model",
-    "simulation/elements/controllers/control_set_controller.py": "a file of controls beside the model",
-    "simulation/elements/controllers/prescribed_controller.py": "a file of controls beside the model",
-    "simulation/elements/controllers/synergy_controller.py": "signals of a table beside the model",
-    "simulation/elements/kinds/coordinate_linear_stop_force.py": "a class after OpenSim 4.6",
-    "simulation/elements/kinds/exponential_coordinate_limit_force.py": "a class after OpenSim 4.6",
-    "simulation/elements/metabolic.py": "probes are left out with a notice, and refuse no model",
-    "simulation/elements/probe.py": "probes are left out with a notice, and refuse no model",
-    "simulation/elements/probes/joint_internal_power_probe.py": "probes are left out with a notice",
-    "simulation/elements/geometries/paths/geometry_path.py": "words that the reader replaces, or unknown classes",
-    "simulation/elements/geometries/paths/function_based_path.py": "reported by OSIM209 before",
-    "simulation/elements/geometries/sphere_on_plane.py": "reported by OSIM302 before",
-    "simulation/elements/kinds/smooth_sphere_half_space_force.py": "reported by OSIM206 before",
-    "simulation/elements/contact.py": "frames that are none of a body, and an option",
+    "simulation/elements/controllers.py": "a file of controls beside the model",
+    "simulation/elements/force_type.py": "an option of static optimization",
+    "simulation/elements/force_types/coordinate_forces.py": "classes after OpenSim 4.6",
+    "simulation/elements/force_types/smooth_contacts.py": "reported by OSIM206 before",
     "simulation/elements/gather.py": "the sum of all that is left out",
-    "simulation/elements/kind.py": "an option of static optimization",
+    "simulation/elements/geometries/paths/function_based_path.py": "reported by OSIM209 before",
+    "simulation/elements/geometries/paths/geometry_path.py": "words that the reader replaces, or unknown classes",
+    "simulation/elements/geometries/sphere_on_plane.py": "reported by OSIM302 before",
+    "simulation/elements/mechanical_probes.py": "probes are left out with a notice",
+    "simulation/elements/metabolic_probes.py": "probes are left out with a notice",
+    "simulation/elements/probe_type.py": "probes are left out with a notice",
+    "simulation/elements/synergies.py": "signals of a table beside the model",
+    "simulation/elements/triangle_mesh.py": "a mesh beside the model",
     "mechanics/multibody/assembly.py": "speeds that a call sets",
     "mechanics/multibody/build.py": "frames that are none of a body, loops",
     "mechanics/multibody/constraint_records.py": "a class that nobody has",

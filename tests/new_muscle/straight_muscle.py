@@ -9,9 +9,10 @@ from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.schema.facts import NAN, Contradiction, Facts
 from osimlite.schema.fields import real
 from osimlite.schema.muscles import Muscle
-from osimlite.simulation.elements.kind import State
+from osimlite.simulation.elements.force_type import State
 from osimlite.simulation.elements.muscle import muscle
 from osimlite.simulation.elements.parameters import Number, positive
+from osimlite.simulation.elements.registry import register_force_type
 
 
 class StraightMuscle(Muscle):
@@ -63,16 +64,18 @@ def straight(
     return force, now.activation, fibers, 1.0, active, factor, force, 0.0, change, now.rate
 
 
-KIND = muscle(
-    StraightMuscle,
-    straight,
-    ("activation_rate", "fiber_velocity"),
-    Number("max_isometric_force"),
-    positive("optimal_fiber_length"),
-    Number("tendon_slack_length"),
-    positive("fastest"),
-    positive("width"),
-    Number("grip"),
-    positive("rise_time"),
-    states=(State("activation", lambda force: force.default_activation),),
+register_force_type(
+    muscle(
+        StraightMuscle,
+        straight,
+        ("activation_rate", "fiber_velocity"),
+        Number("max_isometric_force"),
+        positive("optimal_fiber_length"),
+        Number("tendon_slack_length"),
+        positive("fastest"),
+        positive("width"),
+        Number("grip"),
+        positive("rise_time"),
+        states=(State("activation", lambda force: force.default_activation),),
+    )
 )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 
@@ -12,8 +11,7 @@ import osimlite
 from osimlite.schema import registry
 from osimlite.schema.outputs import outputs_of
 from osimlite.schema.states import states_of, variables
-from osimlite.simulation.elements import kinds
-from osimlite.simulation.elements.kind import kind_of_class
+from osimlite.simulation.elements.registry import FORCE_TYPES
 
 TEXT = """<?xml version="1.0" encoding="UTF-8"?>
 <OpenSimDocument Version="40600"><Model name="lift"><gravity>0 0 0</gravity>
@@ -35,17 +33,16 @@ TEXT = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def forget_classes():
-    kind_of_class.cache_clear()
     for forget in registry.callbacks_of_changes:
         forget()
 
 
 @pytest.fixture
 def straight_muscle(monkeypatch):
-    """The class, while its file counts as one of those of the kinds, and its line in the registry is there."""
-    name = f"{kinds.__name__}.straight_muscle"
+    """The class, while its lines in the tables of classes and of force types are there."""
+    name = "tests.new_muscle.straight_muscle"
     with monkeypatch.context() as patched:
-        patched.setattr(kinds, "__path__", [*kinds.__path__, str(Path(__file__).parent)])
+        patched.setitem(FORCE_TYPES.modules, "StraightMuscle", name)
         patched.setitem(registry.MODULES, "StraightMuscle", name)
         forget_classes()
         yield import_module(name).StraightMuscle

@@ -15,7 +15,7 @@ from osimlite.schema.forces import Force
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation import Simulation
-from osimlite.simulation.elements.kind import kind_of_class
+from osimlite.simulation.elements.registry import FORCE_TYPES
 from tests.oracle.test_constraints import CASES, _chain
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
@@ -91,7 +91,7 @@ def test_real_models_without_muscles(name: str, engine: str, corpus: Any, tmp_pa
     entry = next(item for item in corpus if item.id == name)
     model = read_text(gzip.decompress(entry.converted.read_bytes()).decode())
     for force in model.components(Force):
-        if kind_of_class(type(force)) is None or isinstance(force, PathSpring | Muscle):
+        if FORCE_TYPES.find(type(force)) is None or isinstance(force, PathSpring | Muscle):
             force.appliesForce = False
     osimlite.write(model, tmp_path / "model.osim")
     # Knees that turn about several axes have OpenSim's derivatives.

@@ -18,7 +18,7 @@ from osimlite.mechanics.multibody.spatial import offset
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements import Forces, force_elements
-from osimlite.simulation.elements.kind import kinds as declared_kinds
+from osimlite.simulation.elements.registry import FORCE_TYPES
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
@@ -151,9 +151,7 @@ def test_every_class_of_force_is_here():
             for item in (result if isinstance(result, tuple | list) else (result,))
         }
     kinds = [
-        kind
-        for kind in declared_kinds()
-        if not (getattr(kind, "states", ()) or kind.component.since)
+        kind for kind in FORCE_TYPES if not (getattr(kind, "states", ()) or kind.component.since)
     ]
     assert {
         kind.component.__name__ for kind in kinds if not issubclass(kind.component, Muscle)

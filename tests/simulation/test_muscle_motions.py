@@ -14,8 +14,7 @@ import pytest
 
 import osimlite
 from osimlite import Sine
-from osimlite.schema.registry import class_for
-from osimlite.simulation.elements.kind import kind_of_class
+from osimlite.simulation.elements.registry import FORCE_TYPES
 from tests.simulation.elements.muscle_rows import CONFIGURATIONS, FOLDER, hung, muscle
 
 MUSCLES = {
@@ -29,7 +28,7 @@ MUSCLES = {
 KNOWN = [
     case
     for case, name in MUSCLES.items()
-    if kind_of_class(class_for(CONFIGURATIONS[name]["cls"])) is not None
+    if FORCE_TYPES.find(CONFIGURATIONS[name]["cls"]) is not None
 ]
 
 

@@ -25,12 +25,12 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.scholz_paths import Scholz2015GeometryPath
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.force_records import ForceElement
 from osimlite.simulation.elements.geometries.paths.scholz2015_geometry_path import (
     check as check_cable,
 )
-from osimlite.simulation.elements.items import ForceElement
-from osimlite.simulation.elements.probe import probe_elements
+from osimlite.simulation.elements.probe_type import probe_elements
 from osimlite.simulation.engines.linking import AT_HAND
 from osimlite.simulation.system import System
 

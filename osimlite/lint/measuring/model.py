@@ -24,7 +24,7 @@ from osimlite.mechanics.multibody.constraints import Coupler, Lock, Prescribed
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.simulation.elements.gather import GEODESIC
+from osimlite.simulation.elements.builder import GEODESIC
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.engines.linking import AT_HAND
 from osimlite.simulation.engines.machine_code import has_machine_code

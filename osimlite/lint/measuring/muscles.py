@@ -16,9 +16,10 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.states import states_of
-from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.elements.kind import Kind, kind_of_class
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.force_type import ForceType
 from osimlite.simulation.elements.parameters import Fields, Number, Numbers, Together
+from osimlite.simulation.elements.registry import FORCE_TYPES
 
 ROUNDING = 1e-9
 REST = 0.01
@@ -29,7 +30,7 @@ class Fibers(NamedTuple):
     """A muscle with its law, which is called as Python: some hundred times, where compiling it would take longer."""
 
     path: str  # of the muscle
-    kind: Kind  # of the muscle
+    kind: ForceType  # of the muscle
     component: Any  # the muscle
     values: tuple[Any, ...]  # of the parameters of the law, but for the control
 
@@ -88,7 +89,7 @@ def fibers_of(model: Model, mechanism: Mechanism, wanted: Container[str]) -> Ite
     """
     builder = ElementBuilder(model, mechanism, Path())
     for muscle in model.components(Muscle):
-        kind = kind_of_class(type(muscle))
+        kind = FORCE_TYPES.find(type(muscle))
         if kind is None or not muscle.appliesForce or builder.path(muscle) not in wanted:
             continue
         _, *terms = kind.terms

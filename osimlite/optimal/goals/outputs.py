@@ -19,7 +19,7 @@ from osimlite.schema.moco.goals import (
 )
 from osimlite.schema.moco.path_constraints import MocoOutputBoundConstraint
 from osimlite.schema.model import Model
-from osimlite.simulation.elements.kind import DeclaredForce
+from osimlite.simulation.elements.force_type import DeclaredForce
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
@@ -184,7 +184,11 @@ def _find_output(
     problem.functions.outputs  # noqa: B018
     forces: Any = problem.functions.forces.elements
     law = next(
-        (each.kind for each in forces if each.path == path and isinstance(each, DeclaredForce)),
+        (
+            each.force_type
+            for each in forces
+            if each.path == path and isinstance(each, DeclaredForce)
+        ),
         None,
     )
     index = law.known_of.get(name) if law is not None else None

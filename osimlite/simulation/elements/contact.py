@@ -23,8 +23,9 @@ from osimlite.schema.contact import (
 from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tree import Use
-from osimlite.simulation.elements.gather import ElementBuilder, Triple, kind_of, triple
-from osimlite.simulation.elements.items import Item, Response
+from osimlite.simulation.elements.builder import ElementBuilder, Triple, kind_of, triple
+from osimlite.simulation.elements.force_records import ForceRecord, Response
+from osimlite.simulation.elements.registry import register_force_type
 from osimlite.simulation.states import StateVariable
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ class PairContact:
     vt: float
     early_return: bool = False
 
-    def items(self, places: Places) -> list[Item]:
+    def items(self, places: Places) -> list[ForceRecord]:
         """An item for each pair, and what computes them one by one if they depend on one another."""
         result = []
         for pair in self.pairs:
@@ -101,14 +102,16 @@ class PairContact:
                 kernel = "touch_ellipsoid" if one.is_half_space else "touch_ellipsoids"
                 shapes = (surface for surface in (one, two) if not surface.is_half_space)
                 numbers = (*numbers, *(x for surface in shapes for x in _shape(surface, places)))
-            result.append(Item(kernel, links, numbers, is_contact=True, is_part=self.early_return))
+            result.append(
+                ForceRecord(kernel, links, numbers, is_contact=True, is_part=self.early_return)
+            )
         if self.early_return:
             result.append(self._early_return(places))
         else:
             result += self._responses()
         return result
 
-    def _responses(self) -> list[Item]:
+    def _responses(self) -> list[ForceRecord]:
         """What tells how the force of each pair of half spaces and spheres changes, along its normal and across it."""
         result, back = [], (ITEM.OWN + 2) * len(self.pairs)
         for pair in self.pairs:
@@ -117,7 +120,7 @@ class PairContact:
                 for axis in range(3):
                     ints = back, axis, int(one.is_half_space)
                     result.append(
-                        Item(ints=ints, is_part=True, response=Response(RESPONSE, 0, 0, 1))
+                        ForceRecord(ints=ints, is_part=True, response=Response(RESPONSE, 0, 0, 1))
                     )
                     back += ITEM.OWN + len(ints)
             back -= ITEM.OWN + 2
@@ -144,7 +147,7 @@ class PairContact:
             self.vt,
         )
 
-    def _early_return(self, places: Places) -> Item:
+    def _early_return(self, places: Places) -> ForceRecord:
         """What computes the pairs one by one in Simbody's order."""
         stations = [places.station(surface.body, surface.center) for surface in self.surfaces]
         links = (link for link, _ in stations)
@@ -155,7 +158,7 @@ class PairContact:
             for x in (*center, surface.radius)
         )
         ints = len(stations), len(self.pairs), *links, *pairs
-        return Item("early_return", ints, tuple(numbers), room=5 * len(stations))
+        return ForceRecord("early_return", ints, tuple(numbers), room=5 * len(stations))
 
     def pair_name(self, place: int) -> str:
         """What to call a pair: the force, and the surfaces if it has more than one pair."""
@@ -209,6 +212,7 @@ class PairContact:
         )
 
 
+@register_force_type
 class HuntCrossley(PairContact):
     """One HuntCrossleyForce on half spaces, spheres and ellipsoids."""
 

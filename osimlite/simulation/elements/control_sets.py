@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import inf, nextafter
 from pathlib import Path
 
 import numpy as np
 
 from osimlite.base.records import dataclass
+from osimlite.base.text import did_you_mean
 from osimlite.errors import ModelError
 from osimlite.io.document.part import read_object
+from osimlite.io.tables.storage import beside
 from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseConstant
 from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial
 from osimlite.schema.control_sets import (
@@ -20,7 +22,11 @@ from osimlite.schema.control_sets import (
     ControlLinearNode,
     ControlSet,
 )
+from osimlite.schema.controller_types import ControlSetController
+from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.control_tables import read_controls
+from osimlite.simulation.elements.controls import Drive, actuators_by_name, named
+from osimlite.simulation.elements.registry import register_controller
 
 
 @dataclass(frozen=True)
@@ -108,3 +114,33 @@ def _lines(times: Sequence[float], values: Sequence[float], *, goes_on: bool) ->
         return PiecewisePolynomial(np.array(times[:-1]), lines)
     ends = np.array(((values[0], 0.0), (values[-1], 0.0)))
     return PiecewisePolynomial(np.array((times[0], *times)), np.vstack((ends[:1], lines, ends[1:])))
+
+
+@register_controller(ControlSetController)
+def drive_by_control_set(
+    builder: ElementBuilder, controller: ControlSetController
+) -> Iterator[Drive]:
+    """What it does to the actuators that it names, and to the first of each name in its file.
+
+    Raises:
+        ModelError: there is no actuator of a name in the file, or a control has no meaning.
+    """
+    if controller.controls_file in ("", "Unassigned"):
+        return
+    path = beside(builder.folder, str(controller.controls_file))
+    result = ControlCurves.read(path)
+    driven = named(builder, controller)
+    actuators = actuators_by_name(builder)
+    for name in result.actuators:
+        if name not in actuators:
+            raise ModelError(
+                f"'{builder.path(controller)}' has no actuator for the control '{name}' of its file"
+                f"{did_you_mean(name, actuators)}",
+                file=str(path),
+            )
+        if all(item.name != name for item in driven):
+            driven.append(actuators[name])
+    for actuator in driven:
+        curve = result.of(actuator.name)
+        if curve is not None:
+            yield Drive(actuator, curve)

@@ -19,9 +19,10 @@ from osimlite.schema.base import Unknown
 from osimlite.schema.controller_types import ControlSetController, TrackingController
 from osimlite.schema.controllers import Controller
 from osimlite.simulation.elements.integral import value_of
+from osimlite.simulation.elements.registry import CONTROLLERS
 
 if TYPE_CHECKING:
-    from osimlite.simulation.elements.gather import ElementBuilder
+    from osimlite.simulation.elements.builder import ElementBuilder
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,21 +144,18 @@ class ModelControls:
 def _drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive]]:
     """What each enabled controller does.
 
-    A class of controllers is declared in the module of its name in `controllers/`, by a function
-    `drives`.
+    `CONTROLLERS` has the function of each class of controllers.
     """
-    from osimlite.simulation.elements.gather import module_of
-
     for controller in builder.components(Controller):
         if isinstance(controller, Unknown):
             continue
         # OpenSim 4.6 enables a ControlSetController that has read its file.
         if not (controller.enabled or isinstance(controller, ControlSetController)):
             continue
-        if (module := module_of("controllers", type(controller))) is not None:
+        if (drive_by := CONTROLLERS.find(type(controller))) is not None:
             path = builder.path(controller)
             if path not in builder.drives:
-                builder.drives[path] = list(module.drives(builder, controller))
+                builder.drives[path] = list(drive_by(builder, controller))
             yield from ((controller, drive) for drive in builder.drives[path])
             continue
         why = f" driven by the {type(controller).__name__} '{builder.path(controller)}'"

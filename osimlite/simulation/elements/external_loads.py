@@ -25,11 +25,12 @@ from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import natural_splines
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.prescribed import ExternalForce, ExternalLoads
-from osimlite.simulation.elements.geometries.load import Load
-from osimlite.simulation.elements.kind import DeclaredForce
+from osimlite.simulation.elements.force_type import DeclaredForce, ForceType
+from osimlite.simulation.elements.geometries.load import GivenLoad, Load
+from osimlite.simulation.elements.registry import register_force_type
 
 if TYPE_CHECKING:
-    from osimlite.simulation.elements.gather import ElementBuilder
+    from osimlite.simulation.elements.builder import ElementBuilder
 
 Functions = tuple[Function, Function, Function]
 TABLES = (".mot", ".sto", ENDING)
@@ -265,3 +266,14 @@ def functions_of(times: Array, columns: Array) -> list[Function]:
             PiecewiseLinear(tuple(times.tolist()), tuple(column)) for column in columns.T.tolist()
         ]
     return [*natural_splines(times, columns, 2)]
+
+
+class MeasuredLoad(GivenLoad):
+    """Load of an ExternalForce in a set of ExternalLoads that is part of the model."""
+
+    def read(self, builder: ElementBuilder, force: Any) -> Load:
+        """Return the load of a force."""
+        return load_in_model(builder, force)
+
+
+register_force_type(ForceType(ExternalForce, MeasuredLoad()))

@@ -25,6 +25,7 @@ from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.mechanics.multibody.spatial import Array, transform
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.contact_forces import ElasticFoundationForce
+from osimlite.simulation.elements.builder import ElementBuilder, triple
 from osimlite.simulation.elements.contact import (
     ContactPair,
     ContactSurface,
@@ -34,8 +35,8 @@ from osimlite.simulation.elements.contact import (
     place_of,
     surface_of,
 )
-from osimlite.simulation.elements.gather import ElementBuilder, triple
-from osimlite.simulation.elements.items import Item
+from osimlite.simulation.elements.force_records import ForceRecord
+from osimlite.simulation.elements.registry import register_force_type
 from osimlite.simulation.elements.triangle_mesh import TriangleMesh
 
 Load = tuple[Vector, Vector, float]
@@ -43,6 +44,7 @@ Load = tuple[Vector, Vector, float]
 
 
 @dataclass(frozen=True)
+@register_force_type
 class ElasticFoundation(PairContact):
     """One ElasticFoundationForce; surface 2 of each pair is a mesh, surface 1 may be one."""
 
@@ -82,16 +84,17 @@ class ElasticFoundation(PairContact):
             force.transition_velocity,
         )
 
-    def items(self, places: Places) -> list[Item]:
+    def items(self, places: Places) -> list[ForceRecord]:
         """The contacts, and after them what computes each."""
         contacts = [
-            Item("touch_mesh", (GROUND, GROUND), is_contact=True, is_part=True) for _ in self.pairs
+            ForceRecord("touch_mesh", (GROUND, GROUND), is_contact=True, is_part=True)
+            for _ in self.pairs
         ]
         return contacts + [
             self._pair(number, pair, places) for number, pair in enumerate(self.pairs)
         ]
 
-    def _pair(self, number: int, pair: ContactPair, places: Places) -> Item:
+    def _pair(self, number: int, pair: ContactPair, places: Places) -> ForceRecord:
         one, two = self.surfaces[pair.first], self.surfaces[pair.second]
         links, numbers = self.pair_numbers(pair, places)
         assert two.mesh is not None
@@ -100,7 +103,7 @@ class ElasticFoundation(PairContact):
             touching = _Meshes(
                 Springs(one, two, self.vt), places.placement(one.body), places.placement(two.body)
             )
-            return Item("", ints, numbers, room=MESH_WORK, python=touching)
+            return ForceRecord("", ints, numbers, room=MESH_WORK, python=touching)
         stiffness, *material = two.material
         middles = (places.station(two.body, middle)[1] for middle in two.mesh.centroids.tolist())
         springs = (
@@ -108,7 +111,7 @@ class ElasticFoundation(PairContact):
             for area, middle in zip(two.mesh.areas.tolist(), middles, strict=True)
             for x in (stiffness * area, *middle)
         )
-        return Item(
+        return ForceRecord(
             "touch_mesh", ints, (*numbers[:11], *material, self.vt, *springs), room=MESH_WORK
         )
 

@@ -21,9 +21,10 @@ from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.table import GIVEN, written
 from osimlite.mechanics.laws.dual_numbers import carrying, carrying_room, slope_of
 from osimlite.simulation.elements.laws import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
+from osimlite.simulation.elements.registry import FORCE_TYPES
 
 if TYPE_CHECKING:
-    from osimlite.simulation.elements.kind import Kind, State
+    from osimlite.simulation.elements.force_type import ForceType, State
     from osimlite.simulation.elements.parameters import Parameter
 
 SOLVED = "solved"
@@ -73,40 +74,44 @@ class Abreast(NamedTuple):
 class KernelText:
     """Writes the kernels of a kind."""
 
-    kind: Kind  # the declaration
+    force_type: ForceType  # the declaration
 
     @cached_property
     def kernel(self) -> Callable[..., int]:
         """The function that computes and applies one force."""
-        return self._function("", self.kind.law, [*self._computing, *self.kind.geometry.after])
+        return self._function(
+            "", self.force_type.law, [*self._computing, *self.force_type.geometry.after]
+        )
 
     @cached_property
     def off_kernel(self) -> Callable[..., int]:
         """The function that computes one force and does not apply it."""
-        return self._function(OFF, self.kind.law, self._computing)
+        return self._function(OFF, self.force_type.law, self._computing)
 
     @cached_property
     def equilibrium_kernel(self) -> Callable[..., int]:
         """The function that brings the states of one force into equilibrium."""
-        kind = self.kind
-        lines = [f"{', '.join((SOLVED, *kind.settled))} = {self._call(self._arguments)}"]
-        lines += self._noted((*kind.geometry.inputs, *kind.settled))
+        force_type = self.force_type
+        lines = [f"{', '.join((SOLVED, *force_type.settled))} = {self._call(self._arguments)}"]
+        lines += self._noted((*force_type.geometry.inputs, *force_type.settled))
         lines += [f"if not {SOLVED}:", "    return OUTCOME.UNSOLVED"]
         for place, state in self._places.items():
-            if state.name in kind.settled:
+            if state.name in force_type.settled:
                 lines += [f"if i[{place}] >= 0:", f"    y[i[{place}]] = {state.name}"]
-        return self._function(EQUILIBRIUM, kind.equilibrium, lines)
+        return self._function(EQUILIBRIUM, force_type.equilibrium, lines)
 
     @cached_property
     def rigid_kernel(self) -> Callable[..., int]:
         """The function of a muscle that pulls with its control times the force of fully active fibers."""
         lines = [f"active_fiber_force = {self._call(self._arguments)}"]
-        lines += [f"activation = {self._arguments[len(self.kind.geometry.inputs)]}"]
+        lines += [f"activation = {self._arguments[len(self.force_type.geometry.inputs)]}"]
         lines += ["tension = activation * active_fiber_force"]
         lines += self._noted(
-            ("tension", "activation", "active_fiber_force", *self.kind.geometry.inputs)
+            ("tension", "activation", "active_fiber_force", *self.force_type.geometry.inputs)
         )
-        return self._function(RIGID, self.kind.rigid, [*lines, *self.kind.geometry.after])
+        return self._function(
+            RIGID, self.force_type.rigid, [*lines, *self.force_type.geometry.after]
+        )
 
     @cached_property
     def response_kernel(self) -> Callable[..., int]:
@@ -116,11 +121,11 @@ class KernelText:
         :mod:`osimlite.mechanics.kernels.condensation`. The moment is that of the last evaluation,
         whose record tells what that has found.
         """
-        kind, force = self.kind, self.kind.geometry.along[0]
-        rows, changed = (force, *(state.rate for state in kind.states)), self.changed_outputs
+        force_type, force = self.force_type, self.force_type.geometry.along[0]
+        rows, changed = (force, *(state.rate for state in force_type.states)), self.changed_outputs
         arguments = self._arguments
         directions = {column: direction for direction, column in enumerate(changed)}
-        law, count = kind.again or kind.law, len(changed)
+        law, count = force_type.again or force_type.law, len(changed)
         for column, place in changed.items():
             arguments[place] = f"carrying({arguments[place]}, {directions[column]}, {count})"
         # Formulas compute in the record; controls have what reflexes add to them.
@@ -130,41 +135,50 @@ class KernelText:
             else each.replace(", rate)", ", 0.0)")
             for each in arguments
         ]
-        if kind.again is not None and kind.law is not None:
-            given = signature(kind.law).parameters
+        if force_type.again is not None and force_type.law is not None:
+            given = signature(force_type.law).parameters
             arguments += [
-                f"found[{kind.recorded[name]}]"
-                for name in signature(kind.again).parameters
+                f"found[{force_type.recorded[name]}]"
+                for name in signature(force_type.again).parameters
                 if name not in given
             ]
         # A rate may have the name of an output of another meaning, such as that of a state.
-        lines = [f"{', '.join(f'{name}_0' for name in kind.outputs)} = {self._call(arguments)}"]
-        lines += [f"{force} = 1.0", *kind.geometry.after, "change = at(data, WORK.SCRATCH)"]
+        lines = [
+            f"{', '.join(f'{name}_0' for name in force_type.outputs)} = {self._call(arguments)}"
+        ]
+        lines += [f"{force} = 1.0", *force_type.geometry.after, "change = at(data, WORK.SCRATCH)"]
         for row, name in enumerate(rows):
             for column in range(WIDTH):
                 value = (
                     f"slope_of({name}_0, {directions[column]})" if column in directions else "0.0"
                 )
                 lines.append(f"change[{WIDTH * row + column}] = {value}")
-        lines[:0] = *self._places_of_item, *(kind.geometry.again or kind.geometry.before)
+        lines[:0] = (
+            *self._places_of_item,
+            *(force_type.geometry.again or force_type.geometry.before),
+        )
         carried = {function.__name__: function for function in (carrying, carrying_room, slope_of)}
         return self._written(RESPONSE, "item", lines, law=law, **carried)
 
     @cached_property
     def abreast_kernel(self) -> Callable[..., int]:
         """The function that computes and applies several forces that follow one another."""
-        kind, made = self.kind, self.kind.abreast
+        force_type, made = self.force_type, self.force_type.abreast
         if made is None:
-            raise TypeError(f"the law of {kind.name} has no parts")
-        inputs, recorded, arguments = kind.geometry.inputs, kind.recorded, self._arguments
+            raise TypeError(f"the law of {force_type.name} has no parts")
+        inputs, recorded, arguments = (
+            force_type.geometry.inputs,
+            force_type.recorded,
+            self._arguments,
+        )
         # Up to the end the record has what is known.
         own = (f"found[{place}]" for name, place in recorded.items() if name not in inputs)
         known = dict(zip(made.known._fields, own, strict=False))
-        of_moment = len(self.input_names) + 1 + sum(state.given for state in kind.states)
+        of_moment = len(self.input_names) + 1 + sum(state.given for state in force_type.states)
         told = f"known({', '.join(known.values())}), {arguments[of_moment]}"
         begin = f"{', '.join(known.values())} = {self._call(arguments[: of_moment + 1], 'begin')}"
         first, second = made.asked, made.sought
-        *_, curves = kind.terms
+        *_, curves = force_type.terms
         places, number = {}, self.size - curves.size
         for name, term in zip(curves.type._fields, curves.terms, strict=True):  # type: ignore[attr-defined]
             places[name], number = f"i[ITEM.NUMBERS] + {number}", number + term.size
@@ -176,7 +190,13 @@ class KernelText:
         lines = [
             "asked = 0",
             *self._each(
-                [*kind.geometry.before, *self._noted(inputs), begin, *asks, f"asked += {count}"]
+                [
+                    *force_type.geometry.before,
+                    *self._noted(inputs),
+                    begin,
+                    *asks,
+                    f"asked += {count}",
+                ]
             ),
         ]
         answers = ", ".join(f"value_of(lanes, {count} * asked + {k})" for k in range(count))
@@ -206,9 +226,9 @@ class KernelText:
             f"{found} = found_law({told}, value_of(lanes, asked), missed_of(lanes, asked))",
             "asked += 1",
         ]
-        end = [f"{', '.join(kind.outputs)} = end({told})"]
+        end = [f"{', '.join(force_type.outputs)} = end({told})"]
         end += self._results(name for name in recorded if name not in inputs)
-        lines += self._each([*ended, *end, *kind.geometry.after])
+        lines += self._each([*ended, *end, *force_type.geometry.after])
         return self._written(
             ABREAST,
             "run",
@@ -247,24 +267,24 @@ class KernelText:
     @property
     def changed_outputs(self) -> dict[int, int]:
         """By column of the derivatives the place of the argument that is changed."""
-        kind = self.kind
+        force_type = self.force_type
         inputs = list(self.input_names)
         result = {
             column: inputs.index(name)
-            for column, name in enumerate(kind.geometry.inputs)
+            for column, name in enumerate(force_type.geometry.inputs)
             if name in inputs
         }
-        given = [column for column, state in enumerate(kind.states) if state.given]
-        first = len(inputs) + kind.controlled
+        given = [column for column, state in enumerate(force_type.states) if state.given]
+        first = len(inputs) + force_type.controlled
         return result | {2 + column: first + number for number, column in enumerate(given)}
 
     @property
     def responds(self) -> bool:
         """Whether its forces have derivatives along one displacement."""
-        kind = self.kind
+        force_type = self.force_type
         return (
-            kind.law is not None
-            and kind.geometry.along[0] in kind.outputs
+            force_type.law is not None
+            and force_type.geometry.along[0] in force_type.outputs
             and bool(self.changed_outputs)
         )
 
@@ -272,12 +292,12 @@ class KernelText:
         self, form: str, law: Callable[..., Any] | None, lines: Sequence[str]
     ) -> Callable[..., int]:
         return self._written(
-            form, "item", [*self._places_of_item, *self.kind.geometry.before, *lines], law=law
+            form, "item", [*self._places_of_item, *self.force_type.geometry.before, *lines], law=law
         )
 
     @property
     def _places_of_item(self) -> list[str]:
-        recorded = len(self.kind.recorded)
+        recorded = len(self.force_type.recorded)
         return [
             "i = at(model, item)",
             "p, found = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])",
@@ -287,7 +307,7 @@ class KernelText:
     def _written(
         self, form: str, place: str, lines: Sequence[str], **own: Any
     ) -> Callable[..., int]:
-        kind, name = self.kind, self.kind.name + form
+        force_type, name = self.force_type, self.force_type.name + form
         source = "\n    ".join(
             [
                 f'def {name}({GIVEN}, {place}: "int") -> "int":',
@@ -295,70 +315,76 @@ class KernelText:
                 "return OUTCOME.OK\n",
             ]
         )
-        scope = {name: value for term in kind.terms for name, value in term.functions().items()}
-        if kind.together is not None:
-            scope[kind.together.__name__] = kind.together
+        scope = {
+            name: value for term in force_type.terms for name, value in term.functions().items()
+        }
+        if force_type.together is not None:
+            scope[force_type.together.__name__] = force_type.together
         return written(
             name,
-            f"{__package__}.kinds.{kind.name}",
+            FORCE_TYPES.module_of(force_type.component),
             source,
             **own,
-            **kind.geometry.functions(),
+            **force_type.geometry.functions(),
             **scope,
         )
 
     @property
     def _computing(self) -> list[str]:
         """What is done with the law, but for the force."""
-        kind, lines = self.kind, []
-        if kind.law is not None:
-            results = f"{', '.join(kind.outputs)} = " if kind.outputs else ""
+        force_type, lines = self.force_type, []
+        if force_type.law is not None:
+            results = f"{', '.join(force_type.outputs)} = " if force_type.outputs else ""
             lines.append(f"{results}{self._call(self._arguments)}")
-        return lines + self._results(kind.recorded)
+        return lines + self._results(force_type.recorded)
 
     def _results(self, names: Iterable[str]) -> list[str]:
         """Note results of the law by their names, and what it says of states."""
-        kind, lines = self.kind, self._noted(names)
-        if SOLVED in kind.outputs:
+        force_type, lines = self.force_type, self._noted(names)
+        if SOLVED in force_type.outputs:
             lines += [f"if not {SOLVED}:", "    return OUTCOME.UNSOLVED"]
         for place, state in self._places.items():
             lines += [f"if i[{place}] >= 0:", f"    f[i[{place}]] = {state.rate}"]
         return lines
 
     def _noted(self, names: Iterable[str]) -> list[str]:
-        recorded = self.kind.recorded
+        recorded = self.force_type.recorded
         return [f"found[{recorded[name]}] = {name}" for name in names if name in recorded]
 
     @property
     def _places(self) -> dict[int, State]:
         """Each state, by the integer of an item that says where it is, -1 if it has none."""
-        first = ITEM.OWN + sum(term.heads for term in self.kind.terms)
-        return {first + number: state for number, state in enumerate(self.kind.states)}
+        first = ITEM.OWN + sum(term.heads for term in self.force_type.terms)
+        return {first + number: state for number, state in enumerate(self.force_type.states)}
 
     @property
     def _arguments(self) -> list[str]:
         """What a law is called with."""
-        kind = self.kind
-        terms = arguments_of(kind.terms, ITEM.OWN, 0)
+        force_type = self.force_type
+        terms = arguments_of(force_type.terms, ITEM.OWN, 0)
         given = [place for place, state in self._places.items() if state.given]
         states = [f"(y[i[{place}]] if i[{place}] >= 0 else 0.0)" for place in given]
-        count = 1 if kind.controlled else 0
+        count = 1 if force_type.controlled else 0
         return [*self.input_names, *terms[:count], *states, *terms[count:]]
 
     @property
     def input_names(self) -> tuple[str, ...]:
         """Names of what the law gets from the geometry."""
-        return self.kind.geometry.inputs if self.kind.inputs is None else self.kind.inputs
+        return (
+            self.force_type.geometry.inputs
+            if self.force_type.inputs is None
+            else self.force_type.inputs
+        )
 
     def _call(self, arguments: Sequence[str], law: str = "law") -> str:
         """The law called with these; as one, those that change with time, if the kind says so."""
-        made = self.kind.together
+        made = self.force_type.together
         if made is None:
             return f"{law}({', '.join(arguments)})"
         names = (
             *self.input_names,
             "excitation",
-            *(state.name for state in self.kind.states if state.given),
+            *(state.name for state in self.force_type.states if state.given),
         )
         given = dict(zip(names, arguments, strict=False))
         first = f"{made.__name__}({', '.join(given.get(name, '0.0') for name in made._fields)})"
@@ -367,12 +393,12 @@ class KernelText:
     @property
     def heads(self) -> int:
         """How many integers of an item are the kind's own."""
-        return sum(term.heads for term in self.kind.terms) + len(self.kind.states)
+        return sum(term.heads for term in self.force_type.terms) + len(self.force_type.states)
 
     @property
     def size(self) -> int:
         """How many numbers of an item are the parameters."""
-        return sum(term.size for term in self.kind.terms)
+        return sum(term.size for term in self.force_type.terms)
 
 
 def arguments_of(terms: Iterable[Parameter], head: int, number: int) -> list[str]:

@@ -10,11 +10,10 @@ likewise.
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import Any
 
 from osimlite.mechanics.kernels.table import LAW_MODULES, own_function
+from osimlite.simulation.elements.registry import FORCE_TYPES, PROBE_TYPES
 
 EQUILIBRIUM, OFF, RESPONSE, RIGID, ABREAST = (
     "_equilibrium",
@@ -56,16 +55,11 @@ def library_laws(directions: int = 0) -> list[str]:
     Args:
         directions: of the derivatives that their numbers carry; 0 for floats.
     """
-    kinds, probes = (import_module(f"{__package__}.{name}") for name in ("kinds", "probes"))
     names = list(LAW_MODULES)
-    for name in sorted(module.name for module in iter_modules(kinds.__path__)):
-        kind: Any = getattr(import_module(f"{kinds.__name__}.{name}"), "KIND", None)
-        if hasattr(kind, "forms"):
-            names += [name + form for form in kind.forms]
-    for name in sorted(module.name for module in iter_modules(probes.__path__)):
-        probe = getattr(import_module(f"{probes.__name__}.{name}"), "PROBE", None)
-        if getattr(probe, "law", None) is not None:
-            names.append(name)
+    for force_type in FORCE_TYPES:
+        # Contacts in pairs have kernels of the engine.
+        names += [force_type.name + form for form in getattr(force_type, "forms", ())]
+    names += [probe.name for probe in PROBE_TYPES if probe.law is not None]
     if not directions:
         return names
     # The kernels of responses have derivatives of their own within; nothing is brought into
@@ -94,10 +88,10 @@ def law_function(name: str) -> Callable[..., Any]:
     function: Callable[..., Any]
     if name in LAW_MODULES:
         function = own_function(name)
-    elif name.endswith("_probe"):
-        function = import_module(f"{__package__}.probes.{name}").PROBE.kernel
+    elif (probe := PROBE_TYPES.find_kernel(name)) is not None:
+        function = probe.kernel
     else:
-        module = next((name.removesuffix(form) for form in FORMS if name.endswith(form)), name)
-        kind = import_module(f"{__package__}.kinds.{module}").KIND
-        function = getattr(kind.text, FORMS.get(name.removeprefix(module), "kernel"))
+        stem = next((name.removesuffix(form) for form in FORMS if name.endswith(form)), name)
+        force_type = FORCE_TYPES.find_kernel(stem)
+        function = getattr(force_type.text, FORMS.get(name.removeprefix(stem), "kernel"))
     return function

@@ -8,9 +8,9 @@ from typing import Any
 
 from osimlite.errors import ModelError
 from osimlite.mechanics.laws.muscles import SIGNIFICANT, MuscleInputs
-from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.force_type import ForceType
 from osimlite.simulation.elements.geometries.path import PATH
-from osimlite.simulation.elements.kind import Kind
 from osimlite.simulation.elements.parameters import Number, Parameter, Vector
 
 RECORDED = (
@@ -118,7 +118,7 @@ def muscle(
     rates: tuple[str, ...],
     *parameters: Parameter,
     **more: Any,
-) -> Kind:
+) -> ForceType:
     """The kind of a muscle.
 
     Args:
@@ -128,7 +128,7 @@ def muscle(
         parameters: that the law is given.
         more: attributes of the kind.
     """
-    return Kind(
+    return ForceType(
         component,
         PATH,
         law,

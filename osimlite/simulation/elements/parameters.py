@@ -12,7 +12,7 @@ from osimlite.mechanics.kernels.functions import with_reflex
 from osimlite.mechanics.multibody.formula import Formula, program
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import Function
-from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.kernel_text import arguments_of
 
 

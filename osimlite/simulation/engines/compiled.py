@@ -24,7 +24,7 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
 from osimlite.simulation.batches import BatchEngine, BatchOptions, Runs, Watch
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.gather import OPENSIM
+from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.engines.base import KernelEngine
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.engines.linking import version

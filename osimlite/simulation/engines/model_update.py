@@ -23,9 +23,9 @@ from osimlite.schema.model import Model
 from osimlite.simulation.batches import Renewed
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.controls import Controls, ModelControls
-from osimlite.simulation.elements.items import Item
-from osimlite.simulation.elements.kind import kind_of_class
-from osimlite.simulation.elements.probe import DeclaredProbe, probe_elements
+from osimlite.simulation.elements.force_records import ForceRecord
+from osimlite.simulation.elements.probe_type import DeclaredProbe, probe_elements
+from osimlite.simulation.elements.registry import FORCE_TYPES
 from osimlite.simulation.pack import pack
 
 if TYPE_CHECKING:
@@ -85,7 +85,9 @@ class NumbersOnly:
                 if path in self._items
             ]
         sharing = {
-            type(owner) for owner in owners if getattr(kind_of_class(type(owner)), "shares", False)
+            type(owner)
+            for owner in owners
+            if getattr(FORCE_TYPES.find(type(owner)), "shares", False)
         }
         for force in (
             *owners,
@@ -157,10 +159,10 @@ class NumbersOnly:
         return packed.numbers if is_alike and packed.order == self._engine.order else None
 
 
-def _length(items: Sequence[Item]) -> int:
+def _length(items: Sequence[ForceRecord]) -> int:
     return sum(len(item.numbers) for item in items)
 
 
-def _kind(item: Item) -> tuple[object, ...]:
+def _kind(item: ForceRecord) -> tuple[object, ...]:
     """What of an item is not its numbers."""
     return item.kernel, item.ints, len(item.numbers), item.room, item.is_contact, item.is_part

@@ -14,7 +14,7 @@ from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.elements.probe import DeclaredProbe
+from osimlite.simulation.elements.probe_type import DeclaredProbe
 from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, NO_BOUNDS
 from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import Observer, Stepper

@@ -19,7 +19,7 @@ from osimlite.io.document.reader import read_text
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
-from osimlite.simulation.elements.gather import OPENSIM
+from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.engines import engine_name
 from osimlite.simulation.initial_state import in_units_of, suspect_value
 from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, check_integrator

@@ -14,7 +14,7 @@ from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateAc
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.springs import SpringGeneralizedForce
-from osimlite.simulation.elements.kinds.coordinate_limit_force import constants
+from osimlite.simulation.elements.force_types.coordinate_forces import read_limit_constants
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.draft import Draft, Lead, Unsayable, Value, add
 
@@ -62,7 +62,7 @@ def limit(draft: Draft, force: CoordinateLimitForce, path: str) -> str:
     """A spring beyond each limit: a tendon that is slack up to it."""
     lead, place = _lead(draft, force)
     info = draft.mechanism.coordinates[place]
-    Ku, qu, Kl, ql, D, t = constants(force, info)
+    Ku, qu, Kl, ql, D, t = read_limit_constants(force, info)
     if ql > qu:
         raise Unsayable("its lower limit lies above its upper one")
     if Ku == Kl:

@@ -8,7 +8,7 @@ from typing import Any
 from osimlite.errors import ModelError
 from osimlite.schema.forces import Force
 from osimlite.schema.muscles import Muscle
-from osimlite.simulation.elements.kind import kind_of_class
+from osimlite.simulation.elements.registry import FORCE_TYPES
 from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf import coordinate_forces as on_coordinates
 from osimlite.translate.mjcf import frame_forces as on_frames
@@ -44,7 +44,7 @@ def add_forces(draft: Draft) -> None:
         try:
             if not force.appliesForce:
                 raise Unsayable("its appliesForce is false")
-            if isinstance(force, Muscle) and kind_of_class(type(force)):
+            if isinstance(force, Muscle) and FORCE_TYPES.find(type(force)):
                 draft.fidelity.translated[path] = muscle(draft, force, path)
             elif what in MAKERS:
                 draft.fidelity.translated[path] = MAKERS[what](draft, force, path)

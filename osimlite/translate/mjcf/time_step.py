@@ -23,7 +23,7 @@ from osimlite.schema.muscles import Muscle
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
 from osimlite.schema.springs import BushingForce, PointToPointSpring, SpringGeneralizedForce
 from osimlite.simulation.elements import ElementBuilder, Forces
-from osimlite.simulation.elements.items import ForceElement
+from osimlite.simulation.elements.force_records import ForceElement
 from osimlite.simulation.system import System
 from osimlite.translate.mjcf.draft import Draft, text
 from osimlite.translate.mjcf.isometric import isometric_tension

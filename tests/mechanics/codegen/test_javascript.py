@@ -14,8 +14,9 @@ from osimlite.mechanics.codegen.reader import TranslationError
 from osimlite.mechanics.kernels.paths import pull_path
 from osimlite.mechanics.kernels.pointers import at
 from osimlite.mechanics.kernels.table import LAW_MODULES
-from osimlite.simulation.elements.kind import Kind, kinds
+from osimlite.simulation.elements.force_type import ForceType
 from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.elements.registry import FORCE_TYPES
 from tests.mechanics.codegen import constructs
 from tests.mechanics.codegen.compiled import are_same_bits, call_python
 
@@ -123,7 +124,7 @@ def test_what_is_not_known_is_an_error(function):
 
 def test_all_kernels_are_translated_but_those_with_random_numbers():
     """Noise of reflexes is of integers of 64 bits."""
-    kernels = [*LAW_MODULES, *(kind.name for kind in kinds() if isinstance(kind, Kind))]
+    kernels = [*LAW_MODULES, *(kind.name for kind in FORCE_TYPES if isinstance(kind, ForceType))]
     translated = []
     for name in kernels:
         try:

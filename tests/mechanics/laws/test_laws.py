@@ -12,7 +12,8 @@ from typing import get_type_hints
 
 from osimlite.mechanics import kernels
 from osimlite.mechanics import laws as forces
-from osimlite.simulation.elements.kind import Kind, kinds
+from osimlite.simulation.elements.force_type import ForceType
+from osimlite.simulation.elements.registry import FORCE_TYPES
 from tests.cases import of_each
 
 BUILT_IN = {"abs", "bool", "float", "int", "max", "min", "range"}
@@ -43,7 +44,7 @@ def laws():
         for module in modules
         for _, function in inspect.getmembers(module, inspect.isfunction)
     ]
-    for kind in (kind for kind in kinds() if isinstance(kind, Kind)):
+    for kind in (kind for kind in FORCE_TYPES if isinstance(kind, ForceType)):
         own = kind.law, kind.equilibrium, *kind.geometry.calls
         pending += [law for law in own if law is not None]
     result = set()

@@ -14,8 +14,10 @@ from osimlite.schema.coordinate_stops import (
     ExponentialCoordinateLimitForce,
 )
 from osimlite.simulation import Simulation
-from osimlite.simulation.elements.kinds.coordinate_linear_stop_force import stop
-from osimlite.simulation.elements.kinds.exponential_coordinate_limit_force import limits
+from osimlite.simulation.elements.force_types.coordinate_forces import (
+    compute_exponential_limit,
+    compute_linear_stop,
+)
 
 
 def slide(force) -> osimlite.Model:
@@ -76,8 +78,8 @@ def test_the_force_is_what_the_energy_falls_by():
     h = 1e-6
     for x in np.linspace(-0.3, 0.4, 29):
         for law, numbers in (
-            (stop, (100.0, 0.0, 0.1, -0.2)),
-            (limits, (-0.2, 0.3, 50.0, 75.0, 20.0, 25.0)),
+            (compute_linear_stop, (100.0, 0.0, 0.1, -0.2)),
+            (compute_exponential_limit, (-0.2, 0.3, 50.0, 75.0, 20.0, 25.0)),
         ):
             (_, before), (force, _), (_, after) = (law(x + d, 0.0, *numbers) for d in (-h, 0.0, h))
             assert force == pytest.approx((before - after) / (2.0 * h), rel=1e-6, abs=1e-4)

@@ -14,7 +14,7 @@ from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.elements.kind import DeclaredForce
+from osimlite.simulation.elements.force_type import DeclaredForce
 from osimlite.simulation.elements.laws import RESPONSE
 from osimlite.simulation.engines.linking import COMPILED
 from osimlite.simulation.system import System
@@ -66,7 +66,7 @@ def test_they_are_derivatives_of_the_law(case, monkeypatch):
     for system in (code, python):
         system.program.link_responses("bdf")
     given: dict[str, tuple[Any, ...]] = {}
-    for kind in {force.kind for force in forces.elements if isinstance(force, DeclaredForce)}:
+    for kind in {force.force_type for force in forces.elements if isinstance(force, DeclaredForce)}:
         if kind.text.responds:
             noted = partial(_noted, given, kind)
             monkeypatch.setitem(kind.text.kernel.__globals__, "law", noted)

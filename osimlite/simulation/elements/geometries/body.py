@@ -29,7 +29,7 @@ from osimlite.mechanics.laws.vectors import (
 )
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import GROUND
-from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
+from osimlite.simulation.elements.builder import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 

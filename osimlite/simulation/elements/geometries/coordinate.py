@@ -9,7 +9,7 @@ from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.layout import MODEL
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.multibody.links import Places
-from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 

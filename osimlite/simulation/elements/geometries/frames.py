@@ -21,7 +21,7 @@ from osimlite.mechanics.laws.bushing import xyz_angles, xyz_moment, xyz_rates
 from osimlite.mechanics.laws.vectors import minus, put, times, turned, turned_back, vector
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 DEVIATIONS, LOADS, RATES, AXES, ROOM = 12, 18, 24, 30, 48

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 from osimlite.mechanics.multibody.links import Places
-from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.elements.items import Item
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.force_records import ForceRecord
 
 
 class Geometry:
@@ -43,7 +43,7 @@ class Geometry:
             UnsupportedError: it acts where osimlite cannot compute it.
         """
 
-    def parts(self, place: Any, places: Places) -> list[Item]:
+    def parts(self, place: Any, places: Places) -> list[ForceRecord]:
         """Items that the code calls; `item - g[0]` then is the place of the last of them."""
         return []
 

@@ -10,7 +10,7 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.points import apply_force, station, velocity
 from osimlite.mechanics.laws.vectors import dot, minus, norm, put, times, vector
 from osimlite.mechanics.multibody.links import Places
-from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
+from osimlite.simulation.elements.builder import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 

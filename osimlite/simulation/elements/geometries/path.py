@@ -6,9 +6,10 @@ from typing import Any, Protocol
 
 from osimlite.mechanics.kernels.paths import known_length, path_length, pull_path
 from osimlite.mechanics.multibody.links import Places
-from osimlite.simulation.elements.gather import ElementBuilder, kind_of, module_of
+from osimlite.simulation.elements.builder import ElementBuilder, kind_of
+from osimlite.simulation.elements.force_records import ForceRecord
 from osimlite.simulation.elements.geometries.geometry import Geometry
-from osimlite.simulation.elements.items import Item
+from osimlite.simulation.elements.registry import PATHS
 
 
 class Path(Protocol):
@@ -17,7 +18,7 @@ class Path(Protocol):
     # whether its moment arm about a coordinate takes in those that must move with that
     coupled: bool
 
-    def items(self, places: Places) -> list[Item]:
+    def items(self, places: Places) -> list[ForceRecord]:
         """Parts, of which the last is the path's own; see :mod:`osimlite.mechanics.kernels.paths`."""
 
 
@@ -42,12 +43,13 @@ class AlongPath(Geometry):
         Raises: UnsupportedError: it is of a class, or wraps around a surface, that osimlite cannot
             compute. ModelError: it makes no sense.
         """
-        module = module_of("geometries.paths", type(force.geometry_path))
-        if module is None:
+        read_path = PATHS.find(type(force.geometry_path))
+        if read_path is None:
             raise builder.unsupported(force, f" on a {kind_of(force.geometry_path)}")
-        return module.read(builder, force)
+        path: Path = read_path(builder, force)
+        return path
 
-    def parts(self, place: Path, places: Places) -> list[Item]:
+    def parts(self, place: Path, places: Places) -> list[ForceRecord]:
         """Those of the path."""
         return place.items(places)
 

@@ -13,8 +13,8 @@ from osimlite.mechanics.kernels.points import apply_force, direction, station, v
 from osimlite.mechanics.laws.vectors import Vector, along, dot, minus, put, times, vector
 from osimlite.mechanics.multibody.links import Places
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
+from osimlite.simulation.elements.builder import ElementBuilder, kind_of
 from osimlite.simulation.elements.contact import ContactSurface, surface_of
-from osimlite.simulation.elements.gather import ElementBuilder, kind_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 NO_MATERIAL = (0.0, 0.0, 0.0, 0.0, 0.0)

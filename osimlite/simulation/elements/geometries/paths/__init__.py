@@ -1,4 +1,4 @@
-"""The classes of paths, each read by the module that has its name: `GeometryPath` by `geometry_path`.
+"""Classes of paths, each with the function that reads it in terms of the mechanism.
 
-The function `read(builder, owner)` of such a module takes the owner of the path.
+`PATHS` in :mod:`osimlite.simulation.elements.registry` names the module of each class.
 """

@@ -20,8 +20,10 @@ from osimlite.mechanics.multibody.functions import (
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.schema_functions import numeric
 from osimlite.schema.functions import Constant, ExpressionBasedFunction, MultiplierFunction
-from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.elements.items import Item
+from osimlite.schema.paths import FunctionBasedPath
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.force_records import ForceRecord
+from osimlite.simulation.elements.registry import register_path
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class OfCoordinates:
 
     coupled: ClassVar[bool] = False
 
-    def items(self, places: Places) -> list[Item]:
+    def items(self, places: Places) -> list[ForceRecord]:
         """What pulls, the functions, and the path."""
         values = [places.locked_value(coordinate) for coordinate in self.coordinates]
         freedoms = [places.freedom(coordinate) for coordinate in self.coordinates]
@@ -50,17 +52,17 @@ class OfCoordinates:
             if self.speed
             else []
         )
-        parts = [Item("pull_coordinates", is_part=True), *of_values, *of_speeds]
+        parts = [ForceRecord("pull_coordinates", is_part=True), *of_values, *of_speeds]
         backs = [
             sum(ITEM.OWN + len(item.ints) for item in parts[index:]) for index in range(len(parts))
         ]
         arms = backs[2 : 2 + len(self.arms)] or [0] * len(values)
         ints = backs[0], len(values), backs[1], backs[-1] if of_speeds else 0, *freedoms, *arms
-        return [*parts, Item("function_path", ints, room=ARMS + len(values), is_part=True)]
+        return [*parts, ForceRecord("function_path", ints, room=ARMS + len(values), is_part=True)]
 
     def _item(
         self, function: Function | Formula, arguments: Sequence[int], values: Sequence[float]
-    ) -> Item:
+    ) -> ForceRecord:
         """A function of places in a state; where one is negative, of a value in its place."""
         size, room = len(arguments), DERIVATIVES + len(arguments)
         if isinstance(function, Formula):
@@ -70,10 +72,12 @@ class OfCoordinates:
                 ints += [len(steps) // 3, len(numbers), *steps]
                 numbers += constants
             registers = size + max(len(item.steps) for item in formulas)
-            return Item("formula", tuple(ints), tuple(numbers), room=room + registers, is_part=True)
+            return ForceRecord(
+                "formula", tuple(ints), tuple(numbers), room=room + registers, is_part=True
+            )
         if size == 1:
             table = table_of_one(function, f"a function of the path of '{self.path}'")
-            return Item(
+            return ForceRecord(
                 "function_of_one", (1, 0, *arguments), (*values, *table), room=room, is_part=True
             )
         factor = 1.0
@@ -86,12 +90,13 @@ class OfCoordinates:
             order, coefficients = max(map(sum, function.powers)), function.coefficients
         numbers = [*values, *(factor * coefficient for coefficient in coefficients)]
         room += size * (order + 1) + 2 * size
-        return Item(
+        return ForceRecord(
             "polynomial", (size, order, *arguments), tuple(numbers), room=room, is_part=True
         )
 
 
-def read(builder: ElementBuilder, owner: Any) -> OfCoordinates:
+@register_path(FunctionBasedPath)
+def read_function_path(builder: ElementBuilder, owner: Any) -> OfCoordinates:
     """The functions of an owner's path.
 
     Raises:

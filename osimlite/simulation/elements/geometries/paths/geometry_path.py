@@ -37,12 +37,14 @@ from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.paths import (
     AbstractPathPoint,
     ConditionalPathPoint,
+    GeometryPath,
     MovingPathPoint,
     PathPoint,
 )
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere, WrapTorus
-from osimlite.simulation.elements.gather import ElementBuilder, kind_of
-from osimlite.simulation.elements.items import Item
+from osimlite.simulation.elements.builder import ElementBuilder, kind_of
+from osimlite.simulation.elements.force_records import ForceRecord
+from osimlite.simulation.elements.registry import register_path
 
 TOLERANCE = 1e-5
 """A conditional point counts so far outside its range, in OpenSim."""
@@ -128,15 +130,15 @@ class ThroughPoints:
         first = self.points[0]
         return first.body, first.frame[:3, :3] @ first.location + first.frame[:3, 3]
 
-    def items(self, places: Places) -> list[Item]:
+    def items(self, places: Places) -> list[ForceRecord]:
         """What pulls, the surfaces, and the path."""
-        parts = [Item("pull_points", is_part=True)]
+        parts = [ForceRecord("pull_points", is_part=True)]
         wraps: list[int] = []
         behind = sum(bool(surface.law) for surface in self.surfaces)
         for surface in () if self.geodesic else self.surfaces:
             if surface.law:
                 parts.append(
-                    Item(surface.law, (), surface.numbers, room=SURFACE_WORK, is_part=True)
+                    ForceRecord(surface.law, (), surface.numbers, room=SURFACE_WORK, is_part=True)
                 )
                 wraps.append(ITEM.OWN * (behind + 2 - len(parts)))
             else:
@@ -165,10 +167,14 @@ class ThroughPoints:
             most = max(Counter(surface.first for surface in self.surfaces).values())
             slots, room = slots_and_room(most, len(self.surfaces), room)
             kernel, wraps = "geodesic_path", wraps + slots
-        return [*parts, Item(kernel, (*ints, *wraps), tuple(numbers), room=room, is_part=True)]
+        return [
+            *parts,
+            ForceRecord(kernel, (*ints, *wraps), tuple(numbers), room=room, is_part=True),
+        ]
 
 
-def read(builder: ElementBuilder, owner: Any) -> ThroughPoints:
+@register_path(GeometryPath)
+def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
     """The points of an owner's path, and the surfaces that it wraps around.
 
     Raises:

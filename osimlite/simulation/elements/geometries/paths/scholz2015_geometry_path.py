@@ -54,9 +54,10 @@ from osimlite.schema.contact import (
     ContactSphere,
     ContactTorus,
 )
-from osimlite.schema.scholz_paths import Scholz2015GeometryPathPoint
-from osimlite.simulation.elements.gather import ElementBuilder, kind_of
-from osimlite.simulation.elements.items import Item
+from osimlite.schema.scholz_paths import Scholz2015GeometryPath, Scholz2015GeometryPathPoint
+from osimlite.simulation.elements.builder import ElementBuilder, kind_of
+from osimlite.simulation.elements.force_records import ForceRecord
+from osimlite.simulation.elements.registry import register_path
 
 FIRST_STEP = 1e-10
 """Of the first integration of a geodesic, m."""
@@ -127,7 +128,7 @@ class Cable:
         assert isinstance(first, Point)
         return first.body, first.runs
 
-    def items(self, places: Places) -> list[Item]:
+    def items(self, places: Places) -> list[ForceRecord]:
         """What pulls, and the path."""
         most = together = 0
         ints, numbers, work = list[int](), list[float](), FIRST
@@ -139,14 +140,14 @@ class Cable:
             numbers += own
             work += element.work
         head = ITEM.OWN, len(self.elements), work
-        path = Item(
+        path = ForceRecord(
             "cable_path",
             (*head, *ints),
             tuple(numbers),
             room=work + solver_room(most),
             is_part=True,
         )
-        return [Item("pull_cable", is_part=True), path]
+        return [ForceRecord("pull_cable", is_part=True), path]
 
     def found(self, mechanism: Mechanism, q: Array) -> Cable | None:
         """The same, which begins with what it is at a pose; None if it is none there."""
@@ -170,7 +171,8 @@ class Cable:
         )
 
 
-def read(builder: ElementBuilder, owner: Any) -> Cable:
+@register_path(Scholz2015GeometryPath)
+def read_cable(builder: ElementBuilder, owner: Any) -> Cable:
     """The elements of an owner's path.
 
     Raises:
@@ -223,7 +225,7 @@ def check(builder: ElementBuilder, owner: Any) -> None:
                     f"the point '{name}' of the path of '{builder.path(owner)}' is inside the "
                     f"obstacle '{geometry.name}' where the model starts; move it out"
                 )
-    read(builder, owner)
+    read_cable(builder, owner)
 
 
 def _is_enclosed(builder: ElementBuilder, point_item: Any, geometry: ContactGeometry) -> bool:

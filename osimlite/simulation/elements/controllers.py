@@ -1,0 +1,113 @@
+"""Controllers that are functions of time, columns of a file, or reflexes of muscles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from osimlite.base.text import did_you_mean
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.io.tables.storage import beside
+from osimlite.schema.actuators import Actuator
+from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.examples import ToyPropMyoController, ToyReflexController
+from osimlite.schema.muscles import Muscle
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.control_tables import column_function, read_controls
+from osimlite.simulation.elements.controls import Drive, Reflex, actuators_by_name, named
+from osimlite.simulation.elements.registry import register_controller
+
+LISTS_OF_PATHS = 40600
+"""Documents before this version name actuators by their names."""
+
+
+@register_controller(PrescribedController)
+def drive_as_prescribed(
+    builder: ElementBuilder, controller: PrescribedController
+) -> Iterator[Drive]:
+    """What it does to each actuator.
+
+    Raises:
+        ModelError: it has not one function for each actuator, or its file does not fit.
+    """
+    path, given = builder.path(controller), controller.ControlFunctions.objects
+    actuators = named(builder, controller)
+    if len(given) != len(actuators):
+        raise ModelError(
+            f"'{path}' has {len(given)} functions for {len(actuators)} actuators; give it one for each"
+        )
+    for actuator, function in zip(actuators, given, strict=True):
+        try:
+            signal: Any = builder.function(actuator, function, f"control by {path}")
+        except UnsupportedError as error:
+            signal = error
+        yield Drive(actuator, signal)
+    if controller.controls_file:
+        yield from _from_file(builder, controller, actuators)
+
+
+def _from_file(
+    builder: ElementBuilder, controller: PrescribedController, taken: list[Any]
+) -> Iterator[Drive]:
+    """The columns of the file, which are called by names or paths of actuators.
+
+    As in OpenSim, a column is passed over if the controller names an actuator by the same word, or
+    if one before it has the same label.
+    """
+    path = builder.path(controller)
+    actuators = actuators_by_name(builder)
+    actuators |= {builder.path(item): item for item in builder.components(Actuator)}
+    table = read_controls(beside(builder.folder, str(controller.controls_file)))
+    known = {
+        word if isinstance(word, str) else builder.path(word)
+        for word in controller.socket_actuators
+    }
+    if builder.model.document_version < LISTS_OF_PATHS:
+        known |= {item.name for item in taken}
+    taken = list(taken)
+    for index, label in enumerate(table.columns):
+        if label in known:
+            continue
+        if label not in actuators:
+            names = [item.name for item in actuators.values()]
+            raise ModelError(
+                f"the column '{label}' of the file of '{path}' is no actuator of the model{did_you_mean(label, names)}",
+                file=table.file,
+            )
+        actuator = actuators[label]
+        if any(item is actuator for item in taken):
+            raise ModelError(
+                f"'{path}' sets '{builder.path(actuator)}' by the column '{label}' and otherwise too; leave one out",
+                file=table.file,
+            )
+        known.add(label)
+        taken.append(actuator)
+        degree = 1 if controller.interpolation_method is None else controller.interpolation_method
+        yield Drive(
+            actuator, column_function(table, index, degree, f"the interpolation_method of '{path}'")
+        )
+
+
+@register_controller(ToyReflexController)
+def drive_by_reflex(builder: ElementBuilder, controller: ToyReflexController) -> Iterator[Drive]:
+    """The gain where a muscle lengthens at its greatest contraction velocity, less where it is slower.
+
+    Raises:
+        ModelError: it names an actuator that is no muscle.
+    """
+    for muscle in named(builder, controller):
+        if isinstance(muscle, Actuator) and not isinstance(muscle, Muscle):
+            raise ModelError(
+                f"'{builder.path(controller)}' drives '{builder.path(muscle)}', which is no muscle; name muscles only"
+            )
+        yield Drive(muscle, Reflex(controller.gain))
+
+
+@register_controller(ToyPropMyoController)
+def refuse_proportional_control(
+    builder: ElementBuilder, controller: ToyPropMyoController
+) -> Iterator[Drive]:
+    """Why its actuator cannot be computed."""
+    actuator = builder.target(controller, "socket_actuator", controller.socket_actuator)
+    why = f" driven by the ToyPropMyoController '{builder.path(controller)}', which follows an activation"
+    yield Drive(actuator, builder.unsupported(actuator, why))

@@ -1,1 +1,0 @@
-"""What each class of controllers does, in the module of its name: `drives(builder, controller)` yields it."""

@@ -1,0 +1,148 @@
+"""Bushings between two frames: loads that are linear, functions, or expressions of the deviations."""
+
+from collections.abc import Sequence
+
+from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.programs import compute
+from osimlite.mechanics.laws.bushing import bushing_dissipation, bushing_load
+from osimlite.mechanics.laws.springs import spring_energy
+from osimlite.schema.springs import (
+    BushingForce,
+    ExpressionBasedBushingForce,
+    FunctionBasedBushingForce,
+)
+from osimlite.simulation.elements.force_type import DeclaredForce, ForceType, State
+from osimlite.simulation.elements.geometries.frames import DEVIATIONS, BetweenFrames, damp, damped
+from osimlite.simulation.elements.integral import integral
+from osimlite.simulation.elements.parameters import Curve, Expressions, Vector
+from osimlite.simulation.elements.registry import register_force_type
+
+
+def compute_linear_bushing(
+    deviations: Floats, rates: Floats, loads: Floats, stiffness: Floats, damping: Floats
+) -> tuple[float, float]:
+    """Energy, and the power that the dampers take up; fills the loads."""
+    energy = power = 0.0
+    for k in range(6):
+        rate = damped(rates[k], damping[k])
+        loads[k] = bushing_load(deviations[k], rate, stiffness[k], damping[k])
+        energy += spring_energy(deviations[k], stiffness[k])
+        power += bushing_dissipation(rate, damping[k])
+    return energy, power
+
+
+register_force_type(
+    ForceType(
+        BushingForce,
+        BetweenFrames(about_bodies=True),
+        compute_linear_bushing,
+        outputs=("energy", "dissipated_energy_rate"),
+        parameters=(
+            Vector(
+                6,
+                lambda builder, force: (
+                    *force.rotational_stiffness,
+                    *force.translational_stiffness,
+                ),
+            ),
+            Vector(
+                6, lambda builder, force: (*force.rotational_damping, *force.translational_damping)
+            ),
+        ),
+        states=(State("dissipated_energy", given=False, is_simbody=True),),
+        goes_on=True,
+    )
+)
+
+
+def compute_function_bushing(
+    deviations: Floats,
+    rates: Floats,
+    loads: Floats,
+    damping: Floats,
+    mx: Floats,
+    my: Floats,
+    mz: Floats,
+    fx: Floats,
+    fy: Floats,
+    fz: Floats,
+) -> None:
+    """Fill the loads."""
+    loads[0], _, _ = value_at(mx, deviations[0])
+    loads[1], _, _ = value_at(my, deviations[1])
+    loads[2], _, _ = value_at(mz, deviations[2])
+    loads[3], _, _ = value_at(fx, deviations[3])
+    loads[4], _, _ = value_at(fy, deviations[4])
+    loads[5], _, _ = value_at(fz, deviations[5])
+    damp(loads, rates, damping)
+
+
+def _compute_function_energy(force: DeclaredForce, record: Sequence[float]) -> float:
+    _, *functions = force.values
+    deviations = record[DEVIATIONS : DEVIATIONS + 6]
+    return sum(
+        integral(function, 0.0, value)
+        for function, value in zip(functions, deviations, strict=True)
+    )
+
+
+register_force_type(
+    ForceType(
+        FunctionBasedBushingForce,
+        BetweenFrames(),
+        compute_function_bushing,
+        parameters=(
+            Vector(
+                6, lambda builder, force: (*force.rotational_damping, *force.translational_damping)
+            ),
+            Curve("m_x_theta_x_function"),
+            Curve("m_y_theta_y_function"),
+            Curve("m_z_theta_z_function"),
+            Curve("f_x_delta_x_function"),
+            Curve("f_y_delta_y_function"),
+            Curve("f_z_delta_z_function"),
+        ),
+        stored=_compute_function_energy,
+    )
+)
+
+
+DEVIATION_NAMES = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
+
+
+def compute_expression_bushing(
+    deviations: Floats,
+    rates: Floats,
+    loads: Floats,
+    damping: Floats,
+    steps: Ints,
+    constants: Floats,
+    registers: Floats,
+) -> None:
+    """Fill the loads."""
+    for k in range(6):
+        registers[k] = deviations[k]
+    for k in range(6):
+        # Each formula has its count of steps before it, and the place of its constants.
+        loads[k] = compute(at(steps, 2), steps[0], at(constants, steps[1]), registers, 6)
+        steps = at(steps, 2 + 3 * steps[0])
+    damp(loads, rates, damping)
+
+
+register_force_type(
+    ForceType(
+        ExpressionBasedBushingForce,
+        BetweenFrames(),
+        compute_expression_bushing,
+        parameters=(
+            Vector(
+                6, lambda builder, force: (*force.rotational_damping, *force.translational_damping)
+            ),
+            Expressions(
+                tuple(f"{load}_expression" for load in ("Mx", "My", "Mz", "Fx", "Fy", "Fz")),
+                DEVIATION_NAMES,
+            ),
+        ),
+    )
+)

@@ -1,0 +1,188 @@
+"""Springs, stops and expressions that act on a coordinate."""
+
+from math import exp
+from typing import Any
+
+from osimlite.errors import ModelError
+from osimlite.mechanics.kernels.programs import of_two
+from osimlite.mechanics.laws.coordinate_limit import (
+    limit_constants,
+    limit_dissipation,
+    limit_energy,
+    limit_force,
+)
+from osimlite.mechanics.laws.springs import coordinate_spring_force, spring_energy
+from osimlite.mechanics.multibody.mechanism import CoordinateInfo
+from osimlite.schema.coordinate_stops import (
+    CoordinateLinearStopForce,
+    ExponentialCoordinateLimitForce,
+)
+from osimlite.schema.forces import CoordinateLimitForce
+from osimlite.schema.springs import ExpressionBasedCoordinateForce, SpringGeneralizedForce
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.force_type import ForceType, State
+from osimlite.simulation.elements.geometries.coordinate import COORDINATE, OnCoordinate
+from osimlite.simulation.elements.parameters import Expression, Numbers
+from osimlite.simulation.elements.registry import register_force_type
+
+
+def compute_coordinate_spring(
+    q: float, u: float, k: float, q0: float, c: float
+) -> tuple[float, float]:
+    """Force and energy."""
+    return coordinate_spring_force(q, u, k, q0, c), spring_energy(q - q0, k)
+
+
+register_force_type(
+    ForceType(
+        SpringGeneralizedForce,
+        COORDINATE,
+        compute_coordinate_spring,
+        outputs=("force", "energy"),
+        parameters=("stiffness", "rest_length", "viscosity"),
+        labels={"{name}_Force": "force"},
+    )
+)
+
+
+register_force_type(
+    ForceType(
+        ExpressionBasedCoordinateForce,
+        COORDINATE,
+        of_two,
+        outputs=("force",),
+        parameters=(Expression("expression", ("q", "qdot")),),
+        labels={"{name}": "force"},
+    )
+)
+
+
+def compute_coordinate_limit(
+    q: float, u: float, Ku: float, qu: float, Kl: float, ql: float, D: float, t: float
+) -> tuple[float, float, float]:
+    """Force, power that the damper takes up, energy."""
+    if ql <= q <= qu:
+        return 0.0, 0.0, 0.0
+    force = limit_force(q, u, Ku, qu, Kl, ql, D, t)
+    return force, limit_dissipation(q, u, qu, ql, D, t), limit_energy(q, Ku, qu, Kl, ql, t)
+
+
+def read_limit_constants(
+    force: CoordinateLimitForce, info: CoordinateInfo
+) -> tuple[float, float, float, float, float, float]:
+    """What the law is given besides the state, from the properties of the force and what its coordinate is."""
+    return limit_constants(
+        force.upper_stiffness,
+        force.upper_limit,
+        force.lower_stiffness,
+        force.lower_limit,
+        force.damping,
+        force.transition,
+        info.motion_type == "rotational",
+    )
+
+
+def _read_limit_parameters(
+    builder: ElementBuilder, force: CoordinateLimitForce
+) -> tuple[float, ...]:
+    return read_limit_constants(force, builder.mechanism.coordinates[builder.coordinate(force)])
+
+
+register_force_type(
+    ForceType(
+        CoordinateLimitForce,
+        COORDINATE,
+        compute_coordinate_limit,
+        outputs=("force", "dissipatedEnergy_rate", "energy"),
+        parameters=(Numbers(6, _read_limit_parameters),),
+        states=(State("dissipatedEnergy", given=False),),
+        labels={"{name}": "force", "{name}.PotentialEnergy": "energy"},
+    )
+)
+
+
+def compute_linear_stop(
+    q: float, u: float, k: float, d: float, upper: float, lower: float
+) -> tuple[float, float]:
+    """Generalized force -k x (1 + d v), N.m (N for a translation), which never pulls, and energy k x^2 / 2, J.
+
+    x is how far the coordinate is beyond the limit, and v how fast it runs on. Source: Simbody's
+    MobilityLinearStop, as the documentation of OpenSim's class has it.
+
+    Args:
+        q: coordinate, rad (m).
+        u: its speed, rad/s (m/s).
+        k: stiffness, N.m/rad (N/m).
+        d: damping, s/rad (s/m).
+        upper: limit, rad (m).
+        lower: limit, rad (m).
+    """
+    if q > upper:
+        return min(0.0, -k * (q - upper) * (1.0 + d * u)), 0.5 * k * (q - upper) * (q - upper)
+    if q < lower:
+        return max(0.0, -k * (q - lower) * (1.0 - d * u)), 0.5 * k * (q - lower) * (q - lower)
+    return 0.0, 0.0
+
+
+def _check_linear_stop(builder: ElementBuilder, force: Any) -> None:
+    if force.stiffness < 0.0 or force.damping < 0.0 or force.lower_limit > force.upper_limit:
+        raise ModelError(
+            f"'{builder.path(force)}' needs a stiffness and a damping that are not negative, and a lower_limit that is "
+            "not above the upper_limit"
+        )
+
+
+register_force_type(
+    ForceType(
+        CoordinateLinearStopForce,
+        OnCoordinate("socket_coordinate"),
+        compute_linear_stop,
+        outputs=("force", "energy"),
+        parameters=("stiffness", "damping", "upper_limit", "lower_limit"),
+        labels={"{name}": "force", "PotentialEnergy": "energy"},
+        check=_check_linear_stop,
+    )
+)
+
+
+def compute_exponential_limit(
+    q: float, u: float, lower: float, upper: float, a: float, b: float, c: float, d: float
+) -> tuple[float, float]:
+    """Generalized force a exp(-b (q - lower)) - c exp(d (q - upper)), N.m (N for a translation), and its energy, J.
+
+    Source: F. C. Anderson and M. G. Pandy, "A dynamic optimization solution for vertical jumping in
+    three dimensions", Computer Methods in Biomechanics and Biomedical Engineering 2 (1999) 201-231.
+
+    Args:
+        q: coordinate, rad (m).
+        u: its speed; nothing depends on it.
+        lower: limit, rad (m).
+        upper: limit, rad (m).
+        a: force at the lower limit, N.m (N).
+        b: how steeply it grows, 1/rad (1/m).
+        c: force at the upper limit, N.m (N).
+        d: how steeply it grows, 1/rad (1/m).
+    """
+    below, above = a * exp(-b * (q - lower)), c * exp(d * (q - upper))
+    return below - above, below / b + above / d
+
+
+def _read_shape_parameters(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
+    shapes = *force.lower_shape_parameters, *force.upper_shape_parameters
+    if not all(shape > 0.0 for shape in shapes):
+        raise ModelError(
+            f"the shape parameters of '{builder.path(force)}' are not all positive; give such"
+        )
+    return shapes
+
+
+register_force_type(
+    ForceType(
+        ExponentialCoordinateLimitForce,
+        OnCoordinate("socket_coordinate"),
+        compute_exponential_limit,
+        outputs=("force", "energy"),
+        parameters=("lower_limit", "upper_limit", Numbers(4, _read_shape_parameters)),
+        labels={"{name}": "force", "PotentialEnergy": "energy"},
+    )
+)

@@ -1,0 +1,283 @@
+"""The muscles of Millard 2012: fibers and tendon in equilibrium, or with a mass between them."""
+
+from collections.abc import Sequence
+from functools import partial
+from math import cos, pi
+from typing import Any
+
+from osimlite.mechanics.laws.millard2012_acceleration import (
+    AccelerationCurves,
+    Millard2012Acceleration,
+    millard2012_acceleration,
+    millard2012_acceleration_energy,
+    millard2012_acceleration_equilibrium,
+    millard2012_acceleration_rigid,
+)
+from osimlite.mechanics.laws.millard2012_equilibrium import (
+    Fibers,
+    Millard2012Equilibrium,
+    MillardCurves,
+    fibers_asking,
+    fibers_at,
+    fibers_loaded,
+    fibers_moved,
+    millard2012_again,
+    millard2012_energy,
+    millard2012_equilibrium,
+    millard2012_equilibrium_length,
+    millard2012_rigid,
+    muscle_of,
+)
+from osimlite.mechanics.laws.muscle_curves import (
+    ACTIVE_SIZE,
+    COMPRESSIVE_SIZE,
+    PASSIVE_SIZE,
+    TENDON_SIZE,
+    VELOCITY_SIZE,
+    active_force_length,
+    fiber_compressive_force_cos_pennation,
+    fiber_compressive_force_length,
+    fiber_force_length,
+    force_velocity,
+    tendon_force_length,
+)
+from osimlite.mechanics.laws.muscles import SIGNIFICANT, pennation
+from osimlite.schema.muscle_parts import MuscleFirstOrderActivationDynamicModel
+from osimlite.schema.muscles import Millard2012AccelerationMuscle, Millard2012EquilibriumMuscle
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.force_type import DeclaredForce, State
+from osimlite.simulation.elements.kernel_text import Abreast, Asked, Sought
+from osimlite.simulation.elements.muscle import PENNATION, SPRING, curve, muscle, require
+from osimlite.simulation.elements.parameters import Fields, Number, Together, positive
+from osimlite.simulation.elements.registry import register_force_type
+
+MIN_FIBER_DAMPING = 0.001
+"""A muscle whose `fiber_damping` is less has none, as in OpenSim."""
+
+
+def _read_minimum_activation(force: Any) -> float:
+    # Without dynamics of activation, OpenSim's part for them never hears of the property.
+    owner = MuscleFirstOrderActivationDynamicModel() if force.ignore_activation_dynamics else force
+    return float(owner.minimum_activation)
+
+
+def _read_pennation(force: Any) -> tuple[float, ...]:
+    return pennation(
+        force.optimal_fiber_length, force.pennation_angle_at_optimal, force.maximum_pennation_angle
+    )
+
+
+def _min_fiber_length(force: Any) -> float:
+    by_curve: float = (
+        force.active_force_length_curve.min_norm_active_fiber_length * force.optimal_fiber_length
+    )
+    return max(SIGNIFICANT, by_curve, _read_pennation(force)[1])
+
+
+def _read_equilibrium_fields(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
+    damping = force.fiber_damping if force.fiber_damping >= MIN_FIBER_DAMPING else 0.0
+    return (
+        damping,
+        _read_minimum_activation(force),
+        *_read_pennation(force),
+        _min_fiber_length(force),
+    )
+
+
+def _adapt_active_curve(force: Any) -> dict[str, float]:
+    least = force.active_force_length_curve.minimum_value
+    return {"minimum_value": max(least, 0.1) if force.is_classic else min(least, 0.0)}
+
+
+def _adapt_velocity_curve(force: Any) -> dict[str, float]:
+    own = force.force_velocity_curve
+    ends = own.concentric_slope_at_vmax, own.eccentric_slope_at_vmax
+    if force.is_classic:
+        return _set_end_slopes(*map(max, ends, _adapt_inverse_curve(force).values()))
+    return _set_end_slopes(*(min(end, 0.0) for end in ends))
+
+
+def _adapt_inverse_curve(force: Any) -> dict[str, float]:
+    own = force.force_velocity_curve
+    return _set_end_slopes(
+        0.5 * own.concentric_slope_near_vmax, 0.5 * own.eccentric_slope_near_vmax
+    )
+
+
+def _set_end_slopes(concentric: float, eccentric: float) -> dict[str, float]:
+    return {"concentric_slope_at_vmax": concentric, "eccentric_slope_at_vmax": eccentric}
+
+
+def _check_equilibrium_muscle(builder: ElementBuilder, force: Any) -> None:
+    least = 0.01 if force.is_classic else 0.0
+    slack = Number("tendon_slack_length", lambda x: x >= 0.0, "is negative")
+    require(
+        builder,
+        force,
+        Number("minimum_activation", lambda x: x >= least, f"is less than {least:g}"),
+        slack if force.ignore_tendon_compliance else positive("tendon_slack_length"),
+    )
+
+
+def _compute_equilibrium_energy(force: DeclaredForce, record: Sequence[float]) -> float:
+    _, m, curves = force.values
+    known = force.known(record)
+    return millard2012_energy(
+        m, known["length"], known["fiber_length"], known["cos_pennation"], curves
+    )
+
+
+register_force_type(
+    muscle(
+        Millard2012EquilibriumMuscle,
+        millard2012_equilibrium,
+        ("solved", "activation_rate", "fiber_velocity", SPRING),
+        Fields(
+            Millard2012Equilibrium,
+            (
+                Number("max_isometric_force"),
+                positive("optimal_fiber_length"),
+                Number("tendon_slack_length"),
+                positive("max_contraction_velocity"),
+                positive("activation_time_constant"),
+                positive("deactivation_time_constant"),
+                Number("ignore_tendon_compliance"),
+                Number("ignore_activation_dynamics"),
+            ),
+            _read_equilibrium_fields,
+        ),
+        Together(
+            MillardCurves,
+            (
+                curve(
+                    "active_force_length_curve",
+                    ACTIVE_SIZE,
+                    active_force_length,
+                    _adapt_active_curve,
+                ),
+                curve("force_velocity_curve", VELOCITY_SIZE, force_velocity, _adapt_velocity_curve),
+                curve(
+                    "force_velocity_curve",
+                    VELOCITY_SIZE,
+                    partial(force_velocity, inverse=True),
+                    _adapt_inverse_curve,
+                ),
+                curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
+                curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
+            ),
+        ),
+        states=(
+            State(
+                "activation",
+                lambda force: min(
+                    max(force.default_activation, _read_minimum_activation(force)), 1.0
+                ),
+            ),
+            State(
+                "fiber_length",
+                lambda force: max(force.default_fiber_length, _min_fiber_length(force)),
+                output="fiber_velocity",
+            ),
+        ),
+        equilibrium=millard2012_equilibrium_length,
+        settled=("fiber_length",),
+        rigid=millard2012_rigid,
+        again=millard2012_again,
+        abreast=Abreast(
+            Fibers,
+            fibers_at,
+            Asked(
+                {"active": "by_length", "passive": "by_length", "tendon": "tendon"},
+                fibers_loaded,
+                ("velocity", "by_velocity", "by_length", "elastic", "tendon"),
+            ),
+            Sought(
+                ("velocity", "inverse"),
+                fibers_asking,
+                fibers_moved,
+                ("told_by", "velocity", "by_velocity"),
+            ),
+            muscle_of,
+        ),
+        stored=_compute_equilibrium_energy,
+        check=_check_equilibrium_muscle,
+    )
+)
+
+
+def _read_acceleration_fields(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
+    own = force.muscle_first_order_activation_dynamic_model
+    angle = force.pennation_angle_at_optimal
+    return (
+        own.activation_time_constant,
+        own.deactivation_time_constant,
+        own.minimum_activation,
+        *pennation(force.optimal_fiber_length, angle, 0.5 * pi),
+        cos(angle),
+    )
+
+
+def _check_acceleration_muscle(builder: ElementBuilder, force: Any) -> None:
+    PENNATION.read(builder, force)
+
+
+def _compute_acceleration_energy(force: DeclaredForce, record: Sequence[float]) -> float:
+    _, m, curves = force.values
+    known = force.known(record)
+    return millard2012_acceleration_energy(
+        m, known["length"], known["fiber_length"], known["cos_pennation"], curves
+    )
+
+
+register_force_type(
+    muscle(
+        Millard2012AccelerationMuscle,
+        millard2012_acceleration,
+        ("solved", "activation_rate", "fiber_velocity", "fiber_acceleration"),
+        Fields(
+            Millard2012Acceleration,
+            (
+                Number("max_isometric_force"),
+                positive("optimal_fiber_length"),
+                positive("tendon_slack_length"),
+                positive("max_contraction_velocity"),
+                positive("mass"),
+                Number("tendon_force_length_damping"),
+                Number("fiber_compressive_force_length_damping"),
+                Number("fiber_force_length_damping"),
+                Number("fiber_compressive_force_cos_pennation_damping"),
+                Number("fiber_damping"),
+            ),
+            _read_acceleration_fields,
+        ),
+        Together(
+            AccelerationCurves,
+            (
+                curve("active_force_length_curve", ACTIVE_SIZE, active_force_length),
+                curve("force_velocity_curve", VELOCITY_SIZE, force_velocity),
+                curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
+                curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
+                curve(
+                    "fiber_compressive_force_length_curve",
+                    COMPRESSIVE_SIZE,
+                    fiber_compressive_force_length,
+                ),
+                curve(
+                    "fiber_compressive_force_cos_pennation_curve",
+                    COMPRESSIVE_SIZE,
+                    fiber_compressive_force_cos_pennation,
+                ),
+            ),
+        ),
+        states=(
+            State("activation"),
+            State("fiber_length", output="fiber_velocity"),
+            State("fiber_velocity", output="fiber_acceleration"),
+        ),
+        equilibrium=millard2012_acceleration_equilibrium,
+        settled=("fiber_length", "fiber_velocity"),
+        rigid=millard2012_acceleration_rigid,
+        stored=_compute_acceleration_energy,
+        check=_check_acceleration_muscle,
+    )
+)

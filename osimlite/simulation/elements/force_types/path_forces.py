@@ -1,0 +1,188 @@
+"""Springs, ligaments and expressions whose tension acts along a path."""
+
+from collections.abc import Sequence
+
+from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.pointers import Floats, Ints
+from osimlite.mechanics.kernels.programs import of_two
+from osimlite.mechanics.laws.springs import (
+    blankevoort_energy,
+    blankevoort_tension,
+    path_spring_energy,
+    path_spring_tension,
+    stretch,
+)
+from osimlite.schema.path_actuators import ClutchedPathSpring
+from osimlite.schema.path_forces import (
+    Blankevoort1991Ligament,
+    ExpressionBasedPathForce,
+    Ligament,
+    PathSpring,
+)
+from osimlite.simulation.elements.force_type import DeclaredForce, ForceType, State
+from osimlite.simulation.elements.geometries.path import PATH
+from osimlite.simulation.elements.integral import integral
+from osimlite.simulation.elements.parameters import Curve, Expression, Number, positive
+from osimlite.simulation.elements.registry import register_force_type
+
+
+def compute_path_spring(
+    length: float, rate: float, l0: float, k: float, d: float
+) -> tuple[float, float]:
+    """Tension and energy."""
+    return path_spring_tension(length, rate, l0, k, d), path_spring_energy(length, l0, k)
+
+
+register_force_type(
+    ForceType(
+        PathSpring,
+        PATH,
+        compute_path_spring,
+        outputs=("tension", "energy"),
+        parameters=("resting_length", "stiffness", "dissipation"),
+        labels={"{name}_tension": "tension"},
+    )
+)
+
+
+MIN_ENGAGING_CONTROL = 2.0 ** (-52.0 * 7.0 / 8.0)
+"""A control that is no larger does not engage the spring: Simbody's SignificantReal."""
+
+
+def compute_clutched_spring(
+    rate: float, control: float, stretch: float, k: float, d: float, relaxation: float
+) -> tuple[float, float]:
+    """Tension c k z (1 + d v), N, and rate of the stretch z, m/s: that of the path, -z / relaxation without control.
+
+    Args:
+        rate: v of the path, m/s.
+        control: c, kept between 0 and 1.
+        stretch: z, m.
+        k: stiffness, N/m.
+        d: dissipation, s/m.
+        relaxation: time constant, s.
+    """
+    tension = min(max(control, 0.0), 1.0) * k * stretch * (1.0 + d * rate)
+    return tension, rate if control > MIN_ENGAGING_CONTROL else -stretch / relaxation
+
+
+def _at_least_zero(name: str) -> Number:
+    return Number(name, lambda value: value >= 0.0, "is less than 0; give it one that is not")
+
+
+register_force_type(
+    ForceType(
+        ClutchedPathSpring,
+        PATH,
+        compute_clutched_spring,
+        inputs=("rate",),
+        outputs=("tension", "stretch_rate"),
+        parameters=(
+            _at_least_zero("stiffness"),
+            _at_least_zero("dissipation"),
+            positive("relaxation_time_constant"),
+        ),
+        controlled=True,
+        states=(State("stretch", lambda spring: spring.initial_stretch),),
+        labels={"{name}": "tension"},
+        goes_on=True,
+    )
+)
+
+
+def compute_ligament(length: float, l0: float, force: float, curve: Floats) -> tuple[float, float]:
+    """Tension, and length over resting length."""
+    ratio = length / l0
+    if not length > l0:
+        return 0.0, ratio
+    value, _, _ = value_at(curve, ratio)
+    return force * value, ratio
+
+
+def _compute_ligament_energy(force: DeclaredForce, record: Sequence[float]) -> float:
+    l0, largest, curve = force.values
+    ratio = record[1]
+    return float(largest * l0 * integral(curve, 1.0, ratio)) if ratio > 1.0 else 0.0
+
+
+register_force_type(
+    ForceType(
+        Ligament,
+        PATH,
+        compute_ligament,
+        inputs=("length",),
+        outputs=("tension", "ratio"),
+        parameters=(positive("resting_length"), "pcsa_force", Curve("force_length_curve")),
+        labels={"{name}": "tension"},
+        stored=_compute_ligament_energy,
+    )
+)
+
+
+def compute_blankevoort_ligament(
+    length: float, rate: float, l0: float, k: float, e1: float, c: float
+) -> tuple[float, float, float, float, float, float, float, float]:
+    """Tension and its two parts, length and strain with their rates, energy."""
+    tension = blankevoort_tension(length, rate, l0, k, e1, c)
+    elastic = blankevoort_tension(length, 0.0, l0, k, e1, c)
+    energy = blankevoort_energy(length, l0, k, e1)
+    return tension, elastic, tension - elastic, length, rate, length / l0 - 1.0, rate / l0, energy
+
+
+register_force_type(
+    ForceType(
+        Blankevoort1991Ligament,
+        PATH,
+        compute_blankevoort_ligament,
+        outputs=(
+            "tension",
+            "elastic",
+            "damping",
+            "length",
+            "rate",
+            "strain",
+            "strain_rate",
+            "energy",
+        ),
+        parameters=(
+            positive("slack_length"),
+            "linear_stiffness",
+            "transition_strain",
+            "damping_coefficient",
+        ),
+        labels={
+            "{name}.force_spring": "elastic",
+            "{name}.force_damping": "damping",
+            "{name}.force_total": "tension",
+            "{name}.length": "length",
+            "{name}.lengthening_speed": "rate",
+            "{name}.strain": "strain",
+            "{name}.strain_rate": "strain_rate",
+        },
+    )
+)
+
+
+def compute_expression_tension(
+    length: float,
+    rate: float,
+    l0: float,
+    clamped: float,
+    steps: Ints,
+    constants: Floats,
+    registers: Floats,
+) -> float:
+    """Tension."""
+    return of_two(stretch(length, l0, clamped > 0.0), rate, steps, constants, registers)
+
+
+register_force_type(
+    ForceType(
+        ExpressionBasedPathForce,
+        PATH,
+        compute_expression_tension,
+        outputs=("tension",),
+        parameters=("resting_length", "clamp_stretch", Expression("expression", ("s", "ldot"))),
+        labels={"{name}_tension": "tension"},
+    )
+)

@@ -1,0 +1,99 @@
+"""A muscle whose tendon keeps its slack length."""
+
+from math import sqrt
+from typing import NamedTuple
+
+from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.laws.muscles import MuscleInputs
+from osimlite.schema.muscles import RigidTendonMuscle
+from osimlite.simulation.elements.muscle import height, muscle
+from osimlite.simulation.elements.parameters import Curve, Fields, Number, Together, positive
+from osimlite.simulation.elements.registry import register_force_type
+
+MAX_PARALLEL_HEIGHT_M = 2.0**-26
+"""Fibers that are no higher (m) are in line with the tendon: Simbody's SqrtEps."""
+
+
+class RigidTendonFields(NamedTuple):
+    """The numbers of a muscle."""
+
+    strength: float  # max_isometric_force, N
+    optimal: float  # optimal_fiber_length, m
+    slack: float  # tendon_slack_length, m
+    fastest: float  # max_contraction_velocity, 1/s
+    height: float  # of the fibers across the tendon, m
+
+
+class RigidTendonCurves(NamedTuple):
+    """Active and passive force over length (the latter kept from 0 to 10), and a factor over velocity, normalized."""
+
+    active: Floats
+    passive: Floats
+    velocity: Floats
+
+
+def compute_rigid_tendon_muscle(
+    now: MuscleInputs, m: RigidTendonFields, curves: RigidTendonCurves
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """The muscle at a moment; see RigidTendonMuscle of OpenSim, which takes the path's rate for the fibers' velocity.
+
+    Returns: Tension (N), activation, fiber length (m), cosine of pennation, factors of the active
+        force by length and by velocity, active and passive fiber force (N), fiber velocity (m/s).
+    """
+    along = max(now.length - m.slack, 0.0)
+    fiber_length, cos = along, 1.0
+    if m.height > MAX_PARALLEL_HEIGHT_M:
+        fiber_length = sqrt(along * along + m.height * m.height)
+        cos = along / fiber_length
+    active, _, _ = value_at(curves.active, fiber_length / m.optimal)
+    passive, _, _ = value_at(curves.passive, fiber_length / m.optimal)
+    factor, _, _ = value_at(curves.velocity, now.rate / (m.optimal * m.fastest))
+    active_force = m.strength * now.excitation * active * factor
+    passive_force = m.strength * min(max(passive, 0.0), 10.0)
+    tension = (active_force + passive_force) * cos
+    return (
+        tension,
+        now.excitation,
+        fiber_length,
+        cos,
+        active,
+        factor,
+        active_force,
+        passive_force,
+        now.rate,
+    )
+
+
+def compute_full_force(now: MuscleInputs, m: RigidTendonFields, curves: RigidTendonCurves) -> float:
+    """Force (N) of fully active fibers along the tendon."""
+    _, _, _, cos, active, factor, _, _, _ = compute_rigid_tendon_muscle(now, m, curves)
+    return m.strength * active * factor * cos
+
+
+register_force_type(
+    muscle(
+        RigidTendonMuscle,
+        compute_rigid_tendon_muscle,
+        ("fiber_velocity",),
+        Fields(
+            RigidTendonFields,
+            (
+                Number("max_isometric_force"),
+                positive("optimal_fiber_length"),
+                Number("tendon_slack_length"),
+                positive("max_contraction_velocity"),
+            ),
+            height,
+        ),
+        Together(
+            RigidTendonCurves,
+            (
+                Curve("active_force_length_curve"),
+                Curve("passive_force_length_curve"),
+                Curve("force_velocity_curve"),
+            ),
+        ),
+        rigid=compute_full_force,
+    )
+)

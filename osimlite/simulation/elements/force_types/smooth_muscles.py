@@ -1,0 +1,138 @@
+"""Muscles that are smooth everywhere: DeGrooteFregly2016Muscle and MeyerFregly2016Muscle."""
+
+from collections.abc import Callable
+from typing import Any
+
+from osimlite.mechanics.laws.smooth_muscles import (
+    LARGEST_FORCE,
+    SmoothMuscle,
+    SmoothTendon,
+    degroote,
+    degroote_equilibrium,
+    degroote_rigid,
+    meyer,
+    meyer_rigid,
+    tendon_growth,
+)
+from osimlite.schema.muscles import DeGrooteFregly2016Muscle, MeyerFregly2016Muscle
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.force_type import State
+from osimlite.simulation.elements.muscle import PENNATION, SPRING, height, muscle
+from osimlite.simulation.elements.parameters import Fields, Number, positive
+from osimlite.simulation.elements.registry import register_force_type
+
+ACTIVATION = State("activation")
+
+
+def smooth_fields(
+    timed: Callable[[ElementBuilder, Any], Any] = lambda builder, force: force,
+) -> Fields:
+    """The numbers of such a muscle; `timed` gives the one that has its constants of activation."""
+
+    def others(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
+        first = timed(builder, force)
+        return (
+            *height(builder, force),
+            not force.ignore_passive_fiber_force,
+            not force.ignore_activation_dynamics,
+            first.activation_time_constant,
+            first.deactivation_time_constant,
+            first.activation_dynamics_smoothing,
+        )
+
+    return Fields(
+        SmoothMuscle,
+        (
+            Number("max_isometric_force"),
+            positive("optimal_fiber_length"),
+            Number("tendon_slack_length"),
+            positive("max_contraction_velocity"),
+            Number("active_force_width_scale", lambda x: x >= 1.0, "is less than 1"),
+            Number("fiber_damping", lambda x: x >= 0.0, "is less than 0"),
+        ),
+        others,
+    )
+
+
+def check_smooth(builder: ElementBuilder, force: Any) -> None:
+    """Refuse such a muscle as OpenSim does.
+
+    Raises:
+        ModelError: a property has no meaning; it is named.
+    """
+    times = (
+        "activation_time_constant",
+        "deactivation_time_constant",
+        "activation_dynamics_smoothing",
+    )
+    for number in (PENNATION, *map(positive, (*times, "default_activation"))):
+        number.read(builder, force)
+
+
+def _find_activation_owner(
+    builder: ElementBuilder, force: DeGrooteFregly2016Muscle
+) -> DeGrooteFregly2016Muscle:
+    """The muscle whose constants of activation count.
+
+    OpenSim keeps them in variables of the process, so that those of the first muscle that it
+    computes are those of all: of the first in the model, if the process computes no other.
+    """
+    muscles = [] if builder.own_times else builder.model.components(DeGrooteFregly2016Muscle)
+    return next((muscle for muscle in muscles if not muscle.ignore_activation_dynamics), force)
+
+
+def _check_degroote(builder: ElementBuilder, force: DeGrooteFregly2016Muscle) -> None:
+    check_smooth(builder, force)
+    positive("tendon_strain_at_one_norm_force").read(builder, force)
+    words = f"is not from 0 to {LARGEST_FORCE:g}"
+    Number("default_normalized_tendon_force", lambda x: 0.0 <= x <= LARGEST_FORCE, words).read(
+        builder, force
+    )
+
+
+def _read_tendon_fields(
+    builder: ElementBuilder, force: DeGrooteFregly2016Muscle
+) -> tuple[float, ...]:
+    is_explicit = force.tendon_compliance_dynamics_mode == "explicit"
+    return (
+        tendon_growth(force.tendon_strain_at_one_norm_force),
+        not force.ignore_tendon_compliance,
+        is_explicit,
+    )
+
+
+register_force_type(
+    muscle(
+        DeGrooteFregly2016Muscle,
+        degroote,
+        ("activation_rate", "normalized_tendon_force_rate", "fiber_velocity", SPRING, "energy"),
+        smooth_fields(_find_activation_owner),
+        Fields(
+            SmoothTendon, (positive("passive_fiber_strain_at_one_norm_force"),), _read_tendon_fields
+        ),
+        states=(
+            ACTIVATION,
+            State("normalized_tendon_force"),
+        ),
+        equilibrium=degroote_equilibrium,
+        settled=("normalized_tendon_force",),
+        rigid=degroote_rigid,
+        check=_check_degroote,
+        shares=True,
+        goes_on=True,
+    )
+)
+
+
+register_force_type(
+    muscle(
+        MeyerFregly2016Muscle,
+        meyer,
+        ("activation_rate", "fiber_velocity", SPRING),
+        smooth_fields(),
+        states=(ACTIVATION,),
+        rigid=meyer_rigid,
+        check=check_smooth,
+        goes_on=True,
+    )
+)

@@ -1,0 +1,91 @@
+"""The muscle of Thelen 2003."""
+
+from collections.abc import Sequence
+from math import exp
+
+from osimlite.mechanics.laws.muscles import pennation
+from osimlite.mechanics.laws.thelen2003 import (
+    Thelen2003,
+    tendon_shape,
+    thelen2003,
+    thelen2003_energy,
+    thelen2003_equilibrium,
+    thelen2003_rigid,
+)
+from osimlite.schema.muscles import Thelen2003Muscle
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.force_type import DeclaredForce, State
+from osimlite.simulation.elements.muscle import muscle, require
+from osimlite.simulation.elements.parameters import Fields, Number, positive
+from osimlite.simulation.elements.registry import register_force_type
+
+
+def _check_muscle(builder: ElementBuilder, force: Thelen2003Muscle) -> None:
+    flags = "ignore_tendon_compliance", "ignore_activation_dynamics"
+    require(
+        builder,
+        force,
+        *(
+            Number(flag, lambda x: x == 0.0, "is true, which a Thelen2003Muscle cannot do")
+            for flag in flags
+        ),
+        Number("minimum_activation", lambda x: x >= 0.01, "is less than 0.01"),
+        *map(positive, ("FmaxTendonStrain", "FmaxMuscleStrain")),
+        Number("KshapePassive", lambda x: 1e-9 < x < 700.0, "is not between 1e-9 and 700"),
+        Number(
+            "fv_linear_extrap_threshold", lambda x: x * force.Flen > 1.0, "is not above 1 / Flen"
+        ),
+    )
+
+
+def _read_derived_fields(builder: ElementBuilder, force: Thelen2003Muscle) -> tuple[float, ...]:
+    angles = force.pennation_angle_at_optimal, force.maximum_pennation_angle
+    shape = force.KshapePassive
+    return (
+        *pennation(force.optimal_fiber_length, *angles),
+        *tendon_shape(force.FmaxTendonStrain),
+        shape / force.FmaxMuscleStrain,
+        1.0 / (exp(shape) - 1.0),
+    )
+
+
+def _compute_energy(force: DeclaredForce, record: Sequence[float]) -> float:
+    known = force.known(record)
+    return thelen2003_energy(
+        force.values[1], known["length"], known["fiber_length"], known["cos_pennation"]
+    )
+
+
+register_force_type(
+    muscle(
+        Thelen2003Muscle,
+        thelen2003,
+        ("activation_rate", "fiber_velocity"),
+        Fields(
+            Thelen2003,
+            (
+                Number("max_isometric_force"),
+                positive("optimal_fiber_length"),
+                positive("tendon_slack_length"),
+                positive("max_contraction_velocity"),
+                positive("activation_time_constant"),
+                positive("deactivation_time_constant"),
+                Number("minimum_activation"),
+                positive("KshapeActive"),
+                positive("Af"),
+                Number("Flen", lambda x: x > 1.0, "is not above 1"),
+                Number("fv_linear_extrap_threshold"),
+            ),
+            _read_derived_fields,
+        ),
+        states=(
+            State("activation"),
+            State("fiber_length", output="fiber_velocity"),
+        ),
+        equilibrium=thelen2003_equilibrium,
+        settled=("fiber_length",),
+        rigid=thelen2003_rigid,
+        stored=_compute_energy,
+        check=_check_muscle,
+    )
+)

@@ -1,0 +1,159 @@
+"""Probes of actuator forces and powers, of joint power, and of the energy of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import floor, inf, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from osimlite.mechanics.multibody.constraints import Lock, Prescribed
+from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.probe_types import (
+    ActuatorForceProbe,
+    ActuatorPowerProbe,
+    JointInternalPowerProbe,
+    SystemEnergyProbe,
+)
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.probe_type import (
+    DeclaredProbe,
+    ProbeType,
+    Reading,
+    Subject,
+    members_of,
+)
+from osimlite.simulation.elements.registry import register_probe_type
+
+
+class Power(NamedTuple):
+    """A factor of a quantity, and the power to which both are raise_to_power."""
+
+    factor: float
+    exponent: float
+
+
+def raise_to_power(x: float, exponent: float) -> float:
+    """A power of a number, as C++ has it."""
+    if x < 0.0 and exponent != floor(exponent):
+        return nan
+    if x == 0.0 and exponent < 0.0:
+        return inf
+    return x**exponent
+
+
+def compute_actuator_force(actuation: float, n: Power) -> float:
+    """A force, N or N.m, to a power."""
+    return raise_to_power(n.factor * actuation, n.exponent)
+
+
+def _read_forces(builder: ElementBuilder, probe: ActuatorForceProbe) -> Reading:
+    actuators = members_of(builder, probe, probe.actuator_names, "/forceset", "Actuator")
+    subjects = tuple(Subject(actuator, Power(1.0, probe.exponent)) for actuator in actuators)
+    return define_reading(
+        probe.name, [item.name for item in actuators], subjects, is_sum=probe.sum_forces_together
+    )
+
+
+def define_reading(
+    name: str, subjects: list[str], read: tuple[Subject, ...], *, is_sum: bool
+) -> Reading:
+    """What a probe reads whose results are those of its subjects, or their sum."""
+    if is_sum:
+        return Reading((f"{name}_Summed",), read)
+    return Reading(tuple(f"{name}_{subject}" for subject in subjects), read, first=0)
+
+
+register_probe_type(
+    ProbeType(ActuatorForceProbe, _read_forces, compute_actuator_force, ("actuation",), Power)
+)
+
+
+def compute_actuator_power(actuation: float, speed: float, n: Power) -> float:
+    """A power, W, to a power."""
+    return raise_to_power(n.factor * actuation * speed, n.exponent)
+
+
+def _read_powers(builder: ElementBuilder, probe: ActuatorPowerProbe) -> Reading:
+    actuators = members_of(builder, probe, probe.actuator_names, "/forceset", "Actuator")
+    # A tension pulls against the lengthening speed.
+    factors = [-1.0 if isinstance(item, PathActuator) else 1.0 for item in actuators]
+    subjects = tuple(
+        Subject(item, Power(factor, probe.exponent))
+        for item, factor in zip(actuators, factors, strict=True)
+    )
+    return define_reading(
+        probe.name, [item.name for item in actuators], subjects, is_sum=probe.sum_powers_together
+    )
+
+
+register_probe_type(
+    ProbeType(
+        ActuatorPowerProbe, _read_powers, compute_actuator_power, ("actuation", "speed"), Power
+    )
+)
+
+
+def _read_joints(builder: ElementBuilder, probe: JointInternalPowerProbe) -> Reading:
+    mechanism, joints = (
+        builder.mechanism,
+        members_of(builder, probe, probe.joint_names, "/jointset", "Joint"),
+    )
+    infos = [
+        (place, info)
+        for place, info in enumerate(mechanism.coordinates)
+        if info.prescribed is not None
+    ]
+    driven = [
+        [place for place, info in infos if info.joint == builder.path(joint)] for joint in joints
+    ]
+    if any(driven) and not all(
+        isinstance(item, Lock | Prescribed) for item in mechanism.constraints
+    ):
+        raise builder.unsupported(probe, " of prescribed coordinates beside other constraints")
+    reading = define_reading(
+        probe.name, [joint.name for joint in joints], (), is_sum=probe.sum_powers_together
+    )
+    return reading._replace(details=(driven, probe.exponent, probe.sum_powers_together))
+
+
+def _measure_joint_power(
+    probe: DeclaredProbe, system: Any, t: float, y: Sequence[float]
+) -> list[float]:
+    """What the motion takes besides gravity and the forces, times the speeds."""
+    driven, exponent, is_sum = probe.reading.details
+    powers = np.zeros(len(system.mechanism.coordinates))
+    if any(driven):
+        state, count = system.state, len(system.order)
+        q, u = state.values(y), state.speeds(y)
+        forces = state.spread(system.applied(t, y)[count : 2 * count], [0.0] * len(q))
+        udot = system.mechanism.acceleration(q, u, forces, time=t)
+        powers = (system.mechanism.inverse_dynamics(q, u, udot) - forces) * u
+    result = [raise_to_power(float(sum(powers[places])), exponent) for places in driven]
+    return [sum(result)] if is_sum else result
+
+
+register_probe_type(ProbeType(JointInternalPowerProbe, _read_joints, measure=_measure_joint_power))
+
+
+def _read_energies(builder: ElementBuilder, probe: SystemEnergyProbe) -> Reading:
+    kinds = (
+        probe.compute_kinetic_energy,
+        probe.compute_potential_energy,
+        probe.compute_potential_energy,
+    )
+    return Reading((probe.name,), details=tuple(map(float, kinds)))
+
+
+def _measure_energy(probe: DeclaredProbe, system: Any, t: float, y: Sequence[float]) -> list[float]:
+    """Of the kinetic energy and those of gravity and forces, the sum of those that are asked for."""
+    return [
+        sum(
+            factor * part
+            for factor, part in zip(probe.reading.details, system.energies(t, y), strict=True)
+        )
+    ]
+
+
+register_probe_type(ProbeType(SystemEnergyProbe, _read_energies, measure=_measure_energy))

@@ -1,0 +1,252 @@
+"""Probes of metabolic power: the models of Bhargava 2004, its smooth form, and Umberger 2010."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.laws.metabolics import (
+    Bhargava2004,
+    Smoothed,
+    Umberger2010,
+    bhargava2004,
+    bhargava2004_smoothed,
+    umberger2010,
+)
+from osimlite.mechanics.multibody.functions import Function, PiecewiseLinear
+from osimlite.schema.metabolics import (
+    Bhargava2004MuscleMetabolicsProbe,
+    Bhargava2004SmoothedMuscleMetabolics,
+    Umberger2010MuscleMetabolicsProbe,
+)
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.probe_type import DeclaredProbe, ProbeType, Reading, Subject
+from osimlite.simulation.elements.registry import register_probe_type
+
+
+def read_metabolic_probe(
+    builder: ElementBuilder,
+    probe: Any,
+    numbers: Callable[[Any, Any, float], Any],
+    curve: Function | None = None,
+) -> Reading:
+    """The power of all muscles of a probe and the basal one, and, if the probe reports them, that and each muscle's.
+
+    Args: builder: of the elements. probe: that reads. numbers: what the law is given, from the
+        parameters of a muscle, the muscle, and its find_muscle_mass (kg). curve: that the law is given.
+
+    Raises: UnsupportedError: OpenSim switches the probe off, for a muscle that does not exist or a
+        number without meaning.
+    """
+    known: dict[str, Any] = builder.tree.members("/forceset", "Muscle")
+    parameters = probe.metabolic_muscle_parameter_set.objects
+    subjects = []
+    for item in parameters:
+        muscle = known.get(item.name)
+        if muscle is None:
+            raise builder.unsupported(
+                probe, f" of the muscle '{item.name}', which the model does not have"
+            )
+        subjects.append(
+            Subject(muscle, numbers(item, muscle, find_muscle_mass(builder, probe, item, muscle)))
+        )
+    basal = (
+        probe.basal_coefficient * builder.mechanism.total_mass**probe.basal_exponent
+        if probe.basal_rate_on
+        else 0.0
+    )
+    labels: tuple[str, ...] = (f"{probe.name}_TOTAL",)
+    first = -1
+    if not probe.report_total_metabolics_only:
+        names = ("BASAL", *(item.name for item in parameters))
+        labels, first = (*labels, *(f"{probe.name}_{name}" for name in names)), 2
+    return Reading(labels, tuple(subjects), first, basal, curve)
+
+
+def find_muscle_mass(builder: ElementBuilder, probe: Any, item: Any, muscle: Any) -> float:
+    """Of a muscle, kg: the one that is provided, or density, optimal fiber length and cross-section.
+
+    Raises:
+        UnsupportedError: a number has no meaning.
+    """
+    provided = item.provided_muscle_mass
+    names = (
+        ["specific_tension", "density"]
+        if not item.use_provided_muscle_mass
+        else ["provided_muscle_mass"]
+    )
+    for name in names:
+        if not (getattr(item, name) or 0.0) > 0.0:
+            raise builder.unsupported(
+                probe, f" of the muscle '{item.name}', whose {name} is not positive"
+            )
+    if not 0.0 <= item.ratio_slow_twitch_fibers <= 1.0:
+        raise builder.unsupported(
+            probe, f" of the muscle '{item.name}', whose ratio_slow_twitch_fibers is not 0 to 1"
+        )
+    if item.use_provided_muscle_mass:
+        return float(provided)
+    return float(
+        muscle.max_isometric_force
+        / item.specific_tension
+        * item.density
+        * muscle.optimal_fiber_length
+    )
+
+
+def compute_bhargava(
+    activation: float,
+    excitation: float,
+    active_force: float,
+    passive_force: float,
+    fiber_length: float,
+    fiber_velocity: float,
+    force_length: float,
+    curve: Floats,
+    m: Bhargava2004,
+) -> float:
+    """Return the metabolic power (W) of one muscle."""
+    maintained, _, _ = value_at(curve, fiber_length / m.optimal_fiber_length)
+    return bhargava2004(
+        activation,
+        excitation,
+        active_force,
+        passive_force,
+        fiber_velocity,
+        force_length,
+        maintained,
+        m,
+    )
+
+
+def define_bhargava(probe: Any, item: Any, muscle: Any, mass: float) -> Bhargava2004:
+    """What the law must know of a muscle and of a probe, whose switches are on if it has none."""
+    return Bhargava2004(
+        muscle.max_isometric_force,
+        muscle.optimal_fiber_length,
+        mass,
+        *(getattr(item, name) for name in Bhargava2004._fields[3:8]),
+        *(getattr(probe, name, True) for name in Bhargava2004._fields[8:]),
+    )
+
+
+def _read_bhargava(builder: ElementBuilder, probe: Bhargava2004MuscleMetabolicsProbe) -> Reading:
+    name = "normalized_fiber_length_dependence_on_maintenance_rate"
+    curve = builder.function(probe, getattr(probe, name), name)
+    return read_metabolic_probe(builder, probe, partial(define_bhargava, probe), curve)
+
+
+BHARGAVA_INPUTS = (
+    "activation",
+    "control",
+    "active_fiber_force",
+    "passive_fiber_force",
+    "fiber_length",
+    "fiber_velocity",
+    "active_force_length",
+)
+
+register_probe_type(
+    ProbeType(
+        Bhargava2004MuscleMetabolicsProbe,
+        _read_bhargava,
+        compute_bhargava,
+        BHARGAVA_INPUTS,
+        Bhargava2004,
+        has_curve=True,
+    )
+)
+
+
+RATE_NAMES = "metabolic", "activation", "maintenance", "shortening", "mechanical_work"
+MAINTENANCE_CURVE = PiecewiseLinear((0.0, 0.5, 1.0, 1.5, 10.0), (0.5, 0.5, 1.0, 0.0, 0.0))
+
+
+def _read_smoothed(
+    builder: ElementBuilder, component: Bhargava2004SmoothedMuscleMetabolics
+) -> Reading:
+    path = builder.path(component)
+    forms = {"tanh": 1.0, "huber": 2.0}
+    form = forms[component.smoothing_type or "tanh"] if component.use_smoothing else 0.0
+    sharpness = (getattr(component, name) for name in Smoothed._fields[1:])
+    smoothed = Smoothed(form, *(10.0 if number is None else number for number in sharpness))
+    subjects = []
+    labels = [f"{path}|total_{rate}_rate" for rate in RATE_NAMES]
+    for item in component.muscle_parameters:
+        muscle: Any = builder.target(item, "socket_muscle", item.socket_muscle)
+        numbers = define_bhargava(
+            component, item, muscle, find_muscle_mass(builder, component, item, muscle)
+        )
+        subjects.append(Subject(muscle, (*numbers, *smoothed)))
+        labels.append(f"{path}|muscle_metabolic_rate:{builder.path(muscle)}")
+    basal = component.basal_coefficient * builder.mechanism.total_mass**component.basal_exponent
+    return Reading(tuple(labels), tuple(subjects), constant=basal)
+
+
+def _measure_smoothed(
+    probe: DeclaredProbe, system: Any, t: float, y: Sequence[float]
+) -> list[float]:
+    """Sums of the rates of all muscles, the basal one added to the first, and the whole rate of each."""
+    rates = []
+    for places, numbers in zip(probe.places, probe.numbers, strict=True):
+        m, by = (
+            Bhargava2004(*numbers[: -len(Smoothed._fields)]),
+            Smoothed(*numbers[-len(Smoothed._fields) :]),
+        )
+        activation, control, active, passive, length, velocity, factor = (
+            system.recorded(*place) for place in places
+        )
+        maintained, _, _ = MAINTENANCE_CURVE.derivatives(length / m.optimal_fiber_length)
+        rates.append(
+            bhargava2004_smoothed(
+                activation, control, active, passive, velocity, factor, maintained, m, by
+            )
+        )
+    sums = [sum(column) for column in zip(*rates, strict=True)] or [0.0] * len(RATE_NAMES)
+    return [sums[0] + probe.reading.constant, *sums[1:], *(row[0] for row in rates)]
+
+
+register_probe_type(
+    ProbeType(
+        Bhargava2004SmoothedMuscleMetabolics,
+        _read_smoothed,
+        reads=BHARGAVA_INPUTS,
+        measure=_measure_smoothed,
+    )
+)
+
+
+def _read_umberger(builder: ElementBuilder, probe: Umberger2010MuscleMetabolicsProbe) -> Reading:
+    of_probe = [getattr(probe, name) for name in Umberger2010._fields[4:]]
+    return read_metabolic_probe(
+        builder,
+        probe,
+        lambda item, muscle, mass: Umberger2010(
+            muscle.max_contraction_velocity,
+            muscle.optimal_fiber_length,
+            mass,
+            item.ratio_slow_twitch_fibers,
+            *of_probe,
+        ),
+    )
+
+
+register_probe_type(
+    ProbeType(
+        Umberger2010MuscleMetabolicsProbe,
+        _read_umberger,
+        umberger2010,
+        (
+            "activation",
+            "control",
+            "active_fiber_force",
+            "fiber_length",
+            "fiber_velocity",
+            "active_force_length",
+        ),
+        Umberger2010,
+    )
+)

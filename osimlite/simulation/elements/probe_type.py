@@ -1,0 +1,281 @@
+"""One declaration for each kind of probe; packing, kernel, integrals and columns follow from it.
+
+A probe adds up, or lists, what a law gives for each of its subjects: actuators or muscles. The law
+is a scalar function of floats; it is given what the record of the subject has, a curve if there is
+one, and a named tuple of numbers. The kernel of a kind is written from this. It runs with the
+forces where the probe integrates, since the integrals are states then, and otherwise when somebody
+asks.
+
+The integers of the item are: count of the subjects, place among the results of the first (-1 if
+there is only the sum), count of the integrals, the first of them in y, place of the curve, and for
+each subject the places in the work vector of what the law is given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from osimlite.base.quantity import tell
+from osimlite.base.records import dataclass
+from osimlite.base.text import did_you_mean
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.kernels.table import GIVEN, written
+from osimlite.mechanics.multibody.function_tables import table_of_one
+from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.links import Places
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.force_records import CONTROLS, ForceElement, ForceRecord, Silent
+from osimlite.simulation.elements.force_type import DeclaredForce
+from osimlite.simulation.elements.registry import PROBE_TYPES, kernel_name
+from osimlite.simulation.states import StateVariable
+
+HEAD = ITEM.OWN + 5
+"""Offset of the integers that tell what a probe reads, after those of its own."""
+
+INTEGRATE = "integrate"
+
+
+class Subject(NamedTuple):
+    """One actuator, and the numbers that the law is given with it."""
+
+    actuator: Any
+    numbers: Any
+
+
+class Reading(NamedTuple):
+    """What a probe reads."""
+
+    labels: tuple[str, ...]  # of its results
+    subjects: tuple[Subject, ...] = ()  # what the law is called for
+    # place among the results of that of the first subject; -1 if the sum is all there is. The sum
+    # is the first result unless the subjects begin there.
+    first: int = -1
+    # that the sum begins with; it is the second result if the subjects begin after it
+    constant: float = 0.0
+    curve: Function | None = None  # that the law is given
+    details: Any = ()  # what a measure must know
+
+
+@dataclass(frozen=True, eq=False)
+class ProbeType:
+    """A kind of probe."""
+
+    component: type  # class of the probes
+    # what one reads; raises an UnsupportedError for one that cannot be computed
+    read: Callable[[ElementBuilder, Any], Reading]
+    law: Callable[..., float] | None = None  # gives the quantity of one subject
+    # names of what it is given of a subject: of its record, or "actuation", "speed" and "control"
+    reads: tuple[str, ...] = ()
+    numbers: Any = tuple  # the tuple that it is given last
+    # computes the results in the place of a law, from the probe, the system after its forces were
+    # evaluated, and for what time (s) and state that was
+    measure: Callable[[DeclaredProbe, Any, float, Sequence[float]], Sequence[float]] | None = None
+    has_curve: bool = False  # whether the law is given a curve
+
+    @property
+    def name(self) -> str:
+        """Of its kernel, and of the module that declares it."""
+        return kernel_name(self.component.__name__)
+
+    @cached_property
+    def kernel(self) -> Callable[..., int]:
+        """The function that computes one probe."""
+        scope = {"law": self.law, self.numbers.__name__: self.numbers}
+        return written(self.name, PROBE_TYPES.module_of(self.component), self.source, **scope)
+
+    @property
+    def source(self) -> str:
+        """The text of the kernel."""
+        size, count = len(self.numbers._fields), len(self.reads)
+        given = [f"data[a[{k}]]" for k in range(count)]
+        given += [f"at(p, i[{HEAD - 1}])"] if self.has_curve else []
+        given.append(f"{self.numbers.__name__}({', '.join(f'b[{k}]' for k in range(size))})")
+        lines = [
+            f'def {self.name}({GIVEN}, item: "int") -> "int":',
+            "i = at(model, item)",
+            "p, found = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])",
+            "first, total = i[ITEM.OWN + 1], p[0]",
+            "for k in range(i[ITEM.OWN]):",
+            f"    a, b = at(i, {HEAD} + {count} * k), at(p, 1 + {size} * k)",
+            f"    value = law({', '.join(given)})",
+            "    total += value",
+            "    if first >= 0:",
+            "        found[first + k] = value",
+            "if first != 0:",
+            "    found[0] = total",
+            "if first == 2:",
+            "    found[1] = p[0]",
+            "for k in range(i[ITEM.OWN + 2]):",
+            "    f[i[ITEM.OWN + 3] + k] = found[k]",
+        ]
+        return "\n    ".join([*lines, "return OUTCOME.OK"]) + "\n"
+
+
+@dataclass(frozen=True)
+class DeclaredProbe(Silent):
+    """One probe; see :class:`osimlite.simulation.elements.force_records.ForceElement` for what it is to the kernels."""
+
+    component: type  # its class
+    path: str  # of the component
+    name: str  # of the component
+    operation: str  # what is made of its results: "value", "integrate" and so on
+    gain: float  # factor of what is reported
+    initial: tuple[float, ...]  # where integrals start
+    reading: Reading  # what it reads
+    # for each subject and each thing that it reads, the element whose record has it, and where
+    # there
+    places: tuple[tuple[tuple[str, int], ...], ...] = ()
+    numbers: tuple[tuple[float, ...], ...] = ()  # that the law is given of each subject
+
+    @property
+    def probe_type(self) -> ProbeType:
+        """The declaration."""
+        return PROBE_TYPES.find(self.component)
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        """Its integrals."""
+        labels = self.reading.labels if self.operation == INTEGRATE else ()
+        return tuple(StateVariable(f"{self.path}/{label}", is_named=False) for label in labels)
+
+    def items(self, places: Places) -> list[ForceRecord]:
+        """What the kernels compute."""
+        if self.probe_type.law is None:
+            return []
+        reading, integrals = self.reading, len(self.states)
+        numbers = [reading.constant, *(number for row in self.numbers for number in row)]
+        ints = [len(self.places), reading.first, integrals, 0, len(numbers)]
+        reads = [read for row in self.places for read in row]
+        looks_at = tuple((len(ints) + number, owner) for number, (owner, _) in enumerate(reads))
+        ints += [place for _, place in reads]
+        if reading.curve is not None:
+            numbers += table_of_one(reading.curve, f"the curve of '{self.path}'")
+        return [
+            ForceRecord(
+                self.probe_type.name,
+                tuple(ints),
+                tuple(numbers),
+                room=len(reading.labels),
+                is_part=not integrals,
+                states=(3,) if integrals else (),
+                looks_at=looks_at,
+            )
+        ]
+
+
+def probe_elements(
+    builder: ElementBuilder, elements: Sequence[ForceElement]
+) -> list[DeclaredProbe]:
+    """The probes of a model that are enabled, in its order; those that cannot be computed are told of and left out.
+
+    Components whose outputs are reported are among them.
+
+    Args:
+        builder: of the elements.
+        elements: the forces of the model.
+
+    Raises:
+        ModelError: a probe names what does not exist, where OpenSim stops too.
+    """
+    by_path = {element.path: element for element in elements}
+    result = []
+    for probe in builder.tree.components:
+        probe_type = PROBE_TYPES.find(type(probe))
+        if probe_type is None or not getattr(probe, "enabled", True):
+            continue
+        try:
+            result.append(_made(probe_type, builder, probe, by_path))
+        except UnsupportedError as error:
+            tell(f"{error.message} is left out of the probes")
+    return result
+
+
+def _made(
+    probe_type: ProbeType, builder: ElementBuilder, probe: Any, elements: Mapping[str, ForceElement]
+) -> DeclaredProbe:
+    path, reading = builder.path(probe), probe_type.read(builder, probe)
+    # A component with outputs has values, and no operations.
+    operation, gain = getattr(probe, "probe_operation", "value"), float(getattr(probe, "gain", 1.0))
+    if operation == INTEGRATE and probe_type.law is None:
+        raise builder.unsupported(probe, ", whose integral osimlite does not compute")
+    initial: tuple[float, ...] = tuple(getattr(probe, "initial_conditions_for_integration", ()))
+    if len(initial) != len(reading.labels):
+        # As in OpenSim, which says that it is an error.
+        initial = (0.0,) * len(reading.labels)
+    subjects = [
+        _subject(probe_type, builder, probe, subject, elements) for subject in reading.subjects
+    ]
+    builder.check(
+        probe, [gain, reading.constant, *initial, *(x for _, numbers in subjects for x in numbers)]
+    )
+    return DeclaredProbe(
+        type(probe),
+        path,
+        probe.name,
+        operation,
+        gain,
+        initial,
+        reading,
+        tuple(places for places, _ in subjects),
+        tuple(numbers for _, numbers in subjects),
+    )
+
+
+def _subject(
+    probe_type: ProbeType,
+    builder: ElementBuilder,
+    probe: Any,
+    subject: Subject,
+    elements: Mapping[str, ForceElement],
+) -> tuple[tuple[tuple[str, int], ...], tuple[float, ...]]:
+    """Where what the law is given of a subject stands, and its numbers."""
+    actuator, numbers = subject
+    path = builder.path(actuator)
+    control = CONTROLS, builder.controls.first_of(builder, actuator)
+    element = elements.get(path)
+    if not actuator.appliesForce and "factor" in getattr(numbers, "_fields", ()):
+        # Its force is 0.
+        return (control,) * len(probe_type.reads), tuple(map(float, numbers._replace(factor=0.0)))
+    if not isinstance(element, DeclaredForce) or not actuator.appliesForce:
+        raise builder.unsupported(probe, f" of '{path}', which applies no force that is computed")
+    known = element.force_type.known_of
+    places = []
+    for name in probe_type.reads:
+        place = known.get(name)
+        if place is None and name != "control":
+            raise builder.unsupported(
+                probe, f" of '{path}', of which no {name.replace('_', ' ')} is known"
+            )
+        places.append(control if place is None else (path, place))
+    return tuple(places), tuple(map(float, numbers))
+
+
+def members_of(
+    builder: ElementBuilder, probe: Any, words: Sequence[Any], path: str, probe_type: str
+) -> list[Any]:
+    """The components in a set that a probe names; the one word `all` means all.
+
+    Args:
+        builder: of the elements.
+        probe: that names them.
+        words: names, or components.
+        path: of the set.
+        kind: class of the components.
+
+    Raises:
+        ModelError: there is none of a name.
+    """
+    known = builder.tree.members(path, probe_type)
+    names = [word if isinstance(word, str) else word.name for word in words]
+    if names and names[0].upper() == "ALL":
+        return list(known.values())
+    for name in names:
+        if name not in known:
+            raise ModelError(
+                f"'{builder.path(probe)}' names the {probe_type.lower()} '{name}', which the model does not have"
+                f"{did_you_mean(name, known)}"
+            )
+    return [known[name] for name in names]

@@ -1,0 +1,92 @@
+"""Controllers by synergies, and outputs of components that are functions of time, as their inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from osimlite.base.records import dataclass
+from osimlite.base.text import did_you_mean
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.io.tables.storage import beside
+from osimlite.mechanics.multibody.functions import Function, PiecewiseLinear, Scaled
+from osimlite.schema.controller_types import SynergyController
+from osimlite.schema.reporters import SignalGenerator, TableSource__double_
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.control_tables import read_controls
+from osimlite.simulation.elements.controls import Drive, named
+from osimlite.simulation.elements.registry import register_controller
+
+
+@dataclass(frozen=True)
+class TableColumn(PiecewiseLinear):
+    """Straight lines between the rows of a table, outside of which there is nothing."""
+
+    source: str = ""  # path of the component that has the table
+
+
+def read_signal(builder: ElementBuilder, controller: Any, text: str) -> Function | None:
+    """The output that a controller's input names as `path|output:channel`; None if it is no function of time.
+
+    Raises:
+        ModelError: there is no such output.
+    """
+    path, _, output = text.partition("(")[0].partition("|")
+    source = builder.tree.walk(path, builder.path(controller), "Component").target
+    if source is None:
+        raise ModelError(
+            f"an input of '{builder.path(controller)}' names '{text}', which the model does not have; "
+            "run 'osimlite validate'"
+        )
+    name, _, channel = output.partition(":")
+    if isinstance(source, SignalGenerator) and name == "signal":
+        return builder.function(source, source.function, "function")
+    if isinstance(source, TableSource__double_) and name == "column":
+        table = read_controls(beside(builder.folder, source.filename))
+        if channel not in table.columns:
+            raise ModelError(
+                f"'{builder.path(source)}' has no column '{channel}'{did_you_mean(channel, table.columns)}",
+                file=table.file,
+            )
+        if len(table.times) < 2:
+            raise ModelError("the table has one row; give it at least two", file=table.file)
+        return TableColumn(
+            tuple(table.times.tolist()), tuple(table[channel].tolist()), builder.path(source)
+        )
+    return None
+
+
+@register_controller(SynergyController)
+def drive_by_synergies(builder: ElementBuilder, controller: SynergyController) -> Iterator[Drive]:
+    """The signals times the weights of each control; nothing without signals.
+
+    Raises:
+        ModelError: there is not one read_signal for each vector, or not one weight for each control.
+    """
+    path, vectors = builder.path(controller), controller.synergy_vectors
+    counts = [
+        (item, getattr(type(item), "control_count", 1)) for item in named(builder, controller)
+    ]
+    targets = [(item, number) for item, count in counts for number in range(count)]
+    for vector in vectors:
+        if len(vector.synergy_weights) != len(targets):
+            raise ModelError(
+                f"the synergy vector '{vector.name}' of '{path}' has {len(vector.synergy_weights)} weights for "
+                f"{len(targets)} controls; give it one for each"
+            )
+    words = controller.input_controls
+    if words and len(words) != len(vectors):
+        raise ModelError(
+            f"'{path}' has {len(words)} inputs for {len(vectors)} synergy vectors; give it one for each"
+        )
+    for vector, word in zip(vectors, words, strict=False):
+        function = read_signal(builder, controller, word)
+        for (actuator, number), weight in zip(targets, vector.synergy_weights, strict=True):
+            if function is None:
+                refused: UnsupportedError = builder.unsupported(
+                    actuator,
+                    f" driven by '{path}', whose input '{word}' is no function of time that is known",
+                )
+                yield Drive(actuator, refused)
+            else:
+                yield Drive(actuator, Scaled(weight, function), number)
