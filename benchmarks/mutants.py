@@ -176,7 +176,11 @@ def neighbours(mutant: Mutant) -> list[str]:
 def try_mutant(
     mutant: Mutant, tests: Sequence[str], folder: Path, *, full: bool, seconds: float
 ) -> str:
-    """Call tests with a mutant in place, and return `killed`, `survived` or `untested`."""
+    """Call tests with a mutant in place.
+
+    Returns:
+        ``killed`` (a test fails), ``survived``, ``timed out`` or ``untested``.
+    """
     if not tests:
         return "untested"
     path = folder / mutant.file
@@ -190,7 +194,7 @@ def try_mutant(
             cwd=folder, env=environment, capture_output=True, timeout=seconds, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return "killed"
+        return "timed out"
     finally:
         path.write_bytes(before)
     # 5: pytest has collected no test.
@@ -225,7 +229,7 @@ def main() -> int:
     parser.add_argument("--packages", default=",".join(PACKAGES))
     parser.add_argument("--full", action="store_true", help="call the tests of the full suite too")
     parser.add_argument(
-        "--seconds", type=float, default=300.0, help="a mutant whose tests take longer is killed"
+        "--seconds", type=float, default=300.0, help="time limit of the tests of one mutant"
     )
     words = parser.parse_args()
     if words.record:
@@ -244,15 +248,16 @@ def main() -> int:
         for mutant in choose_mutants(words.packages.split(","), words.count, words.seed, lines):
             tests = lines.tests_of(mutant) if lines else neighbours(mutant)
             start = time.monotonic()
-            fate = try_mutant(mutant, tests, folder, full=words.full, seconds=words.seconds)
-            counts[fate] += 1
-            taken = f"{time.monotonic() - start:5.0f} s  {len(tests):2d} tests"
+            outcome = try_mutant(mutant, tests, folder, full=words.full, seconds=words.seconds)
+            counts[outcome] += 1
+            duration = f"{time.monotonic() - start:5.0f} s  {len(tests):2d} tests"
             print(
-                f"{fate:9}{taken}  {mutant.file}:{mutant.line}  {mutant.old} -> {mutant.new}",
+                f"{outcome:9} {duration}  {mutant.file}:{mutant.line}  {mutant.old} -> {mutant.new}",
                 flush=True,
             )
     tried = counts["killed"] + counts["survived"]
-    print(f"{counts['killed']} of {tried} killed, {counts['untested']} untested")
+    others = f"{counts['timed out']} timed out, {counts['untested']} untested"
+    print(f"{counts['killed']} of {tried} killed, {others}")
     return 0
 
 
