@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+import shlex
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -40,12 +42,22 @@ def test_the_yaml_of_the_guide_is_a_model(repo: Path, tmp_path: Path) -> None:
 
 
 def test_every_command_named_exists_and_every_command_is_named(repo: Path) -> None:
-    named = set(
-        re.findall(
-            r"^osimlite ([a-z-]+)", "\n".join(blocks((repo / "README.md").read_text(), "sh")), re.M
-        )
-    )
-    assert named | {"demo"} == set(COMMANDS)
+    text = (repo / "README.md").read_text()
+    named = set(re.findall(r"^osimlite ([a-z-]+)", "\n".join(blocks(text, "sh")), re.M))
+    rows = set(re.findall(r"^\|[^|]+\| `osimlite ([a-z-]+)` \|", text, re.M))
+    assert rows == set(COMMANDS)
+    assert named <= rows
+
+
+def test_the_examples_of_the_table_have_existing_options(repo: Path) -> None:
+    examples = re.findall(r"\| `(osimlite [^`]+)` \|$", (repo / "README.md").read_text(), re.M)
+    assert len(examples) > 20
+    for example in examples:
+        command, *words = shlex.split(example)[1:]
+        module = import_module(f"osimlite.cli.{command.replace('-', '_')}")
+        parameters = getattr(module, command.replace("-", "_")).parameters()
+        options = {spelling for each in parameters for spelling in each.spellings}
+        assert {word for word in words if re.fullmatch(r"--?[a-z-]+", word)} <= options, example
 
 
 @pytest.mark.parametrize("command", COMMANDS)
