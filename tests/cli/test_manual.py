@@ -64,7 +64,10 @@ def test_whatever_raises_errors_has_a_page():
         ("info damaged.osim", "docs/rules.md#text"),
         ("format damaged.osim", "docs/rules.md#text"),
         ("build nobody", "docs/errors.md#models-from-python-yaml-and-json"),
-        ("build dynamic-walker -p thigh=1 -o x.osim", "docs/errors.md#models-from-python-yaml-and-json"),
+        (
+            "build dynamic-walker -p thigh=1 -o x.osim",
+            "docs/errors.md#models-from-python-yaml-and-json",
+        ),
         ("build dynamic-walker -o nowhere/x.osim", "docs/errors.md#files"),
         ("translate walker.osim -o damaged.osim", "docs/errors.md#files"),
         ("rule OSIM999", "docs/rules.md"),
