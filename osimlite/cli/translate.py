@@ -10,7 +10,7 @@ from osimlite.base.text import listed
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import add_row, plain_console, plain_table, say
-from osimlite.translate.exporters import exporters
+from osimlite.translate.exporters import list_exporters
 
 if TYPE_CHECKING:
     from osimlite.base.choices import Choice
@@ -22,13 +22,13 @@ WRITTEN = "the file that is written"
 
 
 def _choices() -> Iterator[Choice]:
-    for exporter in exporters("translate").values():
+    for exporter in list_exporters("translate").values():
         yield from exporter.choices
 
 
 def _told() -> str:
     return "The format: " + "; ".join(
-        f"'{name}' writes {each.help}" for name, each in exporters("translate").items()
+        f"'{name}' writes {each.help}" for name, each in list_exporters("translate").items()
     )
 
 
@@ -72,7 +72,7 @@ def translate(
 
         require("mujoco", extra="mujoco", purpose="--check")
         to = "mjcf"
-    formats = exporters("translate")
+    formats = list_exporters("translate")
     if to not in formats:
         raise OsimliteError(f"--to is {' or '.join(map(repr, formats))}, not '{to}'")
     for name, exporter in formats.items():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from osimlite.base.choices import Choice
 from osimlite.cli import _options as options
 from osimlite.cli._command import Argument, Option, command_with
-from osimlite.translate.exporters import exporters
+from osimlite.translate.exporters import list_exporters
 
 if TYPE_CHECKING:
     from osimlite.view.shown import Shown
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def _choices() -> Iterator[Choice]:
     yield from options.simulating("wrapping")()
-    for name, exporter in exporters("view").items():
+    for name, exporter in list_exporters("view").items():
         yield Choice(name, Path | None, exporter.help, unit="FILE")
         yield from exporter.choices
 
@@ -81,7 +81,9 @@ def view(
     )
     for remark in (*shown.remarks, *describe_errors(shown.findings, shown.scene.remarks)):
         say(remark)
-    written = {name: each for name, each in exporters("view").items() if chosen[name] is not None}
+    written = {
+        name: each for name, each in list_exporters("view").items() if chosen[name] is not None
+    }
     for name, exporter in written.items():
         choices = {each.name: chosen[each.name] for each in exporter.choices}
         say(f"wrote {exporter.write(shown, chosen[name], **choices)}")

@@ -1,4 +1,4 @@
-"""An exporter is one file: the command line, its help and its messages follow from it."""
+"""An exporter is one entry of a table: the command line, its help and its messages follow from it."""
 
 from __future__ import annotations
 
@@ -6,57 +6,56 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from osimlite.base.choices import Choice
 from osimlite.cli import main
 from osimlite.io.document.printer import write
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.translate import exporters
+from osimlite.translate.exporters import Exporter
 
 pytest.importorskip("numpy", reason="needs numpy (extra 'sim')")
 
-NAMES = '''
-"""A list of the bodies."""
-from osimlite.base.choices import Choice
-from osimlite.translate.exporters import Exporter
 
-def write(model, *, folder, name, geometry, ending="txt"):
+class Names:
+    """Translation of a model to a list of its bodies."""
+
+    def __init__(self, model: Any, name: str, ending: str, made: Any) -> None:
+        self.robot, self.fidelity = made.robot, made.fidelity
+        self.text = "\n".join(body.name for body in model.body_set.objects)
+        self.file = f"{name}.{ending}"
+
+    def write(self, folder: Path) -> list[Path]:
+        folder.mkdir()
+        (folder / self.file).write_text(self.text)
+        return [folder / self.file]
+
+
+def write_names(
+    model: Any, *, folder: Path, name: str, geometry: Any, ending: str = "txt"
+) -> Names:
     from osimlite.translate import to_urdf
-    made = to_urdf(model, folder=folder, name=name)
-    text = "\\n".join(body.name for body in model.body_set.objects)
-    class Names:
-        robot, fidelity = made.robot, made.fidelity
-        def write(self, folder):
-            folder.mkdir()
-            (folder / f"{name}.{ending}").write_text(text)
-            return [folder / f"{name}.{ending}"]
-    return Names()
 
-EXPORTER = Exporter("names", "translate", "a list of bodies", write, (Choice("ending", str | None, "Of the file."),))
-'''
+    return Names(model, name, ending, to_urdf(model, folder=folder, name=name))
 
 
 @pytest.fixture(autouse=True)
 def forget() -> Iterator[None]:
-    """Let the exporters be looked up anew, in the test and after it."""
-    forget_exporters()
-    yield
-    forget_exporters()
-
-
-def forget_exporters() -> None:
-    exporters.exporters.cache_clear()
+    """Let the options of the command be looked up anew, in the test and after it."""
     # The command takes its options from the exporters when its module is imported.
+    sys.modules.pop("osimlite.cli.translate", None)
+    yield
     sys.modules.pop("osimlite.cli.translate", None)
 
 
 @pytest.fixture
 def names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    more = tmp_path / "more"
-    more.mkdir()
-    (more / "names.py").write_text(NAMES)
-    monkeypatch.setattr(exporters, "__path__", [*exporters.__path__, str(more)])
+    choices = (Choice("ending", str | None, "Of the file."),)
+    exporter = Exporter("names", "translate", "a list of bodies", write_names, choices)
+    monkeypatch.setattr(exporters, "EXPORTERS", [*exporters.EXPORTERS, exporter])
     monkeypatch.chdir(tmp_path)
     write(dynamic_walker(), "walker.osim")
 
@@ -68,7 +67,7 @@ def call(*words: str) -> int:
 
 
 @pytest.mark.usefixtures("names")
-def test_a_new_exporter_is_one_file(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_new_exporter_is_one_entry(capsys: pytest.CaptureFixture[str]) -> None:
     assert call("translate", "walker.osim", "--to", "names", "--ending", "lst", "-o", "out") == 0
     assert "RightThigh" in Path("out/walker.lst").read_text()
     assert call("translate", "--help") == 0
@@ -81,7 +80,10 @@ def test_a_new_exporter_is_one_file(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_exporters_are_told_without_what_they_work_with() -> None:
-    code = "import sys; from osimlite.translate.exporters import exporters as e; e('view'), e('translate'); print(*sys.modules)"
+    code = (
+        "import sys; from osimlite.translate.exporters import list_exporters;"
+        "list_exporters('view'), list_exporters('translate'); print(*sys.modules)"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(done.stdout.split()) & {
         "numpy",

@@ -1,0 +1,194 @@
+"""Formats that a model can be written in, for other programs and for people.
+
+An exporter is one entry of `EXPORTERS`: the options of ``osimlite translate`` and ``osimlite view``,
+their help and their messages follow from it. What an exporter works with is imported in its
+function, because the entries are read to list what there is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from osimlite.base.choices import Choice
+from osimlite.base.records import dataclass
+
+if TYPE_CHECKING:
+    from osimlite.translate.export import Urdf
+    from osimlite.translate.mjcf.export import Mjcf
+    from osimlite.view.shown import Shown
+
+SCREENSHOT_SIZE = (1200, 900)
+"""Width and height of a screenshot, pixels."""
+
+
+@dataclass(frozen=True)
+class Exporter:
+    """Declaration of a format.
+
+    The function of an exporter of ``osimlite translate`` takes a model and its options, as
+    :func:`osimlite.to_urdf` does, and returns an object with `write`, `fidelity` and `robot`, as
+    :class:`osimlite.translate.export.Urdf` has them. That of ``osimlite view`` takes a
+    :class:`osimlite.view.shown.Shown`, a path and its options, writes the file, and returns a
+    sentence about it.
+    """
+
+    # Of the format in `osimlite translate --to`, or of the option of `osimlite view` that names
+    # the file.
+    name: str
+    command: str  # "translate" or "view"
+    help: str  # what is written
+    write: Callable[..., Any]
+    choices: tuple[Choice, ...] = ()  # options that this format has
+    is_default: bool = False  # whether the command writes it if no format is named
+
+
+def write_urdf(*model: Any, **choices: Any) -> Urdf:
+    """Translate a model to URDF; see :func:`osimlite.to_urdf`."""
+    from osimlite.translate.export import to_urdf
+
+    return to_urdf(*model, **choices)
+
+
+def write_mjcf(*model: Any, **choices: Any) -> Mjcf:
+    """Translate a model to MJCF; see :func:`osimlite.to_mjcf`."""
+    from osimlite.translate.mjcf.export import to_mjcf
+
+    return to_mjcf(*model, **choices)
+
+
+def write_page(shown: Shown, path: Path) -> str:
+    """Write a page for browsers, and return its name and size."""
+    return f"{shown.write_page(path)} ({_megabytes(path)})"
+
+
+def write_glb(shown: Shown, path: Path) -> str:
+    """Write a file of glTF, and return its name and size."""
+    return f"{shown.write_glb(path)} ({_megabytes(path)})"
+
+
+def write_rerun(shown: Shown, path: Path) -> str:
+    """Write a recording for the viewer of Rerun, and return its name, its size and how to open it."""
+    return f"{shown.write_rrd(path)} ({_megabytes(path)}); open it with: rerun {path}"
+
+
+def write_screenshot(shown: Shown, path: Path, *, at: float | None) -> str:
+    """Write a picture of a moment (s), and return its name."""
+    return str(shown.write_picture(path, SCREENSHOT_SIZE, at))
+
+
+def _megabytes(path: Path) -> str:
+    return f"{path.stat().st_size / 1e6:.1f} MB"
+
+
+URDF_CHOICES = (
+    Choice(
+        "limits",
+        str | None,
+        "'range' writes coordinate ranges as hard limits, which they are not in OpenSim.",
+        shown="none",
+        group="URDF",
+    ),
+    Choice(
+        "merge",
+        bool | None,
+        "Make bodies that do not move relative to each other one link.",
+        group="URDF",
+        spelled=("--merge",),
+    ),
+    Choice(
+        "collision",
+        bool | None,
+        "Write contact geometry as collision shapes (a half space as a large box).",
+        group="URDF",
+        spelled=("--collision",),
+    ),
+    Choice(
+        "effort",
+        float | None,
+        "Greatest force (N, N m) of joints whose coordinate has no actuators that limit it.",
+        shown="no limit",
+        group="URDF",
+    ),
+    Choice(
+        "velocity",
+        float | None,
+        "Greatest rate (m/s, rad/s) of all joints.",
+        shown="no limit",
+        group="URDF",
+    ),
+)
+"""Options of the format URDF."""
+
+MJCF_CHOICES = (
+    Choice("mujoco", int | None, "The version to write for, 3 or 4.", shown="4", group="MJCF"),
+    Choice(
+        "contact",
+        str | None,
+        "'native' writes contact forces as contacts of MuJoCo's own law, 'none' leaves them out.",
+        shown="native",
+        group="MJCF",
+    ),
+    Choice(
+        "fit",
+        str | None,
+        "'wraps' fits what tendons go around to the paths, 'force' muscles too (up to a minute).",
+        shown="none",
+        group="MJCF",
+    ),
+    Choice(
+        "spline",
+        str | None,
+        "What joints follow that move by splines: a 'quartic', or 'series': a quartic of a quartic.",
+        shown="series",
+        group="MJCF",
+    ),
+    Choice(
+        "driver",
+        bool | None,
+        "Write what osimlite.mjcf.Driver moves by OpenSim's own laws: the file itself has no forces.",
+        group="MJCF",
+        spelled=("--driver",),
+    ),
+)
+"""Options of the format MJCF."""
+
+EXPORTERS: list[Exporter] = [
+    Exporter(
+        "urdf",
+        "translate",
+        "<file>.urdf, and <file>.coordinates.json, which says how coordinates drive joints where "
+        "URDF cannot",
+        write_urdf,
+        URDF_CHOICES,
+        is_default=True,
+    ),
+    Exporter("mjcf", "translate", "<file>.xml for MuJoCo", write_mjcf, MJCF_CHOICES),
+    Exporter("glb", "view", "Write a file for Blender, slides and web pages (glTF).", write_glb),
+    Exporter("html", "view", "Write one page that needs no server and no network.", write_page),
+    Exporter("rerun", "view", "Write a recording for the Rerun viewer (.rrd).", write_rerun),
+    Exporter(
+        "screenshot",
+        "view",
+        "Write a picture (.png); needs no display.",
+        write_screenshot,
+        (
+            Choice(
+                "at",
+                float | None,
+                "The moment of the screenshot.",
+                unit="SECONDS",
+                shown="the first",
+            ),
+        ),
+    ),
+]
+"""All formats; the order is that of the help."""
+
+
+def list_exporters(command: str) -> dict[str, Exporter]:
+    """Return the exporters of a command by name, the default one first."""
+    selected = [exporter for exporter in EXPORTERS if exporter.command == command]
+    selected.sort(key=lambda exporter: not exporter.is_default)
+    return {exporter.name: exporter for exporter in selected}
