@@ -1,8 +1,9 @@
-"""Optimal control: the studies of OpenSim's Moco, by direct collocation with exact derivatives.
+"""Optimal control: studies of OpenSim's Moco, solved by direct collocation with exact derivatives.
 
-A study becomes a `problem` (what varies, between which bounds), its equations at one point of the
-grid become formulas (`point`), a `scheme` says how points hang together, `program` is the nonlinear
-program of all that with sparse exact derivatives, and `ipopt` solves it; `refinement` makes the
-mesh finer where that is needed, and `simulated` integrates what was found. A goal is one module in
-`goals`, which is found by the name of its class.
+The way of a study through the modules: `problem` reads what varies and between which `bounds`;
+`goals` and `path_constraints` formulate the terms at one `point` of the grid; a transcription
+scheme (`schemes`) connects the points; `program` assembles the nonlinear program with sparse exact
+derivatives; `ipopt` solves it; `refinement` repeats this on finer meshes; `solution` collects the
+results, and `simulation_check` integrates the model with the controls of a solution. `inverse` and
+`track` make the studies of MocoInverse and MocoTrack.
 """

@@ -1,4 +1,4 @@
-"""Between which bounds what an optimization finds has to be: what the study says, and Moco's rules for the rest."""
+"""Bounds of variables: those of the study, and Moco's rules for the rest."""
 
 from __future__ import annotations
 
@@ -18,19 +18,23 @@ from osimlite.schema.muscles import DeGrooteFregly2016Muscle, Muscle
 from osimlite.schema.patterns import Pattern
 
 Range = tuple[float, float]
+"""Lower and upper bound."""
 FREE: Range = (-math.inf, math.inf)
-MIN_TENDON_FORCE, MAX_TENDON_FORCE = 0.0, 5.0
-"""Of a normalized tendon force, by ``statebounds_normalized_tendon_force``."""
+"""Range without bounds."""
+MIN_TENDON_FORCE = 0.0
+"""Lower bound of a normalized tendon force, from ``statebounds_normalized_tendon_force``."""
+MAX_TENDON_FORCE = 5.0
+"""Upper bound of a normalized tendon force, from ``statebounds_normalized_tendon_force``."""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Of one variable.
+    """Bounds of one variable.
 
     Attributes:
-        within: over the whole motion.
-        first: at the start.
-        last: at the end.
+        within: bounds over the whole motion.
+        first: bounds at the start.
+        last: bounds at the end.
     """
 
     within: Range
@@ -39,22 +43,29 @@ class Bounds:
 
     @classmethod
     def from_ranges(cls, within: Range, first: Range = FREE, last: Range = FREE) -> Bounds:
-        """Those at the ends are never wider than the others, as in Moco."""
+        """Return bounds whose ends are never wider than the rest, as in Moco.
+
+        Args:
+            within: bounds over the motion.
+            first: bounds at the start.
+            last: bounds at the end.
+        """
         return cls(within, _intersect(first, within), _intersect(last, within))
 
 
 def _intersect(inner: Range, outer: Range) -> Range:
+    """Return the part of one range within another."""
     return max(inner[0], outer[0]), min(inner[1], outer[1])
 
 
 def read_range(bounds: Any) -> Range | None:
-    """What a ``MocoBounds`` or a list of one or two numbers says; None if it says nothing."""
+    """Return the range of a ``MocoBounds`` or of a list of one or two numbers; None if it is empty."""
     given = tuple(getattr(bounds, "bounds", bounds))
     return None if not given else (float(given[0]), float(given[-1]))
 
 
 class _VariableInfos:
-    """What the study says of each of some variables."""
+    """Entries of a study for some variables: those by name override those by pattern."""
 
     def __init__(
         self,
@@ -68,12 +79,13 @@ class _VariableInfos:
             self.infos |= {name: info for name in names if matches(name)}
         self.infos |= {info.name: info for info in infos}
 
-    def bounds(self, name: str, otherwise: Range) -> Bounds:
+    def bounds(self, name: str, default: Range) -> Bounds:
+        """Return the bounds of a variable; those that the study leaves open are `default`."""
         info = self.infos.get(name)
         if info is None:
-            return Bounds.from_ranges(otherwise)
+            return Bounds.from_ranges(default)
         return Bounds.from_ranges(
-            read_range(info.bounds) or otherwise,
+            read_range(info.bounds) or default,
             read_range(info.initial_bounds) or FREE,
             read_range(info.final_bounds) or FREE,
         )
@@ -82,7 +94,16 @@ class _VariableInfos:
 def find_control_bounds(
     phase: MocoPhase, names: Sequence[str], components: Mapping[str, Component]
 ) -> dict[str, Bounds]:
-    """Of controls; without any word of the study those of the actuator."""
+    """Find the bounds of controls; without an entry in the study they are those of the actuator.
+
+    Args:
+        phase: phase of the study.
+        names: paths of the controls.
+        components: components of the model by path.
+
+    Returns:
+        Bounds by path.
+    """
     infos = _VariableInfos(phase.control_infos_pattern, phase.control_infos, names)
     result = {}
     for name in names:
@@ -102,39 +123,55 @@ def find_state_bounds(
     components: Mapping[str, Component],
     controls: Mapping[str, Bounds],
 ) -> dict[str, Bounds]:
-    """Of states; values without a word have the range of the coordinate, activations that of the excitation."""
+    """Find the bounds of states by Moco's rules.
+
+    Without an entry in the study, values have the range of the coordinate and activations that of
+    the excitation.
+
+    Args:
+        phase: phase of the study.
+        names: paths of the states.
+        components: components of the model by path.
+        controls: bounds of the controls by path.
+
+    Returns:
+        Bounds by path.
+    """
     infos = _VariableInfos(phase.state_infos_pattern, phase.state_infos, names)
     speeds = read_range(phase.default_speed_bounds) or FREE
     result = {}
     for name in names:
         path, _, what = name.rpartition("/")
         owner: Any = components.get(path)
-        otherwise = FREE
+        default = FREE
         if what == "value":
-            otherwise = tuple(owner.range)
+            default = tuple(owner.range)
         elif what == "speed":
-            otherwise = speeds
+            default = speeds
         elif what == "normalized_tendon_force" and isinstance(owner, DeGrooteFregly2016Muscle):
-            otherwise = MIN_TENDON_FORCE, MAX_TENDON_FORCE
+            default = MIN_TENDON_FORCE, MAX_TENDON_FORCE
         elif what == "activation" and isinstance(owner, ActivationCoordinateActuator):
-            otherwise = owner.min_control, owner.max_control
+            default = owner.min_control, owner.max_control
         elif (
             what == "activation"
             and isinstance(owner, Muscle)
             and phase.bound_activation_from_excitation
         ):
-            otherwise = (
+            default = (
                 controls[path].within
                 if path in controls
                 else (owner.min_control, owner.max_control)
             )
-        result[name] = infos.bounds(name, otherwise)
+        result[name] = infos.bounds(name, default)
     return result
 
 
 def compute_scaling(low: float, high: float) -> tuple[float, float]:
-    """Factor and offset that a variable has by its scaled self, as Moco makes them: the width of
-    its bounds, and the middle between them with the other sign.
+    """Compute the factor and the offset of a variable, ``w = factor x + offset``, as Moco does.
+
+    Returns:
+        Width of the bounds, and the negative of their middle; (1, 0) without finite bounds, (1,
+        bound) if both bounds are equal.
     """
     width = high - low
     if not math.isfinite(width):
@@ -143,7 +180,7 @@ def compute_scaling(low: float, high: float) -> tuple[float, float]:
 
 
 def compute_midpoint(low: Array, high: Array) -> Array:
-    """Where a search begins: between the bounds, at the only one, or at zero."""
+    """Return the middle between bounds, the only bound, or zero: where a search starts."""
     has_low, has_high = np.isfinite(low), np.isfinite(high)
     ends = np.where(has_low, low, 0.0), np.where(has_high, high, 0.0)
     return (ends[0] + ends[1]) * np.where(has_low & has_high, 0.5, 1.0)

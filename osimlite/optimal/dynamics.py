@@ -1,4 +1,4 @@
-"""The equations of motion at one point: explicit, implicit, or along a motion that is given."""
+"""Equations of motion at one point of the grid, explicit or implicit."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 
 class Dynamics:
-    """What rates are, and what must be zero, at a point.
+    """Rates of the states and residuals at a point.
 
-    Multipliers are variables of their own at all points, and push as ``Gᵀ multipliers``; the
-    model's constraints are equations of points of the mesh (M. Posa et al., ICRA 2016),
-    accelerations of all points if intervals lead to states that are moved onto them (R. Bordalba et
-    al., IEEE Transactions on Robotics 39, 2023).
+    Multipliers are variables at all points and act as generalized forces ``Gᵀ multipliers``. The
+    model's constraints are equations at the points of the mesh (M. Posa et al., ICRA 2016), or at
+    all points for accelerations if states are projected onto the constraints at the end of
+    intervals (R. Bordalba et al., IEEE Transactions on Robotics 39, 2023).
 
     Attributes:
         is_implicit: whether accelerations are variables.
@@ -33,16 +33,16 @@ class Dynamics:
         self._first_rate = self.size if self.is_implicit else 0
 
     def list_forces(self) -> Iterable[tuple[str, Any]]:
-        """The forces of the model, by their paths."""
+        """Return the forces of the model with their paths."""
         return [(item.path, item) for item in self.functions.forces.elements]
 
     def compute_path_lengths(self, point: Point) -> tuple[Formula, Formula]:
-        """Lengths and lengthening speeds of the paths of ``functions.path_names``."""
+        """Compute lengths (m) and lengthening speeds (m/s) of the paths of ``functions.path_names``."""
         lengths, speeds, _ = self.functions.paths(point.t, point.x, point.p)
         return lengths, speeds
 
     def compute_rates(self, point: Point) -> Formula:
-        """The derivative of the whole state."""
+        """Compute the time derivative of the complete state."""
         size, f = self.size, self.functions
         speeds = point.x[size : 2 * size]
         if self.is_implicit:
@@ -61,21 +61,21 @@ class Dynamics:
         )
 
     def _insert_tendon_rates(self, point: Point, rates: Formula) -> Formula:
-        """Rates of tendon forces that are variables, in their places."""
+        """Return the rates with those rates of tendon forces that are variables."""
         for number, path in enumerate(self.tendons.paths):
             place = self.functions.states.index(f"{path}/normalized_tendon_force")
             rates[place] = point.derivatives[self._first_rate + number]
         return rates
 
     def _compute_auxiliary_rates(self, point: Point) -> Formula:
-        """Rates of the auxiliary states by the laws."""
+        """Compute the rates of the auxiliary states by the force laws."""
         none, f = casadi.SX.zeros(len(self.functions.states)), self.functions
         return -f.residual(point.t, point.x, none, point.u, point.p, point.multipliers)[
             2 * self.size :
         ]
 
     def correct_rates(self, point: Point) -> Formula:
-        """The rates, with the correction of velocities that keeps states on the constraints."""
+        """Return the rates with the velocity correction that keeps states on the constraints (Posa et al.)."""
         rates = point.rates
         if self.problem.uses_projection or not point.slacks.numel():
             return rates
@@ -83,7 +83,11 @@ class Dynamics:
         return casadi.vertcat(rates[: self.size] + g.T @ point.slacks, rates[self.size :])
 
     def compute_residuals(self, point: Point) -> tuple[list[str], Formula]:
-        """What must be zero at all points, with its names."""
+        """Compute the residuals that are zero at all points.
+
+        Returns:
+            Names of the residuals, and the residuals (k, 1).
+        """
         names, errors = self.tendons.compute_residuals(point, point.derivatives[self._first_rate :])
         if not self.is_implicit:
             return names, errors
@@ -96,7 +100,15 @@ class Dynamics:
         )
 
     def compute_constraint_errors(self, point: Point, is_mesh: bool) -> tuple[list[str], Formula]:
-        """Errors of the model's constraints at a point, with their names."""
+        """Compute the errors of the model's constraints at a point.
+
+        Args:
+            point: point of the grid.
+            is_mesh: whether the point is an end of an interval.
+
+        Returns:
+            Names of the errors, and the errors (k, 1).
+        """
         problem, own = self.problem, self.problem.constraint_names
         if not problem.has_constraints or not (is_mesh or problem.uses_projection):
             return [], casadi.SX(0, 1)
@@ -110,7 +122,16 @@ class Dynamics:
         return names, casadi.vertcat(position, velocity, acceleration)
 
     def make_joint_load(self, path: str, side: str, frame: str) -> Callable[[Point], Formula]:
-        """Moment (N m) and force (N) that a joint pushes one of its bodies with, along the axes of a frame (6, 1)."""
+        """Return the function of a point for the load of a joint on one of its bodies.
+
+        Args:
+            path: path of the joint.
+            side: "parent" or "child", the body on which the load acts.
+            frame: path of the frame along whose axes the load is expressed.
+
+        Returns:
+            Function that returns moment (N m) and force (N), (6, 1).
+        """
         load = self.functions.joint_load(path, side)
 
         def formula(point: Point) -> Formula:
@@ -123,7 +144,15 @@ class Dynamics:
     def make_generalized_forces(
         self, pushing: Sequence[str], coordinates: Sequence[str]
     ) -> Callable[[Point], Formula]:
-        """What coordinates take beyond gravity and the forces of some paths, N and N m."""
+        """Return the function of a point for the generalized forces that the motion needs.
+
+        Args:
+            pushing: paths of forces that act; gravity acts as well.
+            coordinates: paths of the coordinates.
+
+        Returns:
+            Function that returns the generalized forces still missing, N and N m.
+        """
         missing, rows = (
             self.functions.generalized_forces(pushing),
             [*map(self.functions.coordinates.index, coordinates)],
@@ -131,16 +160,19 @@ class Dynamics:
         return lambda point: missing(point.t, point.x, point.rates, point.u, point.p)[rows]
 
     def _evaluate_constraints(self, point: Point) -> Sequence[Formula]:
-        """Errors of positions, speeds and accelerations, and the matrix G."""
+        """Return the errors of positions, speeds and accelerations, and the Jacobian G of the constraints."""
         found: Sequence[Formula] = self.functions.constraints(
             point.t, point.x, point.rates, point.p
         )
         return found
 
     def compute_projection_errors(self, point: Point) -> tuple[list[str], Formula]:
-        """How far values and speeds are from those that the interval leads to, moved along the constraints; with names.
+        """Compute the errors of projected values and speeds: ``x - projections - Gᵀ slacks``.
 
-        Of the slacks the first half, as Moco has them, moves values and the second speeds.
+        The first half of the slacks moves values and the second half speeds, as in Moco.
+
+        Returns:
+            Names of the errors, and the errors (k, 1).
         """
         names, g = self.problem.projected_names, self._evaluate_constraints(point)[3]
         moved = casadi.vertcat(*(g.T @ part for part in casadi.vertsplit(point.slacks, g.size1())))

@@ -1,4 +1,4 @@
-"""The exact Hessian of the Lagrangian of a nonlinear program."""
+"""Exact Hessian of the Lagrangian of a nonlinear program."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from osimlite.optimal.sparse import SparseMatrix
 
 
 class Hessian:
-    """Second derivatives of ``factor f + multipliers · g``, of which CasADi wants the upper half.
+    """Upper triangle of the second derivatives of ``factor f + multipliers · g``, as CasADi's Ipopt wants it.
 
     Attributes:
-        sparsity: of the numbers that `numbers` gives.
+        sparsity: sparsity pattern of the result of `compute_entries`.
     """
 
     def __init__(self, program: Program) -> None:
@@ -54,7 +54,13 @@ class Hessian:
         )
 
     def compute_entries(self, w: Array, factor: float, multipliers: Array) -> Array:
-        """In the order of `sparsity`."""
+        """Return the entries of the upper triangle in the order of `sparsity`.
+
+        Args:
+            w: variables (n,).
+            factor: factor of the objective.
+            multipliers: multipliers of the constraints (m,).
+        """
         program, direct = self.program, len(self.program.end_columns)
         totals = program._compute_rows(w)[program._row_count :]
         given = program._end_arguments(w, totals)

@@ -1,4 +1,4 @@
-"""MocoInverse: what muscles do in a motion that is given exactly."""
+"""MocoInverse: muscle controls in a prescribed motion."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.tools.processors import TabOpUseAbsoluteStateNames
 
 TENDON_RATE_WEIGHT = 0.01
-"""Of the squares of rates of tendon forces."""
+"""Weight of the squared rates of tendon forces, as in MocoInverse."""
 
 
 def build_inverse_problem(
@@ -43,17 +43,17 @@ def build_inverse_problem(
     more: Callable[[MocoStudy], None] | None = None,
     scaled: Mapping[str, str] | None = None,
 ) -> Problem:
-    """The problem that the tool makes.
+    """Build the optimal control problem of a MocoInverse.
 
     Args:
-        tool: its settings.
-        file: they stand in.
-        folder: that their files are in, if they are in none.
-        more: changes the study before it becomes a problem: goals, bounds, settings of the solver.
-        scaled: as of :func:`osimlite.moco.solve`.
+        tool: settings.
+        file: setup file of the settings; None if there is none.
+        folder: folder of the files that settings without a file name.
+        more: function that changes the study before the problem is built: goals, bounds, solver.
+        scaled: as for :func:`osimlite.moco.solve`.
 
     Raises:
-        OsimliteError: the settings or their files are not as they have to be.
+        OsimliteError: the settings or their files are invalid.
     """
     asked = StudyContext(file, folder)
     model = processed(tool.model, asked.folder)
@@ -110,18 +110,18 @@ def solve_inverse(
     refine: float | str | Refinement | None = None,
     scaled: Mapping[str, str] | None = None,
 ) -> MocoSolution:
-    """Find what muscles do in a motion that is given, as OpenSim's MocoInverse.
+    """Find the muscle controls of a prescribed motion, as OpenSim's MocoInverse.
 
     Args:
-        tool: its settings.
-        folder: that their files are in; the current folder if None.
-        more: changes the study before it is solved: goals, bounds, settings of the solver.
-        tell: is told of each iteration.
-        refine: as of :func:`osimlite.moco.solve`.
-        scaled: likewise.
+        tool: settings.
+        folder: folder of the files that the settings name; the current folder if None.
+        more: function that changes the study before it is solved: goals, bounds, solver.
+        tell: function that is called with the progress after each iteration.
+        refine: as for :func:`osimlite.moco.solve`.
+        scaled: as for :func:`osimlite.moco.solve`.
 
     Raises:
-        OsimliteError: as of :func:`build_inverse_problem`.
+        OsimliteError: as for :func:`build_inverse_problem`.
     """
     problem = build_inverse_problem(
         tool, None, None if folder is None else Path(folder), more, scaled
@@ -134,7 +134,13 @@ def solve_inverse_problem(
     tell: Callable[[Progress], None] | None,
     refine: float | str | Refinement | None = None,
 ) -> MocoSolution:
-    """The solution of the problem of the tool, with the values and speeds of the motion that was given."""
+    """Solve the problem of a MocoInverse; the solution includes the values and speeds of the prescribed motion.
+
+    Args:
+        problem: problem of :func:`build_inverse_problem`.
+        tell: function that is called with the progress after each iteration.
+        refine: as for :func:`osimlite.moco.solve`.
+    """
     given: PrescribedMotion = problem.functions
     solution = solve_program(Program(problem), None, tell, refine)
     trajectory = solution.trajectory
@@ -148,7 +154,12 @@ def solve_inverse_problem(
 def _read_kinematics(
     asked: StudyContext, tool: MocoInverse, model: Model
 ) -> tuple[StoTable, Callable[[Array], Array]]:
-    """The table of a tool, and the motion of all coordinates through its poses, which fulfil the constraints."""
+    """Read the kinematics of a MocoInverse.
+
+    Returns:
+        The table, and the motion of all coordinates: splines through poses that fulfil the model's
+        constraints.
+    """
     mechanism = build_mechanism(model)
     infos = mechanism.coordinates
     names = [f"{info.path}/value" for info in infos]

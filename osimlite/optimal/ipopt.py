@@ -1,4 +1,4 @@
-"""Ipopt, with a nonlinear program's own derivatives and with progress that a person can follow."""
+"""Ipopt with a nonlinear program's own derivatives, readable progress and a clean stop on Ctrl-C."""
 
 from __future__ import annotations
 
@@ -21,26 +21,29 @@ from osimlite.optimal.hessian import Hessian
 from osimlite.optimal.program import Program, cache_last
 
 METIS_MIN_VARIABLES = 1500
-"""Of fewer variables METIS takes longer than its order saves."""
-EXACT_TOLERANCE_FACTOR, MIN_TOLERANCE = 1e-2, 1e-8
-"""Part of a study's tolerance to which exact second derivatives go on, which takes a few steps, and Ipopt's own."""
+"""Number of variables from which METIS saves more time by its order than it takes."""
+EXACT_TOLERANCE_FACTOR = 1e-2
+"""Factor of a study's tolerance with exact second derivatives: Newton's last steps are few and cheap."""
+MIN_TOLERANCE = 1e-8
+"""Lower bound of the tolerance that `EXACT_TOLERANCE_FACTOR` leads to; Ipopt's default."""
 FEASIBILITY_TOLERANCE = 1e-4
-"""Of two iterates that violate nothing by more than this the cheaper one is the better."""
+"""Largest violation up to which the iterate with the lower objective is the better one."""
 
 
 THREADS_VARIABLE = "OPENBLAS_NUM_THREADS"
+"""Environment variable that limits the threads of OpenBLAS."""
 WARM_START_OPTIONS = {"mu_init": 1e-7, "bound_push": 1e-8, "bound_frac": 1e-8}
-"""Of a search that starts near its end: what its barrier costs is no more than the barrier times the bounds."""
+"""Ipopt options for a guess near the solution: a small barrier, and no move away from the bounds."""
 
 
 @dataclass(frozen=True)
 class Violation:
-    """A constraint that is not fulfilled.
+    """Violation of a constraint.
 
     Attributes:
-        name: of what should hold.
-        time: s; None for what concerns both ends.
-        size: by how much it is missed.
+        name: name of the constraint.
+        time: time of the point, s; None for a constraint on both ends of the motion.
+        size: distance of the value from its bounds.
     """
 
     name: str
@@ -54,12 +57,12 @@ class Violation:
 
 @dataclass(frozen=True)
 class Progress:
-    """Where the search is.
+    """State of the search after an iteration.
 
     Attributes:
-        iteration: number of it.
-        objective: what is made small.
-        worst: the largest violation; None without any.
+        iteration: number of the iteration.
+        objective: value of the objective.
+        worst: largest violation; None if all constraints hold.
     """
 
     iteration: int
@@ -73,14 +76,14 @@ class Progress:
 
 @dataclass(frozen=True, eq=False)
 class SolverResult:
-    """What came out.
+    """Result of one Ipopt run.
 
     Attributes:
-        w: the variables.
-        status: in Ipopt's words.
-        success: whether it is a solution to the tolerances.
-        iterations: that were taken.
-        duration: of the search, s.
+        w: variables (n,).
+        status: Ipopt's return status.
+        success: whether the result is a solution within the tolerances.
+        iterations: number of iterations.
+        duration: duration of the search, s.
     """
 
     w: Array
@@ -93,13 +96,13 @@ class SolverResult:
 def find_violations(
     program: Program, w: Array, rows: Array | None = None, most: int = 10
 ) -> list[Violation]:
-    """The largest ones, the largest first.
+    """Return the largest violations of the constraints, the largest first.
 
     Args:
-        program: that they are of.
-        w: the variables.
-        rows: the values of g at w, if they are known.
-        most: how many at most.
+        program: nonlinear program.
+        w: variables (n,).
+        rows: values of g at `w`; None to compute them.
+        most: maximum number of violations.
     """
     rows = program.compute_values(w)[1] if rows is None else rows
     size = np.maximum(np.maximum(program.lower - rows, rows - program.upper), 0.0)
@@ -116,21 +119,24 @@ def find_violations(
 def run_ipopt(
     program: Program,
     guess: Array,
-    tell: Callable[[Progress], None] | None = None,
+    report: Callable[[Progress], None] | None = None,
     *,
     near: bool = False,
 ) -> SolverResult:
-    """Look for the least objective from a guess.
+    """Minimize the objective of a nonlinear program from a guess.
 
-    An interrupt (Ctrl-C) ends the search, and the best that was found is what comes out.
+    An interrupt (Ctrl-C) stops the search after the iteration; the result is then the best iterate.
 
     Args:
-        program: that is solved.
-        guess: to start from.
-        tell: is told of each iteration.
-        near: whether the guess is nearly a solution, so that it is not moved away from its bounds.
+        program: nonlinear program.
+        guess: initial variables (n,).
+        report: function that is called with the progress after each iteration.
+        near: whether the guess is nearly a solution, so that Ipopt must not move it off its bounds.
+
+    Raises:
+        SimulationError: the objective or a constraint is not a number.
     """
-    search = _SearchCallbacks(program, tell)
+    search = _SearchCallbacks(program, report)
     # Without a name Ipopt reads no file of options. By default it reads `ipopt.opt` in the current
     # folder, which may name a file to write to and a library to load.
     options = {
@@ -172,8 +178,9 @@ def run_ipopt(
 
 @cache
 def _load_ipopt() -> None:
-    """Ipopt, whose BLAS asks when it is loaded how many threads it may have: matrices are small,
-    and sums of as many parts as there are cores would be others on each machine.
+    """Load Ipopt with one thread for its BLAS, which reads the number of threads when it is loaded.
+
+    The matrices are small, and sums of one part per core would differ between machines.
     """
     before = os.environ.get(THREADS_VARIABLE)
     os.environ[THREADS_VARIABLE] = before or "1"
@@ -183,12 +190,16 @@ def _load_ipopt() -> None:
 
 
 def _uses_exact_hessian(program: Program) -> bool:
-    """Where nothing is made small, all multipliers vanish in the end, and second derivatives lead astray until then."""
+    """Return whether the search uses exact second derivatives.
+
+    Without an objective all multipliers vanish at the solution, and until then second derivatives
+    lead the search astray.
+    """
     return program.problem.solver.optim_hessian_approximation == "exact" and bool(program.costs)
 
 
 def _make_options(program: Program) -> dict[str, Any]:
-    """As Moco sets them."""
+    """Return Ipopt's options, set as Moco sets them."""
     settings, options = program.problem.solver, dict[str, Any]()
     is_exact = _uses_exact_hessian(program)
     options["hessian_approximation"] = "exact" if is_exact else "limited-memory"
@@ -218,6 +229,7 @@ def _make_options(program: Program) -> dict[str, Any]:
 
 
 def _describe_invalid_number(program: Program, guess: Array) -> str:
+    """Return the message for an objective or a constraint that is not a number."""
     costs, rows = program.compute_values(guess)
     bad = [program.labels[row] for row in np.flatnonzero(~np.isfinite(rows))[:1]]
     bad += [name for name, cost in zip(program.costs, costs, strict=True) if not np.isfinite(cost)]
@@ -226,7 +238,7 @@ def _describe_invalid_number(program: Program, guess: Array) -> str:
 
 
 class _ArrayCallback(casadi.Callback):  # type: ignore[misc]
-    """A function of CasADi that computes with arrays."""
+    """CasADi function that a Python function computes from NumPy arrays."""
 
     def __init__(
         self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], law: Callable[..., Any]
@@ -268,14 +280,22 @@ class _ArrayCallback(casadi.Callback):  # type: ignore[misc]
 
 
 def _make_dense_column(size: int) -> Any:
+    """Return the sparsity of a dense column."""
     return casadi.Sparsity.dense(size, 1)
 
 
 class _SearchCallbacks:
-    """The functions that Ipopt asks, and what it tells after each iteration."""
+    """Functions that Ipopt calls, and the best iterate.
 
-    def __init__(self, program: Program, tell: Callable[[Progress], None] | None) -> None:
-        self.program, self.tell, self.stops, self.count = program, tell, False, 0
+    Ipopt searches for scaled variables x, from which the variables follow as ``w = factors x +
+    offsets``.
+    """
+
+    def __init__(self, program: Program, report: Callable[[Progress], None] | None) -> None:
+        self.program = program
+        self.report = report
+        self.stops = False
+        self.count = 0
         self.best: Array | None = None
         self._best = (np.inf, np.inf)
         self.factors, self.offsets = program.layout.scaling
@@ -307,11 +327,11 @@ class _SearchCallbacks:
         )
 
     def unscale(self, x: Array) -> Array:
-        """The variables, of those that Ipopt has."""
+        """Return the variables w of Ipopt's variables x."""
         return self.factors * x + self.offsets
 
     def scale(self, w: Array) -> Array:
-        """The reverse of `real`."""
+        """Return Ipopt's variables x of the variables w."""
         return (w - self.offsets) / self.factors
 
     def _values(self, x: Array, *_: Array) -> tuple[Any, ...]:
@@ -326,20 +346,21 @@ class _SearchCallbacks:
 
     # ---------------------------------------------------------------------------------------- after an iteration
     def _record_iteration(self, x: Array, f: Array, rows: Array, *_: Array) -> tuple[Any, ...]:
+        """Keep the best iterate, report the progress, and tell Ipopt whether to stop."""
         objective = float(f[0])
         found = find_violations(self.program, self.unscale(x), rows, most=1)
         size = found[0].size if found else 0.0
         rank = (size, np.inf) if size > FEASIBILITY_TOLERANCE else (0.0, objective)
         if rank < self._best:
             self.best, self._best = self.unscale(x), rank
-        if self.tell is not None:
-            self.tell(Progress(self.count, objective, found[0] if found else None))
+        if self.report is not None:
+            self.report(Progress(self.count, objective, found[0] if found else None))
         self.count += 1
         return (1.0 if self.stops else 0.0,)
 
     @contextmanager
     def stop_on_interrupt(self) -> Iterator[None]:
-        """The first Ctrl-C ends the search after the iteration, the second at once."""
+        """Let the first Ctrl-C stop the search after the iteration, and the second at once."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -357,6 +378,7 @@ class _SearchCallbacks:
 
 
 def _make_hessian_callback(program: Program, search: _SearchCallbacks) -> Any:
+    """Return the CasADi function of the scaled Hessian of the Lagrangian."""
     hessian = Hessian(program)
     first, second = (
         search.factors[np.array(places, dtype=int)] for places in hessian.sparsity.get_triplet()

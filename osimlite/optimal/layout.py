@@ -1,4 +1,4 @@
-"""Where each variable of the nonlinear program is."""
+"""Layout of the variables of the nonlinear program."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
 
 MIN_SPLINE_TIMES = 6
-"""Times that splines of fifth degree need."""
+"""Number of times that a spline of fifth degree needs at least."""
 VARIABLE_KINDS = "states", "controls", "multipliers", "derivatives", "slacks", "projections"
-"""What a point may have variables of, in this order."""
+"""Kinds of variables of a point, in their order."""
 PROJECTION_SUFFIX = "/projection"
-"""Ending of the names of states where an interval leads to, before they are moved onto the constraints."""
+"""Suffix of the names of states at the end of an interval, before they are projected onto the constraints."""
 
 
 class Layout:
-    """The variables: initial and final time, parameters, and then those of one point after the other.
+    """Vector of variables: initial and final time, parameters, then the variables of each point in turn.
 
     Attributes:
-        names: by kind the names of the variables of a point.
-        shared: how many there are before those of the first point.
-        places: for each point the places of its variables.
-        lower: bounds (n,).
-        upper: bounds (n,).
-        places_of: by kind the places (points, names); -1 where a point has none.
+        names: names of the variables of a point, by kind.
+        shared: number of variables before those of the first point.
+        point_indices: indices of the variables of each point.
+        indices: indices (points, names) of the variables by kind; -1 where a point has none.
+        lower: lower bounds (n,).
+        upper: upper bounds (n,).
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -107,8 +107,9 @@ class Layout:
             raise problem.invalid_error(problem.phase, message)
 
     def has_kind(self, kind: str, point: int) -> bool:
-        """Whether a point has variables of a kind: corrections of velocities are between nodes,
-        projections at the ends of intervals.
+        """Return whether a point has variables of a kind.
+
+        Velocity corrections are at points between nodes, projections at the ends of intervals.
         """
         if kind == "slacks" and not self.problem.uses_projection:
             return not self.problem.grid.is_mesh[point]
@@ -118,8 +119,10 @@ class Layout:
 
     @cached_property
     def scaling(self) -> tuple[Array, Array]:
-        """Factors (n,) and offsets (n,) that the variables have by those that the search takes:
-        each by its own bounds, where Moco 4.6 takes those of the last one of its kind for all.
+        """Factors (n,) and offsets (n,) with which the search scales the variables.
+
+        Each variable is scaled by its own bounds; Moco 4.6 takes those of the last variable of a
+        kind for all of that kind.
         """
         scale, shift = np.ones(len(self.lower)), np.zeros(len(self.lower))
         if not self.problem.solver.scale_variables_using_bounds:
@@ -133,11 +136,14 @@ class Layout:
         return scale, shift
 
     def make_guess(self) -> Array:
-        """The middle between the bounds of each, as Moco begins."""
+        """Return the middle between the bounds of each variable, as Moco's default guess."""
         return compute_midpoint(self.lower, self.upper)
 
     def guess_from_trajectory(self, trajectory: Any) -> Array:
-        """A guess from a trajectory, by splines between its times; what it has not is in the middle of its bounds."""
+        """Return the variables of a trajectory, interpolated by splines.
+
+        Variables that the trajectory lacks are in the middle between their bounds.
+        """
         result, times = self.make_guess(), trajectory.times
         result[:2] = times[0], times[-1]
         at = times[0] + self.problem.grid.fractions * (times[-1] - times[0])
@@ -153,7 +159,7 @@ class Layout:
         return result
 
     def describe_variable(self, place: int) -> str:
-        """What a variable is, and where."""
+        """Return the name of a variable."""
         if place < self.shared:
             return ["initial time", "final time", *self.problem.parameters][place]
         for kind in VARIABLE_KINDS:
@@ -164,7 +170,13 @@ class Layout:
 
 
 def _resample(times: Array, column: Array, at: Array) -> Array:
-    """A column at other times: by a natural spline of fifth degree as Moco does, of few times on lines."""
+    """Interpolate a column: by a natural spline of fifth degree as Moco, linearly if there are few times.
+
+    Args:
+        times: times (n,), s.
+        column: values (n,); those that are not finite are skipped.
+        at: times of the result (m,), s.
+    """
     if len(times) == len(at) and np.allclose(times, at, rtol=0.0, atol=1e-12):
         return column
     known = np.isfinite(column)

@@ -1,4 +1,4 @@
-"""Formulas at one point of the grid: what goals and constraints are made of."""
+"""Formulas at one point of the grid, of which goals and constraints are made."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ if TYPE_CHECKING:
     from osimlite.schema.moco.tracking import MocoContactTrackingGoal
 
 Formula = Any
-"""An ``SX`` of CasADi."""
+"""CasADi ``SX`` expression."""
 
 
 @dataclass(frozen=True, eq=False)
 class TimeFunction:
-    """A function of time that is given, such as a measured angle.
+    """Function of time that is known in advance, such as a measured angle.
 
-    Attributes: number: among those of the problem. values: at times (n,) the value and both of its
-        derivatives (3, n). factor: place among the parameters of the problem of the one that it is
-        multiplied by; None if by none.
+    Attributes:
+        number: index among the functions of the problem.
+        values: function of times (n,) that returns value, first and second derivative (3, n).
+        factor: index of the parameter that multiplies it; None for no parameter.
     """
 
     number: int
@@ -35,13 +36,16 @@ class TimeFunction:
     factor: int | None = None
 
     def expand(self, t: Formula, known: Formula) -> Formula:
-        """The value; exact to the second derivative, as what is known is renewed for each time."""
+        """Return the value by a Taylor expansion about the time `known[0]`.
+
+        The expansion is renewed for each time, so that value and both derivatives are exact.
+        """
         first, since = 1 + 3 * self.number, t - known[0]
         return known[first] + since * (known[first + 1] + 0.5 * since * known[first + 2])
 
 
 class Frame(NamedTuple):
-    """Where a frame is in ground, and how it moves."""
+    """Pose and velocity of a frame in ground."""
 
     position: Formula  # (3, 1), m
     rotation: Formula  # (3, 3)
@@ -51,19 +55,25 @@ class Frame(NamedTuple):
 
 @dataclass(eq=False)
 class Point:
-    """Symbols, and what follows from them, at one moment of the motion.
+    """Symbols at one time of the motion, and formulas that follow from them.
 
-    Attributes: problem: that is solved. t: time, s, and behind it the loads of the model
-        (`problem.functions.loads`). x: the whole state in the order of `problem.functions.states`,
-        what is prescribed included. u: controls, in the order of `problem.functions.controls`.
-        multipliers: of the model's constraints. derivatives: that are variables: accelerations, and
-        rates of auxiliary states; empty if explicit. slacks: of velocity corrections or
-        projections, if the point has them. p: parameters, one for each number of the model that
-        they stand for. parameters: as the problem has them. known: what the series are made of: the
-        time that they are expanded about, and three numbers for each. projections: values and
-        speeds that the interval leads to, before they are moved onto the constraints, if the point
-        has them. solved: symbols in the formulas for what linear equations with a symmetric matrix
-        determine, each with what is zero then: accelerations.
+    Attributes:
+        problem: optimal control problem.
+        t: time, s, followed by the time-dependent loads of the model (`problem.functions.loads`).
+        x: complete state in the order of `problem.functions.states`, prescribed states included.
+        u: controls in the order of `problem.functions.controls`.
+        multipliers: multipliers of the model's constraints.
+        derivatives: accelerations and rates of auxiliary states that are variables; empty if
+            explicit.
+        slacks: velocity corrections or projection slacks, if the point has them.
+        p: values of the model's parameters, one for each number of the model.
+        parameters: parameters of the problem.
+        known: data of the functions of time: the time of the expansion, and value, first and second
+            derivative of each function there.
+        projections: values and speeds at the end of the interval before they are projected onto the
+            constraints, if the point has them.
+        linear_systems: pairs of symbols and linear equations with a symmetric matrix that determine
+            them: accelerations.
     """
 
     problem: Problem
@@ -82,37 +92,44 @@ class Point:
 
     @cached_property
     def before_projection(self) -> Point:
-        """The same with the values and speeds that the interval leads to."""
+        """The same point with the values and speeds before projection."""
         size = self.projections.numel()
         x = casadi.vertcat(self.projections, self.x[size:])
         return replace(self, x=x, _kept={}) if size else self
 
     def state(self, path: str) -> Formula:
-        """The state of a path."""
+        """Return the state with a path."""
         return self.x[self.problem.functions.states.index(path)]
 
     def control(self, path: str) -> Formula:
-        """The control of a path."""
+        """Return the control with a path."""
         return self.u[self.problem.functions.controls.index(path)]
 
     def evaluate(self, series: TimeFunction) -> Formula:
-        """What a series is at this time."""
+        """Return the value of a function of time at this point."""
         value = series.expand(self.t[0], self.known)
         return value if series.factor is None else self.parameters[series.factor] * value
 
     @cached_property
     def rates(self) -> Formula:
-        """The derivative of the whole state, of which speeds and accelerations are those of the dynamics mode."""
+        """Time derivative of the complete state by the dynamics of the problem."""
         return self.problem.dynamics.compute_rates(self)
 
     @property
     def accelerations(self) -> Formula:
-        """Of the coordinates, in the order of `problem.functions.coordinates`."""
+        """Accelerations of the coordinates, in the order of `problem.functions.coordinates`."""
         size = len(self.problem.functions.coordinates)
         return self.rates[size : 2 * size]
 
     def output(self, name: str) -> dict[str, Formula]:
-        """What is computed of the model under one of the names of ``functions.outputs``, by its labels."""
+        """Return a group of outputs of the model by label.
+
+        Args:
+            name: name of a result of ``functions.outputs``.
+
+        Returns:
+            Formula of each output by its label.
+        """
         functions = self.problem.functions
         if not self._kept:
             values = functions.outputs(self.t, self.x, self.u, self.p)
@@ -122,27 +139,27 @@ class Point:
         return {label: self._kept[name][place] for place, label in enumerate(labels)}
 
     def frame(self, path: str) -> Frame:
-        """A frame of the model."""
+        """Return the pose and velocity of a frame of the model."""
         found = self.problem.functions.frames([path])(self.t, self.x, self.p)
         return Frame(found[0], casadi.reshape(found[1], 3, 3), *found[2:])
 
     def acceleration(self, frame: Frame) -> Formula:
-        """Of the origin of a frame (3, 1), m/s²."""
+        """Return the acceleration of the origin of a frame (3, 1), m/s²."""
         return casadi.jtimes(frame.velocity, self.x, self.rates)
 
     def mass_center(self) -> Formula:
-        """Of the whole model in ground (3,), m."""
+        """Return the position of the model's mass centre in ground (3,), m."""
         return casadi.vertcat(*self.output("mass_center").values())
 
 
 @dataclass(frozen=True, eq=False)
 class Endpoints:
-    """What the value of a goal is made of.
+    """Arguments of the value of a goal.
 
     Attributes:
-        start: the first point.
-        end: the last one.
-        integral: of the goal's integrand over time; None if it has none.
+        start: first point.
+        end: last point.
+        integral: integral of the goal's integrand over time; None without an integrand.
     """
 
     start: Point
@@ -151,25 +168,32 @@ class Endpoints:
 
     @property
     def duration(self) -> Formula:
-        """S."""
+        """Duration of the motion, s."""
         return self.end.t[0] - self.start.t[0]
 
 
 COST_ONLY = ("cost",)
+"""Modes of a goal that can only be a cost."""
 COST_FIRST = "cost", "endpoint_constraint"
+"""Modes of a goal that is a cost by default."""
 CONSTRAINT_FIRST = "endpoint_constraint", "cost"
+"""Modes of a goal that is an endpoint constraint by default."""
 
 
 @dataclass(frozen=True, eq=False)
 class GoalTerms:
-    """What a goal consists of.
+    """Formulas of a goal.
 
-    Attributes: value: from both ends, and from the integral over time, the value or the column of
-        values of the goal. integrand: at a point; None if nothing is integrated. modes: that the
-        goal can have, first the one that it has where the study says nothing: COST, BOTH,
-        CONSTRAINT. The cost of a goal that is a constraint first is the sum of the squares of its
-        values, of others the sum. is_sum: whether the integrand is added up over all points in the
-        place of being integrated.
+    As a cost, a goal with several values counts by their sum; a goal that is a constraint by
+    default by the sum of their squares.
+
+    Attributes:
+        value: function of both ends and the integral that returns the value or the column of
+            values.
+        integrand: function of a point whose integral `value` needs; None if there is none.
+        modes: modes that the goal can have, its default first: COST_ONLY, COST_FIRST,
+            CONSTRAINT_FIRST.
+        is_sum: whether the integrand is summed over all points instead of integrated.
     """
 
     value: Callable[[Endpoints], Formula]
@@ -180,12 +204,12 @@ class GoalTerms:
 
 @dataclass(frozen=True, eq=False)
 class ConstraintRows:
-    """What a path constraint consists of.
+    """Formulas of a path constraint.
 
     Attributes:
-        labels: of its values, for messages.
-        formula: at a point, the column of its values.
-        limits: least and greatest of each value.
+        labels: names of the values, for messages.
+        formula: function of a point that returns the column of values.
+        limits: lower and upper bound of each value.
     """
 
     labels: list[str]
@@ -196,7 +220,7 @@ class ConstraintRows:
 def make_integral_terms(
     integrand: Callable[[Point], Formula], modes: tuple[str, ...] = COST_ONLY
 ) -> GoalTerms:
-    """The terms of a goal that is the integral of something over time."""
+    """Return the terms of a goal that is the integral of an integrand over time."""
     return GoalTerms(lambda ends: ends.integral, integrand, modes)
 
 

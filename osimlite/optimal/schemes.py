@@ -1,7 +1,7 @@
-"""Schemes of transcription: how states, their rates and controls hang together within an interval of the mesh.
+"""Transcription schemes: equations between states, rates and controls within a mesh interval.
 
-Moco's, as its ``CasOCTranscription`` has them; T. Betts, Practical Methods for Optimal Control,
-2010, and for those of Legendre D. Garg et al., Automatica 46, 2010.
+The schemes are those of Moco's ``CasOCTranscription``; see J. T. Betts, Practical Methods for
+Optimal Control, 2010, and for Legendre's D. Garg et al., Automatica 46, 2010.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from osimlite.mechanics.multibody.spatial import Array
 
 @dataclass(frozen=True, eq=False)
 class Scheme:
-    """What must hold within an interval that has n points, both of its ends included.
+    """Equations within an interval of n points, both ends included.
 
     Attributes:
-        name: as in ``transcription_scheme``.
-        fractions: of the points (n,), from 0 to 1.
-        weights: (n,) with which values at the points make up the mean over the interval.
-        states: (k, n) of k equations that are zero, each for every state.
-        rates: (k, n) likewise, of the rates times the duration of the interval.
-        controls: (j, n) of j equations that put controls on the line between those at both ends.
+        name: value of ``transcription_scheme``.
+        fractions: positions of the points within the interval (n,), from 0 to 1.
+        weights: quadrature weights of the points (n,), whose sum is 1.
+        states: factors (k, n) of the states in the k equations that hold for each state.
+        rates: factors (k, n) of the rates, times the duration of the interval, in these equations.
+        controls: factors (j, n) of j equations that make controls linear between both ends.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Scheme:
 
 
 def make_scheme(name: str) -> Scheme:
-    """The scheme of a name that the schema allows."""
+    """Return the scheme with a name that the schema allows."""
     if name == "trapezoidal":
         half = np.array([0.5, 0.5])
         return Scheme(
@@ -52,7 +52,13 @@ def make_scheme(name: str) -> Scheme:
 
 
 def _make_legendre_scheme(name: str, degree: int, is_radau: bool) -> Scheme:
-    """Collocation at the roots of a polynomial of Legendre; Radau's has the end of the interval among them."""
+    """Return the collocation at the roots of a Legendre polynomial.
+
+    Args:
+        name: value of ``transcription_scheme``.
+        degree: degree of the polynomial.
+        is_radau: whether the end of the interval is a collocation point (Radau).
+    """
     roots = casadi.collocation_points(degree, "radau" if is_radau else "legendre")
     slopes, end, weights = (np.array(part) for part in casadi.collocation_coeff(roots))
     count = degree + (1 if is_radau else 2)
@@ -78,11 +84,11 @@ class Grid:
     """All points of a motion.
 
     Attributes:
-        scheme: of each interval.
-        fractions: of the points (n,), from 0 at the start to 1 at the end.
-        lengths: of the intervals (m,), which are one together.
-        is_mesh: (n,) whether a point is an end of an interval.
-        weights: (n,) with which values at the points make up the mean over the motion.
+        scheme: transcription scheme of each interval.
+        fractions: positions of the points in time (n,), from 0 at the start to 1 at the end.
+        lengths: lengths of the intervals (m,), whose sum is 1.
+        is_mesh: whether each point is an end of an interval (n,).
+        weights: quadrature weights of the points over the motion (n,), whose sum is 1.
     """
 
     scheme: Scheme
@@ -93,7 +99,12 @@ class Grid:
 
     @classmethod
     def from_mesh(cls, scheme: Scheme, mesh: Array) -> Grid:
-        """The grid of a mesh, which begins with 0 and ends with 1."""
+        """Return the grid of a mesh.
+
+        Args:
+            scheme: transcription scheme.
+            mesh: ends of the intervals (m + 1,), from 0 to 1.
+        """
         lengths, steps = np.diff(mesh), len(scheme.fractions) - 1
         fractions = np.append(
             (mesh[:-1, None] + lengths[:, None] * scheme.fractions[:-1]).ravel(), 1.0
@@ -104,6 +115,6 @@ class Grid:
         return cls(scheme, fractions, lengths, np.arange(len(fractions)) % steps == 0, weights)
 
     def get_points(self, interval: int) -> range:
-        """Numbers of the points of an interval."""
+        """Return the indices of the points of an interval."""
         steps = len(self.scheme.fractions) - 1
         return range(interval * steps, (interval + 1) * steps + 1)

@@ -1,4 +1,4 @@
-"""What was found, simulated with its own controls: how long an integration stays with the solution."""
+"""Check of a solution: a simulation with its controls, and how long it stays near the solution."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from osimlite.optimal.trajectory import MocoTrajectory
 from osimlite.simulation.run import simulate
 
 INTEGRATION_ACCURACY = 1e-7
-"""Of the integration."""
+"""Relative accuracy of the integration, well below `MATCH_TOLERANCE`."""
 RECORDED_STEPS = 1000
-"""So many moments of it are recorded, between which lines are close enough."""
+"""Number of recorded time steps, between which linear interpolation is accurate enough."""
 MATCH_TOLERANCE = 0.01
-"""Of a coordinate (rad or m) that is as good as found."""
+"""Difference of a coordinate, rad or m, up to which simulation and solution agree."""
 
 
 @dataclass(frozen=True, eq=False)
 class SimulationCheck:
-    """How far a simulation is from what was found.
+    """Differences between a simulation and the solution whose controls it used.
 
     Attributes:
-        times: of the solution (n,), s.
-        apart: by paths of coordinates what the values differ by (n,), rad or m.
+        times: times of the solution (n,), s.
+        apart: absolute difference of each coordinate by its path (n,), rad or m.
     """
 
     times: Array
@@ -34,17 +34,18 @@ class SimulationCheck:
 
     @property
     def largest(self) -> Array:
-        """Of all coordinates (n,)."""
+        """Largest difference of all coordinates at each time (n,)."""
         result: Array = np.max([*self.apart.values()], axis=0)
         return result
 
     @property
     def matches_until(self) -> float:
-        """The last time, s, up to which no coordinate is off by more than `MATCH_TOLERANCE`."""
+        """Last time, s, up to which no coordinate differs by more than `MATCH_TOLERANCE`."""
         far = np.flatnonzero(self.largest > MATCH_TOLERANCE)
         return float(self.times[-1] if not len(far) else self.times[max(far[0] - 1, 0)])
 
     def __str__(self) -> str:
+        """Return the summary line of the command ``run --simulate``."""
         at_end = {path: float(column[-1]) for path, column in self.apart.items()}
         worst = max(at_end, key=lambda path: at_end[path])
         return (
@@ -54,14 +55,17 @@ class SimulationCheck:
 
 
 def check_by_simulation(problem: Problem, trajectory: MocoTrajectory) -> SimulationCheck:
-    """Simulate the model from the first state of a motion, with its controls, which are lines between their nodes.
+    """Simulate a model from the first state of a solution with its controls, and compare the coordinates.
+
+    The controls are interpolated linearly between the points of the grid.
 
     Args:
-        problem: whose model moves.
-        trajectory: that was found.
+        problem: problem with the model.
+        trajectory: solution of the problem.
 
-    Raises: OsimliteError: the motion is given, begins later than at 0 s, or has parameters; the
-        model cannot be simulated.
+    Raises:
+        OsimliteError: the motion is prescribed, begins after 0 s, or has parameters; or the model
+            cannot be simulated.
     """
     if isinstance(problem.functions, PrescribedMotion):
         raise OsimliteError("the motion was given")

@@ -1,4 +1,4 @@
-"""What came out of a study, and how it is solved."""
+"""Solutions of Moco studies: solve a study, evaluate a trajectory."""
 
 from __future__ import annotations
 
@@ -26,15 +26,21 @@ from osimlite.schema.moco.studies import MocoStudy
 
 @dataclass(frozen=True, eq=False)
 class MocoSolution:
-    """What came out of a study.
+    """Solution of a Moco study.
 
-    Attributes: trajectory: the motion, with everything that was varied. success: whether it is a
-        solution to the tolerances of the study. status: in Ipopt's words. objective: what was made
-        small. terms: the parts of it, by the names of the goals. violations: the largest of what is
-        not fulfilled, the largest first. iterations: that were taken, on all meshes. duration: of
-        the search, s. rounds: what was done on each mesh, and the largest error of its intervals;
-        empty if none was refined. stride: the motion and what follows it, if a MocoPeriodicityGoal
-        says that; None otherwise.
+    Attributes:
+        trajectory: motion with all variables.
+        success: whether it is a solution within the study's tolerances.
+        status: Ipopt's return status.
+        objective: value of the objective.
+        terms: weighted part of the objective of each goal, by the goal's name.
+        violations: largest violations of the constraints, the largest first.
+        iterations: number of iterations on all meshes.
+        duration: duration of the search, s.
+        rounds: search on each mesh with the largest error of its intervals; empty without
+            refinement.
+        stride: motion and its next period, if a MocoPeriodicityGoal says how it continues; else
+            None.
     """
 
     trajectory: MocoTrajectory
@@ -50,24 +56,24 @@ class MocoSolution:
 
     @property
     def states(self) -> StoTable:
-        """Over time; m, rad, s, N."""
+        """Table of the states over time; m, rad, s, N."""
         return self.trajectory.table("states")
 
     @property
     def controls(self) -> StoTable:
-        """Over time."""
+        """Table of the controls over time."""
         return self.trajectory.table("controls")
 
     @property
     def parameters(self) -> dict[str, float]:
-        """By name."""
+        """Values of the parameters by name."""
         return self.trajectory.parameters
 
     def write(self, path: str | Path) -> None:
-        """Write a file as Moco's, which OpenSim's MocoTrajectory reads.
+        """Write a solution file as Moco's, which OpenSim's MocoTrajectory reads.
 
         Raises:
-            OsimliteError: it cannot be written.
+            OsimliteError: the file cannot be written.
         """
         self.trajectory.write(path)
 
@@ -81,22 +87,28 @@ def solve(
     refine: float | str | Refinement | None = None,
     scaled: Mapping[str, str] | None = None,
 ) -> MocoSolution:
-    """Solve a study of Moco: the same nonlinear program as Moco's, with exact derivatives.
+    """Solve a Moco study: the same nonlinear program as Moco's, with exact derivatives.
 
-    Args: study: a file, or the study itself. guess: to start from, in place of the study's; without
-        either the middle between the bounds of each variable. folder: that the files are in which a
-        study names that is in no file; the current folder if None. tell: is told of each iteration.
-        Ctrl-C ends the search, and the best so far is what comes out. refine: split intervals of
-        the mesh until the error of none is above this, see :class:`Refinement`; None for the mesh
-        as it is. scaled: by names of the goals' scale factors the column of the goal's table that
-        each multiplies: what OpenSim's ``addScaleFactor`` is told, and no file.
+    Args:
+        study: study file or study.
+        guess: initial trajectory or its file, instead of the study's guess; without either the
+            search starts in the middle between the bounds of each variable.
+        folder: folder of the files that a study without a file names; the current folder if None.
+        tell: function that is called with the progress after each iteration. Ctrl-C stops the
+            search, and the solution is then the best iterate.
+        refine: split intervals of the mesh until the error of each is below this, see
+            :class:`Refinement`; None to keep the mesh.
+        scaled: column of the goal's table that each scale factor of a goal multiplies, by the
+            factor's
+            name: what OpenSim's ``addScaleFactor`` receives, and no file contains.
 
-    Returns: What came out; `success` says whether it is a solution, and `violations` what is not
-        fulfilled otherwise.
+    Returns:
+        The solution; `success` says whether it meets the tolerances, `violations` what it violates.
 
     Raises:
-        UnsupportedError: there is something in it that is not solved here; it says what and where.
-        OsimliteError: the study cannot be read, or is none.
+        UnsupportedError: the study contains something that is not supported here; the message says
+            what and where.
+        OsimliteError: the study cannot be read, or is invalid.
     """
     with name_file_in_errors(study):
         return solve_program(Program(build_problem(study, folder, scaled)), guess, tell, refine)
@@ -107,11 +119,11 @@ def build_problem(
     folder: str | Path | None = None,
     scaled: Mapping[str, str] | None = None,
 ) -> Problem:
-    """The problem of a study.
+    """Build the optimal control problem of a study.
 
     Args:
-        study: a file, or the study itself.
-        folder: that its files are in, if it is in none; the current folder if None.
+        study: study file or study.
+        folder: folder of the files that a study without a file names; the current folder if None.
         scaled: as for :func:`solve`.
 
     Raises:
@@ -130,7 +142,14 @@ def solve_program(
     tell: Callable[[Progress], None] | None,
     refine: float | str | Refinement | None = None,
 ) -> MocoSolution:
-    """The solution of a nonlinear program; as :func:`solve`."""
+    """Solve a nonlinear program.
+
+    Args:
+        program: nonlinear program.
+        guess: as for :func:`solve`.
+        tell: as for :func:`solve`.
+        refine: as for :func:`solve`.
+    """
     problem, rounds = program.problem, list[Round]()
     if guess is None and problem.solver.guess_file.strip():
         guess = problem.locate_file(problem.solver.guess_file)

@@ -1,4 +1,4 @@
-"""What the parts of a study share: where its files are, and how an error says what it is about."""
+"""Context of a study: the folder of its files, checks of its parts, and errors with their line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from osimlite.schema.specs import FieldSpec, value_specs
 
 @contextmanager
 def name_file_in_errors(file: object) -> Iterator[None]:
-    """Errors that name no file are about this one, if it is one."""
+    """Add the file, if it is one, to errors that name none."""
     try:
         yield
     except OsimliteError as error:
@@ -32,18 +32,18 @@ def name_file_in_errors(file: object) -> Iterator[None]:
 
 
 MAX_MESH_INTERVALS = 20_000
-"""Intervals of a mesh. Published studies have some hundred; each takes memory and time."""
+"""Maximum number of mesh intervals. Published studies have some hundred; each takes memory and time."""
 
 MAX_MESH_VALUES = 2_000_000
-"""Intervals of a mesh times states of the model."""
+"""Maximum product of the number of mesh intervals and the number of states."""
 
 
 class StudyContext:
-    """A study or a tool of Moco, by the file that it stands in.
+    """Study or tool of Moco, with the file and the folder that it belongs to.
 
     Args:
-        file: it stands in; None if it is in none.
-        folder: that the files are in that it names, if it is in none; the current folder if None.
+        file: file of the study; None if there is none.
+        folder: folder of the files that a study without a file names; the current folder if None.
     """
 
     def __init__(self, file: str | Path | None, folder: Path | None) -> None:
@@ -51,11 +51,11 @@ class StudyContext:
         self.folder = self.file.parent if self.file is not None else folder or Path(".")
 
     def locate_file(self, name: str) -> Path:
-        """Where a file is that the study names: looked for from its folder, then from the current one."""
+        """Return the path of a file that the study names, looked for in its folder, then in the current one."""
         return beside(self.folder, name.strip())
 
     def _locate_part(self, part: Object) -> dict[str, Any]:
-        """Where a part of the study stands: objects know no lines, but their tags and names are in the text."""
+        """Return file and line of a part of the study: objects know no lines, but their tags and names are in the text."""
         if self.file is None:
             return {}
         tags = re.compile(rf"<{re.escape(_get_tag(part))}(\s[^>]*)?/?>")
@@ -69,22 +69,29 @@ class StudyContext:
         return {"file": str(self.file), "line": found[0][0] if found else 1}
 
     def unsupported_error(self, part: Object, reason: str) -> UnsupportedError:
-        """The error of what is not solved here."""
+        """Return the error for a part that is valid in OpenSim and not supported here."""
         name = f" '{part.name}'" if part.name else ""
         return UnsupportedError(f"{_get_tag(part)}{name}: {reason}", **self._locate_part(part))
 
     def invalid_error(self, part: Object, reason: str) -> DocumentError:
-        """The error of what cannot be."""
+        """Return the error for a part that is invalid."""
         name = f" '{part.name}'" if part.name else ""
         return DocumentError(f"{_get_tag(part)}{name}: {reason}", **self._locate_part(part))
 
     def check_name(
         self, part: Object, name: str, known: Iterable[str], what: str, whose: str = "the model"
     ) -> None:
-        """Refuse a name that is none, with the nearest one that is.
+        """Check that a name is known; the error suggests the nearest known name.
+
+        Args:
+            part: part of the study with the name, for the message.
+            name: name to check.
+            known: known names.
+            what: what the name stands for, for the message.
+            whose: owner of the known names, for the message.
 
         Raises:
-            DocumentError: it is none.
+            DocumentError: the name is unknown.
         """
         known = [*known]
         if name not in known:
@@ -93,10 +100,10 @@ class StudyContext:
             )
 
     def check_values(self, whole: Object) -> None:
-        """Refuse what has a part that is none, or a value that cannot be; its model is left aside.
+        """Check all parts of a study except its model for unknown classes and invalid values.
 
         Raises:
-            DocumentError: there is one.
+            DocumentError: a part is of an unknown class, or a value is invalid.
         """
         for part in whole.walk():
             if isinstance(part, Component) and part.model is not None:
@@ -129,10 +136,11 @@ class StudyContext:
                     )
 
     def compile_pattern(self, part: Object, text: str) -> Callable[[str], Any]:
-        """What tells whether a name matches a pattern.
+        """Return the function that matches names against a pattern.
 
         Raises:
-            DocumentError: it is none.
+            UnsupportedError: the pattern uses syntax that is not supported here.
+            DocumentError: the pattern is invalid.
         """
         try:
             return Pattern(text).fullmatch
@@ -145,7 +153,7 @@ class StudyContext:
 
 
 def _describe_invalid_value(spec: FieldSpec, word: Any) -> str:
-    """What is wrong with a number or a word of a property; nothing if all is right."""
+    """Return the end of the message on an invalid value of a property; empty if the value is valid."""
     kind = spec.kind
     if not isinstance(kind, Value) or word is None:
         return ""
@@ -159,4 +167,5 @@ def _describe_invalid_value(spec: FieldSpec, word: Any) -> str:
 
 
 def _get_tag(part: Object) -> str:
+    """Return the XML tag of a part."""
     return part.class_name if isinstance(part, Unknown) else type(part).tag

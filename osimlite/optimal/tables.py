@@ -1,4 +1,4 @@
-"""Tables that studies name, as their processors make them, and splines through their columns."""
+"""Reference tables of studies, as their processors make them, and splines through their columns."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
 
 TIME_TOLERANCE_S = 1e-6
-"""By how much a motion may be longer than the data that it follows, s."""
+"""Time, s, by which a motion may exceed the data that it tracks."""
 
 
 def read_reference(problem: Problem, part: Object, processor: TableProcessor) -> StoTable:
-    """The table of a processor, in rad.
+    """Read the reference table of a goal, in rad.
 
     Args:
-        problem: that it is for.
-        part: of the study that has the processor, for messages.
-        processor: that names the file.
+        problem: problem of the study.
+        part: goal with the processor, for messages; a table of `problem.tables` replaces the file.
+        processor: processor that names the file.
 
     Raises:
-        UnsupportedError: one of its operators is not applied here.
+        UnsupportedError: an operator of the processor is not supported here.
         OsimliteError: the file cannot be read.
     """
     given = problem.tables.get(part.name)
@@ -65,7 +65,19 @@ def process_table(
     states: Sequence[str],
     mechanism: Mechanism,
 ) -> StoTable:
-    """The table as its processor makes it, given the paths of states; errors as of :func:`read_reference`."""
+    """Read a table and apply the operators of its processor.
+
+    Args:
+        problem: study, for its folder and messages.
+        part: part of the study with the processor, for messages.
+        processor: processor that names the file.
+        states: paths of the model's states.
+        mechanism: mechanism of the model.
+
+    Raises:
+        UnsupportedError: an operator of the processor is not supported here.
+        OsimliteError: the file cannot be read.
+    """
     if not processor.filepath.strip():
         raise problem.invalid_error(part, "it names no table")
     table = read_table(problem.locate_file(processor.filepath))
@@ -87,7 +99,7 @@ def process_table(
 
 
 def read_table(path: Path) -> StoTable:
-    """A table; of a file of markers three columns for each, as OpenSim flattens them, m."""
+    """Read a table; a marker file gives three columns for each marker, as OpenSim flattens them, m."""
     if path.suffix.lower() != ".trc":
         return read_sto(path)
     markers = MarkerData.of(path)
@@ -98,6 +110,7 @@ def read_table(path: Path) -> StoTable:
 
 
 def _filter_lowpass(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
+    """Return the table after OpenSim's low-pass filter, resampled at equal steps first if need be."""
     if operator.cutoff_frequency < 0.0:
         return table
     times, rows = table.times, table.rows
@@ -122,7 +135,7 @@ def _append_coupled_values(
     table: StoTable,
     mechanism: Mechanism,
 ) -> StoTable:
-    """With the values of coordinates that enforced constraints make functions of others, behind the other columns."""
+    """Return the table with the values of coordinates that couplers determine."""
     paths = [f"{info.path}/value" for info in mechanism.coordinates]
     for item in mechanism.constraints:
         if not isinstance(item, Coupler):
@@ -141,7 +154,7 @@ def _append_coupled_values(
 
 
 def _resolve_state_path(label: str, states: Sequence[str]) -> str:
-    """The path of the state that an old label means; the label itself if it means none."""
+    """Return the path of the state that an old label means; the label itself if it means none."""
     ending = f"{label[:-2]}/speed" if label.endswith("_u") else label.replace(".", "/")
     for end in (label, ending, f"{ending}/value", re.sub(r"^.*/(?=[^/]+/[^/]+$)", "", label)):
         found = [state for state in states if state == end or state.endswith(f"/{end}")]
@@ -151,6 +164,7 @@ def _resolve_state_path(label: str, states: Sequence[str]) -> str:
 
 
 def _convert_to_radians(table: StoTable, mechanism: Mechanism) -> StoTable:
+    """Return the table with angles in rad."""
     if not table.in_degrees:
         return table
     angles = {info.path for info in mechanism.coordinates if info.unit == "rad"}
@@ -159,10 +173,15 @@ def _convert_to_radians(table: StoTable, mechanism: Mechanism) -> StoTable:
 
 
 def fit_splines(problem: Problem, table: StoTable, columns: list[str]) -> list[TimeFunction]:
-    """Splines of fifth degree through columns of a table, as OpenSim's GCVSplineSet.
+    """Fit splines of fifth degree through columns of a table, as OpenSim's GCVSplineSet.
+
+    Args:
+        problem: problem to which the splines are added as functions of time.
+        table: table with the columns.
+        columns: names of the columns.
 
     Raises:
-        DocumentError: a column is not there, has gaps, or is too short for the motion.
+        DocumentError: a column is missing, has gaps, or does not cover the motion.
     """
     check_columns(table, columns)
     first, last = float(table.times[0]), float(table.times[-1])
@@ -180,16 +199,16 @@ def fit_splines(problem: Problem, table: StoTable, columns: list[str]) -> list[T
 
 
 def sample_function(function: Function, times: Array) -> Array:
-    """A function of time at times (n,): its value and both derivatives (3, n)."""
+    """Return value, first and second derivative (3, n) of a function of time at times (n,)."""
     found = (function.evaluate((t,)) for t in times.tolist())
     return np.array([(value, slope[0], curve[0][0]) for value, slope, curve in found]).T
 
 
 def check_columns(table: StoTable, columns: Sequence[str]) -> None:
-    """Refuse a table through whose columns no splines can go.
+    """Check that splines can be fitted through columns of a table.
 
     Raises:
-        DocumentError: as of :func:`fit_splines`.
+        DocumentError: a column is missing or has gaps, or the times are too few or do not rise.
     """
     if len(table.times) < MIN_SPLINE_TIMES:
         message = f"it has {len(table.times)} times; splines of fifth degree take {MIN_SPLINE_TIMES} at least"
@@ -204,12 +223,13 @@ def check_columns(table: StoTable, columns: Sequence[str]) -> None:
 
 
 def _sample_column(curves: SplineCurves, number: int, times: Array) -> Array:
+    """Return value and derivatives (3, n) of one column at times (n,)."""
     found: Array = curves.evaluate(times)[:, :, number]
     return found
 
 
 class SplineCurves:
-    """Splines through columns, asked for all at once."""
+    """Splines through columns, evaluated together; the values of the last times are cached."""
 
     def __init__(self, times: Array, rows: Array) -> None:
         self._curves = SampledCurves(times, rows)
@@ -217,7 +237,7 @@ class SplineCurves:
         self._values = np.zeros(0)
 
     def evaluate(self, times: Array) -> Array:
-        """Value and two derivatives (3, n, m) at n times of m columns."""
+        """Return values, first and second derivatives (3, n, m) of m columns at times (n,)."""
         if self._times is None or not np.array_equal(self._times, times):
             self._times, self._values = (
                 times.copy(),

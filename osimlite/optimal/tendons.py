@@ -1,4 +1,4 @@
-"""Tendons of the implicit kind: the rate of their force is a variable, and equilibrium with the fibers an equation."""
+"""Equilibrium equations between tendon and fibers of DeGrooteFregly2016Muscle."""
 
 from __future__ import annotations
 
@@ -25,21 +25,23 @@ if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
 
 
-IMPLICIT, EXPLICIT = "implicit", "explicit"
-"""What ``tendon_compliance_dynamics_mode`` may be."""
+IMPLICIT = "implicit"
+"""Value of ``tendon_compliance_dynamics_mode``: the rate of the tendon force is a variable."""
+EXPLICIT = "explicit"
+"""Value of ``tendon_compliance_dynamics_mode``: the rate of the tendon force follows from the equilibrium."""
 
 
 class TendonEquations:
-    """The muscles of De Groote and Fregly with elastic tendons of one ``tendon_compliance_dynamics_mode``.
+    """Equations of the DeGrooteFregly2016Muscles with elastic tendons of one ``tendon_compliance_dynamics_mode``.
 
     Args:
-        problem: that they are part of.
-        elements: forces of the model, by their paths.
-        mode: of the muscles.
+        problem: problem with the muscles.
+        elements: forces of the model with their paths.
+        mode: mode of the muscles.
 
     Attributes:
-        paths: of the muscles.
-        names: of the rates, as Moco has them.
+        paths: paths of the muscles.
+        names: names of the rates of their tendon forces, as in Moco.
     """
 
     def __init__(
@@ -60,10 +62,17 @@ class TendonEquations:
         self.names = [f"{path}/implicitderiv_normalized_tendon_force" for path in self.paths]
 
     def compute_residuals(self, point: Point, rates: Formula) -> tuple[list[str], Formula]:
-        """By how much each tendon's force exceeds what the fibers bear, over the muscle's strength.
+        """Compute the excess of each tendon force over the fiber force, relative to the muscle's strength.
 
-        The tendon lengthens by what its force's rate asks for, and the fibers by the rest of what
-        the path does.
+        The tendon lengthens as the rate of its force says, and the fibers by the rest of the path's
+        lengthening speed.
+
+        Args:
+            point: point of the grid.
+            rates: rates of the normalized tendon forces (m, 1), 1/s.
+
+        Returns:
+            Names of the residuals, and the residuals (m, 1).
         """
         if not self.muscles:
             return [], casadi.SX(0, 1)
@@ -90,10 +99,10 @@ class TendonEquations:
         return [f"{path} equilibrium" for path in self.paths], casadi.vertcat(*rows)
 
     def compute_rate_errors(self, point: Point) -> Formula:
-        """By how much the rate of the force of the fibers along each tendon exceeds that of the tendon, N/s.
+        """Compute the rate of each fiber force along the tendon less the rate of the tendon force, N/s.
 
-        Fibers are springs there: neither the activation nor the force's factor by the velocity
-        changes (M. Millard et al., Journal of Biomechanical Engineering 135, 2013, A6).
+        The fibers are springs here: neither the activation nor the force-velocity factor changes
+        (M. Millard et al., Journal of Biomechanical Engineering 135, 2013, A6).
         """
         functions, rows = self.problem.functions, [casadi.SX(0, 1)]
         lengths, speeds = self.problem.dynamics.compute_path_lengths(point)

@@ -1,4 +1,4 @@
-"""The studies that Moco's tools make: their parts, and when they begin and end."""
+"""Parts of the studies that MocoInverse and MocoTrack make: the study itself, its times and its mesh."""
 
 from __future__ import annotations
 
@@ -23,7 +23,13 @@ from osimlite.schema.tools.processors import ModelProcessor
 
 
 def make_study(tool: MocoInverse | MocoTrack, model: Model, solver: MocoCasADiSolver) -> MocoStudy:
-    """A study of a model that is processed, without goals."""
+    """Return a study of a processed model without goals.
+
+    Args:
+        tool: tool that names the study.
+        model: processed model.
+        solver: solver of the study.
+    """
     phase = MocoPhase(name="phases", model=ModelProcessor(name="model", model=model))
     return MocoStudy(
         name=tool.name, problem=MocoProblem(name="problem", phases=phase), solver=solver
@@ -33,10 +39,20 @@ def make_study(tool: MocoInverse | MocoTrack, model: Model, solver: MocoCasADiSo
 def set_time_range(
     asked: StudyContext, tool: MocoInverse | MocoTrack, tables: Sequence[StoTable], study: MocoStudy
 ) -> tuple[float, float]:
-    """Set bounds of time and the mesh by the settings of a tool, and return the first and the last time, s.
+    """Set bounds of time and the mesh of a study by the settings of a tool.
+
+    Args:
+        asked: tool with its folder, for messages.
+        tool: settings.
+        tables: reference tables, which the motion must not exceed.
+        study: study to change.
+
+    Returns:
+        Initial and final time, s.
 
     Raises:
-        DocumentError: the tables have no data between the times of the tool.
+        DocumentError: the tables have no data between the times of the tool, or the mesh is too
+            fine.
     """
     first = max(float(table.times[0]) for table in tables)
     last = min(float(table.times[-1]) for table in tables)

@@ -1,4 +1,4 @@
-"""MocoTrack: the study of a motion that follows measured states."""
+"""MocoTrack: a motion that tracks measured states or markers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from osimlite.schema.moco.tracking import MocoMarkerTrackingGoal, MocoStateTrack
 from osimlite.schema.tools.inverse_kinematics import MarkersReference, MarkerWeight, MarkerWeightSet
 
 SPLINE_HALF_ORDER = 3
-"""Of the splines whose derivatives are followed; they are of fifth degree."""
+"""Half order of the splines whose derivatives are tracked: degree 5, as OpenSim's GCVSpline."""
 
 
 def build_track_problem(
@@ -36,18 +36,21 @@ def build_track_problem(
     more: Callable[[MocoStudy], None] | None = None,
     scaled: Mapping[str, str] | None = None,
 ) -> tuple[Problem, MocoTrajectory | None]:
-    """The problem that the tool makes, and what it starts from if that is not the middle between the bounds.
+    """Build the optimal control problem of a MocoTrack.
 
     Args:
-        tool: its settings.
-        file: they stand in.
-        folder: that their files are in, if they are in none.
-        more: changes the study before it becomes a problem: goals, bounds, settings of the solver.
-        scaled: as of :func:`osimlite.moco.solve`.
+        tool: settings.
+        file: setup file of the settings; None if there is none.
+        folder: folder of the files that settings without a file name.
+        more: function that changes the study before the problem is built: goals, bounds, solver.
+        scaled: as for :func:`osimlite.moco.solve`.
+
+    Returns:
+        The problem, and the guess; None for the middle between the bounds.
 
     Raises:
-        UnsupportedError: there is something that is not done here.
-        OsimliteError: the settings or their files are not as they have to be.
+        UnsupportedError: the settings contain something that is not supported here.
+        OsimliteError: the settings or their files are invalid.
     """
     place = file.parent if file is not None else folder or Path(".")
     solver = MocoCasADiSolver(
@@ -126,18 +129,18 @@ def solve_track(
     refine: float | str | Refinement | None = None,
     scaled: Mapping[str, str] | None = None,
 ) -> MocoSolution:
-    """Find a motion that follows measured states, as OpenSim's MocoTrack.
+    """Find a motion that tracks measured states or markers, as OpenSim's MocoTrack.
 
     Args:
-        tool: its settings.
-        folder: that their files are in; the current folder if None.
-        more: changes the study before it is solved: goals, bounds, settings of the solver.
-        tell: is told of each iteration.
-        refine: as of :func:`osimlite.moco.solve`.
-        scaled: likewise.
+        tool: settings.
+        folder: folder of the files that the settings name; the current folder if None.
+        more: function that changes the study before it is solved: goals, bounds, solver.
+        tell: function that is called with the progress after each iteration.
+        refine: as for :func:`osimlite.moco.solve`.
+        scaled: as for :func:`osimlite.moco.solve`.
 
     Raises:
-        OsimliteError: as of :func:`build_track_problem`.
+        OsimliteError: as for :func:`build_track_problem`.
     """
     problem, guess = build_track_problem(
         tool, None, None if folder is None else Path(folder), more, scaled
@@ -146,7 +149,7 @@ def solve_track(
 
 
 def _make_marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
-    """What follows markers; one without a weight counts 1."""
+    """Return the goal that tracks markers; markers without a weight have weight 1."""
     weights = [
         MarkerWeight(name=item.name, weight=item.weight) for item in tool.markers_weight_set.objects
     ]
@@ -163,7 +166,7 @@ def _make_marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
 
 
 def _append_speeds(table: StoTable) -> StoTable:
-    """With the derivatives of those values that have no speeds."""
+    """Return the table with the derivatives of those coordinate values that have no speed column."""
     ends = [
         (name, f"{name.removesuffix('/value')}/speed")
         for name in table.columns
@@ -179,7 +182,7 @@ def _append_speeds(table: StoTable) -> StoTable:
 
 
 def _find_state_weights(problem: Problem, tool: MocoTrack, table: StoTable) -> list[MocoWeight]:
-    """Those of the tool; none for what the model's constraints determine."""
+    """Return the weights of the tool, and weight 0 for states that the model's constraints determine."""
     own = {weight.name: weight.weight for weight in tool.states_weight_set.objects}
     result = {}
     for path in problem.functions.coordinates:

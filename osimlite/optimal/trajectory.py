@@ -1,4 +1,4 @@
-"""Motions as Moco writes them: times, states, controls, multipliers, derivatives, slacks, parameters."""
+"""Trajectories as Moco writes them: times, states, controls, multipliers, derivatives, slacks, parameters."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ COLUMN_KINDS = (
     "slacks",
     "parameters",
 )
-"""What the header counts, in the order of the columns."""
+"""Kinds of columns that the header counts, in the order of the columns."""
 
 
 @dataclass(frozen=True, eq=False)
 class MocoTrajectory:
-    """What a motion consists of; a file of it is read by OpenSim's class of this name.
+    """Trajectory of all variables; OpenSim's class of this name reads its files.
 
     Attributes:
-        times: (n,), s.
-        columns: by name, each (n,); m, rad, s, N.
-        names: by ``states``, ``controls`` and so on the names of the columns.
-        parameters: by name.
-        header: what the file says besides, such as ``objective``.
+        times: times (n,), s.
+        columns: values of each variable by name (n,); m, rad, s, N.
+        names: names of the columns by kind, such as ``states`` and ``controls``.
+        parameters: values of parameters by name.
+        header: further entries of the file's header, such as ``objective``.
     """
 
     times: Array
@@ -49,10 +49,15 @@ class MocoTrajectory:
     def from_variables(
         cls, layout: Layout, w: Array, header: dict[str, str] | None = None
     ) -> MocoTrajectory:
-        """Of the variables of a nonlinear program.
+        """Return the trajectory of the variables of a nonlinear program.
 
-        What only points between nodes have, corrections of velocities, is spread over all times as
-        Moco does.
+        Variables of points between nodes only (velocity corrections) are interpolated at all times,
+        as in Moco.
+
+        Args:
+            layout: layout of the variables.
+            w: variables (n,).
+            header: entries of the header.
         """
         times = w[0] + layout.problem.grid.fractions * (w[1] - w[0])
         columns: dict[str, Array] = {}
@@ -88,8 +93,8 @@ class MocoTrajectory:
         """Read a file of Moco, or any table of states and controls over time.
 
         Raises:
-            OsimliteError: it cannot be read.
-            DocumentError: it has no times, or more or fewer columns than its header says.
+            OsimliteError: the file cannot be read.
+            DocumentError: the file has no times, or its header counts other columns.
         """
         table = read_sto(path)
         if not len(table.times):
@@ -115,7 +120,7 @@ class MocoTrajectory:
         return cls(table.times, of, names, parameters, table.header)
 
     def table(self, kind: str = "") -> StoTable:
-        """The columns of one kind, or of all."""
+        """Return the table of the columns of one kind, or of all columns."""
         kinds: Iterable[str] = [kind] if kind else COLUMN_KINDS[:-1]
         names = [name for each in kinds for name in self.names.get(each, ())]
         rows = (
@@ -143,7 +148,7 @@ class MocoTrajectory:
         """Write a file that OpenSim's MocoTrajectory reads.
 
         Raises:
-            OsimliteError: it cannot be written.
+            OsimliteError: the file cannot be written.
         """
         make_folder(Path(path).parent)
         with written_atomically(path) as stream:
