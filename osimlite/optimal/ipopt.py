@@ -18,7 +18,8 @@ from osimlite.derivatives.symbols import casadi
 from osimlite.errors import SimulationError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.hessian import Hessian
-from osimlite.optimal.program import Program, cache_last
+from osimlite.optimal.point_functions import cache_last
+from osimlite.optimal.program import Program
 
 METIS_MIN_VARIABLES = 1500
 """Number of variables from which METIS saves more time by its order than it takes."""

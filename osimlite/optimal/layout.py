@@ -74,7 +74,7 @@ class Layout:
             "slacks": [Bounds.from_ranges(correction)] * len(problem.slack_names),
             "projections": [*problem.states.values()][: len(problem.projected_names)],
         }
-        self.shared = 2 + len(problem.parameters)
+        self.shared: int = 2 + len(problem.parameters)
         ranges = [*problem.times, *problem.parameters.values()]
         lower, upper = ([each[k] for each in ranges] for k in range(2))
         self.point_indices: list[Any] = []

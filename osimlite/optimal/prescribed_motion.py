@@ -1,8 +1,9 @@
-"""A motion that is given exactly: only actuators are left to be found, as with OpenSim's PositionMotion.
+"""Problems with a prescribed motion, in which only actuators vary, as with OpenSim's PositionMotion.
 
-What the motion takes, what each actuator pushes and how long its path is are numbers over time
-then, from the kernels. The laws of the actuators become formulas on a test bench: a model in which
-each pulls a carriage of its own, whose place stands for the length of its path.
+The generalized forces that the motion needs, the moment arms of the actuators and the lengths of
+their paths are numbers over time, which the kernels compute. The laws of the actuators become
+CasADi formulas on a test bench: a model in which each actuator moves its own carriage, whose
+coordinate is the length of the actuator's path.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.derivatives.functions import casadi as functions_of
+from osimlite.derivatives.functions import casadi as make_casadi_model
 from osimlite.derivatives.symbols import casadi
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.multibody import build_mechanism
@@ -21,6 +22,7 @@ from osimlite.mechanics.multibody.schema_functions import numeric
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.dynamics import Dynamics
 from osimlite.optimal.point import Formula, Point, TimeFunction
+from osimlite.optimal.point_functions import cache_last
 from osimlite.optimal.tables import sample_function
 from osimlite.schema.actuators import (
     ActivationCoordinateActuator,
@@ -42,13 +44,18 @@ if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
 
 Motion = Callable[[Array], Array]
-"""At times (n,) values, rates and their rates (3, n, coordinates) of all coordinates of a mechanism."""
+"""Function of times (n,) that returns values, speeds and accelerations (3, n, coordinates) of a mechanism."""
 RELATIVE_ZERO = 1e-13
-"""Part of the largest number that is none."""
+"""Fraction of the largest number below which a number counts as zero."""
 
 
 def read_position_motion(part: PositionMotion, model: Model) -> Motion | str:
-    """The motion of all coordinates of a model; the path of the first one without a function if there is one."""
+    """Return the motion of all coordinates; the path of the first coordinate without a function if there is one.
+
+    Args:
+        part: PositionMotion of the model.
+        model: model.
+    """
     functions: dict[str, Any] = {item.name: item for item in part.functions.objects}
     paths = [info.path for info in build_mechanism(model).coordinates]
     missing = next((path for path in paths if path not in functions), None)
@@ -63,18 +70,21 @@ def read_position_motion(part: PositionMotion, model: Model) -> Motion | str:
 
 
 class PrescribedMotion:
-    """What :class:`~osimlite.derivatives.functions.CasadiModel` is for a model that moves by itself, along a given motion.
+    """Model along a prescribed motion, in the place of a :class:`~osimlite.derivatives.functions.CasadiModel`.
 
     Args:
-        model: without the motion.
-        motion: of all its coordinates.
-        folder: of the model's file.
+        model: model without the PositionMotion.
+        motion: motion of all its coordinates.
+        folder: folder of the model's file.
 
     Attributes:
-        mechanism: of the model.
-        states: the auxiliary states alone, the only ones that are to be found.
-        controls: of the actuators.
-        bench: the functions of the test bench.
+        mechanism: mechanism of the model.
+        states: paths of the auxiliary states, the only ones that vary.
+        controls: paths of the controls of the actuators.
+        bench: CasADi functions of the test bench.
+        carriages: index of each actuator's carriage among the coordinates of the bench.
+        moving: paths of the coordinates that the constraints leave free to move.
+        numbers: cached `_tabulate_numbers`.
     """
 
     coordinates: tuple[str, ...] = ()
@@ -82,39 +92,42 @@ class PrescribedMotion:
     def __init__(self, model: Model, motion: Motion, folder: Path) -> None:
         self.mechanism = build_mechanism(model, opensim_derivatives=True)
         self._motion = motion
-        choices: dict[str, Any] = {"folder": folder}
-        self._pushing = StaticOptimization(model, self.mechanism, muscles="isometric", **choices)
-        self._pulling = StaticOptimization(model, self.mechanism, **choices)
+        options: dict[str, Any] = {"folder": folder}
+        self._force_balance = StaticOptimization(
+            model, self.mechanism, muscles="isometric", **options
+        )
+        self._path_geometry = StaticOptimization(model, self.mechanism, **options)
         tree = model.tree()
         actuators = [item for item in model.components(Actuator) if item.appliesForce]
         self._paths = [tree.path_of(item) or "" for item in actuators]
         own = [_name_on_bench(k) for k in range(len(actuators))]
-        self.bench = functions_of(build_test_bench(actuators, own))
+        self.bench = make_casadi_model(build_test_bench(actuators, own))
         size = len(self.bench.coordinates)
         known = dict(zip(own, self._paths, strict=True))
         self.states = self.in_system = tuple(
             _rename_to_model(name, known) for name in self.bench.states[2 * size :]
         )
         self.controls = tuple(_rename_to_model(name, known) for name in self.bench.controls)
-        # The carriages have an order of their own.
+        # CasadiModel orders the coordinates of the carriages by the mechanism, not by actuators.
         names = [path.rpartition("/")[2] for path in self.bench.coordinates]
         self.carriages = [names.index(name) for name in own]
         self.path_names = tuple(self._paths)
         self.is_muscle = [isinstance(item, Muscle) for item in actuators]
-        self.moving = self._pushing.moving
-        self.constraints_kept = self._pushing.equation_count
-        self.numbers = _cache_last(self._numbers)
-        self._known, self._model, self._folder = known, model, folder
+        self.moving = self._force_balance.moving
+        self.constraints_kept = self._force_balance.equation_count
+        self.numbers = cache_last(self._tabulate_numbers)
+        self._model_paths, self._model, self._folder = known, model, folder
 
     def list_forces(self) -> list[tuple[str, Any]]:
-        """The forces on the bench, by the paths of the model."""
+        """Return the forces on the bench with their paths in the model."""
         return [
-            (_rename_to_model(item.path, self._known), item) for item in self.bench.forces.elements
+            (_rename_to_model(item.path, self._model_paths), item)
+            for item in self.bench.forces.elements
         ]
 
     @property
     def outputs(self) -> Any:
-        """None.
+        """Raise the error that outputs are not available.
 
         Raises:
             UnsupportedError: always.
@@ -125,55 +138,62 @@ class PrescribedMotion:
 
     frames = outputs
 
-    def _numbers(self, times: Array) -> Array:
-        """What is known at times (t,), one row each: lengths and speeds of m paths, what n
-        coordinates need, what each of the paths gives each of them by 1 N, and the equations of the
-        constraints.
+    def _tabulate_numbers(self, times: Array) -> Array:
+        """Compute the numbers of the motion at times (t,), one row each.
+
+        A row holds lengths and speeds of m paths, the generalized forces that n coordinates need,
+        the generalized force (n) of each path with 1 N (m, n), and the Jacobian of the constraints.
         """
         values, speeds, accelerations = self._motion(times)
-        needed, *matrices = self._pushing.balance(times, values, speeds, accelerations)
-        lengths, rates = self._pulling.path_lengths(times, values, speeds)
+        needed, *matrices = self._force_balance.balance(times, values, speeds, accelerations)
+        lengths, rates = self._path_geometry.path_lengths(times, values, speeds)
         return np.hstack(
             [lengths, rates, needed, *(item.reshape(len(times), -1) for item in matrices)]
         )
 
     @cached_property
-    def whole(self) -> Any:
-        """Functions of the model, whose actuators push with as many N or N m as their controls say."""
+    def force_model(self) -> Any:
+        """CasADi functions of the model in which the control of each actuator is its force, N or N m."""
         model = self._model.copy_deep()
         forces: Any = model.force_set.objects
-        for place, item in enumerate(forces):
+        for index, item in enumerate(forces):
             if isinstance(item, ScalarActuator) and item.appliesForce:
-                forces[place] = ideal(item, 1.0) or item
-        return functions_of(model, folder=self._folder)
+                forces[index] = ideal(item, 1.0) or item
+        return make_casadi_model(model, folder=self._folder)
 
     def compute_linear_response(self, function: Callable[..., Any], times: Array) -> Array:
-        """What depends on forces in a motion, at times (t,).
+        """Compute the linear dependence of a function on forces along the motion.
 
-        Args: function: ``function(t, x, xdot, u, p, multipliers) -> (k, t)`` of `whole`, that has
-            no squares of forces. times: s.
+        Args:
+            function: ``function(t, x, xdot, u, p, multipliers) -> (k, t)`` of `force_model`, linear
+                in the forces.
+            times: times (t,), s.
 
-        Returns: One row each (t, (1 + a + c) k): without them, and what 1 N of each actuator and 1
-            of each multiplier add.
+        Returns:
+            One row per time (t, (1 + a + c) k): the value without forces, and the change by 1 N of
+            each of a actuators and by 1 of each of c multipliers.
         """
-        whole, infos = self.whole, [info.path for info in self.mechanism.coordinates]
-        order = [infos.index(path) for path in whole.coordinates]
+        force_model, infos = self.force_model, [info.path for info in self.mechanism.coordinates]
+        order = [infos.index(path) for path in force_model.coordinates]
         values, speeds, accelerations = (part[:, order].T for part in self._motion(times))
-        x = np.tile(whole.x[:, None], len(times))
+        x = np.tile(force_model.x[:, None], len(times))
         x[: 2 * len(order)] = np.vstack([values, speeds])
         xdot = np.zeros_like(x)
         xdot[: 2 * len(order)] = np.vstack([speeds, accelerations])
-        places, count = [whole.controls.index(path) for path in self._paths], len(self._paths)
+        indices, count = (
+            [force_model.controls.index(path) for path in self._paths],
+            len(self._paths),
+        )
         found = []
         for unit in np.eye(1 + count + self.constraints_kept):
-            u = np.zeros(len(whole.controls))
-            u[places] = unit[1 : 1 + count]
+            u = np.zeros(len(force_model.controls))
+            u[indices] = unit[1 : 1 + count]
             found.append(np.array(function(times[None], x, xdot, u, [], unit[1 + count :])))
         found[1:] = [item - found[0] for item in found[1:]]
         return np.vstack(found).T
 
     def tabulate_states(self, times: Array) -> dict[str, Array]:
-        """Values and speeds of all coordinates over time, by paths of states."""
+        """Return values and speeds of all coordinates at times (t,) by the path of the state."""
         values, speeds, _ = self._motion(times)
         infos = self.mechanism.coordinates
         own = (
@@ -185,7 +205,7 @@ class PrescribedMotion:
 
 
 class PrescribedDynamics(Dynamics):
-    """The equations at a point of a motion that is given."""
+    """Equations at a point of a prescribed motion."""
 
     functions: Any
 
@@ -199,10 +219,13 @@ class PrescribedDynamics(Dynamics):
         given: PrescribedMotion = self.functions
         start, end = problem.times[0][0], problem.times[1][0]
         self._times = start + problem.grid.fractions * (end - start)
-        self._entries = self._series(given.numbers)
+        self._entries = self._add_series(given.numbers)
 
-    def _series(self, numbers: Callable[[Array], Array]) -> list[TimeFunction | None]:
-        """Of numbers (t, m) at times (t,) those that are not zero: most actuators push few coordinates."""
+    def _add_series(self, numbers: Callable[[Array], Array]) -> list[TimeFunction | None]:
+        """Return functions of time for numbers (t, m) of times (t,), and None for zeros.
+
+        Most actuators act on few coordinates, so that most numbers are zero at all times.
+        """
         found = numbers(self._times)
         matters = np.abs(found).max(axis=0) > RELATIVE_ZERO * np.abs(found).max()
         return [
@@ -211,23 +234,24 @@ class PrescribedDynamics(Dynamics):
         ]
 
     def list_forces(self) -> list[tuple[str, Any]]:
-        """The actuators, by their paths in the model."""
+        """Return the actuators with their paths in the model."""
         return self.functions.list_forces()
 
     def compute_path_lengths(self, point: Point) -> tuple[Formula, Formula]:
-        """As given."""
+        """Return the prescribed lengths (m) and lengthening speeds (m/s) of the actuators' paths."""
         count = len(self.functions.path_names)
-        return self._known(point, 0, count), self._known(point, count, count)
+        return self._select_entries(point, 0, count), self._select_entries(point, count, count)
 
-    def _known(self, point: Point, first: int, count: int) -> Formula:
+    def _select_entries(self, point: Point, first: int, count: int) -> Formula:
+        """Return the numbers of the motion from an index on."""
         return _stack_series(point, self._entries[first : first + count])
 
-    def _residual(self, point: Point) -> Formula:
-        """Of the bench, at rest but for its auxiliary states: what pulls its carriages, and the rates of the states."""
+    def _compute_bench_residual(self, point: Point) -> Formula:
+        """Compute the residual of the bench at zero rates: forces on the carriages, and rates of auxiliary states."""
         bench = self.functions.bench
         lengths, speeds = self.compute_path_lengths(point)
-        places = np.argsort(self.functions.carriages)
-        x = casadi.vertcat(lengths[places.tolist()], speeds[places.tolist()], point.x)
+        indices = np.argsort(self.functions.carriages)
+        x = casadi.vertcat(lengths[indices.tolist()], speeds[indices.tolist()], point.x)
         return bench.residual(
             point.t,
             x,
@@ -238,98 +262,102 @@ class PrescribedDynamics(Dynamics):
         )
 
     def compute_rates(self, point: Point) -> Formula:
-        """Of the auxiliary states."""
+        """Compute the rates of the auxiliary states."""
         count = len(self.functions.path_names)
-        return self._insert_tendon_rates(point, -self._residual(point)[2 * count :])
+        return self._insert_tendon_rates(point, -self._compute_bench_residual(point)[2 * count :])
 
     def compute_residuals(self, point: Point) -> tuple[list[str], Formula]:
-        """What the motion takes and actuators and constraints do not give, and what tendons and fibers do not share."""
+        """Compute the generalized forces that actuators and constraints leave missing, and tendon residuals.
+
+        Returns:
+            Names of the residuals, and the residuals (k, 1).
+        """
         names, errors = self.tendons.compute_residuals(point, point.derivatives)
         count, moving = len(self.functions.path_names), self.functions.moving
         first, size = 2 * count + len(moving), count * len(moving)
-        needed = self._known(point, 2 * count, len(moving))
-        pushes = casadi.reshape(self._known(point, first, size), count, -1).T
+        needed = self._select_entries(point, 2 * count, len(moving))
+        pushes = casadi.reshape(self._select_entries(point, first, size), count, -1).T
         bound = casadi.reshape(
-            self._known(point, first + size, point.multipliers.numel() * len(moving)),
+            self._select_entries(point, first + size, point.multipliers.numel() * len(moving)),
             len(moving),
             -1,
         )
-        rows = needed - pushes @ self._forces(point) + bound @ point.multipliers
+        rows = needed - pushes @ self._compute_actuator_forces(point) + bound @ point.multipliers
         return [*(f"{name} residual" for name in moving), *names], casadi.vertcat(rows, errors)
 
     def make_joint_load(self, path: str, side: str, frame: str) -> Callable[[Point], Formula]:
-        """As the motion, the actuators and the constraints make it."""
-        load = self.functions.whole.joint_load(path, side)
-        turned = self.functions.whole.frames([frame])
+        """Return the function of a point for the load of a joint in the motion; see :class:`Dynamics`."""
+        load = self.functions.force_model.joint_load(path, side)
+        turned = self.functions.force_model.frames([frame])
 
         def function(t: Any, x: Any, xdot: Any, u: Any, p: Any, multipliers: Any) -> Any:
             turn = np.array(turned(t, x, p)[1]).T.reshape(-1, 3, 3)
             force, moment = (np.array(part) for part in load(t, x, xdot, u, p, multipliers))
-            # Matrices stand column by column.
+            # CasADi flattens matrices column by column.
             return np.vstack([np.einsum("tij,jt->it", turn, part) for part in (moment, force)])
 
-        return self._linear(function, 6)
+        return self._make_linear_formula(function, 6)
 
     def make_generalized_forces(
         self, pushing: Sequence[str], coordinates: Sequence[str]
     ) -> Callable[[Point], Formula]:
-        """As the motion and the actuators make them."""
-        missing = self.functions.whole.generalized_forces(pushing)
-        rows = [self.functions.whole.coordinates.index(path) for path in coordinates]
-        return self._linear(lambda *given: np.array(missing(*given[:-1]))[rows], len(rows))
+        """Return the function of a point for the generalized forces in the motion; see :class:`Dynamics`."""
+        missing = self.functions.force_model.generalized_forces(pushing)
+        rows = [self.functions.force_model.coordinates.index(path) for path in coordinates]
+        return self._make_linear_formula(
+            lambda *given: np.array(missing(*given[:-1]))[rows], len(rows)
+        )
 
-    def _linear(self, function: Callable[..., Array], size: int) -> Callable[[Point], Formula]:
-        """Formulas (size, 1) of what forces make in the motion."""
-        entries = self._series(
-            _cache_last(partial(self.functions.compute_linear_response, function))
+    def _make_linear_formula(
+        self, function: Callable[..., Array], size: int
+    ) -> Callable[[Point], Formula]:
+        """Return the function of a point for a column (size, 1) that depends linearly on forces."""
+        entries = self._add_series(
+            cache_last(partial(self.functions.compute_linear_response, function))
         )
 
         def formula(point: Point) -> Formula:
-            given = casadi.vertcat(1.0, self._forces(point), point.multipliers)
+            given = casadi.vertcat(1.0, self._compute_actuator_forces(point), point.multipliers)
             return casadi.reshape(_stack_series(point, entries), size, -1) @ given
 
         return formula
 
-    def _forces(self, point: Point) -> Formula:
-        """Of the actuators (m, 1), N or N m."""
+    def _compute_actuator_forces(self, point: Point) -> Formula:
+        """Compute the forces of the actuators (m, 1), N or N m."""
         count = len(self.functions.path_names)
-        pull = -self._residual(point)[count : 2 * count][self.functions.carriages]
-        # Muscles shorten what they pull at.
+        force = -self._compute_bench_residual(point)[count : 2 * count][self.functions.carriages]
+        # Muscles pull the carriage back, so that a positive force has the other sign.
         return casadi.vertcat(
-            *(-pull[k] if muscle else pull[k] for k, muscle in enumerate(self.functions.is_muscle))
+            *(
+                -force[k] if muscle else force[k]
+                for k, muscle in enumerate(self.functions.is_muscle)
+            )
         )
 
 
 def _stack_series(point: Point, entries: Sequence[TimeFunction | None]) -> Formula:
-    """The numbers of series, of which those that are None are zero."""
+    """Return the column of values of functions of time; None stands for zero."""
     return casadi.vertcat(
         *(casadi.SX(1, 1) if entry is None else point.evaluate(entry) for entry in entries)
     )
 
 
-def _cache_last(numbers: Callable[[Array], Array]) -> Callable[[Array], Array]:
-    """The same function of times, which keeps what it found last."""
-    kept: list[Array] = []
-
-    def known(times: Array) -> Array:
-        if not kept or not np.array_equal(kept[0], times):
-            kept[:] = times.copy(), numbers(times)
-        return kept[1]
-
-    return known
-
-
 def _sample_column(numbers: Callable[[Array], Array], number: int, times: Array) -> Array:
-    """One of the numbers of a motion, which is not asked for at other times than these."""
+    """Return value and derivatives (3, n) of one number of the motion.
+
+    The derivatives are zero: the times of a prescribed motion are fixed, and no others are
+    evaluated.
+    """
     found = numbers(times)[:, number]
     return np.stack([found, np.zeros_like(found), np.zeros_like(found)])
 
 
 def build_test_bench(actuators: Sequence[Any], names: Sequence[str]) -> Model:
-    """A model without gravity in which each actuator pulls at a carriage of its own.
+    """Build a model without gravity in which each actuator moves its own carriage.
 
-    Args: actuators: muscles, and others whose force is proportional to their control or their
-        activation. names: of each on the bench, of its carriage and of the coordinate.
+    Args:
+        actuators: muscles, and actuators with a force proportional to their control or activation.
+        names: name of each actuator on the bench, of its carriage and of the coordinate.
     """
     model = Model(name="bench", gravity=(0.0, 0.0, 0.0))
     for item, name in zip(actuators, names, strict=True):
@@ -360,10 +388,11 @@ def build_test_bench(actuators: Sequence[Any], names: Sequence[str]) -> Model:
 
 
 def _name_on_bench(number: int) -> str:
+    """Return the name of an actuator on the bench."""
     return f"bench{number}"
 
 
 def _rename_to_model(path: str, known: Mapping[str, str]) -> str:
-    """A path on the bench as one of the model."""
+    """Return a path on the bench as a path of the model."""
     _, _, name, *rest = path.split("/")
     return "/".join([known[name], *rest])

@@ -1,4 +1,4 @@
-"""An optimal control problem, as a study of Moco says it."""
+"""Optimal control problem of a Moco study."""
 
 from __future__ import annotations
 
@@ -56,32 +56,39 @@ from osimlite.schema.model import Model
 from osimlite.schema.motions import PositionMotion
 
 JOINTS_WITHOUT_RATES = "BallJoint", "EllipsoidJoint", "FreeJoint", "ScapulothoracicJoint"
-"""Joints whose speeds are not the rates of their values: Moco refuses them."""
+"""Joints whose speeds are not the rates of their coordinates; Moco refuses them."""
 
 
 class Problem(StudyContext):
-    """What varies, between which bounds, and what is asked of it.
+    """Variables with their bounds, goals and constraints of a study.
 
     Args:
-        study: as it was read or made.
-        file: it stands in, for messages and for the files that it names.
-        folder: that those files are in, if the study is in none; the current folder if None.
-        tables: by names of goals, in the place of those that their references name.
-        motion: that is given exactly, as if the model had a PositionMotion.
-        scaled: by names of scale factors the columns of references that these multiply.
+        study: study.
+        file: file of the study, for messages and for the files that it names.
+        folder: folder of the files that a study without a file names; the current folder if None.
+        tables: tables by goal name that replace the files of the goals' references.
+        motion: prescribed motion, as if the model had a PositionMotion.
+        scaled: column of the reference that each scale factor multiplies, by the factor's name.
 
-    Attributes: study: as given; `phase` and `solver` are its parts. model: that moves. functions:
-        of the model (:class:`~osimlite.derivatives.functions.CasadiModel`). states: bounds by paths
-        of states, in the order of `functions.states`. controls: likewise of the controls of
-        actuators that act; the others are zero. times: ranges of the initial and the final time, s.
-        parameters: ranges by names of parameters. constraint_names: of the equations that the
-        model's constraints make, as OpenSim numbers them. grid: the points. goals: those that
-        count, with what they consist of. path_rows: of the path constraints. loads: the functions
-        of time of the model's forces (`functions.loads`).
+    Attributes:
+        study: study; `phase` and `solver` are its parts.
+        model: model after the model processor.
+        functions: CasADi functions of the model
+            (:class:`~osimlite.derivatives.functions.CasadiModel`).
+        states: bounds by path of the state, in the order of `functions.states`.
+        controls: bounds by path of the control; controls of actuators that do not act are zero.
+        times: ranges of the initial and the final time, s.
+        parameters: ranges by name of the parameter.
+        constraint_names: names of the equations of the model's constraints, as OpenSim numbers
+            them.
+        grid: points of the motion.
+        goals: enabled goals with their terms.
+        path_rows: rows of the path constraints.
+        loads: functions of time of the model's forces (`functions.loads`).
 
     Raises:
-        UnsupportedError: there is something that is not solved here; it says where in the file.
-        DocumentError: the study says something that cannot be, such as a state that is none.
+        UnsupportedError: the study contains something that is not supported here.
+        DocumentError: the study is invalid, for example names a state that does not exist.
     """
 
     def __init__(
@@ -164,7 +171,18 @@ class Problem(StudyContext):
         names: Sequence[str],
         what: str,
     ) -> list[float]:
-        """How much each of some names counts: by its name, else by the last pattern that matches, else one."""
+        """Find the weights of names: by name, else by the last pattern that matches, else 1.
+
+        Args:
+            part: goal, for messages.
+            by_name: weights by name.
+            by_pattern: weights by pattern; None if the goal has none.
+            names: names that need a weight.
+            what: what the names stand for, for messages.
+
+        Raises:
+            DocumentError: a weight is for an unknown name.
+        """
         own = {weight.name: weight.weight for weight in by_name.objects}
         for name in own:
             self.check_name(part, name, names, what)
@@ -175,11 +193,11 @@ class Problem(StudyContext):
         return [*(found | own).values()]
 
     def add_time_function(self, values: Callable[[Array], Array], label: str = "") -> TimeFunction:
-        """A function of time that is given, for formulas at points (``point.evaluate(series)``).
+        """Add a function of time for formulas at points (``point.evaluate(function)``).
 
         Args:
-            values: at times (n,) the value and both of its derivatives by time (3, n).
-            label: of the column that it is, which a scale factor of the goal may multiply.
+            values: function of times (n,) that returns value, first and second derivative (3, n).
+            label: name of the column, which a scale factor of the goal may multiply.
         """
         factor = self._factors.get(label)
         series = TimeFunction(
@@ -191,7 +209,11 @@ class Problem(StudyContext):
         return series
 
     def list_parameter_paths(self, parameter: MocoParameter) -> list[str]:
-        """Paths of the numbers that a parameter stands for, one at least."""
+        """Return the paths of the numbers that a parameter stands for.
+
+        Raises:
+            DocumentError: the parameter names no component.
+        """
         if not parameter.component_paths:
             raise self.invalid_error(parameter, "it names no component")
         element = parameter.property_element
@@ -203,13 +225,14 @@ class Problem(StudyContext):
 
     # ------------------------------------------------------------------------------------------------- parts
     def _process_model(self) -> Model:
+        """Return the model after its processor."""
         processor = self.phase.model
         if not processor.filepath.strip() and processor.model is None:
             raise self.invalid_error(processor, "it has no model and names none")
         return processed(processor, self.folder)
 
     def _remove_motion(self) -> Motion | None:
-        """That of a PositionMotion, which is taken out of the model."""
+        """Remove an enabled PositionMotion from the model and return its motion; None if there is none."""
         for part in list(self.model.components(PositionMotion)):
             if part.default_enabled:
                 place = part.path
@@ -223,6 +246,7 @@ class Problem(StudyContext):
         return None
 
     def _make_functions(self, parameters: list[str], motion: Motion | None) -> Any:
+        """Return the CasADi functions of the model, or of the model along a prescribed motion."""
         if motion is None:
             try:
                 functions = CasadiModel(self.model, parameters, self.folder, loads_given=True)
@@ -244,6 +268,7 @@ class Problem(StudyContext):
         return PrescribedMotion(self.model, motion, self.folder)
 
     def _check_components(self) -> None:
+        """Check the model for locked coordinates, controllers and joints that Moco or osimlite refuses."""
         for part in self.components.values():
             if isinstance(part, Coordinate) and part.locked:
                 raise self.invalid_error(
@@ -260,13 +285,14 @@ class Problem(StudyContext):
                 raise self.invalid_error(self.phase, f"{message}; take a CustomJoint")
 
     def _check_settings(self) -> None:
+        """Check the settings of the solver."""
         if self.solver.optim_solver != "ipopt":
             raise self.unsupported_error(
                 self.solver, f"of optimizers only ipopt is known, not {self.solver.optim_solver}"
             )
 
     def _make_solver_costs(self) -> Iterator[tuple[MocoGoal, GoalTerms]]:
-        """Squares of variables that the solver's own settings make a cost, named as in Moco."""
+        """Yield the costs that settings of the solver add, named as in Moco."""
         solver, first = (
             self.solver,
             len(self.functions.coordinates) if self.dynamics.is_implicit else 0,
@@ -317,10 +343,12 @@ class Problem(StudyContext):
             yield goal, replace(make_integral_terms(_squared_projection_distance), is_sum=True)
 
     def _is_acting(self, control: str) -> bool:
+        """Return whether the actuator of a control applies its force."""
         owner: Any = self.components.get(control) or self.components[control.rpartition("_")[0]]
         return bool(owner.appliesForce)
 
     def _check_infos(self, controls: Sequence[str]) -> None:
+        """Check the names and patterns of the study's entries for states and controls."""
         for pattern in (*self.phase.state_infos_pattern, *self.phase.control_infos_pattern):
             self.compile_pattern(pattern, pattern.name)
         for infos, known, what in (
@@ -333,6 +361,7 @@ class Problem(StudyContext):
             raise self.unsupported_error(info, "inputs of controllers are not solved here")
 
     def _name_constraints(self) -> list[str]:
+        """Return the names of the equations of the model's constraints, as OpenSim numbers them."""
         count = self.functions.constraints_kept
         if not count:
             return []
@@ -346,7 +375,7 @@ class Problem(StudyContext):
         ]
 
     def _check_constraint_method(self, count: int) -> None:
-        """Refuse settings by which states are not kept on so many equations of constraints."""
+        """Check the settings that keep states on the model's constraints."""
         solver = self.solver
         if solver.kinematic_constraint_method == "Bordalba2023":
             if not solver.enforce_constraint_derivatives:
@@ -366,6 +395,7 @@ class Problem(StudyContext):
             )
 
     def _make_mesh(self) -> Array:
+        """Return the ends of the mesh intervals, from 0 to 1."""
         solver = self.solver
         intervals = len(solver.mesh) or solver.num_mesh_intervals
         most = min(MAX_MESH_INTERVALS, MAX_MESH_VALUES // max(1, len(self.functions.states)))
@@ -380,6 +410,7 @@ class Problem(StudyContext):
         return mesh
 
     def _build_terms(self, goal: MocoGoal) -> GoalTerms:
+        """Build the terms of a goal, and check its mode and its scale factors."""
         build = GOAL_BUILDERS.get(type(goal))
         if build is None:
             raise self.unsupported_error(goal, "goals of this class are not solved here yet")
@@ -409,7 +440,7 @@ class Problem(StudyContext):
         return build(constraint, self)
 
     def _add_scale_factors(self) -> None:
-        """The scale factors of goals, which are parameters, too."""
+        """Add the scale factors of goals to the parameters."""
         for factor in [factor for goal in self.phase.goals for factor in goal.scale_factors]:
             if factor.name not in self._scaled:
                 # OpenSim's method that adds it is told so, and its files are not.
@@ -431,23 +462,23 @@ class Problem(StudyContext):
 
     @property
     def has_constraints(self) -> bool:
-        """Whether states have to be kept on constraints."""
+        """Whether the model's constraints are equations of the problem."""
         return bool(self.constraint_names) and not isinstance(self.functions, PrescribedMotion)
 
     @property
     def uses_projection(self) -> bool:
-        """Whether intervals lead to states that are moved onto the constraints."""
+        """Whether intervals lead to states that are projected onto the constraints (Bordalba et al. 2023)."""
         return self.has_constraints and self.solver.kinematic_constraint_method == "Bordalba2023"
 
     @property
     def projected_names(self) -> list[str]:
-        """Of values and speeds before they are moved."""
+        """Names of values and speeds before projection."""
         count = 2 * len(self.functions.coordinates) if self.uses_projection else 0
         return [f"{name}{PROJECTION_SUFFIX}" for name in self.functions.states[:count]]
 
     @cached_property
     def slack_names(self) -> list[str]:
-        """Of the corrections of velocities, or of those of values and of speeds, which Moco names by turns."""
+        """Names of the velocity corrections; with projection those of values and speeds in turn, as in Moco."""
         if self.uses_projection:
             return [f"mu_{name}{end}" for name in self.constraint_names for end in ("", "_dot")]
         wanted = self.has_constraints and self.solver.enforce_constraint_derivatives
@@ -455,18 +486,24 @@ class Problem(StudyContext):
 
 
 def _squared_projection_distance(point: Point) -> Formula:
-    """The square of how far states are moved at a point."""
+    """Return the squared distance by which states are projected at a point."""
     return casadi.sumsqr(point.projections - point.x[: point.projections.numel()])
 
 
 def _sum_scaled_squares(part: str | slice, by: tuple[float, float], point: Point) -> Formula:
-    """Of the multipliers, or of some of the derivatives that are variables, as they are scaled."""
+    """Return the sum of squares of scaled multipliers or derivatives that are variables.
+
+    Args:
+        part: "multipliers", or the slice of the derivatives.
+        by: factor and offset of the scaling.
+        point: point of the grid.
+    """
     column = point.multipliers if isinstance(part, str) else point.derivatives[part]
     return casadi.sumsqr((column - by[1]) / by[0])
 
 
 def _number_equations(model: Model, count: int) -> Iterable[tuple[int, int]]:
-    """For each equation the number of its constraint and its own."""
+    """Return the number of its constraint and its row within the constraint for each equation."""
     sizes = {"WeldConstraint": 6, "PointConstraint": 3}
     rows: list[tuple[int, int]] = []
     constraints: Mapping[str, Any] = {part.path: part for part in model.constraint_set.objects}

@@ -1,17 +1,15 @@
-"""The nonlinear program of a problem, with its sparse exact derivatives.
+"""Nonlinear program of a problem, with its sparse exact derivatives.
 
-At each point k of the grid one function of CasADi, F(s, z_k), has all that is not linear: rates
-times the duration, residuals, integrands times the duration. s are the times and the parameters,
-z_k the variables of the point. What must be zero is ``A w + B F`` with constant sparse A and B; so
-Jacobian and Hessian are constant sparse maps of the numbers that the functions' own derivatives
-have, and nothing is differentiated twice. What depends on both ends is one more function, E(s, z_0,
-z_n, integrals).
+One CasADi function F(s, z_k) holds all that is nonlinear at point k of the grid: rates times the
+duration, residuals, and integrands times the duration. s are the times and the parameters, z_k the
+variables of the point. The constraints are ``A w + B F`` with constant sparse A and B. Jacobian and
+Hessian are thus constant sparse maps of the derivatives of F at the points, and nothing is
+differentiated twice. Terms that depend on both ends are one more function,
+E(s, z_0, z_n, integrals).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,175 +19,25 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.bounds import read_range
 from osimlite.optimal.layout import VARIABLE_KINDS, Layout
 from osimlite.optimal.point import Endpoints, Point
+from osimlite.optimal.point_functions import BufferedFunction, PointGroup, cache_last
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.sparse import SparseMatrix
 
 SX: Any = casadi.SX
 
 
-class BufferedFunction:
-    """A function of CasADi on arrays, without what its own call takes to convert them.
-
-    Args:
-        function: of dense matrices.
-    """
-
-    def __init__(self, function: Any) -> None:
-        self._buffer, self._run = function.buffer()
-        self._given = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
-        self._results = [np.zeros(function.size_out(k)[::-1]) for k in range(function.n_out())]
-        for k, array in enumerate(self._given):
-            self._buffer.set_arg(k, array.data)
-        for k, array in enumerate(self._results):
-            if array.size:
-                self._buffer.set_res(k, array.reshape(-1).data)
-
-    def __call__(self, *given: Array) -> list[Array]:
-        """Results, and what is given, have their columns as rows."""
-        for own, array in zip(self._given, given, strict=True):
-            own[:] = array.reshape(-1)
-        self._run()
-        return [array.copy() for array in self._results]
-
-
-def cache_last(law: Callable[[Array], Any]) -> Callable[[Array], Any]:
-    """The law, that keeps its result for the array that it was last asked for."""
-    kept: Any = None
-
-    def result(x: Array) -> Any:
-        nonlocal kept
-        if kept is None or not np.array_equal(kept[0], x):
-            kept = x.copy(), law(x)
-        return kept[1]
-
-    return result
-
-
-class PointFormula:
-    """F and its derivatives at a point of one group, whatever the mesh: those of the mesh, or those between."""
-
-    def __init__(self, program: Program, number: int, size: int) -> None:
-        problem, layout = program.problem, program.layout
-        is_mesh = bool(problem.grid.is_mesh[number])
-        self.projected = (
-            len(layout.names["projections"]) if layout.has_kind("projections", number) else 0
-        )
-        s, z = SX.sym("s", layout.shared), SX.sym("z", size)
-        place, known = SX.sym("place"), SX.sym("known", program.known_size)
-        point = program.point(s, z, place, known, number)
-        duration = s[1] - s[0]
-        names, residuals = problem.dynamics.compute_residuals(point)
-        rows, labels, limits = [residuals], [*names], [(0.0, 0.0)] * len(names)
-        if is_mesh or problem.solver.enforce_path_constraint_mesh_interior_points:
-            for own in problem.path_rows:
-                rows.append(own.formula(point))
-                labels += own.labels
-                limits += own.limits
-        names, errors = problem.dynamics.compute_constraint_errors(point, is_mesh)
-        rows.append(errors)
-        labels += names
-        limits += [read_range(problem.phase.kinematic_constraint_bounds) or (0.0, 0.0)] * len(names)
-        rates = [problem.dynamics.correct_rates(point)]
-        if self.projected:
-            rates.append(point.before_projection.rates[: self.projected])
-            names, errors = problem.dynamics.compute_projection_errors(point)
-            rows.append(errors)
-            labels += names
-            limits += [(0.0, 0.0)] * len(names)
-        integrands = [
-            terms.integrand(point) if terms.is_sum else duration * terms.integrand(point)
-            for _, terms in program.integrals
-        ]
-        column = casadi.vertcat(duration * casadi.vertcat(*rates), *rows, *integrands)
-        # What is common is found before anything is differentiated: later that takes ten times as
-        # long, and finds less.
-        solved, equations = (
-            casadi.vertcat(SX(0, 1), *(pair[k] for pair in point.linear_systems)) for k in range(2)
-        )
-        self.labels, self.limits, self.rows = labels, limits, column.numel()
-        parts = casadi.cse(casadi.densify(casadi.vertcat(column, equations)))
-        self._given, self._both, self._unknown = [s, z, place, known], casadi.vertcat(s, z), solved
-        self._column, self._equations = parts[: self.rows], parts[self.rows :]
-        slopes, width = (
-            casadi.jacobian(parts, casadi.vertcat(self._both, solved)),
-            self._both.numel(),
-        )
-        jacobian, self._by_solved = slopes[: self.rows, :width], slopes[: self.rows, width:]
-        self._value, self._moved = SX(0, 1), SX(0, width)
-        if solved.numel():
-            # Not differentiated is how the equations are solved: slopes follow from theirs.
-            self._factors = casadi.ldl(slopes[self.rows :, width:])
-            self._value = casadi.ldl_solve(
-                -casadi.substitute(self._equations, solved, 0), *self._factors
-            )
-            self._moved = -casadi.sparsify(
-                casadi.ldl_solve(slopes[self.rows :, :width], *self._factors)
-            )
-            jacobian += self._by_solved @ self._moved
-        self.jacobian_entries = [*map(np.array, jacobian.sparsity().get_triplet())]
-        self.value = self._function("F", self._given, self._column)
-        self.slope = self._function("J", self._given, casadi.vertcat(*jacobian.nonzeros()))
-
-    def _function(self, name: str, given: list[Any], column: Any) -> Any:
-        """One whose formula has the solutions of the equations in the places of their symbols."""
-        return casadi.Function(name, given, [casadi.substitute(column, self._unknown, self._value)])
-
-    @cached_property
-    def curvature(self) -> tuple[Any, list[Any]]:
-        """The second derivatives, with their rows and columns; they are only made if they are asked for."""
-        multipliers, pushes = (
-            SX.sym("multipliers", self.rows),
-            SX.sym("pushes", self._unknown.numel()),
-        )
-        combined = casadi.dot(multipliers, self._column) + casadi.dot(pushes, self._equations)
-        hessian = casadi.hessian(combined, casadi.vertcat(self._both, self._unknown))[0]
-        if self._unknown.numel():
-            # With these multipliers of the equations the sum does not depend on their solution.
-            found = casadi.ldl_solve(-self._by_solved.T @ multipliers, *self._factors)
-            along = casadi.vertcat(SX.eye(self._both.numel()), self._moved)
-            hessian = casadi.substitute(along.T @ hessian @ along, pushes, found)
-        hessian = casadi.triu(hessian)
-        function = self._function(
-            "H", [*self._given, multipliers], casadi.vertcat(*hessian.nonzeros())
-        )
-        return function, [*map(np.array, hessian.sparsity().get_triplet())]
-
-
-class PointGroup:
-    """F and its derivatives for the points of one group."""
-
-    def __init__(self, program: Program, numbers: list[int]) -> None:
-        problem, layout = program.problem, program.layout
-        self.numbers = np.array(numbers, dtype=int)
-        self.columns = np.array([layout.point_indices[number] for number in numbers])
-        sort = bool(problem.grid.is_mesh[numbers[0]]), layout.has_kind("projections", numbers[0])
-        if sort not in problem.formulas:
-            problem.formulas[sort] = PointFormula(program, numbers[0], self.columns.shape[1])
-        self.formula = formula = problem.formulas[sort]
-        self.projected = formula.projected
-        self.labels, self.limits, self.rows = formula.labels, formula.limits, formula.rows
-        self.jacobian_rows, self.jacobian_columns = formula.jacobian_entries
-        self.value, self.slope = (
-            BufferedFunction(each.map(len(numbers))) for each in (formula.value, formula.slope)
-        )
-
-    def evaluate(self, program: Program, w: Array, places: Array, z: Array) -> Array:
-        """F (n, rows) at other places (n,), from 0 to 1, with these variables (n, ...)."""
-        given = program._arguments_at(w, places, z)
-        return BufferedFunction(self.formula.value.map(len(places)))(*given)[0]
-
-    def make_hessian(self) -> None:
-        """The second derivatives are only made if they are asked for."""
-        function, (self.hessian_rows, self.hessian_columns) = self.formula.curvature
-        self.curvature = BufferedFunction(function.map(len(self.numbers)))
-
-
 class Program:
-    """The nonlinear program: minimize f(w) with lower <= g(w) <= upper.
+    """Nonlinear program: minimize f(w) subject to lower <= g(w) <= upper.
 
-    Attributes: problem: that is solved. layout: of the variables w. labels: of the rows of g.
-        times: of the rows, from 0 at the start to 1 at the end; of what concerns both ends not a
-        number. lower: bounds of g. upper: bounds of g. costs: names of the parts of f.
+    Attributes:
+        problem: optimal control problem.
+        layout: layout of the variables w.
+        groups: groups of points with the same variables.
+        labels: labels of the rows of g.
+        times: fraction of time of each row of g, from 0 to 1; NaN for constraints on both ends.
+        lower: lower bounds of g.
+        upper: upper bounds of g.
+        costs: names of the parts of f.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -225,7 +73,15 @@ class Program:
 
     # --------------------------------------------------------------------------------------------- formulas
     def point(self, s: Any, z: Any, place: Any, known: Any, number: int) -> Point:
-        """The formulas at a point of the grid, for all that have the same variables as one of them."""
+        """Return the formulas at a point of the grid, which hold for all points with the same variables.
+
+        Args:
+            s: symbols of the times and the parameters.
+            z: symbols of the variables of the point.
+            fraction: fraction of time, from 0 to 1.
+            known: symbols of the data of the functions of time.
+            number: index of the point.
+        """
         parts, first = {}, 0
         for kind in VARIABLE_KINDS:
             count = len(self.layout.names[kind]) if self.layout.has_kind(kind, number) else 0
@@ -250,7 +106,7 @@ class Program:
         )
 
     def _make_ends(self) -> None:
-        """E: the parts of the cost, and what goals want to be zero at the ends."""
+        """Make E: the parts of the cost and the endpoint constraints, with their derivatives."""
         problem, layout = self.problem, self.layout
         size, last = layout.shared, len(layout.point_indices) - 1
         s = SX.sym("s", size)
@@ -317,6 +173,7 @@ class Program:
         self.upper = np.append(self.upper, [high for _, high in limits])
 
     def _divided(self, goal: Any, value: Any, ends: Endpoints) -> Any:
+        """Return the value of a goal after its divisions by displacement, duration and mass."""
         if goal.divide_by_displacement:
             value = value / casadi.norm_2(ends.end.mass_center() - ends.start.mass_center())
         if goal.divide_by_duration:
@@ -325,7 +182,7 @@ class Program:
 
     # ------------------------------------------------------------------------------------------ constant parts
     def _assemble(self) -> None:
-        """A and B, with the labels of their rows; behind those of g the rows of the integrals."""
+        """Assemble A and B and the labels of their rows; the rows of the integrals follow those of g."""
         grid, layout = self.problem.grid, self.layout
         states, controls = layout.names["states"], layout.names["controls"]
         scheme, count = grid.scheme, len(layout.names["states"])
@@ -396,12 +253,21 @@ class Program:
             ]
             return SparseMatrix.from_entries(found[0], found[1], found[2], (size, width))
 
-        self._a, self._b = matrix(a, len(layout.lower)), matrix(b, int(self._offsets[-1]))
+        self._a: SparseMatrix = matrix(a, len(layout.lower))
+        self._b: SparseMatrix = matrix(b, int(self._offsets[-1]))
         self.times = np.concatenate(times)
         self.lower, self.upper = (np.array([limit[k] for limit in limits]) for k in range(2))
 
     def _entries(self, rows: str, columns: str) -> tuple[Array, Array]:
-        """Of the derivatives of all points: which rows and columns their numbers belong to."""
+        """Return rows and columns of the derivatives of all points.
+
+        Args:
+            rows: attribute of the groups with the rows.
+            columns: attribute of the groups with the columns.
+
+        Returns:
+            Rows and columns in the program of each entry.
+        """
         first, second = [], []
         for group, start in zip(self.groups, self._offsets, strict=False):
             r, c, count = getattr(group, rows), getattr(group, columns), len(group.numbers)
@@ -416,7 +282,7 @@ class Program:
         return np.concatenate(first), np.concatenate(second)
 
     def _map_jacobian(self) -> None:
-        """How the numbers of the points' Jacobians make up those of A + B J."""
+        """Make the sparse map from the Jacobians of the points to that of A w + B F."""
         width = len(self.layout.lower)
         rows, columns = self._entries("jacobian_rows", "jacobian_columns")
         spread, own = self._b.select_columns(rows.astype(np.int64)), self._a
@@ -438,7 +304,7 @@ class Program:
         self._of_g = self._jacobian_rows < self._row_count
 
     def _map_ends(self) -> None:
-        """The pattern of the rows at the ends, behind the others."""
+        """Make the sparsity pattern of the endpoint constraints, whose rows follow the others."""
         width, direct = len(self.layout.lower), len(self.end_columns)
         pattern = np.zeros((len(self.end_labels), width), dtype=bool)
         pattern[:, self.end_columns] |= self._end_pattern[:, :direct]
@@ -462,7 +328,7 @@ class Program:
 
     # ------------------------------------------------------------------------------------------------- numbers
     def _known(self, times: Array) -> Array:
-        """What the series are made of at times (n,): (n, 3 k + 1)."""
+        """Return the data of the functions of time (n, 3 k + 1) at times (n,)."""
         key = times.tobytes()
         if key not in self._found:
             if len(self._found) >= 8:
@@ -472,15 +338,17 @@ class Program:
         return self._found[key]
 
     def _point_arguments(self, group: PointGroup, w: Array) -> list[Array]:
+        """Return the arguments of F for a group of points."""
         return self._arguments_at(w, self.problem.grid.fractions[group.numbers], w[group.columns])
 
     def _arguments_at(self, w: Array, places: Array, z: Array) -> list[Array]:
-        """What the function of a point is given at places (n,) with variables z (n, ...)."""
+        """Return the arguments of F at fractions of time (n,) with variables z (n, ...)."""
         s = w[: self.layout.shared]
         times = w[0] + places * (w[1] - w[0])
         return [np.tile(s, len(places)), z, places, self._known(times)]
 
     def _evaluate_groups(self, name: str, w: Array) -> Array:
+        """Return the results of a function of all groups in one array."""
         return np.concatenate(
             [
                 getattr(group, name)(*self._point_arguments(group, w))[0].ravel()
@@ -489,23 +357,44 @@ class Program:
         )
 
     def _end_arguments(self, w: Array, totals: Array) -> list[Array]:
+        """Return the arguments of E."""
         known = self._known(w[:2])
         first, last = self.layout.point_indices[0], self.layout.point_indices[-1]
         return [w[: self.layout.shared], w[first], w[last], totals, known[0], known[1]]
 
     def compute_values(self, w: Array) -> tuple[Array, Array]:
-        """The parts of f, and g."""
+        """Compute the parts of f, and g.
+
+        Args:
+            w: variables (n,).
+
+        Returns:
+            Parts of f in the order of `costs`, and g.
+        """
         rows = self._compute_rows(w)
         costs, wanted = self._end_value(*self._end_arguments(w, rows[self._row_count :]))
         return costs.ravel(), np.concatenate([rows[: self._row_count], wanted.ravel()])
 
     def compute_slopes(self, w: Array) -> tuple[Array, Array]:
-        """The gradient of f, and the numbers of the Jacobian of g in the order of `jacobian_sparsity`."""
+        """Compute the first derivatives.
+
+        Args:
+            w: variables (n,).
+
+        Returns:
+            Gradient of f, and the entries of the Jacobian of g in the order of `jacobian_sparsity`.
+        """
         gradient, ends, numbers, _ = self._compute_slopes(w)
         entries = np.concatenate([numbers[self._of_g], ends[self._end_entries]])
         return gradient, entries[self._jacobian_order]
 
     def _compute_slopes(self, w: Array) -> tuple[Array, Array, Array, Array]:
+        """Compute the parts that gradient, Jacobian and Hessian share.
+
+        Returns:
+            Gradient of f, rows of the endpoint constraints, entries of the Jacobian of A w + B F,
+            and the gradients of the integrals.
+        """
         width, direct = len(w), len(self.end_columns)
         numbers = self._jacobian_constant + self._jacobian_map @ self._evaluate_groups("slope", w)
         integrals = np.zeros((len(self.integrals), width))

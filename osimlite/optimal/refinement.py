@@ -1,8 +1,8 @@
-"""Meshes that are as fine as a motion needs: the error of each interval is estimated, and where it is large they split.
+"""Mesh refinement: estimate the error of each interval and split intervals with a large error.
 
 After J. T. Betts, Practical Methods for Optimal Control, 2010, section 4.7: within an interval the
-states are the polynomial that the scheme stands for, and what their rates are off there from the
-equations of motion is the error.
+states are the polynomial of the scheme, and the error is the difference between its rate and the
+equations of motion.
 """
 
 from __future__ import annotations
@@ -25,23 +25,29 @@ from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
 from osimlite.optimal.schemes import Grid
 
-SAMPLE_FRACTIONS, SAMPLE_WEIGHTS = (0.5 * part for part in np.polynomial.legendre.leggauss(4))
-SAMPLE_FRACTIONS = SAMPLE_FRACTIONS + 0.5
-"""Where in an interval (0 to 1) the error is looked at, and how much each counts in the mean."""
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+SAMPLE_FRACTIONS = 0.5 * _NODES + 0.5
+"""Gauss-Legendre nodes within an interval, from 0 to 1, at which the error is sampled."""
+SAMPLE_WEIGHTS = 0.5 * _WEIGHTS
+"""Gauss-Legendre weights of `SAMPLE_FRACTIONS`, whose sum is 1."""
 MAX_PARTS = 4
-"""So many an interval becomes at most at once."""
-MAX_ROUNDS, MAX_INTERVALS = 10, 2000
-"""Of meshes, and of intervals of one, more are not tried."""
+"""Maximum number of parts into which an interval is split at once."""
+MAX_ROUNDS = 10
+"""Number of meshes after which refinement stops."""
+MAX_INTERVALS = 2000
+"""Number of intervals above which no finer mesh is tried."""
 HESSIAN_METHODS = "exact", "limited-memory"
+"""Second derivatives of the searches after the first."""
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """How fine a mesh becomes.
+    """Settings of mesh refinement.
 
-    Attributes: tolerance: of the error of a state within an interval, over one more than the
-        largest size of that state. hessian: second derivatives of all searches but the first:
-        "exact" or "limited-memory".
+    Attributes:
+        tolerance: bound of the error of a state within an interval, relative to 1 plus the largest
+            absolute value of that state.
+        hessian: second derivatives of all searches but the first: "exact" or "limited-memory".
     """
 
     tolerance: float
@@ -49,10 +55,10 @@ class Refinement:
 
     @classmethod
     def parse(cls, given: float | str | Refinement) -> Refinement:
-        """Of a tolerance, or of words such as ``1e-3`` and ``1e-3:limited-memory``.
+        """Return the settings of a tolerance, or of a text such as ``1e-3`` or ``1e-3:limited-memory``.
 
         Raises:
-            SettingError: they say something else.
+            SettingError: the text is invalid.
         """
         if isinstance(given, Refinement):
             return given
@@ -73,7 +79,7 @@ class Refinement:
 
 
 class Round(NamedTuple):
-    """The search on one mesh."""
+    """Search on one mesh."""
 
     intervals: int
     error: float  # the largest of an interval
@@ -92,21 +98,22 @@ def solve_with_refinement(
     refinement: Refinement,
     tell: Callable[[Progress], None] | None = None,
 ) -> tuple[Program, SolverResult, list[Round]]:
-    """Solve on finer and finer meshes, each from the solution before, until no interval's error is above the tolerance.
+    """Solve on finer and finer meshes, each from the solution before, until all errors are below the tolerance.
 
-    A mesh that cannot be solved ends it, and so do too many intervals or meshes.
+    It stops early if a mesh has no solution, or after `MAX_ROUNDS` meshes or `MAX_INTERVALS`
+    intervals.
 
     Args:
-        program: of the first mesh.
-        guess: to start from.
-        refinement: how far.
-        tell: is told of each iteration.
+        program: nonlinear program on the first mesh.
+        guess: initial variables.
+        refinement: settings.
+        tell: function that is called with the progress after each iteration.
 
     Returns:
-        The program of the last mesh, its solution, and what was done.
+        Program on the last mesh, its solution, and the searches on all meshes.
 
     Raises:
-        UnsupportedError: rates are variables, of which no error is known; or a setting is not done.
+        UnsupportedError: the problem has variables or settings for which no error is estimated.
     """
     check_refinable(program.problem)
     found = search(program, guess, tell)
@@ -128,10 +135,10 @@ def solve_with_refinement(
 
 
 def check_refinable(problem: Problem) -> None:
-    """Refuse what has no error here.
+    """Check that errors can be estimated for a problem.
 
     Raises:
-        UnsupportedError: there is such a thing.
+        UnsupportedError: tendons or dynamics are implicit, or states are projected.
     """
     if problem.dynamics.tendons.names:
         raise problem.unsupported_error(
@@ -147,7 +154,7 @@ def check_refinable(problem: Problem) -> None:
 
 
 def estimate_errors(program: Program, w: Array) -> Array:
-    """Of each interval (m,) the largest error of a state over one more than the largest size of that state."""
+    """Estimate the error of each interval (m,): that of the worst state, relative to 1 plus its largest absolute value."""
     grid, layout = program.problem.grid, program.layout
     polynomial = _SolutionPolynomials(program, w)
     count = len(layout.names["states"])
@@ -166,7 +173,15 @@ def estimate_errors(program: Program, w: Array) -> Array:
 
 
 def split_intervals(grid: Grid, error: Array, tolerance: float) -> Array:
-    """The mesh in which intervals of too large errors are so many equal ones as the order of the scheme asks for."""
+    """Return the mesh in which intervals with a large error are split into equal parts.
+
+    The error falls with the order of the scheme, from which the number of parts follows.
+
+    Args:
+        grid: grid of the mesh.
+        error: error of each interval (m,).
+        tolerance: bound of the error.
+    """
     order = 1 + int(grid.scheme.rates.any(axis=0).sum())
     parts = np.ones(len(error), dtype=int)
     large = error > tolerance
@@ -176,7 +191,13 @@ def split_intervals(grid: Grid, error: Array, tolerance: float) -> Array:
 
 
 def interpolate_solution(program: Program, w: Array, finer: Program) -> Array:
-    """What was found, on another mesh, by the polynomials of its intervals."""
+    """Return the variables of a solution on another mesh, by the polynomials of its intervals.
+
+    Args:
+        program: program of the solution.
+        w: variables of the solution.
+        finer: program on the other mesh.
+    """
     grid, layout = program.problem.grid, finer.layout
     starts = np.concatenate([[0.0], np.cumsum(grid.lengths)[:-1]])
     places = finer.problem.grid.fractions
@@ -194,7 +215,7 @@ def interpolate_solution(program: Program, w: Array, finer: Program) -> Array:
 
 
 def _rebuild_program(problem: Problem, mesh: Array, hessian: str) -> Program:
-    """The program of the same problem on another mesh."""
+    """Return the program of the same problem on another mesh."""
     other = copy(problem)
     other.grid = Grid.from_mesh(problem.grid.scheme, mesh)
     other.solver = problem.solver.copy_deep()
@@ -203,11 +224,11 @@ def _rebuild_program(problem: Problem, mesh: Array, hessian: str) -> Program:
 
 
 class _SolutionPolynomials:
-    """What a solution is between its points: states the integral of the polynomial through the rates at these.
+    """Polynomials of a solution between its points; states are integrals of the polynomials through their rates.
 
     Attributes:
-        nodes: of the scheme's points, from 0 to 1, those whose rates count (j,).
-        rates: there, times the duration of the motion (intervals, j, states).
+        nodes: positions of those points of the scheme whose rates count (j,), from 0 to 1.
+        rates: rates at the nodes times the duration of the motion (intervals, j, states).
     """
 
     def __init__(self, program: Program, w: Array) -> None:
@@ -227,7 +248,12 @@ class _SolutionPolynomials:
         }
 
     def evaluate(self, places: Array, intervals: Any) -> dict[str, Array]:
-        """By kind the variables (n, of that kind) at places (n,), from 0 to 1, of intervals (n,)."""
+        """Return the variables (n, names) by kind.
+
+        Args:
+            places: positions within the intervals (n,), from 0 to 1.
+            intervals: indices of the intervals (n,).
+        """
         result = {}
         for kind, values in self._values.items():
             own = values[intervals]
@@ -245,14 +271,14 @@ class _SolutionPolynomials:
 
 
 def _evaluate_basis(nodes: Array, places: Array) -> Array:
-    """Lagrange's polynomials of the nodes (j,) at places (n,): (n, j)."""
+    """Return the values (n, j) of the Lagrange polynomials of nodes (j,) at positions (n,)."""
     return np.polynomial.polynomial.polyvander(places, len(nodes) - 1) @ _compute_coefficients(
         nodes
     )
 
 
 def _integrate_basis(nodes: Array, places: Array) -> Array:
-    """Their integrals from 0 to each place."""
+    """Return the integrals (n, j) of the Lagrange polynomials of nodes (j,) from 0 to positions (n,)."""
     powers = np.polynomial.polynomial.polyvander(places, len(nodes))[:, 1:] / np.arange(
         1, len(nodes) + 1
     )
@@ -260,5 +286,6 @@ def _integrate_basis(nodes: Array, places: Array) -> Array:
 
 
 def _compute_coefficients(nodes: Array) -> Array:
+    """Return the coefficients of the Lagrange polynomials of nodes (j,), one column each."""
     result: Any = np.linalg.inv(np.vander(nodes, increasing=True))
     return result

@@ -1,0 +1,204 @@
+"""CasADi functions of the points of a grid: values, Jacobians and Hessians."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from osimlite.derivatives.symbols import casadi
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.optimal.bounds import read_range
+
+if TYPE_CHECKING:
+    from osimlite.optimal.program import Program
+
+SX: Any = casadi.SX
+"""Type of CasADi's symbolic scalar expressions."""
+
+
+class BufferedFunction:
+    """CasADi function on NumPy arrays, called through buffers: its own call spends more time on conversions.
+
+    Args:
+        function: CasADi function of dense matrices.
+    """
+
+    def __init__(self, function: Any) -> None:
+        self._buffer, self._run = function.buffer()
+        self._inputs = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
+        self._results = [np.zeros(function.size_out(k)[::-1]) for k in range(function.n_out())]
+        for k, array in enumerate(self._inputs):
+            self._buffer.set_arg(k, array.data)
+        for k, array in enumerate(self._results):
+            if array.size:
+                self._buffer.set_res(k, array.reshape(-1).data)
+
+    def __call__(self, *given: Array) -> list[Array]:
+        """Return the results; the rows of arguments and results are the columns of CasADi's matrices."""
+        for own, array in zip(self._inputs, given, strict=True):
+            own[:] = array.reshape(-1)
+        self._run()
+        return [array.copy() for array in self._results]
+
+
+def cache_last(law: Callable[[Array], Any]) -> Callable[[Array], Any]:
+    """Return a function that caches its result for the last array it was called with."""
+    kept: Any = None
+
+    def result(x: Array) -> Any:
+        nonlocal kept
+        if kept is None or not np.array_equal(kept[0], x):
+            kept = x.copy(), law(x)
+        return kept[1]
+
+    return result
+
+
+class PointFormula:
+    """F and its derivatives at points with the same variables, independent of the mesh.
+
+    Accelerations are not eliminated in the formulas: they are symbols that linear equations with a
+    symmetric matrix determine (`Point.linear_systems`), which is factorized once for values, first
+    and second derivatives.
+    """
+
+    def __init__(self, program: Program, number: int, size: int) -> None:
+        problem, layout = program.problem, program.layout
+        is_mesh = bool(problem.grid.is_mesh[number])
+        self.projected = (
+            len(layout.names["projections"]) if layout.has_kind("projections", number) else 0
+        )
+        s, z = SX.sym("s", layout.shared), SX.sym("z", size)
+        fraction, known = SX.sym("fraction"), SX.sym("known", program.known_size)
+        point = program.point(s, z, fraction, known, number)
+        duration = s[1] - s[0]
+        names, residuals = problem.dynamics.compute_residuals(point)
+        rows, labels, limits = [residuals], [*names], [(0.0, 0.0)] * len(names)
+        if is_mesh or problem.solver.enforce_path_constraint_mesh_interior_points:
+            for own in problem.path_rows:
+                rows.append(own.formula(point))
+                labels += own.labels
+                limits += own.limits
+        names, errors = problem.dynamics.compute_constraint_errors(point, is_mesh)
+        rows.append(errors)
+        labels += names
+        limits += [read_range(problem.phase.kinematic_constraint_bounds) or (0.0, 0.0)] * len(names)
+        rates = [problem.dynamics.correct_rates(point)]
+        if self.projected:
+            rates.append(point.before_projection.rates[: self.projected])
+            names, errors = problem.dynamics.compute_projection_errors(point)
+            rows.append(errors)
+            labels += names
+            limits += [(0.0, 0.0)] * len(names)
+        integrands = [
+            terms.integrand(point) if terms.is_sum else duration * terms.integrand(point)
+            for _, terms in program.integrals
+        ]
+        column = casadi.vertcat(duration * casadi.vertcat(*rates), *rows, *integrands)
+        # Eliminate common subexpressions before differentiating: afterwards it takes ten times as
+        # long and finds fewer.
+        implicit, equations = (
+            casadi.vertcat(SX(0, 1), *(pair[k] for pair in point.linear_systems)) for k in range(2)
+        )
+        self.labels, self.limits, self.rows = labels, limits, column.numel()
+        parts = casadi.cse(casadi.densify(casadi.vertcat(column, equations)))
+        self._inputs, self._variables, self._implicit = (
+            [s, z, fraction, known],
+            casadi.vertcat(s, z),
+            implicit,
+        )
+        self._column, self._equations = parts[: self.rows], parts[self.rows :]
+        slopes, width = (
+            casadi.jacobian(parts, casadi.vertcat(self._variables, implicit)),
+            self._variables.numel(),
+        )
+        jacobian, self._slope_by_implicit = slopes[: self.rows, :width], slopes[: self.rows, width:]
+        self._implicit_value, self._implicit_slope = SX(0, 1), SX(0, width)
+        if implicit.numel():
+            # The solution of the equations is not differentiated: its derivatives follow from the
+            # implicit function theorem, with the factors of the same symmetric matrix.
+            self._factors = casadi.ldl(slopes[self.rows :, width:])
+            self._implicit_value = casadi.ldl_solve(
+                -casadi.substitute(self._equations, implicit, 0), *self._factors
+            )
+            self._implicit_slope = -casadi.sparsify(
+                casadi.ldl_solve(slopes[self.rows :, :width], *self._factors)
+            )
+            jacobian += self._slope_by_implicit @ self._implicit_slope
+        self.jacobian_entries = [*map(np.array, jacobian.sparsity().get_triplet())]
+        self.value = self._make_function("F", self._inputs, self._column)
+        self.slope = self._make_function("J", self._inputs, casadi.vertcat(*jacobian.nonzeros()))
+
+    def _make_function(self, name: str, given: list[Any], column: Any) -> Any:
+        """Return a CasADi function in whose formula the solutions replace the symbols of the linear equations."""
+        return casadi.Function(
+            name, given, [casadi.substitute(column, self._implicit, self._implicit_value)]
+        )
+
+    @cached_property
+    def curvature(self) -> tuple[Any, list[Any]]:
+        """CasADi function of the upper triangle of the second derivatives, with its rows and columns.
+
+        It is only made when it is used, as it takes longest.
+        """
+        multipliers, adjoints = (
+            SX.sym("multipliers", self.rows),
+            SX.sym("adjoints", self._implicit.numel()),
+        )
+        combined = casadi.dot(multipliers, self._column) + casadi.dot(adjoints, self._equations)
+        hessian = casadi.hessian(combined, casadi.vertcat(self._variables, self._implicit))[0]
+        if self._implicit.numel():
+            # With these multipliers of the equations (adjoint variables) the first derivative of the
+            # sum by their solution vanishes, so that its second derivatives do not enter.
+            found = casadi.ldl_solve(-self._slope_by_implicit.T @ multipliers, *self._factors)
+            along = casadi.vertcat(SX.eye(self._variables.numel()), self._implicit_slope)
+            hessian = casadi.substitute(along.T @ hessian @ along, adjoints, found)
+        hessian = casadi.triu(hessian)
+        function = self._make_function(
+            "H", [*self._inputs, multipliers], casadi.vertcat(*hessian.nonzeros())
+        )
+        return function, [*map(np.array, hessian.sparsity().get_triplet())]
+
+
+class PointGroup:
+    """F and its derivatives at all points of a grid that have the same variables.
+
+    Attributes:
+        numbers: indices of the points.
+        columns: indices of the variables of each point.
+    """
+
+    def __init__(self, program: Program, numbers: list[int]) -> None:
+        problem, layout = program.problem, program.layout
+        self.numbers = np.array(numbers, dtype=int)
+        self.columns = np.array([layout.point_indices[number] for number in numbers])
+        key = bool(problem.grid.is_mesh[numbers[0]]), layout.has_kind("projections", numbers[0])
+        if key not in problem.formulas:
+            problem.formulas[key] = PointFormula(program, numbers[0], self.columns.shape[1])
+        self.formula = formula = problem.formulas[key]
+        self.projected = formula.projected
+        self.labels, self.limits, self.rows = formula.labels, formula.limits, formula.rows
+        self.jacobian_rows, self.jacobian_columns = formula.jacobian_entries
+        self.value, self.slope = (
+            BufferedFunction(each.map(len(numbers))) for each in (formula.value, formula.slope)
+        )
+
+    def evaluate(self, program: Program, w: Array, fractions: Array, z: Array) -> Array:
+        """Compute F (n, rows) at other fractions of time (n,).
+
+        Args:
+            program: nonlinear program of the group.
+            w: variables, of which times and parameters count.
+            fractions: fractions of the motion (n,), from 0 to 1.
+            z: variables of the points (n, ...).
+        """
+        given = program._arguments_at(w, fractions, z)
+        return BufferedFunction(self.formula.value.map(len(fractions)))(*given)[0]
+
+    def make_hessian(self) -> None:
+        """Make the function of the second derivatives, which a quasi-Newton search never needs."""
+        function, (self.hessian_rows, self.hessian_columns) = self.formula.curvature
+        self.curvature = BufferedFunction(function.map(len(self.numbers)))
