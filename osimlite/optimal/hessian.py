@@ -27,7 +27,7 @@ class Hessian:
         if pattern[direct:, direct:].any():
             raise program.problem.unsupported_error(
                 program.problem.solver,
-                "a goal is not linear in its integral; take optim_hessian_approximation limited-memory",
+                "a goal is not linear in its integral; set optim_hessian_approximation to limited-memory",
             )
         inner, outer = np.nonzero(np.triu(pattern[:direct, :direct]))
         inner, outer = np.sort([program.end_columns[inner], program.end_columns[outer]], axis=0)

@@ -96,7 +96,7 @@ def build_inverse_problem(
                 near = did_you_mean(label, known)
                 raise asked.invalid_error(
                     tool,
-                    f"'{label}' is no state{near}; set kinematics_allow_extra_columns to leave it out",
+                    f"'{label}' is not a state{near}; set kinematics_allow_extra_columns to ignore it",
                 )
     return problem
 
@@ -171,7 +171,7 @@ def _read_kinematics(
     own = [name for name in names if name in table.columns]
     if not own:
         raise asked.invalid_error(
-            tool, "its kinematics have no column such as " + (names[0] if names else "a coordinate")
+            tool, "kinematics has no column such as " + (names[0] if names else "a coordinate")
         )
     check_columns(table, own)
     values = np.tile([info.default_value for info in infos], (len(table.times), 1))

@@ -234,8 +234,12 @@ def _describe_invalid_number(program: Program, guess: Array) -> str:
     costs, rows = program.compute_values(guess)
     bad = [program.labels[row] for row in np.flatnonzero(~np.isfinite(rows))[:1]]
     bad += [name for name, cost in zip(program.costs, costs, strict=True) if not np.isfinite(cost)]
-    what = f"'{bad[0]}' is no number at the guess" if bad else "something is no number on the way"
-    return f"{what}; give a guess_file from which the model can move, or closer bounds"
+    what = (
+        f"'{bad[0]}' is not a number at the guess"
+        if bad
+        else "a value is not a number during the search"
+    )
+    return f"{what}; provide a feasible guess_file, or tighten the bounds"
 
 
 class _ArrayCallback(casadi.Callback):  # type: ignore[misc]

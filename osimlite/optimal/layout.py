@@ -101,9 +101,7 @@ class Layout:
         self.lower, self.upper = np.concatenate(lows), np.concatenate(highs)
         for place in np.flatnonzero(~(self.lower <= self.upper))[:1]:
             span = f"from {self.lower[place]:g} to {self.upper[place]:g}"
-            message = (
-                f"all bounds of '{self.describe_variable(place)}' together leave no value ({span})"
-            )
+            message = f"all bounds of '{self.describe_variable(place)}' exclude each other ({span})"
             raise problem.invalid_error(problem.phase, message)
 
     def has_kind(self, kind: str, point: int) -> bool:

@@ -73,7 +73,8 @@ def build_frame_distance_rows(
         far = pair.maximum_distance
         if not 0.0 <= near <= far:
             raise problem.invalid_error(
-                constraint, f"its distances rise from {near:g} to {far:g} m, which none can fulfil"
+                constraint,
+                f"minimum_distance {near:g} m and maximum_distance {far:g} m exclude each other",
             )
         pairs.append(ends)
         limits.append((near * near, far * far))
@@ -108,11 +109,11 @@ def build_bound_rows(
     functions = [(getattr(constraint, name), limits) for name, limits in ends]
     functions = [pair for pair in functions if pair[0] is not None]
     if not functions:
-        raise problem.invalid_error(constraint, "it has neither a lower_bound nor an upper_bound")
+        raise problem.invalid_error(constraint, "lower_bound or upper_bound is required")
     if constraint.equality_with_lower:
         if constraint.lower_bound is None or constraint.upper_bound is not None:
             raise problem.invalid_error(
-                constraint, "equality_with_lower needs a lower_bound and no upper_bound"
+                constraint, "equality_with_lower requires a lower_bound and no upper_bound"
             )
         functions = [(constraint.lower_bound, (0.0, 0.0))]
     series = [

@@ -243,7 +243,7 @@ def make_projection(
     if part.projection == "none":
         return lambda vector: vector
     if part.projection_vector is None or not any(part.projection_vector):
-        raise problem.invalid_error(part, "a projection needs a projection_vector")
+        raise problem.invalid_error(part, "projection requires a nonzero projection_vector")
     direction = casadi.DM(np.array(part.projection_vector) / np.linalg.norm(part.projection_vector))
 
     def project(vector: Formula) -> Formula:

@@ -133,7 +133,7 @@ class PrescribedMotion:
             UnsupportedError: always.
         """
         raise UnsupportedError(
-            "goals of poses, outputs or markers are not computed where the motion is given"
+            "goals on poses, outputs or markers are not supported with a prescribed motion"
         )
 
     frames = outputs
@@ -214,7 +214,7 @@ class PrescribedDynamics(Dynamics):
         self.is_implicit, self._first_rate = False, 0
         if any(low != high for low, high in problem.times):
             raise problem.unsupported_error(
-                problem.phase, "where the motion is given, initial and final time must be fixed"
+                problem.phase, "initial and final time must be fixed with a prescribed motion"
             )
         given: PrescribedMotion = self.functions
         start, end = problem.times[0][0], problem.times[1][0]

@@ -111,7 +111,7 @@ class Problem(StudyContext):
         # that are moved.
         self.formulas: dict[tuple[bool, bool], Any] = {}
         if not isinstance(study.solver, MocoCasADiSolver):
-            raise self.unsupported_error(study.solver, "of solvers only MocoCasADiSolver is known")
+            raise self.unsupported_error(study.solver, "only MocoCasADiSolver is supported")
         self.solver: MocoCasADiSolver = study.solver
         self.model = self._process_model()
         motion = motion or self._remove_motion()
@@ -128,7 +128,7 @@ class Problem(StudyContext):
             [path for own in paths.values() for path in own], motion
         )
         if not self.functions.states:
-            raise self.invalid_error(self.phase, "its model has no states: nothing moves in it")
+            raise self.invalid_error(self.phase, "the model has no states")
         self.parameters: dict[str, Range] = {
             parameter.name: read_range(parameter.moco_bounds) or FREE
             for parameter in self.phase.parameters
@@ -148,7 +148,7 @@ class Problem(StudyContext):
         )
         if self.times[1][1] <= self.times[0][0]:
             ends = self.times[1][1], self.times[0][0]
-            message = "the phase ends at {:g} s at the latest, and begins at {:g} s at the earliest".format(
+            message = "the latest final time, {:g} s, is not after the earliest initial time, {:g} s".format(
                 *ends
             )
             raise self.invalid_error(self.phase.time_final_bounds, message)
@@ -215,7 +215,7 @@ class Problem(StudyContext):
             DocumentError: the parameter names no component.
         """
         if not parameter.component_paths:
-            raise self.invalid_error(parameter, "it names no component")
+            raise self.invalid_error(parameter, "component_paths is required")
         element = parameter.property_element
         behind = "" if element is None else f"/{element}"
         return [
@@ -228,7 +228,7 @@ class Problem(StudyContext):
         """Return the model after its processor."""
         processor = self.phase.model
         if not processor.filepath.strip() and processor.model is None:
-            raise self.invalid_error(processor, "it has no model and names none")
+            raise self.invalid_error(processor, "a model or a filepath is required")
         return processed(processor, self.folder)
 
     def _remove_motion(self) -> Motion | None:
@@ -263,7 +263,8 @@ class Problem(StudyContext):
             return functions
         if parameters:
             raise self.unsupported_error(
-                self.phase, f"parameters ({parameters[0]}) where the motion is given"
+                self.phase,
+                f"parameters ({parameters[0]}) are not supported with a prescribed motion",
             )
         return PrescribedMotion(self.model, motion, self.folder)
 
@@ -273,22 +274,21 @@ class Problem(StudyContext):
             if isinstance(part, Coordinate) and part.locked:
                 raise self.invalid_error(
                     self.phase,
-                    f"{part.path} is locked, which Moco refuses; take a WeldJoint instead",
+                    f"{part.path} is locked, which Moco rejects; use a WeldJoint instead",
                 )
             if isinstance(part, Controller) and part.enabled:
-                message = (
-                    f"the model's {type(part).tag} '{part.path}' would set controls; leave it out"
-                )
+                message = f"the model's {type(part).tag} '{part.path}' sets controls, which is not supported; remove it"
                 raise self.unsupported_error(self.phase, message)
             if type(part).tag in JOINTS_WITHOUT_RATES:
-                message = f"{type(part).tag} '{part.path}' has speeds that are no rates, which Moco refuses, too"
-                raise self.invalid_error(self.phase, f"{message}; take a CustomJoint")
+                message = f"{type(part).tag} '{part.path}' has speeds other than the rates of its coordinates, which Moco rejects"
+                raise self.invalid_error(self.phase, f"{message}; use a CustomJoint")
 
     def _check_settings(self) -> None:
         """Check the settings of the solver."""
         if self.solver.optim_solver != "ipopt":
             raise self.unsupported_error(
-                self.solver, f"of optimizers only ipopt is known, not {self.solver.optim_solver}"
+                self.solver,
+                f"optim_solver '{self.solver.optim_solver}' is not supported; use ipopt",
             )
 
     def _make_solver_costs(self) -> Iterator[tuple[MocoGoal, GoalTerms]]:
@@ -299,7 +299,7 @@ class Problem(StudyContext):
         )
         if solver.minimize_lagrange_multipliers and not self.constraint_names:
             raise self.invalid_error(
-                solver, "minimize_lagrange_multipliers needs constraints, and the model has none"
+                solver, "minimize_lagrange_multipliers requires a model with constraints"
             )
         for name, wanted, weight, part, bounds in (
             (
@@ -358,7 +358,7 @@ class Problem(StudyContext):
             for info in infos:
                 self.check_name(info, info.name, known, what)
         for info in (*self.phase.input_control_infos, *self.phase.input_control_infos_pattern):
-            raise self.unsupported_error(info, "inputs of controllers are not solved here")
+            raise self.unsupported_error(info, "input controls are not supported")
 
     def _name_constraints(self) -> list[str]:
         """Return the names of the equations of the model's constraints, as OpenSim numbers them."""
@@ -380,18 +380,18 @@ class Problem(StudyContext):
         if solver.kinematic_constraint_method == "Bordalba2023":
             if not solver.enforce_constraint_derivatives:
                 raise self.invalid_error(
-                    solver, "Bordalba2023 needs enforce_constraint_derivatives, as in Moco"
+                    solver, "Bordalba2023 requires enforce_constraint_derivatives, as in Moco"
                 )
         elif (
             solver.transcription_scheme != "hermite-simpson"
             and solver.enforce_constraint_derivatives
         ):
-            message = "constraints of the model with Posa2016 need transcription_scheme hermite-simpson, as in Moco"
+            message = "enforce_constraint_derivatives with Posa2016 requires transcription_scheme hermite-simpson, as in Moco"
             raise self.invalid_error(solver, message)
         if self.functions.constraints.size1_out(0) != count:
             raise self.unsupported_error(
                 self.phase,
-                "the model has constraints that bind speeds alone, which is not solved here",
+                "constraints on speeds alone are not supported",
             )
 
     def _make_mesh(self) -> Array:
@@ -400,20 +400,20 @@ class Problem(StudyContext):
         intervals = len(solver.mesh) or solver.num_mesh_intervals
         most = min(MAX_MESH_INTERVALS, MAX_MESH_VALUES // max(1, len(self.functions.states)))
         if intervals > most:
-            message = f"the mesh has {intervals} intervals; at most {most} are solved of this model"
+            message = f"the mesh has {intervals} intervals; the maximum for this model is {most}"
             raise self.invalid_error(solver, message)
         if not solver.mesh:
             return np.linspace(0.0, 1.0, solver.num_mesh_intervals + 1)
         mesh = np.array(solver.mesh)
         if mesh[0] != 0.0 or mesh[-1] != 1.0 or np.any(np.diff(mesh) <= 0.0):
-            raise self.invalid_error(solver, "the mesh has to rise from 0 to 1")
+            raise self.invalid_error(solver, "mesh must increase from 0 to 1")
         return mesh
 
     def _build_terms(self, goal: MocoGoal) -> GoalTerms:
         """Build the terms of a goal, and check its mode and its scale factors."""
         build = GOAL_BUILDERS.get(type(goal))
         if build is None:
-            raise self.unsupported_error(goal, "goals of this class are not solved here yet")
+            raise self.unsupported_error(goal, "this class of goals is not supported yet")
         self._factors = {self._scaled[factor.name]: factor.name for factor in goal.scale_factors}
         first = len(self.time_functions)
         terms = build(goal, self)
@@ -421,12 +421,12 @@ class Problem(StudyContext):
         for factor in goal.scale_factors:
             if [*self.parameters].index(factor.name) not in used:
                 raise self.invalid_error(
-                    factor, f"the goal follows no column '{self._scaled[factor.name]}'"
+                    factor, f"the goal tracks no column '{self._scaled[factor.name]}'"
                 )
         self._factors = {}
         if goal.mode is not None and goal.mode not in terms.modes:
             raise self.invalid_error(
-                goal, f"it cannot be of mode '{goal.mode}', as in Moco; it is a {terms.modes[0]}"
+                goal, f"mode '{goal.mode}' is not possible, as in Moco; use {terms.modes[0]}"
             )
         return terms
 
@@ -435,7 +435,7 @@ class Problem(StudyContext):
         build = PATH_CONSTRAINT_BUILDERS.get(type(constraint))
         if build is None:
             raise self.unsupported_error(
-                constraint, "path constraints of this class are not solved here yet"
+                constraint, "this class of path constraints is not supported yet"
             )
         return build(constraint, self)
 
@@ -444,14 +444,12 @@ class Problem(StudyContext):
         for factor in [factor for goal in self.phase.goals for factor in goal.scale_factors]:
             if factor.name not in self._scaled:
                 # OpenSim's method that adds it is told so, and its files are not.
-                message = (
-                    "no file says which column it is for, and OpenSim applies none that it reads"
-                )
+                message = "a file cannot say which column it scales, and OpenSim ignores scale factors in files"
                 raise self.unsupported_error(
-                    factor, f"{message}; osimlite.moco is told by `scaled`"
+                    factor, f"{message}; in Python, pass `scaled` to osimlite.moco.solve"
                 )
             if factor.name in self.parameters:
-                raise self.invalid_error(factor, "there is another parameter of its name")
+                raise self.invalid_error(factor, "another parameter has this name")
             self.parameters[factor.name] = read_range(factor) or FREE
 
     @property

@@ -135,9 +135,7 @@ class Program:
             bounds = [read_range(each) or (0.0, 0.0) for each in goal.moco_constraint_info.bounds]
             count = rows[-1].numel()
             if bounds and len(bounds) != count:
-                raise problem.invalid_error(
-                    goal, f"it has {count} values and bounds for {len(bounds)}"
-                )
+                raise problem.invalid_error(goal, f"it has {count} values and {len(bounds)} bounds")
             limits += bounds or [(0.0, 0.0)] * count
             self.end_labels += [
                 goal.name if count == 1 else f"{goal.name} {k}" for k in range(count)

@@ -67,13 +67,13 @@ class Refinement:
             result = cls(float(text), hessian or "exact")
         except ValueError:
             raise SettingError(
-                f"a mesh is refined to a tolerance such as 1e-3, not '{text}'"
+                f"the tolerance of mesh refinement must be a number such as 1e-3, not '{text}'"
             ) from None
         if not 0.0 < result.tolerance < inf:
-            raise SettingError(f"a mesh is refined to a tolerance above 0, not {text}")
+            raise SettingError(f"the tolerance of mesh refinement must be positive, not {text}")
         if result.hessian not in HESSIAN_METHODS:
             raise SettingError(
-                f"meshes are not refined with '{hessian}'{or_known(hessian, HESSIAN_METHODS)}"
+                f"mesh refinement has no second derivatives '{hessian}'{or_known(hessian, HESSIAN_METHODS)}"
             )
         return result
 
@@ -142,14 +142,15 @@ def check_refinable(problem: Problem) -> None:
     """
     if problem.dynamics.tendons.names:
         raise problem.unsupported_error(
-            problem.solver, "meshes are not refined where tendons are implicit; take explicit ones"
+            problem.solver,
+            "mesh refinement does not support implicit tendons; set tendon_compliance_dynamics_mode to explicit",
         )
     if problem.uses_projection:
-        message = "meshes are refined with kinematic_constraint_method Posa2016 only, which leaves no steps in states"
+        message = "mesh refinement requires kinematic_constraint_method Posa2016, as projections make states jump"
         raise problem.unsupported_error(problem.solver, message)
     if problem.dynamics.is_implicit:
         raise problem.unsupported_error(
-            problem.solver, "meshes are refined with multibody_dynamics_mode explicit only"
+            problem.solver, "mesh refinement requires multibody_dynamics_mode explicit"
         )
 
 

@@ -68,13 +68,9 @@ def check_by_simulation(problem: Problem, trajectory: MocoTrajectory) -> Simulat
             cannot be simulated.
     """
     if isinstance(problem.functions, PrescribedMotion):
-        raise OsimliteError("the motion was given")
+        raise OsimliteError("the motion is prescribed")
     if trajectory.times[0] != 0.0 or trajectory.parameters:
-        what = (
-            "has parameters of its own"
-            if trajectory.parameters
-            else f"begins at {trajectory.times[0]:g} s"
-        )
+        what = "has parameters" if trajectory.parameters else f"begins at {trajectory.times[0]:g} s"
         raise OsimliteError(f"the motion {what}")
     end = float(trajectory.times[-1])
     start = {name: float(trajectory.columns[name][0]) for name in trajectory.names["states"]}

@@ -112,7 +112,7 @@ class StudyContext:
                 near = (
                     did_you_mean(part.class_name, MODULES) if part.class_name not in MODULES else ""
                 )
-                raise self.invalid_error(part, f"no object of this class has its place here{near}")
+                raise self.invalid_error(part, f"objects of this class are not allowed here{near}")
             for spec in value_specs(type(part)):
                 value = getattr(part, spec.name)
                 for word in value if isinstance(value, tuple) else (value,):
@@ -125,14 +125,14 @@ class StudyContext:
                     and len(value)
                     and (value[0] == math.inf or value[-1] == -math.inf)
                 ):
-                    raise self.invalid_error(part, f"{spec.name} leave no finite value")
+                    raise self.invalid_error(part, f"{spec.name} contain no finite value")
                 if (
                     spec.name in ("bounds", "initial_bounds", "final_bounds")
                     and len(value) == 2
                     and value[0] > value[1]
                 ):
                     raise self.invalid_error(
-                        part, f"{spec.name} from {value[0]:g} to {value[1]:g} leave no value"
+                        part, f"{spec.name} are reversed: from {value[0]:g} to {value[1]:g}"
                     )
 
     def compile_pattern(self, part: Object, text: str) -> Callable[[str], Any]:
@@ -149,7 +149,7 @@ class StudyContext:
                 part, f"the pattern '{text}' is not supported: {error}"
             ) from None
         except PatternError as error:
-            raise self.invalid_error(part, f"'{text}' is no pattern: {error}") from None
+            raise self.invalid_error(part, f"'{text}' is not a valid pattern: {error}") from None
 
 
 def _describe_invalid_value(spec: FieldSpec, word: Any) -> str:
@@ -158,11 +158,11 @@ def _describe_invalid_value(spec: FieldSpec, word: Any) -> str:
     if not isinstance(kind, Value) or word is None:
         return ""
     if kind.choices and word not in kind.choices:
-        return f"; it can be {listed(map(repr, kind.choices))}{did_you_mean(str(word), map(str, kind.choices))}"
+        return f"; expected {listed(map(repr, kind.choices))}{did_you_mean(str(word), map(str, kind.choices))}"
     if isinstance(word, float) and word != word:
-        return ", which is no number"
+        return ", which is not a number"
     if kind.domain and kind.scalar in ("double", "int") and not domain_test(kind.domain)(word):
-        return f"; it has to be {kind.domain}"
+        return f"; expected {kind.domain}"
     return ""
 
 

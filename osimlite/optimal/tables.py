@@ -79,7 +79,7 @@ def process_table(
         OsimliteError: the file cannot be read.
     """
     if not processor.filepath.strip():
-        raise problem.invalid_error(part, "it names no table")
+        raise problem.invalid_error(part, "a filepath is required")
     table = read_table(problem.locate_file(processor.filepath))
     for operator in processor.operators:
         if isinstance(operator, TabOpLowPassFilter):
@@ -90,11 +90,11 @@ def process_table(
             )
         elif isinstance(operator, TabOpAppendCoupledCoordinateValues):
             if table.in_degrees:
-                message = "the table is in degrees, of which OpenSim takes functions as if they were radians"
+                message = "the table is in degrees, which OpenSim's functions of couplers take for radians; convert it to radians"
                 raise problem.unsupported_error(operator, message)
             table = _append_coupled_values(problem, operator, table, mechanism)
         else:
-            raise problem.unsupported_error(operator, "this operator on tables is not applied here")
+            raise problem.unsupported_error(operator, "this table operator is not supported")
     return replace(_convert_to_radians(table, mechanism), header={"inDegrees": "no"})
 
 
@@ -187,7 +187,7 @@ def fit_splines(problem: Problem, table: StoTable, columns: list[str]) -> list[T
     first, last = float(table.times[0]), float(table.times[-1])
     start, end = problem.times[0][1], problem.times[1][0]
     if start < first - TIME_TOLERANCE_S or end > last + TIME_TOLERANCE_S:
-        message = f"it has data from {first:g} s to {last:g} s, and the motion is at least from {start:g} s to {end:g} s"
+        message = f"the table covers {first:g} s to {last:g} s, but the motion lasts at least from {start:g} s to {end:g} s"
         raise DocumentError(message, file=table.file)
     curves = SplineCurves(
         table.times, np.column_stack([table.times, *(table[name] for name in columns)])[:, 1:]
@@ -211,13 +211,13 @@ def check_columns(table: StoTable, columns: Sequence[str]) -> None:
         DocumentError: a column is missing or has gaps, or the times are too few or do not rise.
     """
     if len(table.times) < MIN_SPLINE_TIMES:
-        message = f"it has {len(table.times)} times; splines of fifth degree take {MIN_SPLINE_TIMES} at least"
+        message = f"the table has {len(table.times)} times; splines of fifth degree need at least {MIN_SPLINE_TIMES}"
         raise DocumentError(message, file=table.file)
     if not (np.diff(table.times) > 0.0).all():
-        raise DocumentError("its times do not rise", file=table.file)
+        raise DocumentError("the times do not increase", file=table.file)
     for name in columns:
         if name not in table.columns:
-            raise DocumentError(f"there is no column '{name}'", file=table.file)
+            raise DocumentError(f"the table has no column '{name}'", file=table.file)
         if not np.isfinite(table[name]).all():
             raise DocumentError(f"column '{name}' has gaps; fill them", file=table.file)
 

@@ -59,7 +59,7 @@ def set_time_range(
     start = first if tool.initial_time is None else tool.initial_time
     end = last if tool.final_time is None else tool.final_time
     if not first <= start < end <= last:
-        message = f"from {start:g} s to {end:g} s there are no data; they are from {first:g} s to {last:g} s"
+        message = f"the tables cover {first:g} s to {last:g} s, not the motion from {start:g} s to {end:g} s"
         raise asked.invalid_error(tool, message)
     assert isinstance(study.solver, MocoCasADiSolver)
     # The quotient of a tiny interval is no integer any more, or infinite.
@@ -67,7 +67,7 @@ def set_time_range(
         not 0.0 < tool.mesh_interval < np.inf
         or (end - start) / MAX_MESH_INTERVALS > tool.mesh_interval
     ):
-        message = f"mesh_interval is {tool.mesh_interval:g} s; at most {MAX_MESH_INTERVALS} intervals are solved"
+        message = f"mesh_interval is {tool.mesh_interval:g} s; the maximum is {MAX_MESH_INTERVALS} intervals"
         raise asked.invalid_error(tool, message)
     study.solver.num_mesh_intervals = math.ceil((end - start) / tool.mesh_interval)
     if tool.clip_time_range:

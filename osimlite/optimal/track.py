@@ -87,9 +87,7 @@ def build_track_problem(
         )
         phase.goals.append(_make_marker_goal(tool))
     if not tables:
-        raise bare.invalid_error(
-            tool, "it has nothing to follow; give it a states_reference or a markers_reference"
-        )
+        raise bare.invalid_error(tool, "a states_reference or a markers_reference is required")
     if tool.minimize_control_effort:
         weights = [weight.copy_deep() for weight in tool.controls_weight_set.objects]
         phase.goals.append(
@@ -114,7 +112,7 @@ def build_track_problem(
         states = {name: table[name] for name in table.columns if name in problem.states}
         if guess is not None:
             raise bare.unsupported_error(
-                tool, "a guess_file and apply_tracked_states_to_guess together"
+                tool, "guess_file and apply_tracked_states_to_guess cannot be combined"
             )
         guess = MocoTrajectory(times, states, {"states": tuple(states)})
     return problem, guess

@@ -103,13 +103,13 @@ class MocoTrajectory:
         for name, word in said.items():
             if not word.isdecimal():
                 raise DocumentError(
-                    f"the header says {name}={word}, which is no count", file=str(path)
+                    f"the header says {name}={word}, which is not a count", file=str(path)
                 )
         counts = [*map(int, said.values())]
         if not any(counts):
             counts[0] = len(table.columns)
         if sum(counts) != len(table.columns):
-            message = f"the header counts {sum(counts)} columns besides the time, and there are {len(table.columns)}"
+            message = f"the header counts {sum(counts)} columns besides the time, but the file has {len(table.columns)}"
             raise DocumentError(message, file=str(path))
         names, first = dict[str, tuple[str, ...]](), 0
         for kind, count in zip(COLUMN_KINDS, counts, strict=True):

@@ -35,7 +35,7 @@ def said_of(study):
         assert error.file is not None, refusal
         assert "\n" not in refusal
         # What is wrong with the study is wrong somewhere in it.
-        if Path(error.file) == study and "is no number at the guess" not in refusal:
+        if Path(error.file) == study and "is not a number at the guess" not in refusal:
             assert error.line is not None, refusal
     else:
         try:

@@ -61,7 +61,7 @@ def test_ours_costs_no_more(tmp_path):
 
 def test_meshes_of_given_motions_are_refined(tmp_path):
     """With rigid tendons; where they are implicit it is refused."""
-    with pytest.raises(OsimliteError, match="not refined where tendons are implicit"):
+    with pytest.raises(OsimliteError, match="does not support implicit tendons"):
         solve_inverse(squat(tmp_path), folder=tmp_path, refine=1e-3)
     rigid = squat(tmp_path, mesh_interval=0.2)
     rigid.model.operators.append(osimlite.ModOpIgnoreTendonCompliance())
@@ -72,7 +72,7 @@ def test_meshes_of_given_motions_are_refined(tmp_path):
 
 
 def test_columns_that_are_no_states_must_be_allowed(tmp_path):
-    with pytest.raises(OsimliteError, match=r"is no state.*set kinematics_allow_extra_columns"):
+    with pytest.raises(OsimliteError, match=r"is not a state.*set kinematics_allow_extra_columns"):
         build_inverse_problem(
             squat(tmp_path, kinematics_allow_extra_columns=False), folder=tmp_path
         )
@@ -97,7 +97,7 @@ def test_setups_are_run_and_tell_the_motion_too(tmp_path):
     osimlite.write(squat(tmp_path, mesh_interval=0.2), tmp_path / "setup.xml")
     outcome = osimlite.run(tmp_path / "setup.xml", simulates=True)
     assert outcome.done
-    assert ("not simulated", "the motion was given") in outcome.told
+    assert ("not simulated", "the motion is prescribed") in outcome.told
     page = osimlite.report({tmp_path / "setup.xml": outcome}, tmp_path / "page.html").read_text(
         encoding="utf-8"
     )
@@ -138,7 +138,7 @@ def test_a_study_with_a_motion(tmp_path):
         ),
         (
             lambda phase: phase.goals.append(osimlite.MocoAverageSpeedGoal(name="speed")),
-            "where the motion is given",
+            "with a prescribed motion",
         ),
     ],
 )

@@ -109,8 +109,8 @@ def test_intervals_split_where_it_is_needed(hessian, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("fine", "a tolerance such as 1e-3, not 'fine'"),
-        ("0", "a tolerance above 0, not 0"),
+        ("fine", "a number such as 1e-3, not 'fine'"),
+        ("0", "must be positive, not 0"),
         ("1e-3:exakt", "'exakt'; did you mean 'exact'"),
     ],
 )
@@ -121,16 +121,14 @@ def test_words_that_are_no_refinement(words, said):
 
 def test_what_has_no_error_here_is_refused(tmp_path):
     given = study(tmp_path, "pendulum-50", multibody_dynamics_mode="implicit")
-    with pytest.raises(
-        osimlite.OsimliteError, match="refined with multibody_dynamics_mode explicit only"
-    ):
+    with pytest.raises(osimlite.OsimliteError, match="requires multibody_dynamics_mode explicit"):
         solve(given, refine=1e-3)
     hanging = study(tmp_path, "hanging-25")
     hanging.problem.phases.goals[1].enabled = False
-    with pytest.raises(osimlite.OsimliteError, match="not refined where tendons are implicit"):
+    with pytest.raises(osimlite.OsimliteError, match="does not support implicit tendons"):
         solve(hanging, refine=1e-3)
     moved = study(tmp_path, "squat-25", kinematic_constraint_method="Bordalba2023")
-    with pytest.raises(osimlite.OsimliteError, match="kinematic_constraint_method Posa2016 only"):
+    with pytest.raises(osimlite.OsimliteError, match="kinematic_constraint_method Posa2016"):
         solve(moved, refine=1e-3)
 
 

@@ -237,12 +237,16 @@ def test_frames_follow_their_own_motion(kind, tmp_path):
             {"frame_paths": ["/bodyset/b2"]},
             "no frame '/bodyset/b2'; did you mean '/bodyset/b",
         ),
-        (FOLLOWED[0], {"frame_paths": []}, "frame_paths names no frames"),
-        (FOLLOWED[1], {"states_reference": osimlite.TableProcessor()}, "names no file to follow"),
+        (FOLLOWED[0], {"frame_paths": []}, "frame_paths is empty"),
+        (
+            FOLLOWED[1],
+            {"states_reference": osimlite.TableProcessor()},
+            "a reference file is required",
+        ),
         (
             FOLLOWED[1],
             {"rotation_reference_file": "turns.sto"},
-            "names a file and a states_reference",
+            "a reference file and a states_reference",
         ),
         (FOLLOWED[2], {}, "no state '/tau0'"),
     ],
@@ -255,7 +259,7 @@ def test_frames_that_are_not_told(kind, given, said, tmp_path):
 @pytest.mark.parametrize(
     ("expression", "variables", "said"),
     [
-        ("", (), "it has no expression"),
+        ("", (), "expression is required"),
         ("2*m", (), "expression is '2\\*m': .*'m'"),
         ("1+", (), "expression is '1\\+'"),
         ("m", ("m",), "0 parameters and 1 variables"),
@@ -287,7 +291,7 @@ ONE = osimlite.MocoContactImpulseTrackingGoalGroup(external_force_name="foot")
             {"joint_path": "/jointset/j1", "expressed_in_frame_path": "/bodyset/b2"},
             "no frame '/bodyset/b2'",
         ),
-        (osimlite.MocoGeneralizedForceTrackingGoal, {}, "names no table"),
+        (osimlite.MocoGeneralizedForceTrackingGoal, {}, "a filepath is required"),
         (
             osimlite.MocoGeneralizedForceTrackingGoal,
             {"force_paths": ["/tau2"]},
@@ -296,19 +300,19 @@ ONE = osimlite.MocoContactImpulseTrackingGoalGroup(external_force_name="foot")
         (
             osimlite.MocoGeneralizedForceTrackingGoal,
             {"force_paths": ["/tau0", "/tau."]},
-            "match '/tau0' twice",
+            "force_paths matches '/tau0' twice",
         ),
         (
             osimlite.MocoGeneralizedForceTrackingGoal,
             {"force_paths": ["/tau("]},
-            "'/tau\\(' is no pattern",
+            "'/tau\\(' is not a valid pattern",
         ),
-        (osimlite.MocoContactImpulseTrackingGoal, {}, "its impulse_axis is -1"),
+        (osimlite.MocoContactImpulseTrackingGoal, {}, "impulse_axis is -1; expected 0, 1 or 2"),
         (osimlite.MocoContactImpulseTrackingGoal, {"impulse_axis": 1}, "it has 0 contact_groups"),
         (
             osimlite.MocoContactImpulseTrackingGoal,
             {"impulse_axis": 1, "contact_groups": [ONE]},
-            "names no external_loads",
+            "external_loads or external_loads_file is required",
         ),
     ],
 )
@@ -322,32 +326,32 @@ def test_loads_that_are_none(kind, given, said, tmp_path):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({}, "names no output_path"),
+        ({}, "output_path is required"),
         (
             {"output_path": "/bodyset/b2|position"},
             "no component '/bodyset/b2'; did you mean '/bodyset/b",
         ),
         (
             {"output_path": "/bodyset/b1|rotation"},
-            "the output 'rotation' of /bodyset/b1 has no formula",
+            "the output 'rotation' of /bodyset/b1 is not supported",
         ),
         (
             {"output_path": "/bodyset/b1|position", "output_index": 3},
-            "no component of output_index 3",
+            "no component output_index 3",
         ),
         (
             {"output_path": "/jointset/j0/q0|value", "output_index": 0},
-            "no component of output_index 0",
+            "no component output_index 0",
         ),
         ({"output_path": "/bodyset/b1|position", "exponent": 0}, "exponent is 0"),
-        ({"output_path": "/bodyset/b1|position", "operation": "addition"}, "need each other"),
+        ({"output_path": "/bodyset/b1|position", "operation": "addition"}, "require each other"),
         (
             {
                 "output_path": "/|com_position",
                 "second_output_path": "/tau0|actuation",
                 "operation": "addition",
             },
-            "outputs are of different types",
+            "have different types",
         ),
     ],
 )
@@ -367,13 +371,11 @@ def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
         k for k, words in enumerate(path.read_text().splitlines(), 1) if "<MocoScaleFactor" in words
     )
     with pytest.raises(
-        osimlite.OsimliteError, match="MocoScaleFactor 'factor': no file says which"
+        osimlite.OsimliteError, match="MocoScaleFactor 'factor': a file cannot say which column"
     ) as raised:
         solve(path)
     assert (raised.value.file, raised.value.line) == (str(path), line)
-    with pytest.raises(
-        osimlite.OsimliteError, match="'factor': the goal follows no column '/tau0'"
-    ):
+    with pytest.raises(osimlite.OsimliteError, match="'factor': the goal tracks no column '/tau0'"):
         solve(path, scaled={"factor": "/tau0"})
     path.write_text(text.replace('name="/tau0"', 'name="/tau2"'))
     with pytest.raises(osimlite.OsimliteError, match="no control '/tau2'; did you mean '/tau"):
@@ -381,9 +383,9 @@ def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
 
 
 def test_settings_without_effect_are_refused(tmp_path):
-    with pytest.raises(osimlite.OsimliteError, match="of optimizers only ipopt is known"):
+    with pytest.raises(osimlite.OsimliteError, match="'snopt' is not supported; use ipopt"):
         build_problem(study(tmp_path, "sliding-100", optim_solver="snopt"))
-    with pytest.raises(osimlite.OsimliteError, match="needs constraints, and the model has none"):
+    with pytest.raises(osimlite.OsimliteError, match="requires a model with constraints"):
         build_problem(study(tmp_path, "sliding-100", minimize_lagrange_multipliers=True))
 
 

@@ -67,7 +67,7 @@ def build_step_length_asymmetry_goal(
     for foot in feet:
         problem.check_name(goal, foot, problem.functions.mechanism.frames, "frame")
     if goal.stride_length <= 0.0:
-        raise problem.invalid_error(goal, "it needs a stride_length above zero, as in OpenSim")
+        raise problem.invalid_error(goal, "stride_length must be positive, as in OpenSim")
     sharpness = 100.0 * goal.asymmetry_smoothing
     half = 0.5 * goal.stride_length
     lengths = half * (1.0 + goal.target_asymmetry), half * (1.0 - goal.target_asymmetry)
@@ -117,7 +117,8 @@ def _find_foot(
     if selected not in names:
         near = did_you_mean(selected, names)
         raise problem.invalid_error(
-            goal, f"contact_force_paths of '{group.name}' have no foot_position '{selected}'{near}"
+            goal,
+            f"contact_force_paths of '{group.name}' do not contain foot_position_contact_force_path '{selected}'{near}",
         )
     contacts = dict(find_contact(goal, problem, name) for name in names)
     sphere = find_contact(goal, problem, selected)[1]

@@ -72,10 +72,10 @@ def build_contact_impulse_tracking_goal(
     """Return the squared error of the impulse, N s, along an axis of ground over the model's weight."""
     axis = goal.impulse_axis
     if axis not in range(3):
-        raise problem.invalid_error(goal, f"its impulse_axis is {axis}; it has to be 0, 1 or 2")
+        raise problem.invalid_error(goal, f"impulse_axis is {axis}; expected 0, 1 or 2")
     if len(goal.contact_groups) != 1:
         raise problem.invalid_error(
-            goal, f"it has {len(goal.contact_groups)} contact_groups; it takes one, as in OpenSim"
+            goal, f"it has {len(goal.contact_groups)} contact_groups; OpenSim accepts exactly one"
         )
     (group,) = read_contact_groups(goal, problem)
 
@@ -102,9 +102,7 @@ def read_contact_groups(goal: ContactGoal, problem: Problem) -> list[ContactGrou
     file = problem.file
     if loads is None:
         if not goal.external_loads_file.strip():
-            raise problem.invalid_error(
-                goal, "it has no external_loads and names no external_loads_file"
-            )
+            raise problem.invalid_error(goal, "external_loads or external_loads_file is required")
         file = problem.locate_file(goal.external_loads_file)
         folder = file.parent
         loads = read_anew(file, ExternalLoads)
@@ -121,11 +119,12 @@ def read_contact_groups(goal: ContactGoal, problem: Problem) -> list[ContactGrou
             )
         if force.force_expressed_in_body not in ("ground", "/ground"):
             raise problem.unsupported_error(
-                goal, f"the force '{force.name}' is along axes of {force.force_expressed_in_body}"
+                goal,
+                f"the force '{force.name}' is expressed in {force.force_expressed_in_body}; only ground is supported",
             )
         labels = [f"{force.force_identifier}{axis}" for axis in "xyz"]
         if not group.contact_force_paths:
-            raise problem.invalid_error(group, "it names no contact_force_paths")
+            raise problem.invalid_error(group, "contact_force_paths is required")
         paths = [
             _find_contact_path(goal, problem, str(path), force, group)
             for path in group.contact_force_paths
@@ -177,8 +176,8 @@ def _find_contact_path(
         *(str(frame).rpartition("/")[2] for frame in group.alternative_frame_paths),
     ]
     if not any(each.rpartition("/")[2] in frames for each in targets):
-        message = f"the sphere of '{path}' is on {'/'.join(frames)}, and '{force.name}' pushes {force.applied_to_body}"
+        message = f"the sphere of '{path}' is on {'/'.join(frames)}, and '{force.name}' acts on {force.applied_to_body}"
         raise problem.unsupported_error(
-            goal, f"{message}; contacts whose half space is pushed are not followed here"
+            goal, f"{message}; forces on the body of the half space are not supported"
         )
     return path

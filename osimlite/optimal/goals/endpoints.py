@@ -136,7 +136,7 @@ def build_expression_based_parameter_goal(
     A property that is no parameter of the study enters with the model's number.
     """
     if not goal.expression.strip():
-        raise problem.invalid_error(goal, "it has no expression")
+        raise problem.invalid_error(goal, "expression is required")
     if len(goal.variables) != len(goal.parameters):
         raise problem.invalid_error(
             goal, f"it has {len(goal.parameters)} parameters and {len(goal.variables)} variables"

@@ -186,9 +186,7 @@ class FrameReference:
         for path in paths:
             problem.check_name(goal, path, problem.functions.mechanism.frames, "frame")
         if not paths:
-            raise problem.invalid_error(
-                goal, "frame_paths names no frames, which OpenSim refuses, too"
-            )
+            raise problem.invalid_error(goal, "frame_paths is empty; OpenSim rejects this too")
         table = self._read_table(problem, paths)
         endings = suffixes(self.kind)
         size = len(endings)
@@ -214,7 +212,7 @@ class FrameReference:
         if self.file.strip():
             if self.states is not None and self.states.filepath.strip():
                 raise problem.invalid_error(
-                    goal, "it names a file and a states_reference; one is enough"
+                    goal, "it has a reference file and a states_reference; remove one"
                 )
             table = read_sto(problem.locate_file(self.file))
             if table.kind != self.kind:
@@ -224,13 +222,13 @@ class FrameReference:
             known = [column.removesuffix(endings[0]) for column in columns]
             if other := [path for path in known if path not in paths]:
                 # OpenSim 4.6 takes all columns of the file, whatever frame_paths says.
-                message = f"frame_paths leaves out '{other[0]}' of {self.file}, which OpenSim follows all the same"
+                message = f"frame_paths leaves out '{other[0]}' of {self.file}, which OpenSim tracks nevertheless"
                 raise problem.invalid_error(
-                    goal, f"{message}; name it, or take the column out of the file"
+                    goal, f"{message}; add it to frame_paths, or remove the column from the file"
                 )
             return table
         if self.states is None or not self.states.filepath.strip():
-            raise problem.invalid_error(goal, "it names no file to follow")
+            raise problem.invalid_error(goal, "a reference file is required")
         motion = read_reference(problem, goal, self.states)
         labels = tuple(f"{path}{end}" for path in paths for end in endings)
         values = self._compute_values(problem, motion, paths)
@@ -246,9 +244,7 @@ class FrameReference:
             problem.check_name(self.goal, column, functions.states, "state")
         needed = [f"{path}/value" for path in functions.coordinates]
         if missing := [name for name in needed if name not in motion.columns]:
-            raise problem.invalid_error(
-                self.goal, f"its states_reference has no column '{missing[0]}'"
-            )
+            raise problem.invalid_error(self.goal, f"states_reference has no column '{missing[0]}'")
         frames = functions.frames(paths)
         rows = []
         x = np.array(functions.x)

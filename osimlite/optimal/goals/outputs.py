@@ -128,21 +128,21 @@ def build_output_formula(
     index = part.output_index
     exponent = part.exponent
     if exponent < 1:
-        raise problem.invalid_error(part, f"its exponent is {exponent}, and has to be 1 at least")
+        raise problem.invalid_error(part, f"exponent is {exponent}; expected 1 or more")
     if bool(part.second_output_path) != bool(part.operation):
-        raise problem.invalid_error(part, "a second_output_path and an operation need each other")
+        raise problem.invalid_error(part, "second_output_path and operation require each other")
     outputs = [
         _find_output(part, problem, text)
         for text in (part.output_path, part.second_output_path)
         if text
     ]
     if not outputs:
-        raise problem.invalid_error(part, "it names no output_path")
+        raise problem.invalid_error(part, "output_path is required")
     sizes = {size for size, _ in outputs}
     if len(sizes) > 1:
-        raise problem.invalid_error(part, "its outputs are of different types")
+        raise problem.invalid_error(part, "output_path and second_output_path have different types")
     if not -1 <= index < max(sizes) or (index >= 0 and max(sizes) == 1):
-        raise problem.invalid_error(part, f"its output has no component of output_index {index}")
+        raise problem.invalid_error(part, f"the output has no component output_index {index}")
 
     def value(point: Point) -> Formula:
         values = [formula(point, path) for _, (formula, path) in outputs]
@@ -193,7 +193,7 @@ def _find_output(
     )
     index = law.known_of.get(name) if law is not None else None
     if law is None or index is None:
-        raise problem.unsupported_error(part, f"the output '{name}' of {path} has no formula here")
+        raise problem.unsupported_error(part, f"the output '{name}' of {path} is not supported")
     # The record of the force may have another label for the output.
     label = f"{path}|{next(label for label, at in law.recorded.items() if at == index)}"
     return 1, (lambda point, path: point.output("forces")[label], path)

@@ -67,7 +67,7 @@ def build_control_tracking_goal(goal: MocoControlTrackingGoal, problem: Problem)
         problem.check_name(goal, name, controls, "control")
         if label not in table.columns:
             raise problem.invalid_error(
-                goal, f"its reference has no column '{label}', which '{name}' is to follow"
+                goal, f"reference has no column '{label}' for the control '{name}'"
             )
     control_weights = problem.find_weights(goal, goal.control_weights, None, controls, "control")
     weights = dict(zip(controls, control_weights, strict=True))
@@ -88,7 +88,7 @@ def build_marker_tracking_goal(goal: MocoMarkerTrackingGoal, problem: Problem) -
     table = problem.tables.get(goal.name)
     if table is None:
         if not reference.marker_file.strip():
-            raise problem.invalid_error(goal, "its markers_reference names no marker_file")
+            raise problem.invalid_error(goal, "markers_reference has no marker_file")
         table = read_table(problem.locate_file(reference.marker_file))
     measured = [*dict.fromkeys(label[:-2] for label in table.columns)]
     paths = {
@@ -146,13 +146,13 @@ def build_generalized_force_tracking_goal(
     for name, series in zip(tracked, fit_splines(problem, table, tracked), strict=True):
         if weights[name] < 0.0:
             raise problem.invalid_error(
-                goal, f"the weight of '{name}' is negative, which OpenSim refuses, too"
+                goal, f"the weight of '{name}' is negative; OpenSim rejects this too"
             )
         greatest = float(np.abs(table[name]).max()) if goal.normalize_tracking_error else 1.0
         if not greatest:
             raise problem.invalid_error(
                 goal,
-                f"the column '{name}' is zero, so that no error can be divided by its greatest",
+                f"the column '{name}' is zero everywhere; set normalize_tracking_error to false",
             )
         rows.append((series, weights[name] / greatest**2))
     needed_forces = problem.dynamics.make_generalized_forces(
@@ -178,7 +178,7 @@ def _match_forces(goal: MocoGeneralizedForceTrackingGoal, problem: Problem) -> l
         if not matched:
             problem.check_name(goal, pattern, forces, "force")
         if twice := [path for path in matched if path in result]:
-            raise problem.invalid_error(goal, f"its force_paths match '{twice[0]}' twice")
+            raise problem.invalid_error(goal, f"force_paths matches '{twice[0]}' twice")
         result += matched
     return result
 
