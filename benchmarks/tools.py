@@ -35,7 +35,7 @@ from osimlite.fitting.orientation_data import OrientationData
 from osimlite.fitting.sensors import place_sensors
 from osimlite.io.tables.storage import write_sto
 from osimlite.io.tables.trc import write_trc
-from osimlite.mechanics.multibody.spatial import quaternion, rotation_xyz
+from osimlite.mechanics.multibody.spatial import quaternion_of, rotation_xyz
 from osimlite.simulation.recorded_motion import RecordedMotion
 from validate import whole_process
 
@@ -227,7 +227,7 @@ def worn(folder: Path, frames: int) -> Case:
         off = np.array(
             [rotation_xyz(angles) for angles in rng.normal(0.0, np.deg2rad(5.0), (len(names), 3))]
         )
-        rows.append(quaternion(off @ found).ravel().tolist())
+        rows.append(quaternion_of(off @ found).ravel().tolist())
     write_sto(folder / "trial.sto", "trial", motion.times.tolist(), names, rows, kind="Quaternion")
     tool = osimlite.IMUInverseKinematicsTool(
         name="trial",

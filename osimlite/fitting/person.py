@@ -161,7 +161,9 @@ def fit(
     placements = Placements(scaled.tree())
     for marker in scaled.components(ModelMarker):
         if marker.name in offsets:
-            _, frame = placements.frame(placements.named(marker, "socket_parent_frame"))
+            _, frame = placements.resolve_frame(
+                placements.follow_socket(marker, "socket_parent_frame")
+            )
             own = frame[:3, :3].T @ offsets[marker.name]
             marker.location = tuple((np.array(marker.location) + own).tolist())
     return Person(

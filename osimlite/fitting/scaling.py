@@ -155,12 +155,12 @@ class _Scaler:
         self.factors = {name: np.array(given, dtype=float) for name, given in factors.items()}
         # What frames lead to does not change while they are scaled.
         for frame in model.components(PhysicalFrame):
-            self.placements.frame(frame)
+            self.placements.resolve_frame(frame)
         self.mechanism = mechanism
 
     def of_base(self, frame: PhysicalFrame) -> Array | None:
         """The factors of the body (or ground) that a frame is fixed to, None if that stays as it is."""
-        base, _ = self.placements.frame(frame)
+        base, _ = self.placements.resolve_frame(frame)
         return self.factors.get(base.rsplit("/", 1)[1])
 
     def scale(self, component: Component) -> None:
@@ -177,7 +177,7 @@ class _Scaler:
             elif whose == HOLDER:
                 factors = self.of_base(self._holder(component))
             else:
-                factors = self.of_base(self.placements.named(component, whose))
+                factors = self.of_base(self.placements.follow_socket(component, whose))
             if factors is not None:
                 setattr(
                     component,
@@ -203,7 +203,7 @@ class _Scaler:
         joint = self.tree.parent_of(coordinate)
         if info.motion_type != "translational" or not isinstance(joint, Joint):
             return None
-        factors = self.of_base(self.placements.named(joint, "socket_parent_frame"))
+        factors = self.of_base(self.placements.follow_socket(joint, "socket_parent_frame"))
         if factors is not None and len(set(factors.tolist())) > 1:
             raise ModelError(
                 f"'{coupler.path}' gives a translation of the joint '{joint.path}', whose parent is scaled by "

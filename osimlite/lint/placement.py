@@ -197,7 +197,7 @@ def _ways(subject: Subject, rough: bool) -> dict[int, list[_Way]]:
 
 def _function(axis: TransformAxis, rough: bool) -> Function | None:
     """What an axis moves by; None if that is not known."""
-    from osimlite.mechanics.multibody.schema_functions import numeric
+    from osimlite.mechanics.multibody.schema_functions import convert_function
 
     function: Any = axis.function
     if isinstance(function, GCVSpline):
@@ -210,7 +210,7 @@ def _function(axis: TransformAxis, rough: bool) -> Function | None:
     try:
         # Of several coordinates, which should not be, a curve takes the first.
         takes_one = isinstance(function, (SimmSpline, PiecewiseLinearFunction))
-        return numeric(function, min(count, 1) if takes_one else count, axis.name)
+        return convert_function(function, min(count, 1) if takes_one else count, axis.name)
     except OsimliteError:
         return None
 

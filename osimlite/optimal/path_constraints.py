@@ -14,7 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from osimlite.derivatives.symbols import casadi
-from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.optimal.goals.outputs import build_output_formula
 from osimlite.optimal.point import ConstraintRows, Formula, Point, make_projection
 from osimlite.optimal.tables import sample_function
@@ -118,7 +118,9 @@ def build_bound_rows(
         functions = [(constraint.lower_bound, (0.0, 0.0))]
     series = [
         problem.add_time_function(
-            partial(sample_function, numeric(function, 1, f"a bound of '{constraint.name}'"))
+            partial(
+                sample_function, convert_function(function, 1, f"a bound of '{constraint.name}'")
+            )
         )
         for function, _ in functions
     ]

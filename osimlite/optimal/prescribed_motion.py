@@ -18,7 +18,7 @@ from osimlite.derivatives.functions import casadi as make_casadi_model
 from osimlite.derivatives.symbols import casadi
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.dynamics import Dynamics
 from osimlite.optimal.point import Formula, Point, TimeFunction
@@ -61,7 +61,7 @@ def read_position_motion(part: PositionMotion, model: Model) -> Motion | str:
     missing = next((path for path in paths if path not in functions), None)
     if missing is not None:
         return missing
-    own = [numeric(functions[path], 1, f"the function of '{path}'") for path in paths]
+    own = [convert_function(functions[path], 1, f"the function of '{path}'") for path in paths]
 
     def motion(times: Array) -> Array:
         return np.stack([sample_function(item, times) for item in own], axis=2)

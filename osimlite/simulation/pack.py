@@ -89,11 +89,11 @@ class Packer(LinkPacker):
             from osimlite.simulation.pack_chain import pack_chain
 
             pack_chain(self, self.chain)
-        ints[MODEL.WORK_CONTROL] = self.room(len(self.controls.names))
+        ints[MODEL.WORK_CONTROL] = self.reserve_work(len(self.controls.names))
         result = self.item_records()
         self.control_record()
         ints[MODEL.STATE_SIZE] = self.state.size
-        ints[MODEL.WORK_STATE] = self.room(ints[MODEL.STATE_SIZE] * STATES)
+        ints[MODEL.WORK_STATE] = self.reserve_work(ints[MODEL.STATE_SIZE] * STATES)
         ints[MODEL.WORK_SIZE] = self.work
         structure, numbers = (
             np.array(ints, dtype=np.int64),
@@ -107,7 +107,7 @@ class Packer(LinkPacker):
         """Write the items; the records of the contacts come first, in their order."""
         groups = [element.items(self.places) for element in self.elements]
         self.ints[MODEL.CONTACTS] = sum(item.is_contact for group in groups for item in group)
-        contact = self.ints[MODEL.WORK_CONTACT] = self.room(
+        contact = self.ints[MODEL.WORK_CONTACT] = self.reserve_work(
             CONTACT_WORK.SIZE * self.ints[MODEL.CONTACTS]
         )
         records: list[int] = []
@@ -124,7 +124,7 @@ class Packer(LinkPacker):
                 place = (
                     contact + CONTACT_WORK.SIZE * len(pairs)
                     if item.is_contact
-                    else self.room(item.room)
+                    else self.reserve_work(item.room)
                 )
                 result[-1].append((place, CONTACT_WORK.SIZE if item.is_contact else item.room))
                 if item.is_contact:
@@ -169,7 +169,7 @@ class Packer(LinkPacker):
                 STATES=response.states,
                 SENSE=response.sense,
             )
-        room = self.room(LANES * ROWS) if any(kernel for kernel, _ in runs) else 0
+        room = self.reserve_work(LANES * ROWS) if any(kernel for kernel, _ in runs) else 0
         self.ints[MODEL.RUNS], self.ints[MODEL.RUN_AT] = len(runs), len(self.ints)
         for (kernel, first), end in zip(
             runs, [*(run[1] for run in runs[1:]), len(records)], strict=False

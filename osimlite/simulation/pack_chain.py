@@ -65,10 +65,10 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
         ints += numbers
     entries = ints[ints[MODEL.DOF_AT] + DOF.ROW]
     ints[start : start + CHAIN.SIZE] = CHAIN.record(
-        DYNAMICS=packer.law("chain_dynamics"),
+        DYNAMICS=packer.require_law("chain_dynamics"),
         SUPPLY=0,
-        WORK_JOINTS=packer.room((4 + count) * count),
-        WORK_SHARES=packer.room(len(shares)),
+        WORK_JOINTS=packer.reserve_work((4 + count) * count),
+        WORK_SHARES=packer.reserve_work(len(shares)),
         ENTRY_AT=entries,
         END_ENTRY=entries + packer.entries,
         **places,

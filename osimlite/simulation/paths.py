@@ -15,7 +15,7 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.constraints import Constraint, Lock
 from osimlite.mechanics.multibody.extremes import any_numbers, methods_of_any_numbers
 from osimlite.mechanics.multibody.kinematics import Kinematics
-from osimlite.mechanics.multibody.linear import shortest, stacked
+from osimlite.mechanics.multibody.linear import solve_least_norm, stack_equations
 from osimlite.mechanics.multibody.mechanism import Mechanism, Values
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.base import Component
@@ -233,8 +233,8 @@ def _coupled(constraints: Sequence[Constraint], state: Kinematics, places: Seque
     """The speeds nearest to 1 for a coordinate and 0 for all others, divided by its own, in the columns of `places`."""
     coupling = np.eye(len(state.q))
     if constraints and places:
-        rows, wanted = stacked([item.velocity_equations(state) for item in constraints])
-        speeds = coupling[:, places] - shortest(
+        rows, wanted = stack_equations([item.velocity_equations(state) for item in constraints])
+        speeds = coupling[:, places] - solve_least_norm(
             rows, rows[:, places] - wanted[:, None], REDUNDANT * len(rows)
         )
         own = speeds[places, range(len(places))]

@@ -22,9 +22,9 @@ from osimlite.mechanics.multibody.functions import (
     Evaluated,
     Function,
     Scaled,
-    zeros,
+    make_zero_derivatives,
 )
-from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
 from osimlite.schema.base import Object
 from osimlite.simulation.elements.control_sets import ControlCurves
@@ -49,7 +49,7 @@ class Called(Function):
         value = float(self.function(x))
         if not isfinite(value):
             raise SettingError(f"the control of '{self.name}' is {value} at {x:g} s; give a number")
-        return zeros(1, value)
+        return make_zero_derivatives(1, value)
 
 
 def driven(
@@ -177,7 +177,7 @@ def _function(name: str, value: Any) -> Function:
     if isinstance(value, Function):
         return value
     if isinstance(value, Object):
-        return numeric(value, 1, f"the control of '{name}'")
+        return convert_function(value, 1, f"the control of '{name}'")
     if callable(value):
         return Called(value, name)
     try:

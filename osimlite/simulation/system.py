@@ -27,7 +27,7 @@ from osimlite.mechanics.kernels.layout import (
     WORK,
 )
 from osimlite.mechanics.kernels.pointers import Floats
-from osimlite.mechanics.multibody.dynamics import massless
+from osimlite.mechanics.multibody.dynamics import describe_massless_motion
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
@@ -352,7 +352,9 @@ class System:
             except SimulationError as error:
                 return error
         elif status == OUTCOME.SINGULAR_MASS:
-            return massless(self.mechanism.coordinates[self.order[int(self._f[0])]].name)
+            return describe_massless_motion(
+                self.mechanism.coordinates[self.order[int(self._f[0])]].name
+            )
         return SimulationError("the motion cannot be computed any further; ask for more accuracy")
 
     # ---------------------------------------------------------------------------------------------- reports

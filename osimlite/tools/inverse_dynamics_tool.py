@@ -141,8 +141,8 @@ def compute_joint_loads(
     by_joint = {body.mobilizer.joint: index for index, body in enumerate(mechanism.bodies)}
     asked, labels = [], []
     for joint in joints:
-        frame = placements.named(joint, "socket_child_frame")
-        base, _ = placements.frame(frame)
+        frame = placements.follow_socket(joint, "socket_child_frame")
+        base, _ = placements.resolve_frame(frame)
         # OpenSim asks what carries the child, and besides what has the joint's coordinates: others
         # if it closes a loop.
         asked.append((joint, {carried[base], by_joint[placements.path(joint)]}))

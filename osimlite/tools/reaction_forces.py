@@ -13,11 +13,11 @@ from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.constrained_dynamics import SLIGHT, bind
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL
 from osimlite.mechanics.kernels.points import link_work
-from osimlite.mechanics.multibody.body_constraints import carrier
+from osimlite.mechanics.multibody.body_constraints import find_carrier
 from osimlite.mechanics.multibody.constraints import Constraint, Coupler
 from osimlite.mechanics.multibody.dynamics import mass_matrix
 from osimlite.mechanics.multibody.kinematics import Kinematics
-from osimlite.mechanics.multibody.linear import shortest
+from osimlite.mechanics.multibody.linear import solve_least_norm
 from osimlite.mechanics.multibody.links import Link, Placement, Places, Tree
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.parts import GROUND
@@ -64,7 +64,7 @@ class ConstraintForces:
                 rows, missing = (
                     np.asarray(np.linalg.solve(factor, item), float) for item in (rows, missing)
                 )
-            result = shortest(rows, missing, SLIGHT * np.sqrt(rows.shape[1]))
+            result = solve_least_norm(rows, missing, SLIGHT * np.sqrt(rows.shape[1]))
             parts = np.split(result, np.cumsum([len(block) for block in blocks])[:-1])
             yield cls(state, list(zip(kept, parts, strict=True)))
 
@@ -136,7 +136,8 @@ def compute_constraint_records(motion: Motion) -> tuple[list[str], Array]:
                 wrenches = forces.on_bodies(constraint, multipliers).reshape(-1, 2, 3)[:, ::-1]
                 row.append(
                     (
-                        wrenches @ forces.state.rotations[carrier(mechanism, constraint.bodies)]
+                        wrenches
+                        @ forces.state.rotations[find_carrier(mechanism, constraint.bodies)]
                     ).ravel()
                 )
                 columns = [

@@ -7,7 +7,7 @@ import numpy as np
 from osimlite.errors import ModelError
 from osimlite.io.meshes.unit_shapes import ball
 from osimlite.mechanics.multibody.mechanism import Mechanism
-from osimlite.mechanics.multibody.spatial import Array, offset
+from osimlite.mechanics.multibody.spatial import Array, make_offset
 from osimlite.schema.contact import (
     ContactEllipsoid,
     ContactGeometry,
@@ -59,7 +59,7 @@ def collect_collisions(
         shape, own = made
         body, placed = mechanism.frames[frame]
         owner = "/ground" if body < 0 else mechanism.bodies[body].path
-        origin = placed @ offset(geometry.location, geometry.orientation) @ own
+        origin = placed @ make_offset(geometry.location, geometry.orientation) @ own
         result.setdefault(owner, []).append(Visual(shape, origin, source=path))
     return result
 

@@ -18,7 +18,7 @@ from osimlite.io.meshes.read import read_surface
 from osimlite.io.meshes.surface import Surface
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.mechanics.multibody.mechanism import Mechanism
-from osimlite.mechanics.multibody.spatial import Array, offset, rotation_about, transform
+from osimlite.mechanics.multibody.spatial import Array, make_offset, make_transform, rotation_about
 from osimlite.schema import actuators, contact, contact_forces, geometry, springs, wrapping
 from osimlite.schema.base import Component
 from osimlite.schema.forces import Force, HuntCrossleyForce
@@ -47,7 +47,7 @@ SPRING: Color = (0.0, 0.62, 0.45)
 STICK: Color = (0.149, 0.196, 0.247)
 """Colour of sticks."""
 
-_TO_Z = transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
+_TO_Z = make_transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
 """From a cylinder along Z to one along Y."""
 
 _ENDLESS = 1.0
@@ -188,7 +188,7 @@ class _Collector:
 
     def _contact(self, surface: contact.ContactGeometry, path: str) -> None:
         body, placed = self._place(surface, "socket_frame")
-        here = placed @ offset(surface.location, surface.orientation)
+        here = placed @ make_offset(surface.location, surface.orientation)
         look = surface.appearance
         opacity = CONTACT_OPACITY * look.opacity
         visible = look.visible and look.surface_properties.representation != 0
@@ -205,7 +205,7 @@ class _Collector:
         if frame is None:
             raise UnsupportedError("is in no frame")
         body, placed = self.mechanism.frames[self.tree.path_of(frame) or ""]
-        here = placed @ offset(surface.translation, surface.xyz_body_rotation)
+        here = placed @ make_offset(surface.translation, surface.xyz_body_rotation)
         own, size = self._shape(surface)
         look = surface.appearance
         visible = look.visible and look.surface_properties.representation != 0 and surface.active
@@ -315,7 +315,7 @@ class _Collector:
         body, placed = self.mechanism.placement(self.tree.path_of(frame) or "")
         base = self.mechanism.bodies[body].name if body >= 0 else "ground"
         labels = (label,) if label else (frame.name, base, surface.name)
-        near = (placed @ offset(surface.location, surface.orientation))[:3, 3]
+        near = (placed @ make_offset(surface.location, surface.orientation))[:3, 3]
         self.pushed.append(
             Pushed(element, path, body, labels, near, self.tree.path_of(surface) or "")
         )

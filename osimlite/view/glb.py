@@ -17,7 +17,7 @@ import numpy as np
 from osimlite import __version__
 from osimlite.base.files import write_atomically
 from osimlite.io.meshes.unit_shapes import normals_of, tube
-from osimlite.mechanics.multibody.spatial import Array, quaternion
+from osimlite.mechanics.multibody.spatial import Array, quaternion_of
 from osimlite.view.motion import Motion, at_times, values_of
 from osimlite.view.picture import FORCE
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
@@ -58,7 +58,7 @@ def write_glb(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
             name,
             _Track(
                 [p.origins[k] for p in poses],
-                _continuous(np.roll(quaternion([p.rotations[k] for p in poses]), -1, axis=1)),
+                _continuous(np.roll(quaternion_of([p.rotations[k] for p in poses]), -1, axis=1)),
             ),
         )
         for k, name in enumerate(names)

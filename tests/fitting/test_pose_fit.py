@@ -21,7 +21,7 @@ from osimlite.mechanics.kernels.pose_fit import weigh
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
-from osimlite.mechanics.multibody.spatial import rotation_xyz, transform
+from osimlite.mechanics.multibody.spatial import make_transform, rotation_xyz
 from osimlite.simulation.engines.linking import COMPILED, PYTHON
 from tests.mechanics.multibody.strategies import Case, cases, constraint_of
 
@@ -105,7 +105,7 @@ def sensors_of(mechanism: Mechanism, rng: np.random.Generator) -> list[Sensor]:
     """A sensor on every body and one in ground."""
     return [
         Sensor(
-            FramePlacement(body, transform(rotation_xyz(rng.uniform(-3.0, 3.0, 3)))),
+            FramePlacement(body, make_transform(rotation_xyz(rng.uniform(-3.0, 3.0, 3)))),
             float(rng.uniform(0.2, 5.0)),
         )
         for body in (-1, *range(len(mechanism.bodies)))
@@ -335,7 +335,7 @@ def test_nothing_seen_from_the_beginning_is_the_start() -> None:
 def test_sensors_turn_bodies(far: float) -> None:
     """Rotations are fitted exactly where that is possible, from near and from far."""
     mechanism = _free_body()
-    frame = transform(rotation_xyz(np.array((0.2, 0.5, -0.3))), (0.1, 0.0, 0.0))
+    frame = make_transform(rotation_xyz(np.array((0.2, 0.5, -0.3))), (0.1, 0.0, 0.0))
     pose = np.array((0.4 + far, 0.3, 0.2, 0.0, 0.0, 0.0))
     wanted = mechanism.at(pose).rotations[0] @ frame[:3, :3]
     fit = PoseFit(mechanism, [], [Sensor(FramePlacement(0, frame))])

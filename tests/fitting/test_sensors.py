@@ -16,7 +16,7 @@ from osimlite.fitting.sensors import place_sensors
 from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.io.tables.trc import write_trc
 from osimlite.mechanics.multibody.spatial import (
-    quaternion,
+    quaternion_of,
     rotation_about_space,
     rotation_of,
     rotation_xyz,
@@ -62,7 +62,7 @@ def turned(*angles: float) -> Any:
 def lab(tmp_path: Path) -> Path:
     """A model, the setup of a placer, and the orientations of a subject that stands."""
     osimlite.write(leg(), tmp_path / "leg.osim")
-    rows = [[*quaternion(turned(0.1, 0.5, 0.2)), *quaternion(turned(0.0, 0.5, 0.0))]]
+    rows = [[*quaternion_of(turned(0.1, 0.5, 0.2)), *quaternion_of(turned(0.0, 0.5, 0.0))]]
     write_sto(tmp_path / "standing.sto", "s", [0.0], ["thigh_imu", "shank_imu"], np.array(rows).reshape(1, -1),
               kind="Quaternion")  # fmt: skip
     (tmp_path / "placer.xml").write_text(PLACER.format(base="thigh_imu"))
@@ -74,7 +74,7 @@ def test_quaternions_and_matrices_are_the_same_rotations() -> None:
     matrices = rotation_of(given)
     assert np.linalg.det(matrices) == pytest.approx(np.ones(30))
     unit = given / np.linalg.norm(given, axis=1)[:, None]
-    assert np.abs(np.sum(quaternion(matrices) * unit, axis=1)) == pytest.approx(
+    assert np.abs(np.sum(quaternion_of(matrices) * unit, axis=1)) == pytest.approx(
         np.ones(30), abs=1e-14
     )
     for length in (1e-300, 1e-5, 1e300):
@@ -193,7 +193,7 @@ def measured(model: osimlite.Model, count: int = 8) -> tuple[Any, dict[str, Any]
     sensors = {
         f"{name}_imu": np.array(
             [
-                quaternion(mechanism.frame_transform(f"/bodyset/{name}/{name}_imu", q)[:3, :3])
+                quaternion_of(mechanism.frame_transform(f"/bodyset/{name}/{name}_imu", q)[:3, :3])
                 for q in poses
             ]
         )
@@ -247,7 +247,7 @@ def test_markers_and_orientations_are_fitted_together() -> None:
     """A sensor of weight 0 is reported and does not pull; markers tell where the model is."""
     model = worn()
     poses, sensors, places = measured(model)
-    sensors["thigh_imu"] = quaternion(turned(0.5, 0.0, 0.0) @ rotation_of(sensors["thigh_imu"]))
+    sensors["thigh_imu"] = quaternion_of(turned(0.5, 0.0, 0.0) @ rotation_of(sensors["thigh_imu"]))
     result = osimlite.inverse_kinematics(
         model, places, orientations=sensors, weights={"thigh_imu": 0.0}
     )

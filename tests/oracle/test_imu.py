@@ -14,7 +14,7 @@ import pytest
 import osimlite
 from osimlite.io.tables.storage import write_sto
 from osimlite.io.tables.trc import write_trc
-from osimlite.mechanics.multibody.spatial import quaternion, rotation_of, rotation_xyz
+from osimlite.mechanics.multibody.spatial import quaternion_of, rotation_of, rotation_xyz
 from tests.fitting.test_scaling import assert_same
 from tests.oracle.test_fitting import ask, model_with
 
@@ -103,7 +103,7 @@ def write_orientations(
     path: Path, times: Sequence[float], names: Sequence[str], rotations: Any
 ) -> None:
     """Rotation matrices (t, k, 3, 3) as a table of quaternions."""
-    rows = quaternion(rotations).reshape(len(times), -1).tolist()
+    rows = quaternion_of(rotations).reshape(len(times), -1).tolist()
     write_sto(path, "orientations", times, names, rows, kind="Quaternion", has_missing=True)
 
 
@@ -193,7 +193,7 @@ def squared(mechanism: Any, names: Sequence[str], q: Any, rotations: Any) -> Any
     frames = {path.rpartition("/")[2]: frame for path, frame in mechanism.frames.items()}
     for name, wanted in zip(names, rotations, strict=True):
         off = (state.transform(frames[name].body) @ frames[name].transform)[:3, :3] @ wanted.T
-        real, *imaginary = quaternion(off)
+        real, *imaginary = quaternion_of(off)
         result.append((2.0 * np.arctan2(np.linalg.norm(imaginary), abs(real))) ** 2)
     return np.array(result)
 

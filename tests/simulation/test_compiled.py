@@ -36,9 +36,9 @@ from osimlite.mechanics.multibody.joints import (
     Mobilizer,
     TransformAxis,
     constant_curvature,
-    custom,
-    ellipsoid,
-    scapulothoracic,
+    make_custom_motions,
+    make_ellipsoid_motions,
+    make_scapulothoracic_motions,
 )
 from osimlite.mechanics.multibody.mechanism import (
     CoordinateInfo,
@@ -47,7 +47,7 @@ from osimlite.mechanics.multibody.mechanism import (
     MobileBody,
 )
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
-from osimlite.mechanics.multibody.spatial import offset
+from osimlite.mechanics.multibody.spatial import make_offset
 from osimlite.schema.functions import PiecewiseConstantFunction
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import Forces, force_elements
@@ -108,14 +108,14 @@ def custom_joint(function):
         TransformAxis((1, 2), AXES[4], both),
         TransformAxis((2,), AXES[5], f.Linear(1.0, 0.1)),
     )
-    return custom(turns, slides)
+    return make_custom_motions(turns, slides)
 
 
 JOINTS = {
     **{name: motions for name, motions in MOTIONS.items() if name != "WeldJoint"},
-    "EllipsoidJoint": ellipsoid((0.1, 0.2, 0.3)),
+    "EllipsoidJoint": make_ellipsoid_motions((0.1, 0.2, 0.3)),
     "ConstantCurvatureJoint": constant_curvature(0.4, (0.1, -0.05, 0.2)),
-    "ScapulothoracicJoint": scapulothoracic((0.1, 0.2, 0.3), (0.05, -0.1), 0.4),
+    "ScapulothoracicJoint": make_scapulothoracic_motions((0.1, 0.2, 0.3), (0.05, -0.1), 0.4),
     **{f"CustomJoint, {name}": custom_joint(function) for name, function in FUNCTIONS.items()},
 }
 
@@ -136,8 +136,8 @@ def tree(joints, *, parents=None, reversed=(), locked=()):
         inertia = np.array(((0.5, 0.03, -0.04), (0.03, 0.6, 0.02), (-0.04, 0.02, 0.7)))
         mass = MassProperties(1.0 + number, np.array((0.1, -0.2, 0.05 * number)), inertia)
         ends = (
-            offset((0.1, 0.2, -0.3), (0.3, -0.2, 0.5)),
-            offset((-0.2, 0.1, 0.1), (0.1, 0.6, -0.4)),
+            make_offset((0.1, 0.2, -0.3), (0.3, -0.2, 0.5)),
+            make_offset((-0.2, 0.1, 0.1), (0.1, 0.6, -0.4)),
         )
         mobilizer = Mobilizer(f"/j{number}", name, motions, own, *ends, number in reversed)
         parent = number - 1 if parents is None else parents[number]

@@ -14,7 +14,7 @@ from osimlite.mechanics.multibody.functions import Constant as NumericConstant
 from osimlite.mechanics.multibody.functions import Linear as NumericLinear
 from osimlite.mechanics.multibody.mechanism import FramePlacement
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
-from osimlite.mechanics.multibody.spatial import offset
+from osimlite.mechanics.multibody.spatial import make_offset
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements import Forces, force_elements
@@ -164,7 +164,7 @@ def test_measured_load():
     cubic = smoothing_spline((0.0, 0.5, 1.0, 1.5, 2.0), (0.3, -1.0, 2.0, 0.5, 0.1), 2, 0.0)
     functions = cubic, NumericLinear(2.0, -0.3), NumericConstant(0.4)
     frames = [
-        FramePlacement(body, offset((0.1, 0.2, -0.3), (0.3, -0.2, 0.5))) for body in (2, 0, 3)
+        FramePlacement(body, make_offset((0.1, 0.2, -0.3), (0.3, -0.2, 0.5))) for body in (2, 0, 3)
     ]
     for given in ((1, 1, 1), (1, 0, 0), (0, 0, 1), (1, 1, 0)):
         kinds = [functions if wanted else () for wanted in given]

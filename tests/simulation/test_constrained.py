@@ -18,7 +18,7 @@ from osimlite.errors import SimulationError, UnsupportedError
 from osimlite.io.document.reader import read_text
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.mechanics.multibody import functions as f
-from osimlite.mechanics.multibody.joints import Mobilizer, TransformAxis, custom
+from osimlite.mechanics.multibody.joints import Mobilizer, TransformAxis, make_custom_motions
 from osimlite.mechanics.multibody.mechanism import CoordinateInfo, MassProperties, MobileBody
 from osimlite.schema import constraint_types as kinds
 from osimlite.schema.custom_joint import CustomJoint
@@ -88,7 +88,7 @@ def knee(*, opensim_derivatives: bool, inertia: Any = None) -> Mechanism:
         TransformAxis((1,), (0.0, 1.0, 0.0), f.Sine(0.1, 2.0, 0.0, 0.0)),
         TransformAxis((), (0.0, 0.0, 1.0), f.Constant(0.05)),
     ]
-    motions = custom(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
+    motions = make_custom_motions(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
     properties = MassProperties(
         2.0,
         np.array((0.1, -0.3, 0.05)),

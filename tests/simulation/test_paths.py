@@ -10,7 +10,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import ModelError
-from osimlite.mechanics.multibody.spatial import inverse
+from osimlite.mechanics.multibody.spatial import invert_transform
 from osimlite.schema.functions import Constant, Sine
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.paths import MovingPathPoint, PathPoint
@@ -85,7 +85,7 @@ def test_points_in_one_place_pull_nothing():
     """What is left then are the pieces between the bodies, which move nothing in ground."""
     model = with_force(FORCES["path"])
     points = model["/forceset/a"].geometry_path.path_point_set.objects
-    place = inverse(osimlite.mechanism(model).body_transforms({})["b0"]) @ (
+    place = invert_transform(osimlite.mechanism(model).body_transforms({})["b0"]) @ (
         *points[0].location,
         1.0,
     )

@@ -12,7 +12,7 @@ import pytest
 from osimlite.mechanics.kernels import wrapping
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.wrap_cylinder import settled
-from osimlite.mechanics.multibody.spatial import inverse, offset, transform
+from osimlite.mechanics.multibody.spatial import invert_transform, make_offset, make_transform
 from osimlite.simulation.engines.linking import COMPILED
 from tests.conftest import ROOT
 from tests.simulation.checked import Checked
@@ -59,9 +59,9 @@ def bent(law, p, first, second):
 def test_surface(name, code):
     (surface,) = SETUPS[name]["objects"]
     law, p = code.entry(f"wrap_{surface['kind'].lower()}"), numbers(surface, alone=1.0)
-    frame = offset(surface["translation"], surface["xyz_body_rotation"])
+    frame = make_offset(surface["translation"], surface["xyz_body_rotation"])
     for case in SETUPS[name]["cases"]:
-        to_surface = inverse(transform(case["R_W"], case["p_W"]) @ frame)
+        to_surface = invert_transform(make_transform(case["R_W"], case["p_W"]) @ frame)
         ends = [(to_surface @ [*case[end], 1.0])[:3] for end in ("p_A", "p_B")]
         says, points, length = bent(law, p, *ends)
         wraps = says > wrapping.NONE and not np.isnan(points).any()

@@ -20,7 +20,7 @@ from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.arc import ArcPoint
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.functions import Function, Linear, Scaled
-from osimlite.mechanics.multibody.joints import TransformAxis, custom
+from osimlite.mechanics.multibody.joints import TransformAxis, make_custom_motions
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
@@ -227,7 +227,7 @@ def test_axes_along_straight_splines_are_joints_of_one_coordinate():
         TransformAxis((0,), x, f.SimmSpline((-1.0, 3.0), (-0.5, 2.5))),
     ]
     flat = [TransformAxis((0,), x, f.SimmSpline((0.0, 1.0, 2.0), (0.2, 0.2, 0.2)))]
-    mechanism = one_body(custom(axes, flat), 1)
+    mechanism = one_body(make_custom_motions(axes, flat), 1)
     robot = build_robot(mechanism)
     assert [joint.name for joint in robot.moving] == ["q0", "q0_rx"]
     assert robot.joint_of.keys() == {0} and mimics(robot)["q0_rx"].leader == "q0"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from osimlite.base.records import dataclass
 from osimlite.errors import SimulationError
 from osimlite.lint.measures import Pose, Value
-from osimlite.mechanics.multibody.linear import stacked
+from osimlite.mechanics.multibody.linear import stack_equations
 from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
@@ -137,5 +137,5 @@ def tied(paths: Paths, start: Array) -> Array:
     if not constraints:
         return np.zeros(len(start), dtype=bool)
     state = paths.mechanism.at(start)
-    rows, _ = stacked([item.velocity_equations(state) for item in constraints])
+    rows, _ = stack_equations([item.velocity_equations(state) for item in constraints])
     return np.abs(rows).max(axis=0) > 0.0

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.constant_curvature import arc_at
 from osimlite.mechanics.kernels.functions import ARC
-from osimlite.mechanics.multibody.functions import Arguments, Evaluated, Function, floats
+from osimlite.mechanics.multibody.functions import Arguments, Evaluated, Function, make_floats
 
 _SERIES = [(-1.0) ** n / math.factorial(2 * n + first) for first in (1, 2) for n in range(16)]
 """Coefficients of the powers of θ² in (sin θ) / θ, then in (1 - cos θ) / θ²."""
@@ -42,5 +42,5 @@ class ArcPoint(Function):
     def evaluate(self, arguments: Arguments) -> Evaluated:
         """Value, gradient (2,) and Hessian (2, 2) at the two angles."""
         one, two = (float(own + start) for own, start in zip(arguments, self.neutral, strict=True))
-        value, a, b, aa, ab, bb = arc_at(floats(self.table), one, two)
+        value, a, b, aa, ab, bb = arc_at(make_floats(self.table), one, two)
         return value, [a, b], [[aa, ab], [ab, bb]]

@@ -22,7 +22,7 @@ from osimlite.base.text import listed
 from osimlite.errors import SimulationError
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.kinematics import Kinematics
-from osimlite.mechanics.multibody.linear import solutions, stacked
+from osimlite.mechanics.multibody.linear import solve_with_null_space, stack_equations
 from osimlite.mechanics.multibody.spatial import Array
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class UnmetConstraintsError(SimulationError):
         )
 
 
-def assembled(mechanism: Mechanism, q: Array, time: float, kept: Collection[int] = ()) -> Array:
+def assemble_pose(mechanism: Mechanism, q: Array, time: float, kept: Collection[int] = ()) -> Array:
     """The coordinate values (n,) nearest to `q` (n,) that fulfil the constraints at `time` (s).
 
     The coordinates with indices `kept` keep their values, as locked ones do. Where no pose within
@@ -72,7 +72,7 @@ def assembled(mechanism: Mechanism, q: Array, time: float, kept: Collection[int]
     unclamped: Array | None = None
     while True:
         try:
-            result = _nearest(mechanism, q, time, held)
+            result = _find_nearest_pose(mechanism, q, time, held)
         except SimulationError:
             if unclamped is None:
                 raise
@@ -107,7 +107,7 @@ def find_unclamped(mechanism: Mechanism, q: Array) -> list[int]:
     ]
 
 
-def projected(state: Kinematics, kept: Collection[int] = ()) -> Array:
+def project_speeds(state: Kinematics, kept: Collection[int] = ()) -> Array:
     """The generalized speeds (n,) nearest to those of `state` that fulfil the constraints.
 
     As in Simbody, the change of a speed that is greater than 1 counts relative to it.
@@ -118,11 +118,11 @@ def projected(state: Kinematics, kept: Collection[int] = ()) -> Array:
     constraints = state.mechanism.constraints
     if not constraints:
         return state.u
-    rows, wanted = stacked([item.velocity_equations(state) for item in constraints])
+    rows, wanted = stack_equations([item.velocity_equations(state) for item in constraints])
     scales = np.maximum(np.abs(state.u), 1.0)
     scales[list(kept)] = 0.0
     missing = wanted - rows @ state.u
-    change, _ = solutions(rows * scales, missing)
+    change, _ = solve_with_null_space(rows * scales, missing)
     u: Array = state.u + scales * change
     if kept and np.abs(rows @ u - wanted).max(initial=0.0) > 1e-9 * (
         1.0 + np.abs(missing).max(initial=0.0)
@@ -135,23 +135,25 @@ def projected(state: Kinematics, kept: Collection[int] = ()) -> Array:
     return u
 
 
-def _nearest(mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int, float]) -> Array:
+def _find_nearest_pose(
+    mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int, float]
+) -> Array:
     """The nearest pose with some coordinates held at given values, whatever their ranges."""
     search = _Search(mechanism, wanted, time, held)
-    q = search.restored(search.start)
+    q = search.restore_pose(search.start)
     if search.assembled:
         return q
     for _ in range(_STEPS):
-        if search.cost(q) < search.tolerance**2:
+        if search.compute_cost(q) < search.tolerance**2:
             # Nothing that counts has moved.
             return q
-        step = search.step(q)
+        step = search.compute_step(q)
         if np.abs(step).max(initial=0.0) < 1e-13 * (1.0 + float(np.abs(q).max(initial=0.0))):
             return q
-        before, size = search.cost(q), 1.0
+        before, size = search.compute_cost(q), 1.0
         while True:
-            trial = search.restored(q + size * step)
-            if search.cost(trial) < before:
+            trial = search.restore_pose(q + size * step)
+            if search.compute_cost(trial) < before:
                 break
             size *= 0.5
             if size < 1e-3:
@@ -181,7 +183,8 @@ class _Search:
         # OpenSim leaves such a pose as it is; its integrator takes the shortest way to the
         # constraints.
         self.assembled = bool(
-            np.abs(_errors(self._state(self.start))).max(initial=0.0) <= self.tolerance
+            np.abs(_compute_position_errors(self._compute_state(self.start))).max(initial=0.0)
+            <= self.tolerance
         )
         # Otherwise what does not count gives way first; what depends on others follows them.
         if not self.assembled:
@@ -196,53 +199,53 @@ class _Search:
                     )[0]
         self.ease = np.where(self.assembled | (self.counted[self.free] > 0.0), 1.0, _EASE)
 
-    def cost(self, q: Array) -> float:
+    def compute_cost(self, q: Array) -> float:
         """What is to be as small as possible."""
         return 0.5 * float(np.sum(self.counted * (q - self.wanted) ** 2))
 
-    def step(self, q: Array) -> Array:
+    def compute_step(self, q: Array) -> Array:
         """Newton's step (n,) along the surface, with the curvature of the constraints."""
-        rows = self._rows(self._state(q))
+        rows = self._compute_rows(self._compute_state(q))
         gradient, weights = (self.counted * (q - self.wanted))[self.free], self.counted[self.free]
         multipliers = np.asarray(
             np.linalg.lstsq(rows.T, -gradient, rcond=1e-9)[0], dtype=np.float64
         )
-        _, along = solutions(rows, np.zeros(len(rows)))
+        _, along = solve_with_null_space(rows, np.zeros(len(rows)))
         curvature = along.T @ (weights[:, None] * along)
         if np.abs(multipliers).max(initial=0.0) > 1e-12:
-            bends = [self._bend(q, direction, multipliers) for direction in along.T]
+            bends = [self._differentiate_pull(q, direction, multipliers) for direction in along.T]
             curvature = curvature + along.T @ np.array(bends).T.reshape(len(self.free), -1)
         values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
         slopes = np.asarray(vectors.T @ (along.T @ gradient), dtype=np.float64)
         # Downhill where the surface bends away; not at all along what does not count.
         flat = np.abs(values) < 1e-7
         lengths: Array = np.where(flat, 0.0, slopes / np.where(flat, 1.0, np.abs(values)))
-        return self._spread(-(along @ (vectors @ lengths)))
+        return self._spread_over_coordinates(-(along @ (vectors @ lengths)))
 
-    def restored(self, q: Array) -> Array:
+    def restore_pose(self, q: Array) -> Array:
         """The pose on the surface that Newton's method leads to, in the shortest steps.
 
         Raises:
             SimulationError: it leads nowhere.
         """
-        state = self._state(q)
-        errors = _errors(state)
+        state = self._compute_state(q)
+        errors = _compute_position_errors(state)
         for _ in range(_STEPS):
-            step, _ = solutions(self._rows(state) * self.ease, -errors)
+            step, _ = solve_with_null_space(self._compute_rows(state) * self.ease, -errors)
             step *= self.ease
             # Far away the equations say little about where to go; small steps, even to worse
             # places, find out.
             size = min(1.0, _FURTHEST / float(np.abs(step).max(initial=_FURTHEST)))
-            trial = q + size * self._spread(step)
-            state = self._state(trial)
-            new = _errors(state)
+            trial = q + size * self._spread_over_coordinates(step)
+            state = self._compute_state(trial)
+            new = _compute_position_errors(state)
             near = np.abs(errors).max(initial=0.0) <= self.tolerance
             if near and np.abs(new).max(initial=0.0) >= 0.5 * np.abs(errors).max(initial=0.0):
                 break
             q, errors = trial, new
         if np.abs(errors).max(initial=0.0) <= self.tolerance:
             return q
-        state = self._state(q)
+        state = self._compute_state(q)
         broken = {
             item.name: float(np.abs(item.position_errors(state)).max(initial=0.0))
             for item in self.mechanism.constraints
@@ -252,35 +255,36 @@ class _Search:
             {name: error for name, error in broken.items() if not error <= self.tolerance},
         )
 
-    def _state(self, q: Array) -> Kinematics:
+    def _compute_state(self, q: Array) -> Kinematics:
         return Kinematics(self.mechanism, q, np.zeros(len(q)), self.time)
 
-    def _rows(self, state: Kinematics) -> Array:
+    def _compute_rows(self, state: Kinematics) -> Array:
         """Derivatives of the errors by the free coordinates (p, f)."""
-        by_speeds = _rows(state)
+        by_speeds = _compute_constraint_matrix(state)
         by_values = np.linalg.solve(self.mechanism.rate_matrix(state.q).T, by_speeds.T).T
         return np.asarray(by_values[:, self.free], dtype=np.float64)
 
-    def _bend(self, q: Array, direction: Array, multipliers: Array) -> Array:
+    def _differentiate_pull(self, q: Array, direction: Array, multipliers: Array) -> Array:
         """How the multipliers' pull on the free coordinates changes along a direction of them (f,)."""
-        change = 1e-6 * self._spread(direction)
+        change = 1e-6 * self._spread_over_coordinates(direction)
         ahead, behind = (
-            self._rows(self._state(place)).T @ multipliers for place in (q + change, q - change)
+            self._compute_rows(self._compute_state(place)).T @ multipliers
+            for place in (q + change, q - change)
         )
         return (ahead - behind) / 2e-6
 
-    def _spread(self, step: Array) -> Array:
+    def _spread_over_coordinates(self, step: Array) -> Array:
         full = np.zeros(len(self.wanted))
         full[self.free] = step
         return full
 
 
-def _errors(state: Kinematics) -> Array:
+def _compute_position_errors(state: Kinematics) -> Array:
     parts = [item.position_errors(state) for item in state.mechanism.constraints]
     return np.concatenate([np.zeros(0), *parts])
 
 
-def _rows(state: Kinematics) -> Array:
+def _compute_constraint_matrix(state: Kinematics) -> Array:
     """Matrix (p, n) from the speeds to the rates of all position errors."""
     rows = [np.zeros((0, len(state.q)))]
     for item in state.mechanism.constraints:

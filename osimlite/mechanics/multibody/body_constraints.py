@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from osimlite.mechanics.multibody.mechanism import Mechanism
 
 
-def carrier(mechanism: Mechanism, bodies: Iterable[int]) -> int:
+def find_carrier(mechanism: Mechanism, bodies: Iterable[int]) -> int:
     """The outermost body that carries bodies, or is one of them; -1 for ground."""
     result = set(bodies)
     while len(result) > 1:
@@ -76,7 +76,7 @@ class PointOnLineConstraint(Constraint):
         """Two unit directions (3,) across the line, in the frame of its body."""
         start = np.eye(3)[int(np.argmin(np.abs(self.along)))]
         across = cross(self.along, start)
-        return _units(across, cross(self.along, across))
+        return _make_unit_vectors(across, cross(self.along, across))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,5 +110,5 @@ class RollingConstraint(Constraint):
         return self.surface, self.roller
 
 
-def _units(*vectors: Array) -> list[Array]:
+def _make_unit_vectors(*vectors: Array) -> list[Array]:
     return [vector / np.linalg.norm(vector) for vector in vectors]

@@ -25,7 +25,7 @@ from osimlite.mechanics.multibody.parts import (
 )
 from osimlite.mechanics.multibody.schema_constraints import ConstraintReader, unknown_constraint
 from osimlite.mechanics.multibody.schema_frames import Placements
-from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.schema_joints import joint_motions, unknown_joint
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.mechanics.multibody.topology import new_base, spanning_tree
@@ -70,7 +70,7 @@ def build_mechanism(
         closed by a FreeJoint or by a joint whose child is ground.
     """
     expect_model(model)
-    return _Builder(model, opensim_derivatives, rolling).mechanism()
+    return _Builder(model, opensim_derivatives, rolling).build()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +86,7 @@ class _Edge:
     motions: tuple[Motion, ...]
     coordinates: tuple[int, ...]
 
-    def mobilizer(self, *, reversed: bool) -> Mobilizer:
+    def build_mobilizer(self, *, reversed: bool) -> Mobilizer:
         return Mobilizer(
             joint=self.path,
             joint_type=self.kind,
@@ -108,19 +108,21 @@ class _Builder:
         self.bodies: dict[str, Body] = {}
         self.constraints: list[Constraint] = []
 
-    def mechanism(self) -> Mechanism:
+    def build(self) -> Mechanism:
         for component in self.tree.components:
             self._refuse(component)
         for component in self.tree.components:
             if isinstance(component, Body):
                 self.bodies[self.placements.path(component)] = component
             if isinstance(component, PhysicalFrame):
-                self.placements.frame(component)
-        edges = [self._edge(joint) for joint in self.tree.components if isinstance(joint, Joint)]
-        bodies = self._bodies(edges)
+                self.placements.resolve_frame(component)
+        edges = [
+            self._make_edge(joint) for joint in self.tree.components if isinstance(joint, Joint)
+        ]
+        bodies = self._build_bodies(edges)
         ground = self.placements.path(self.model.ground)
         index = {body.path: place for place, body in enumerate(bodies)} | {ground: GROUND}
-        self._constrain(index)
+        self._build_constraints(index)
         placed = self.placements
         for path, (base, _) in placed.found.items():
             if base not in index:
@@ -134,7 +136,7 @@ class _Builder:
         stations = {}
         for component in self.tree.components:
             if isinstance(component, Station) and not self.tree.is_internal(component):
-                base, location = placed.station(component)
+                base, location = placed.resolve_station(component)
                 stations[placed.path(component)] = StationPlacement(index[base], location)
         gravity = np.array(self.model.gravity, dtype=float)
         return Mechanism(
@@ -158,13 +160,13 @@ class _Builder:
         if holder is self.model.constraint_set:
             raise unknown_constraint(path, component.class_name)
 
-    def _edge(self, joint: Joint) -> _Edge:
+    def _make_edge(self, joint: Joint) -> _Edge:
         path = self.placements.path(joint)
-        parent, parent_frame = self.placements.frame(
-            self.placements.named(joint, "socket_parent_frame")
+        parent, parent_frame = self.placements.resolve_frame(
+            self.placements.follow_socket(joint, "socket_parent_frame")
         )
-        child, child_frame = self.placements.frame(
-            self.placements.named(joint, "socket_child_frame")
+        child, child_frame = self.placements.resolve_frame(
+            self.placements.follow_socket(joint, "socket_child_frame")
         )
         if parent == child:
             raise ModelError(
@@ -184,7 +186,7 @@ class _Builder:
             low, high = coordinate.range
             self.coordinates.append(
                 CoordinateInfo(
-                    name=_last(own_path),
+                    name=_find_last_body(own_path),
                     path=own_path,
                     joint=path,
                     motion_type=motion_type,
@@ -193,7 +195,7 @@ class _Builder:
                     range=(low, high),
                     clamped=coordinate.clamped,
                     locked=coordinate.locked,
-                    prescribed=self._prescribed(coordinate, own_path),
+                    prescribed=self._convert_prescribed_function(coordinate, own_path),
                     yielding=coordinate.is_free_to_satisfy_constraints,
                 )
             )
@@ -202,24 +204,27 @@ class _Builder:
             type(joint).__name__, path, parent, child, parent_frame, child_frame, motions, own
         )
 
-    def _prescribed(self, coordinate: Coordinate, path: str) -> Function | None:
+    def _convert_prescribed_function(self, coordinate: Coordinate, path: str) -> Function | None:
         # OpenSim leaves a prescribed coordinate without a function free. It cannot start where one
         # is locked too.
         if not coordinate.prescribed or coordinate.prescribed_function is None or coordinate.locked:
             return None
-        return numeric(
+        return convert_function(
             coordinate.prescribed_function,
             1,
             f"the prescribed_function of '{path}'",
             opensim_derivatives=self.opensim_derivatives,
         )
 
-    def _bodies(self, edges: list[_Edge]) -> list[MobileBody]:
+    def _build_bodies(self, edges: list[_Edge]) -> list[MobileBody]:
         """The bodies, each with the mobilizer that carries it; welds for the joints that close loops."""
         ground = self.placements.path(self.model.ground)
         masses = {path: body.mass for path, body in self.bodies.items()}
         joined = {path for edge in edges for path in (edge.parent, edge.child)}
-        edges = [*edges, *(self._free(path, ground) for path in self.bodies if path not in joined)]
+        edges = [
+            *edges,
+            *(self._add_free_joint(path, ground) for path in self.bodies if path not in joined),
+        ]
         while True:
             branches, loops = spanning_tree(edges, ground, masses)
             index = {ground: GROUND} | {
@@ -228,15 +233,17 @@ class _Builder:
             loose = [path for path in self.bodies if path not in index]
             if not loose:
                 break
-            edges.append(self._free(new_base(loose, edges), ground))
+            edges.append(self._add_free_joint(new_base(loose, edges), ground))
         bodies = []
         for edge, outer, backward in branches:
             carrier, mobilizer = (
                 edge.child if backward else edge.parent,
-                edge.mobilizer(reversed=backward),
+                edge.build_mobilizer(reversed=backward),
             )
             properties = mass_properties(self.bodies[outer], outer)
-            bodies.append(MobileBody(_last(outer), outer, index[carrier], properties, mobilizer))
+            bodies.append(
+                MobileBody(_find_last_body(outer), outer, index[carrier], properties, mobilizer)
+            )
         for edge in loops:
             if not edge.coordinates:
                 first = FramePlacement(index[edge.parent], edge.parent_frame)
@@ -244,21 +251,23 @@ class _Builder:
                 self.constraints.append(WeldConstraint(first, second, edge.path))
                 if self.opensim_derivatives:
                     twice = mass_properties(self.bodies[edge.child], edge.child)
-                    carried = edge.mobilizer(reversed=False)
+                    carried = edge.build_mobilizer(reversed=False)
                     path = f"{edge.child}_again{len(bodies)}"
-                    bodies.append(MobileBody(_last(path), path, index[edge.parent], twice, carried))
+                    bodies.append(
+                        MobileBody(_find_last_body(path), path, index[edge.parent], twice, carried)
+                    )
             elif edge.child == ground or edge.kind == "FreeJoint":
                 raise UnsupportedError(
                     f"the joint '{edge.path}' closes a loop through '{edge.parent}' and '{edge.child}', "
                     "which osimlite cannot compute; remove one joint of the loop"
                 )
             else:
-                self._split(edge, index, bodies)
+                self._split_child(edge, index, bodies)
         return bodies
 
-    def _free(self, body: str, ground: str) -> _Edge:
+    def _add_free_joint(self, body: str, ground: str) -> _Edge:
         """The joint that OpenSim makes for a body that nothing connects to ground."""
-        name, motions = f"free_{_last(body)}", MOTIONS["FreeJoint"]
+        name, motions = f"free_{_find_last_body(body)}", MOTIONS["FreeJoint"]
         path, first = f"{self.placements.path(self.model.joint_set)}/{name}", len(self.coordinates)
         for index, motion_type in enumerate(motion_types(motions, 6)):
             own = f"{name}_coord_{index}"
@@ -266,7 +275,7 @@ class _Builder:
         own_places, still = tuple(range(first, first + 6)), np.eye(4)
         return _Edge("FreeJoint", path, ground, body, still, still, motions, own_places)
 
-    def _split(self, edge: _Edge, index: dict[str, int], bodies: list[MobileBody]) -> None:
+    def _split_child(self, edge: _Edge, index: dict[str, int], bodies: list[MobileBody]) -> None:
         """Let the joint carry a part of its child, and weld that to the rest."""
         place, whole = index[edge.child], mass_properties(self.bodies[edge.child], edge.child)
         parts = [
@@ -275,7 +284,13 @@ class _Builder:
         ]
         path = f"{edge.child}_part{len(parts)}"
         bodies.append(
-            MobileBody(_last(path), path, index[edge.parent], whole, edge.mobilizer(reversed=False))
+            MobileBody(
+                _find_last_body(path),
+                path,
+                index[edge.parent],
+                whole,
+                edge.build_mobilizer(reversed=False),
+            )
         )
         parts.append(len(bodies) - 1)
         share = whole.share(len(parts))
@@ -291,13 +306,13 @@ class _Builder:
         )
         self.constraints.append(weld)
 
-    def _constrain(self, index: dict[str, int]) -> None:
+    def _build_constraints(self, index: dict[str, int]) -> None:
         places = {info.path: place for place, info in enumerate(self.coordinates)}
         reader = ConstraintReader(self.placements, index, places, self.opensim_derivatives)
         for component in self.tree.components:
             if not isinstance(component, schema.Constraint) or not component.isEnforced:
                 continue
-            constraint = reader.constraint(component)
+            constraint = reader.build_constraint(component)
             if isinstance(constraint, RollingConstraint) and not self.rolling:
                 continue
             self.constraints.append(constraint)
@@ -344,5 +359,5 @@ def mass_properties(body: Body, path: str) -> MassProperties:
     return MassProperties(mass, center, inertia if mass > np.finfo(float).eps else np.zeros((3, 3)))
 
 
-def _last(path: str) -> str:
+def _find_last_body(path: str) -> str:
     return path.rsplit("/", 1)[1]

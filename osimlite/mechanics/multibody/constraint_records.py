@@ -81,18 +81,18 @@ def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> C
             return _coupler(constraint, places, balls)
         case b.RollingConstraint():
             equations = _rolling(constraint, places)
-            return _between(equations, sum(item.kind != SLIP for item in equations))
+            return _record_between_bodies(equations, sum(item.kind != SLIP for item in equations))
         case b.DistanceConstraint():
             arm = _arm(places, constraint.first, constraint.second)
-            return _between([_Equation(DISTANCE, arm, arm, constraint.distance)])
+            return _record_between_bodies([_Equation(DISTANCE, arm, arm, constraint.distance)])
         case b.PointConstraint():
-            return _between(_meeting(places, constraint.first, constraint.second))
+            return _record_between_bodies(_meeting(places, constraint.first, constraint.second))
         case b.PointOnLineConstraint():
             arm = _arm(places, constraint.line, constraint.follower)
             axes = (_axis(places, constraint.line.body, axis) for axis in constraint.across())
-            return _between([_Equation(PRODUCT, axis, arm) for axis in axes])
+            return _record_between_bodies([_Equation(PRODUCT, axis, arm) for axis in axes])
         case b.WeldConstraint():
-            return _between(_weld(constraint, places))
+            return _record_between_bodies(_weld(constraint, places))
     raise UnsupportedError(
         f"'{constraint.name}' ({type(constraint).__name__}) cannot be kept up; set its isEnforced to false"
     )
@@ -135,7 +135,9 @@ def _coupler(constraint: Coupler, places: Places, balls: Balls) -> ConstraintRec
     )
 
 
-def _between(equations: Sequence[_Equation], positions: int | None = None) -> ConstraintRecord:
+def _record_between_bodies(
+    equations: Sequence[_Equation], positions: int | None = None
+) -> ConstraintRecord:
     ints: list[int] = []
     numbers: list[float] = []
     for item in equations:

@@ -26,9 +26,9 @@ from osimlite.mechanics.kernels.dynamics import (
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL, OUTCOME
 from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.kernels.points import link_work
-from osimlite.mechanics.multibody.functions import floats
-from osimlite.mechanics.multibody.kinematics import Kinematics, numbers
-from osimlite.mechanics.multibody.linear import solutions
+from osimlite.mechanics.multibody.functions import make_floats
+from osimlite.mechanics.multibody.kinematics import Kinematics, check_finite
+from osimlite.mechanics.multibody.linear import solve_with_null_space
 from osimlite.mechanics.multibody.spatial import Array
 
 if TYPE_CHECKING:
@@ -88,30 +88,30 @@ class MassCentres:
 
 def mass_matrix(state: Kinematics) -> Array:
     """M (n, n) of the kinetic energy ½ uᵀ M u."""
-    program, data = state.program, _weighed(state, np.zeros(3))
-    with numbers(data):
-        composite_rigid_body(program.model, data, floats([0.0] * len(state.q)))
+    program, data = state.program, _load_inertias(state, np.zeros(3))
+    with check_finite(data):
+        composite_rigid_body(program.model, data, make_floats([0.0] * len(state.q)))
     return program.mass_matrix(data)
 
 
 def missing_forces(state: Kinematics, udot: Array, gravity: Array) -> Array:
     """Generalized forces (n,) that give the speeds the derivatives `udot` (n,) against `gravity` (3,)."""
     program = state.program
-    model, udots = program.model, floats(udot[program.order].tolist())
-    data, missing = _weighed(state, gravity, udots), floats([0.0] * len(udot))
-    with numbers(data):
+    model, udots = program.model, make_floats(udot[program.order].tolist())
+    data, missing = _load_inertias(state, gravity, udots), make_floats([0.0] * len(udot))
+    with check_finite(data):
         generalized_forces(model, data, missing)
     return -np.array(missing)[program.freedoms]
 
 
-def _weighed(state: Kinematics, gravity: Array, udot: Floats | None = None) -> Floats:
+def _load_inertias(state: Kinematics, gravity: Array, udot: Floats | None = None) -> Floats:
     """The work vector with the inertias of the links, and the wrenches that are missing for their accelerations."""
     model, reals, data = (
         state.program.model,
         state.program.reals,
-        floats(state.vectors[0].tobytes()),
+        make_floats(state.vectors[0].tobytes()),
     )
-    with numbers(data):
+    with check_finite(data):
         for link in range(model[MODEL.LINKS]):
             acceleration = link_work(model, data, link)[LINK_WORK.ACCELERATION + 3 :]
             # In place of gravity, links are pushed upwards.
@@ -134,11 +134,11 @@ def accelerations(state: Kinematics, applied: Array) -> Array:
         SimulationError: a motion that nothing forbids moves no mass, or something is no number.
     """
     program, mechanism, size = state.program, state.mechanism, len(state.q)
-    model, data = program.model, _weighed(state, mechanism.gravity)
+    model, data = program.model, _load_inertias(state, mechanism.gravity)
     _, y, f = state.vectors
-    derivative = floats([*f[:size], *applied[program.order].tolist()])
+    derivative = make_floats([*f[:size], *applied[program.order].tolist()])
     right = at(derivative, size)
-    with numbers(data):
+    with check_finite(data):
         composite_rigid_body(model, data, right)
     matrix = program.mass_matrix(data)
     require_numbers(mechanism, matrix, np.array(right))
@@ -151,7 +151,9 @@ def accelerations(state: Kinematics, applied: Array) -> Array:
             status = constrained_dynamics(model, program.heavy, data, y, derivative, 0)
     udot: Array = np.array(right)[program.freedoms]
     if status != OUTCOME.OK or (size and not np.isfinite(udot).all()):
-        raise massless(_name_of_massless(mechanism, matrix, state.all_equations.rows))
+        raise describe_massless_motion(
+            _name_of_massless(mechanism, matrix, state.all_equations.rows)
+        )
     return udot
 
 
@@ -168,7 +170,7 @@ def require_numbers(mechanism: Mechanism, *arrays: Array) -> None:
         )
 
 
-def massless(coordinate: str) -> SimulationError:
+def describe_massless_motion(coordinate: str) -> SimulationError:
     """The error of a motion that can be as fast as it likes.
 
     Args:
@@ -182,7 +184,7 @@ def massless(coordinate: str) -> SimulationError:
 
 def _name_of_massless(mechanism: Mechanism, matrix: Array, rows: Array) -> str:
     """Name of the coordinate that moves most in the motion which moves least, of those that `rows` (m, n) allow."""
-    _, free = solutions(rows, np.zeros(len(rows)))
+    _, free = solve_with_null_space(rows, np.zeros(len(rows)))
     matrix = free.T @ matrix @ free
     scale = np.sqrt(np.where(matrix.diagonal() > 0.0, matrix.diagonal(), 1.0))
     _, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))

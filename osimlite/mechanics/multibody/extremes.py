@@ -43,7 +43,8 @@ def any_numbers(function: Callable[P, R]) -> Callable[P, R]:
                 raise
             models = [value for value in (*values, *named.values()) if isinstance(value, Model)]
             what = next(
-                (text for model in models if (text := extreme(model))), "a number of the model"
+                (text for model in models if (text := find_extreme_number(model))),
+                "a number of the model",
             )
             raise ModelError(
                 f"{what} is too large or too small to compute with ({fault}); give another"
@@ -63,13 +64,13 @@ def methods_of_any_numbers(cls: C) -> C:
     return cls
 
 
-def extreme(model: Model) -> str:
+def find_extreme_number(model: Model) -> str:
     """The number of a model that is furthest from what models have, with its place; empty if all are usual."""
     tree = model.tree()
     result = [
         (size, f"{name} of '{tree.path_of(component)}', {number:g},")
         for component in tree.components
-        for name, number in _numbers(component)
+        for name, number in _list_numbers(component)
         if (size := _size(number))
     ]
     return max(result)[1] if result else ""
@@ -83,7 +84,7 @@ def _size(number: float) -> float:
     return size / _MOST if size > _MOST else _LEAST / size if 0.0 < size < _LEAST else 0.0
 
 
-def _numbers(component: Component) -> Iterator[tuple[str, float]]:
+def _list_numbers(component: Component) -> Iterator[tuple[str, float]]:
     """Every number of a component, and of what it holds that is no component."""
     for name, info in type(component).model_fields.items():
         held: Any = getattr(component, name)

@@ -15,10 +15,10 @@ def function_table(function: f.Function, where: str) -> list[float]:
     Raises:
         UnsupportedError: there is none.
     """
-    return _known(f.table_at_knots(function), function, where)
+    return _has_table(f.table_at_knots(function), function, where)
 
 
-def _known(table: list[float], function: f.Function, where: str) -> list[float]:
+def _has_table(table: list[float], function: f.Function, where: str) -> list[float]:
     if not table:
         name = type(function).__name__
         raise UnsupportedError(
@@ -53,4 +53,4 @@ def _table_of_one(function: f.Function, where: str) -> list[float]:
             coefficients[power] += coefficient
         kind, *rest = f.Polynomial(tuple(reversed(coefficients))).table
         return [PIECES_OF_OPENSIM if function.opensim_derivatives else kind, *rest]
-    return _known([*function.table], function, where)
+    return _has_table([*function.table], function, where)

@@ -94,18 +94,18 @@ class Multivariate(Function):
         size = len(arguments)
         places: Any = range(size)
         given, table, gradient = (
-            floats(arguments),
-            floats([*arguments, *self.table]),
-            floats([0.0] * size),
+            make_floats(arguments),
+            make_floats([*arguments, *self.table]),
+            make_floats([0.0] * size),
         )
 
         def at_rates(*moving: int) -> tuple[float, float]:
             """Value, and second derivative while some arguments change by 1."""
-            rates = floats([float(k in moving) for k in places])
+            rates = make_floats([float(k in moving) for k in places])
             value, _, curvature = several_at(size, places, table, given, rates, gradient)
             return value, curvature
 
-        value, hessian = at_rates()[0], zeros(size)[2]
+        value, hessian = at_rates()[0], make_zero_derivatives(size)[2]
         for k in places:
             hessian[k][k] = at_rates(k)[1]
         for one, two in combinations(places, 2):
@@ -114,12 +114,12 @@ class Multivariate(Function):
         return value, list(gradient), hessian
 
 
-def floats(numbers: Arguments | bytes) -> Any:
+def make_floats(numbers: Arguments | bytes) -> Any:
     """Numbers in a row, for kernels that run as Python: they are read one by one sooner than those of an array."""
     return memoryview(array("d", numbers))
 
 
-def zeros(size: int, value: float = 0.0) -> Evaluated:
+def make_zero_derivatives(size: int, value: float = 0.0) -> Evaluated:
     """What a function of `size` numbers evaluates to that does not change with them."""
     return value, [0.0] * size, [[0.0] * size for _ in range(size)]
 
@@ -135,12 +135,12 @@ class Constant(Function):
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
         """The value, and zeros for the derivatives."""
-        return zeros(len(arguments), self.value)
+        return make_zero_derivatives(len(arguments), self.value)
 
     @property
     def table(self) -> Sequence[float]:
         """One piece."""
-        return _pieces((0.0,), ((self.value,),))
+        return _tabulate_pieces((0.0,), ((self.value,),))
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ class Linear(Univariate):
     @property
     def table(self) -> Sequence[float]:
         """One piece."""
-        return _pieces((0.0,), ((self.start, self.rate),))
+        return _tabulate_pieces((0.0,), ((self.start, self.rate),))
 
     @property
     def slope(self) -> float | None:
@@ -173,7 +173,7 @@ class Polynomial(Univariate):
     @property
     def table(self) -> Sequence[float]:
         """One piece."""
-        return _pieces((0.0,), (self.coefficients[::-1],))
+        return _tabulate_pieces((0.0,), (self.coefficients[::-1],))
 
 
 @dataclass(frozen=True)
@@ -309,7 +309,7 @@ class PiecewiseLinear(Univariate):
         """The lines, without the last point; where two x are equal the value jumps to the later y."""
         ends = zip(pairwise(self.x), pairwise(self.y), strict=True)
         lines = [(x0, y0, (y1 - y0) / (x1 - x0)) for (x0, x1), (y0, y1) in ends if x1 > x0]
-        return _pieces([x0 for x0, _, _ in lines], [(y0, slope) for _, y0, slope in lines])
+        return _tabulate_pieces([x0 for x0, _, _ in lines], [(y0, slope) for _, y0, slope in lines])
 
 
 @dataclass(frozen=True)
@@ -322,7 +322,7 @@ class PiecewiseConstant(Univariate):
     @property
     def table(self) -> Sequence[float]:
         """The steps."""
-        return _pieces(self.x, [(y,) for y in self.y])
+        return _tabulate_pieces(self.x, [(y,) for y in self.y])
 
 
 class SimmSpline(Univariate):
@@ -366,10 +366,10 @@ class SimmSpline(Univariate):
         first, *_, last = self._pieces
         # At the last point it still is the piece before it.
         knots = self.x[0], *self.x[:-1], math.nextafter(self.x[-1], math.inf)
-        return _pieces(knots, [first[:2], *self._pieces[:-1], last[:2]])
+        return _tabulate_pieces(knots, [first[:2], *self._pieces[:-1], last[:2]])
 
 
-def _pieces(knots: Sequence[float], pieces: Sequence[Sequence[float]]) -> list[float]:
+def _tabulate_pieces(knots: Sequence[float], pieces: Sequence[Sequence[float]]) -> list[float]:
     """The table of the polynomials after each knot, from the constant up; the first one goes on before its knot."""
     width = max(map(len, pieces))
     rows = [(*piece, *[0.0] * (width - len(piece))) for piece in pieces]
@@ -389,12 +389,12 @@ def table_at_knots(function: Function) -> list[float]:
         # That of a spline has the first knot twice.
         first = 5 if isinstance(inner, SimmSpline) else 4
         for k in range(1, len(inner.x) - 1):
-            if _interval(inner.x, inner.x[k]) < k:
+            if _find_interval(inner.x, inner.x[k]) < k:
                 table[first + k] = math.nextafter(inner.x[k], math.inf)
     return table
 
 
-def _interval(knots: Sequence[float], x: float) -> int:
+def _find_interval(knots: Sequence[float], x: float) -> int:
     """The index of the first point of the piece that OpenSim takes at a knot: a search by halves meets it first."""
     if x <= knots[0] or x >= knots[-1]:
         return 0 if x <= knots[0] else len(knots) - 2

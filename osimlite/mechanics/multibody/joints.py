@@ -28,10 +28,15 @@ from osimlite.mechanics.multibody.motions import (
     SimbodyAccelerationError,
     SphericalMotion,
     place,
-    rotate,
+    rotate_about,
     translate,
 )
-from osimlite.mechanics.multibody.spatial import Array, inverse, rotation_about, transform
+from osimlite.mechanics.multibody.spatial import (
+    Array,
+    invert_transform,
+    make_transform,
+    rotation_about,
+)
 from osimlite.schema.joints import (
     BallJoint,
     FreeJoint,
@@ -46,18 +51,18 @@ from osimlite.schema.joints import (
 )
 
 
-def _plain(kind: type[Joint]) -> tuple[Motion, ...]:
+def _make_plain_motions(kind: type[Joint]) -> tuple[Motion, ...]:
     """The motions of a joint type by what its schema says: shifts, then turns, of a ball all at once."""
     axes, words = {"x": X, "y": Y, "z": Z}, [*enumerate((kind.moves or "").split())]
     slides = [translate(axes[word[1]], own) for own, word in words if word[0] == "t"]
-    turns = [rotate(axes[word[1]], own) for own, word in words if word[0] == "r"]
+    turns = [rotate_about(axes[word[1]], own) for own, word in words if word[0] == "r"]
     if kind.speeds_are_rates:
         return (*slides, *turns)
     return (*slides, SphericalMotion(tuple(own for turn in turns for own in turn.coordinates)))
 
 
 MOTIONS: dict[str, tuple[Motion, ...]] = {
-    kind.__name__: _plain(kind)
+    kind.__name__: _make_plain_motions(kind)
     for kind in (
         WeldJoint,
         PinJoint,
@@ -72,12 +77,12 @@ MOTIONS: dict[str, tuple[Motion, ...]] = {
 """X_FM of the joint types that have no properties of their own."""
 
 
-def ellipsoid(radii: ArrayLike) -> tuple[Motion, ...]:
+def make_ellipsoid_motions(radii: ArrayLike) -> tuple[Motion, ...]:
     """Motions of an EllipsoidJoint: rx, ry, rz on the ellipsoid with `radii` (m) along F."""
     return (SphericalMotion((0, 1, 2), np.array(radii, dtype=float)),)
 
 
-def scapulothoracic(
+def make_scapulothoracic_motions(
     radii: ArrayLike, winging_origin: ArrayLike, winging_direction: float
 ) -> tuple[Motion, ...]:
     """Motions of a ScapulothoracicJoint.
@@ -95,7 +100,7 @@ def scapulothoracic(
         SphericalMotion((0, 1, 2), np.asarray(radii, dtype=float)[[1, 0, 2]]),
         place(quarter.T),
         place(None, (x, y, 0.0)),
-        rotate(axis, 3),
+        rotate_about(axis, 3),
         place(None, (-x, -y, 0.0)),
     )
 
@@ -127,7 +132,7 @@ class TransformAxis(NamedTuple):
     function: Function
 
 
-def custom(
+def make_custom_motions(
     rotations: Sequence[TransformAxis],
     translations: Sequence[TransformAxis],
     *,
@@ -141,8 +146,8 @@ def custom(
     Raises:
         ModelError: an axis has no direction.
     """
-    slides = tuple(_along("translate", axis) for axis in translations)
-    turns = tuple(_along("rotate", axis) for axis in rotations)
+    slides = tuple(_make_translation("translate", axis) for axis in translations)
+    turns = tuple(_make_translation("rotate", axis) for axis in rotations)
     return (
         (*slides, SimbodyAccelerationError(turns), *turns)
         if opensim_derivatives
@@ -150,7 +155,7 @@ def custom(
     )
 
 
-def _along(kind: Literal["rotate", "translate"], axis: TransformAxis) -> AxisMotion:
+def _make_translation(kind: Literal["rotate", "translate"], axis: TransformAxis) -> AxisMotion:
     direction = np.array(axis.axis, dtype=float)
     length = float(np.linalg.norm(direction))
     if not 0.0 < length < np.inf:
@@ -190,9 +195,9 @@ class Mobilizer:
     motions: tuple[Motion, ...]  # factors of X_FM
     coordinates: tuple[int, ...] = ()  # index in the mechanism of each of the joint's coordinates
     # X_PF (4, 4), the joint's parent frame in its body (or ground)
-    parent_frame: Array = field(default_factory=transform)
+    parent_frame: Array = field(default_factory=make_transform)
     # X_CM (4, 4), the joint's child frame in its body (or ground)
-    child_frame: Array = field(default_factory=transform)
+    child_frame: Array = field(default_factory=make_transform)
     reversed: bool = False
 
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
@@ -201,14 +206,18 @@ class Mobilizer:
         The numbers in ``coordinates`` of each motion are places among `coordinates` of this
         mobilizer. This is all that a program with one-axis joints needs to know.
         """
-        motions = (Fixed(self.parent_frame), *self.motions, Fixed(inverse(self.child_frame)))
+        motions = (
+            Fixed(self.parent_frame),
+            *self.motions,
+            Fixed(invert_transform(self.child_frame)),
+        )
         chain = [part for motion in motions for part in motion.elementary()]
         return tuple(part.inverse() for part in reversed(chain)) if self.reversed else tuple(chain)
 
     def rate_matrix(self, q: Array) -> Array:
         """N (k, k) with qdot = N u; SimulationError, which names the joint, where N is singular."""
         matrix = np.eye(len(q))
-        with _named(self.joint):
+        with _name_joint_in_errors(self.joint):
             for motion in self.motions:
                 part = motion.rates(q)
                 if part is not None:
@@ -218,7 +227,7 @@ class Mobilizer:
     def rate_bias(self, q: Array, u: Array) -> Array:
         """Ndot u (k,), so that qddot = N udot + Ndot u."""
         bias = np.zeros(len(q))
-        with _named(self.joint):
+        with _name_joint_in_errors(self.joint):
             for motion in self.motions:
                 part = motion.rate_bias(q, u)
                 if part is not None:
@@ -241,7 +250,7 @@ class Mobilizer:
 
 
 @contextmanager
-def _named(joint: str) -> Iterator[None]:
+def _name_joint_in_errors(joint: str) -> Iterator[None]:
     """Puts the joint's path in front of what a motion has to complain about."""
     try:
         yield

@@ -20,7 +20,13 @@ from osimlite.mechanics.kernels.motion import move, place
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.multibody.constraints import Constraint, Equations
 from osimlite.mechanics.multibody.program import Program
-from osimlite.mechanics.multibody.spatial import Array, cross, skew, skews, transform
+from osimlite.mechanics.multibody.spatial import (
+    Array,
+    cross,
+    make_transform,
+    skew_matrices,
+    skew_matrix,
+)
 
 if TYPE_CHECKING:
     from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -30,7 +36,7 @@ Vectors = tuple[Floats, Floats, Floats]
 
 
 @contextmanager
-def numbers(data: Floats) -> Iterator[None]:
+def check_finite(data: Floats) -> Iterator[None]:
     """Whatever Python cannot compute, as an angle that is infinite, leaves no numbers in a work vector."""
     try:
         yield
@@ -72,14 +78,14 @@ class Kinematics:
     def vectors(self) -> Vectors:
         """Work vector, state, and rates, when the links have been moved; no numbers where they cannot be."""
         model, reals, (data, y, f) = self.program.model, self.program.reals, self._unmoved
-        with numbers(data):
+        with check_finite(data):
             place(model, reals, data, y, f)
             move(model, reals, data, y, f)
         return data, y, f
 
     def equations(self, constraint: Constraint) -> Equations:
         """The equations of a constraint."""
-        program = self.program.keeping(constraint)
+        program = self.program.with_constraint(constraint)
         if program is self.program:
             errors, rows, rates, drifts = self.all_equations
             first, end, end_position = program.equations_of(constraint)
@@ -104,7 +110,7 @@ class Kinematics:
             ball.rate_matrix(self.q[list(ball.coordinates)])
         data, y, f = self.vectors if balls or program.on_bodies else self._unmoved
         if program.constraints:
-            with numbers(data):
+            with check_finite(data):
                 bind(program.model, program.reals, data, y, f)
         return program.equations(data)
 
@@ -131,7 +137,10 @@ class Kinematics:
             .T
         )
         result = np.empty((len(program.links), 6, size))
-        result[:, :3], result[:, 3:] = columns[:3], columns[3:] - skews(self._arms) @ columns[:3]
+        result[:, :3], result[:, 3:] = (
+            columns[:3],
+            columns[3:] - skew_matrices(self._arms) @ columns[:3],
+        )
         result.swapaxes(1, 2)[program.still] = 0.0
         return result
 
@@ -170,7 +179,7 @@ class Kinematics:
 
     def transform(self, body: int) -> Array:
         """The body in ground (4, 4)."""
-        return transform(self.rotations[body], self.origins[body])
+        return make_transform(self.rotations[body], self.origins[body])
 
     def point(self, body: int, station: Array) -> Array:
         """Position in ground (3,) of a `station` (3,) given in the body's frame."""
@@ -190,7 +199,7 @@ class Kinematics:
     def point_jacobian(self, body: int, station: Array) -> Array:
         """Matrix (6, n) from the speeds to the body's angular velocity and the velocity of its `station`."""
         matrix: Array = self.jacobians[body].copy()
-        matrix[3:] -= skew(self.rotations[body] @ station) @ matrix[:3]
+        matrix[3:] -= skew_matrix(self.rotations[body] @ station) @ matrix[:3]
         return matrix
 
     def accelerations(self, udot: Array) -> Array:

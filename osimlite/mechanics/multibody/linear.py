@@ -10,14 +10,14 @@ from osimlite.mechanics.kernels.linear_algebra import REDUNDANT, ROUNDING
 from osimlite.mechanics.multibody.spatial import Array
 
 
-def stacked(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+def stack_equations(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
     """G (m, n) and b (m,) of several sets of equations in one."""
     return np.concatenate([rows for rows, _ in equations]), np.concatenate(
         [values for _, values in equations]
     )
 
 
-def solutions(rows: Array, values: Array) -> tuple[Array, Array]:
+def solve_with_null_space(rows: Array, values: Array) -> tuple[Array, Array]:
     """The shortest solution (n,) of `rows` (m, n) x = `values` (m,), and the directions (n, f) left free.
 
     Where equations contradict each other, the solution has the least squares of their errors, each
@@ -40,7 +40,7 @@ def solutions(rows: Array, values: Array) -> tuple[Array, Array]:
     return right[:rank].T @ (left[:, :rank].T @ values / strengths[:rank]), right[rank:].T
 
 
-def shortest(rows: Array, values: Array, tolerance: float) -> Array:
+def solve_least_norm(rows: Array, values: Array, tolerance: float) -> Array:
     """The shortest x (n,) for which `rows` (m, n) x comes nearest to `values` (m,).
 
     What the rows say in directions weaker than `tolerance` times the strongest counts for nothing.

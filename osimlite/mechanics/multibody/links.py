@@ -38,7 +38,13 @@ from osimlite.mechanics.multibody.motions import (
     SphericalMotion,
 )
 from osimlite.mechanics.multibody.parts import GROUND
-from osimlite.mechanics.multibody.spatial import Array, inverse, rotation_about, skew, transform
+from osimlite.mechanics.multibody.spatial import (
+    Array,
+    invert_transform,
+    make_transform,
+    rotation_about,
+    skew_matrix,
+)
 
 if TYPE_CHECKING:
     from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -145,7 +151,7 @@ def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False)
     free = set(free)
     for body in mechanism.bodies:
         parent, frame = (GROUND, np.eye(4)) if body.parent == GROUND else placements[body.parent]
-        operations, rest = _operations(mechanism, body.mobilizer, frame, free)
+        operations, rest = _list_operations(mechanism, body.mobilizer, frame, free)
         if operations or apart:
             links.append(Link(parent, operations))
             parent = len(links) - 1
@@ -162,7 +168,7 @@ def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False)
     return Tree(links, ends, tuple(order), Places(mechanism, freedoms, placements))
 
 
-def _operations(
+def _list_operations(
     mechanism: Mechanism, mobilizer: Mobilizer, frame: Array, free: set[int]
 ) -> tuple[list[Operation], Array]:
     """The motions of a joint from a frame of the carrying link on, and the carried body after the last of them."""
@@ -170,7 +176,7 @@ def _operations(
     chain: list[Motion] = [
         Fixed(mobilizer.parent_frame),
         *mobilizer.motions,
-        Fixed(inverse(mobilizer.child_frame)),
+        Fixed(invert_transform(mobilizer.child_frame)),
     ]
     if mobilizer.reversed:
         chain.reverse()
@@ -181,7 +187,9 @@ def _operations(
         places = [own[number] for number in motion.coordinates]
         still = free.isdisjoint(places)
         if isinstance(motion, Fixed):
-            frame = frame @ (inverse(motion.matrix) if mobilizer.reversed else motion.matrix)
+            frame = frame @ (
+                invert_transform(motion.matrix) if mobilizer.reversed else motion.matrix
+            )
         elif isinstance(motion, SimbodyAccelerationError):
             if motion.elementary() and not free.isdisjoint(own):
                 sign = -1 if mobilizer.reversed else 1
@@ -196,15 +204,15 @@ def _operations(
                 mechanism.coordinates[place].default_value for place in places
             ]
             matrix = motion.placed(q)
-            frame = frame @ (inverse(matrix) if mobilizer.reversed else matrix)
+            frame = frame @ (invert_transform(matrix) if mobilizer.reversed else matrix)
         elif isinstance(motion, AxisMotion):
             axis = -motion.axis if mobilizer.reversed else motion.axis
             function = None if motion.function == IDENTITY else motion.function
             if motion.kind == "rotate":
-                turned = transform(_to_axis(axis))
+                turned = make_transform(_to_axis(axis))
                 result.append(Operation(MOTION.TURN, frame @ turned, places, function))
                 of_motion[id(motion)] = result[-1]
-                frame = inverse(turned)
+                frame = invert_transform(turned)
             else:
                 result.append(Operation(MOTION.SLIDE, frame, places, function, axis=axis))
                 frame = np.eye(4)
@@ -242,18 +250,20 @@ def _load(link: Link, properties: Any, frame: Array) -> None:
     link.mass += properties.mass
     link.first = link.first + properties.mass * center
     link.second = (
-        link.second + rotation @ properties.inertia @ rotation.T - properties.mass * _square(center)
+        link.second
+        + rotation @ properties.inertia @ rotation.T
+        - properties.mass * _square_of_skew(center)
     )
 
 
-def _square(v: Array) -> Array:
+def _square_of_skew(v: Array) -> Array:
     """[v] [v], the inertia of a unit mass at v but for the sign."""
-    return skew(v) @ skew(v)
+    return skew_matrix(v) @ skew_matrix(v)
 
 
-def _inertia(link: Link) -> list[float]:
+def _move_inertia(link: Link) -> list[float]:
     center = link.first / link.mass if link.mass != 0.0 else link.first
-    i = link.second + link.mass * _square(center)
+    i = link.second + link.mass * _square_of_skew(center)
     return [link.mass, *center.tolist(), i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
 
 
@@ -279,7 +289,7 @@ class LinkPacker:
         """
         ints, size = self.ints, len(self.order)
         for link in self.links:
-            self.numbers += _inertia(link)
+            self.numbers += _move_inertia(link)
         ints[MODEL.FIXED_AT] = len(self.numbers)
         for operation in self.operations:
             before = operation.before
@@ -289,20 +299,23 @@ class LinkPacker:
                 *operation.axis.tolist(),
             ]
         ints[MODEL.LINKS], ints[MODEL.DOFS] = len(self.links), size
-        ints[MODEL.WORK_LINK] = self.room(LINK_WORK.SIZE * len(self.links))
-        ints[MODEL.WORK_OPERATION] = self.room(OPERATION_WORK.SIZE * len(self.operations))
-        ints[MODEL.WORK_COLUMN], ints[MODEL.WORK_PIVOT] = self.room(6 * size), self.room(size)
+        ints[MODEL.WORK_LINK] = self.reserve_work(LINK_WORK.SIZE * len(self.links))
+        ints[MODEL.WORK_OPERATION] = self.reserve_work(OPERATION_WORK.SIZE * len(self.operations))
+        ints[MODEL.WORK_COLUMN], ints[MODEL.WORK_PIVOT] = (
+            self.reserve_work(6 * size),
+            self.reserve_work(size),
+        )
         above = self.link_records()
         self.freedom_records(above)
         self.operation_records()
         self.constraint_records(kept, locks)
 
-    def room(self, count: int) -> int:
+    def reserve_work(self, count: int) -> int:
         """Place of some more numbers in the work vector."""
         self.work += count
         return self.work - count
 
-    def law(self, name: str) -> int:
+    def require_law(self, name: str) -> int:
         """Number of a law, which must then be there."""
         self.laws.append(name)
         return LAW_NUMBERS[name]
@@ -334,7 +347,9 @@ class LinkPacker:
         depths: list[int] = []
         for freedom in above:
             depths.append(depths[freedom] + 1 if freedom >= 0 else 0)
-            self.ints += DOF.record(ABOVE=freedom, ROW=self.room(depths[-1] + 1), DEPTH=depths[-1])
+            self.ints += DOF.record(
+                ABOVE=freedom, ROW=self.reserve_work(depths[-1] + 1), DEPTH=depths[-1]
+            )
             self.entries += depths[-1] + 1
         self.ints[MODEL.SUMMED_AT] = len(self.ints)
         summed = [number for number in range(len(above)) if number not in self.simple_freedoms]
@@ -365,8 +380,8 @@ class LinkPacker:
             freedoms = [self.places.freedom(place) for place in item.arguments]
             looked_at: list[int] = []
             if item.kind == MOTION.ACCELERATION_ERROR:
-                law = self.law("place_drift")
-                self.law("move_drift")
+                law = self.require_law("place_drift")
+                self.require_law("move_drift")
                 sign, *watched = item.looked_at
                 looked_at = [
                     sign,
@@ -375,8 +390,8 @@ class LinkPacker:
                 ]
                 looked_at += [-1 if turn is None else numbers[id(turn)] for turn in item.turns]
             elif item.kind in (MOTION.BALL, MOTION.BALL_BACK):
-                law = self.law("place_ball")
-                self.law("move_ball")
+                law = self.require_law("place_ball")
+                self.require_law("move_ball")
                 self.numbers += item.radii.tolist()
             elif item.function is None:
                 freedom = freedoms[0]
@@ -386,9 +401,9 @@ class LinkPacker:
                 table = function_table(
                     item.function, f"the function of an axis of the joint '{infos[0].joint}'"
                 )
-                law = self.law(LAWS_OF_FUNCTIONS.get(int(table[0]), "amount_by_one"))
+                law = self.require_law(LAWS_OF_FUNCTIONS.get(int(table[0]), "amount_by_one"))
                 self.numbers += [*(info.default_value for info in infos), *table]
-                gradient = self.room(len(freedoms))
+                gradient = self.reserve_work(len(freedoms))
             arguments = len(self.ints)
             self.ints += [*freedoms, *looked_at]
             if item.kind in (MOTION.BALL, MOTION.BALL_BACK):
@@ -420,11 +435,11 @@ class LinkPacker:
             records.append(len(self.ints))
             end, end_position = equations + constraint.equations, equations + constraint.positions
             ints = [
-                x + self.room(constraint.room) if k == constraint.room_at else x
+                x + self.reserve_work(constraint.room) if k == constraint.room_at else x
                 for k, x in enumerate(constraint.ints)
             ]
             self.ints += CONSTRAINT.record(
-                LAW=self.law(constraint.law),
+                LAW=self.require_law(constraint.law),
                 NUMBERS=len(self.numbers),
                 FIRST_EQUATION=equations,
                 END_EQUATION=end,
@@ -436,10 +451,10 @@ class LinkPacker:
         record_at, ball_at = len(self.ints), len(self.ints) + len(records)
         self.ints += [*records, *self.balls.values()]
         self.ints[start : start + CONSTRAINED.SIZE] = CONSTRAINED.record(
-            DYNAMICS=self.law("constrained_dynamics"),
-            PROJECT=self.law("project"),
-            FACTORISE=self.law("factorise_law"),
-            MINIMUM_NORM=self.law("minimum_norm_law"),
+            DYNAMICS=self.require_law("constrained_dynamics"),
+            PROJECT=self.require_law("project"),
+            FACTORISE=self.require_law("factorise_law"),
+            MINIMUM_NORM=self.require_law("minimum_norm_law"),
             CONSTRAINTS=len(constraints),
             CONSTRAINT_AT=record_at,
             BALLS=len(self.balls),
@@ -449,7 +464,7 @@ class LinkPacker:
             LOCKS=locks,
             ENTRIES=self.entries,
             **{
-                name: self.room(count)
+                name: self.reserve_work(count)
                 for name, count in room_for(equations, size, self.entries).items()
             },
         )

@@ -21,7 +21,7 @@ from osimlite.base.records import dataclass, field, replace
 from osimlite.base.text import did_you_mean
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody import dynamics
-from osimlite.mechanics.multibody.assembly import assembled, projected
+from osimlite.mechanics.multibody.assembly import assemble_pose, project_speeds
 from osimlite.mechanics.multibody.constraints import Constraint, Lock, Prescribed
 from osimlite.mechanics.multibody.dynamics import MassCentres, Wrench
 from osimlite.mechanics.multibody.extremes import methods_of_any_numbers
@@ -157,7 +157,7 @@ class Mechanism:
         values = self.values(q)
         if all(isinstance(item, Lock) for item in self.constraints):
             return values
-        return assembled(self, values, time, kept)
+        return assemble_pose(self, values, time, kept)
 
     def project_speeds(
         self, q: Values, u: Values, time: float = 0.0, *, kept: Collection[int] = ()
@@ -170,7 +170,7 @@ class Mechanism:
         Raises:
             SimulationError: the constraints do not allow the speeds that are kept.
         """
-        return projected(self.at(q, self.speeds(u), time), kept)
+        return project_speeds(self.at(q, self.speeds(u), time), kept)
 
     def values(self, q: Values) -> Array:
         """Coordinate values as an array (n,)."""
@@ -406,14 +406,14 @@ class Mechanism:
 
     def _station(self, frame: str, station: ArrayLike) -> tuple[int, Array]:
         body, placed = self.placement(frame)
-        point: Array = placed[:3, :3] @ _vector(station, "station") + placed[:3, 3]
+        point: Array = placed[:3, :3] @ _make_vector(station, "station") + placed[:3, 3]
         return body, point
 
     def _applied(self, state: Kinematics, forces: Values, wrenches: Mapping[str, Wrench]) -> Array:
         total = self._array(forces, "force")
         for name, (force, torque) in wrenches.items():
             body, placed = self.placement(name)
-            load = np.concatenate((_vector(torque, "torque"), _vector(force, "force")))
+            load = np.concatenate((_make_vector(torque, "torque"), _make_vector(force, "force")))
             total = total + load @ state.point_jacobian(body, placed[:3, 3])
         return total
 
@@ -435,7 +435,7 @@ class Mechanism:
         return result
 
 
-def _vector(values: ArrayLike, what: str) -> Array:
+def _make_vector(values: ArrayLike, what: str) -> Array:
     result = np.asarray(values, dtype=float)
     if result.shape != (3,):
         raise ModelError(f"a {what} has 3 numbers; got {_sizes(result)}")

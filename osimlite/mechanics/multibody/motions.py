@@ -25,14 +25,14 @@ from osimlite.mechanics.multibody.functions import (
     Constant,
     Evaluated,
     Function,
-    zeros,
+    make_zero_derivatives,
 )
 from osimlite.mechanics.multibody.spatial import (
     Array,
+    make_transform,
     rotation_about,
-    transform,
 )
-from osimlite.mechanics.multibody.spatial import inverse as inverse_transform
+from osimlite.mechanics.multibody.spatial import invert_transform as inverse_transform
 
 
 class Motion(ABC):
@@ -99,8 +99,8 @@ class AxisMotion(Motion):
         """The outgoing frame turned about or moved along the axis."""
         amount = self.amount(q)
         if self.kind == "rotate":
-            return transform(rotation_about(self.axis, amount))
-        return transform(None, amount * self.axis)
+            return make_transform(rotation_about(self.axis, amount))
+        return make_transform(None, amount * self.axis)
 
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
         """Itself."""
@@ -151,7 +151,7 @@ class AccelerationErrorAngle(Function):
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
         """Zero and zeros: what it accelerates by is no derivative of these."""
-        return zeros(len(arguments))
+        return make_zero_derivatives(len(arguments))
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +231,7 @@ class EllipsoidPoint(Function):
         )
 
 
-def rotate(axis: Sequence[float], coordinate: int) -> AxisMotion:
+def rotate_about(axis: Sequence[float], coordinate: int) -> AxisMotion:
     """Rotation about a unit `axis` by a coordinate."""
     return AxisMotion("rotate", np.array(axis), (coordinate,))
 
@@ -243,4 +243,4 @@ def translate(axis: Sequence[float], coordinate: int) -> AxisMotion:
 
 def place(rotation: Array | None = None, translation: Sequence[float] | None = None) -> Fixed:
     """A fixed rotation and translation."""
-    return Fixed(transform(rotation, translation))
+    return Fixed(make_transform(rotation, translation))

@@ -18,7 +18,7 @@ from osimlite.mechanics.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, GRAV
 from osimlite.mechanics.kernels.pointers import Floats, Ints, address
 from osimlite.mechanics.kernels.table import LAW_NUMBERS, own_function
 from osimlite.mechanics.multibody.constraints import Constraint, Equations
-from osimlite.mechanics.multibody.functions import floats
+from osimlite.mechanics.multibody.functions import make_floats
 from osimlite.mechanics.multibody.links import LinkPacker, Tree
 from osimlite.mechanics.multibody.parts import GROUND
 from osimlite.mechanics.multibody.spatial import Array
@@ -58,7 +58,7 @@ class Program:
             ints[MODEL.LAWS + LAW_NUMBERS[name]] = address(own_function(name))
         integers: Any = memoryview(array("q", ints))
         self.model: Ints = integers
-        self.reals, self.heavy = floats(packer.numbers), floats(packer.numbers)
+        self.reals, self.heavy = make_floats(packer.numbers), make_floats(packer.numbers)
         for k in range(GRAVITY_AT, GRAVITY_AT + 3):
             self.reals[k] = 0.0
         self.order = list(order)
@@ -73,7 +73,7 @@ class Program:
         self._kept = [*constraints]
         self._others: dict[int, Program] = {}
 
-    def keeping(self, constraint: Constraint) -> Program:
+    def with_constraint(self, constraint: Constraint) -> Program:
         """This, if the constraint is one of its own, or the program that has it alone."""
         if id(constraint) in self.constraints:
             return self
@@ -136,7 +136,7 @@ class Program:
         """A work vector for a state, the state, and its rates, as they are but for balls."""
         values, speeds = q[self.order].tolist(), u[self.order].tolist()
         return (
-            floats(bytes(8 * self.model[MODEL.WORK_SIZE])),
-            floats([*values, *speeds]),
-            floats([*speeds, *speeds]),
+            make_floats(bytes(8 * self.model[MODEL.WORK_SIZE])),
+            make_floats([*values, *speeds]),
+            make_floats([*speeds, *speeds]),
         )

@@ -14,7 +14,7 @@ from osimlite.mechanics.multibody.constraints import Constraint, Coupler
 from osimlite.mechanics.multibody.functions import Scaled
 from osimlite.mechanics.multibody.parts import FramePlacement, StationPlacement
 from osimlite.mechanics.multibody.schema_frames import Placements
-from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema import constraint_types as schema
 from osimlite.schema.base import Component
@@ -30,7 +30,7 @@ class ConstraintReader:
     coordinates: Mapping[str, int]  # index in the mechanism of every coordinate, by absolute path
     opensim_derivatives: bool  # see `build_mechanism`
 
-    def constraint(self, constraint: SchemaConstraint) -> Constraint:
+    def build_constraint(self, constraint: SchemaConstraint) -> Constraint:
         """The equations of an enforced constraint.
 
         Raises: ModelError: it names what does not exist, or its function, a direction or a distance
@@ -42,21 +42,23 @@ class ConstraintReader:
             raise unknown_constraint(path, type(constraint).__name__)
         return make(self, constraint, path)
 
-    def _base(self, owner: Component, socket: str) -> int:
-        return self.bodies[self.placements.frame(self.placements.named(owner, socket))[0]]
+    def _find_base(self, owner: Component, socket: str) -> int:
+        return self.bodies[
+            self.placements.resolve_frame(self.placements.follow_socket(owner, socket))[0]
+        ]
 
-    def _station(self, owner: Component, socket: str, location: str) -> StationPlacement:
+    def _find_station(self, owner: Component, socket: str, location: str) -> StationPlacement:
         # OpenSim takes the location in the body itself, even where the socket names a frame that is
         # off the body's.
         return StationPlacement(
-            self._base(owner, socket), np.array(getattr(owner, location), dtype=float)
+            self._find_base(owner, socket), np.array(getattr(owner, location), dtype=float)
         )
 
-    def _frame(self, owner: Component, socket: str) -> FramePlacement:
-        base, matrix = self.placements.frame(self.placements.named(owner, socket))
+    def _find_frame(self, owner: Component, socket: str) -> FramePlacement:
+        base, matrix = self.placements.resolve_frame(self.placements.follow_socket(owner, socket))
         return FramePlacement(self.bodies[base], matrix)
 
-    def _coordinate(self, owner: Component, field: str, value: str | Component) -> int:
+    def _find_coordinate(self, owner: Component, field: str, value: str | Component) -> int:
         path = self.placements.path(self.placements.tree.target(owner, field, value))
         if path not in self.coordinates:
             # Of a coordinate that stands several times in a joint, only the first moves something.
@@ -66,66 +68,74 @@ class ConstraintReader:
             )
         return self.coordinates[path]
 
-    def coupler(self, item: schema.CoordinateCouplerConstraint, path: str) -> Constraint:
+    def build_coupler(self, item: schema.CoordinateCouplerConstraint, path: str) -> Constraint:
         """One coordinate as a function of others."""
         names = item.independent_coordinate_names
-        function = numeric(
+        function = convert_function(
             item.coupled_coordinates_function,
             len(names),
             f"the function of '{path}'",
             opensim_derivatives=self.opensim_derivatives,
         )
         return Coupler(
-            self._coordinate(item, "dependent_coordinate_name", item.dependent_coordinate_name),
-            tuple(self._coordinate(item, "independent_coordinate_names", name) for name in names),
+            self._find_coordinate(
+                item, "dependent_coordinate_name", item.dependent_coordinate_name
+            ),
+            tuple(
+                self._find_coordinate(item, "independent_coordinate_names", name) for name in names
+            ),
             function if item.scale_factor == 1.0 else Scaled(item.scale_factor, function),
             path,
         )
 
-    def point(self, item: schema.PointConstraint, path: str) -> Constraint:
+    def build_point_constraint(self, item: schema.PointConstraint, path: str) -> Constraint:
         """Two stations on each other."""
         return b.PointConstraint(
-            self._station(item, "socket_body_1", "location_body_1"),
-            self._station(item, "socket_body_2", "location_body_2"),
+            self._find_station(item, "socket_body_1", "location_body_1"),
+            self._find_station(item, "socket_body_2", "location_body_2"),
             path,
         )
 
-    def distance(self, item: schema.ConstantDistanceConstraint, path: str) -> Constraint:
+    def build_distance_constraint(
+        self, item: schema.ConstantDistanceConstraint, path: str
+    ) -> Constraint:
         """Two stations at a distance."""
         if not 0.0 < item.constant_distance < np.inf:
             raise ModelError(
                 f"'{path}' has a distance of {item.constant_distance:g}; give a positive length in m"
             )
         return b.DistanceConstraint(
-            self._station(item, "socket_body_1", "location_body_1"),
-            self._station(item, "socket_body_2", "location_body_2"),
+            self._find_station(item, "socket_body_1", "location_body_1"),
+            self._find_station(item, "socket_body_2", "location_body_2"),
             item.constant_distance,
             path,
         )
 
-    def on_line(self, item: schema.PointOnLineConstraint, path: str) -> Constraint:
+    def build_point_on_line(self, item: schema.PointOnLineConstraint, path: str) -> Constraint:
         """A station on a line."""
         return b.PointOnLineConstraint(
-            self._station(item, "socket_line_body", "point_on_line"),
-            _direction(item.line_direction_vec, f"the line of '{path}'"),
-            self._station(item, "socket_follower_body", "point_on_follower"),
+            self._find_station(item, "socket_line_body", "point_on_line"),
+            _parse_direction(item.line_direction_vec, f"the line of '{path}'"),
+            self._find_station(item, "socket_follower_body", "point_on_follower"),
             path,
         )
 
-    def rolling(self, item: schema.RollingOnSurfaceConstraint, path: str) -> Constraint:
+    def build_rolling_constraint(
+        self, item: schema.RollingOnSurfaceConstraint, path: str
+    ) -> Constraint:
         """A roller on a plane."""
         return b.RollingConstraint(
-            self._base(item, "socket_surface_body"),
-            self._base(item, "socket_rolling_body"),
-            _direction(item.surface_normal, f"the surface of '{path}'"),
+            self._find_base(item, "socket_surface_body"),
+            self._find_base(item, "socket_rolling_body"),
+            _parse_direction(item.surface_normal, f"the surface of '{path}'"),
             item.surface_height,
             path,
         )
 
-    def weld(self, item: schema.WeldConstraint, path: str) -> Constraint:
+    def build_weld_constraint(self, item: schema.WeldConstraint, path: str) -> Constraint:
         """Two frames on each other."""
         return b.WeldConstraint(
-            self._frame(item, "socket_frame1"), self._frame(item, "socket_frame2"), path
+            self._find_frame(item, "socket_frame1"), self._find_frame(item, "socket_frame2"), path
         )
 
 
@@ -137,7 +147,7 @@ def unknown_constraint(path: str, kind: str) -> UnsupportedError:
     )
 
 
-def _direction(vector: tuple[float, float, float], what: str) -> Array:
+def _parse_direction(vector: tuple[float, float, float], what: str) -> Array:
     direction = np.array(vector, dtype=float)
     length = float(np.linalg.norm(direction))
     if not 0.0 < length < np.inf:
@@ -146,10 +156,10 @@ def _direction(vector: tuple[float, float, float], what: str) -> Array:
 
 
 _READERS: dict[type[SchemaConstraint], Callable[..., Constraint]] = {
-    schema.CoordinateCouplerConstraint: ConstraintReader.coupler,
-    schema.PointConstraint: ConstraintReader.point,
-    schema.ConstantDistanceConstraint: ConstraintReader.distance,
-    schema.PointOnLineConstraint: ConstraintReader.on_line,
-    schema.RollingOnSurfaceConstraint: ConstraintReader.rolling,
-    schema.WeldConstraint: ConstraintReader.weld,
+    schema.CoordinateCouplerConstraint: ConstraintReader.build_coupler,
+    schema.PointConstraint: ConstraintReader.build_point_constraint,
+    schema.ConstantDistanceConstraint: ConstraintReader.build_distance_constraint,
+    schema.PointOnLineConstraint: ConstraintReader.build_point_on_line,
+    schema.RollingOnSurfaceConstraint: ConstraintReader.build_rolling_constraint,
+    schema.WeldConstraint: ConstraintReader.build_weld_constraint,
 }

@@ -6,7 +6,7 @@ import numpy as np
 
 from osimlite.base.text import listed
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.mechanics.multibody.spatial import Array, cross, offset, transform
+from osimlite.mechanics.multibody.spatial import Array, cross, make_offset, make_transform
 from osimlite.schema.base import Component
 from osimlite.schema.frames import (
     Body,
@@ -27,7 +27,7 @@ class Placements:
         self.found: dict[str, tuple[str, Array]] = {}
         """The body (or ground) that each frame is fixed to so far, and where it is there (4, 4)."""
 
-    def frame(self, frame: PhysicalFrame) -> tuple[str, Array]:
+    def resolve_frame(self, frame: PhysicalFrame) -> tuple[str, Array]:
         """The body (or ground) that a frame is fixed to, and the frame's transform (4, 4) there.
 
         Raises: ModelError: frames are fixed to each other in a circle, or stations do not define a
@@ -39,10 +39,15 @@ class Placements:
         while waiting:
             path, last = next(reversed(waiting.items()))
             below = next(
-                (item for item in self._below(last) if self.path(item) not in self.found), None
+                (
+                    item
+                    for item in self._list_parent_frames(last)
+                    if self.path(item) not in self.found
+                ),
+                None,
             )
             if below is None:
-                self.found[path] = self._placed(last, path)
+                self.found[path] = self._place_frame(last, path)
                 del waiting[path]
             elif (place := self.path(below)) in waiting:
                 raise ModelError(
@@ -52,31 +57,34 @@ class Placements:
                 waiting[place] = below
         return self.found[wanted]
 
-    def _below(self, frame: PhysicalFrame) -> list[PhysicalFrame]:
+    def _list_parent_frames(self, frame: PhysicalFrame) -> list[PhysicalFrame]:
         """The frames that a frame is laid on."""
         if isinstance(frame, PhysicalOffsetFrame):
-            return [self.named(frame, "socket_parent")]
+            return [self.follow_socket(frame, "socket_parent")]
         if isinstance(frame, StationDefinedFrame):
-            return [self.named(station, "socket_parent_frame") for station in self._stations(frame)]
+            return [
+                self.follow_socket(station, "socket_parent_frame")
+                for station in self._list_stations(frame)
+            ]
         return []
 
-    def _placed(self, frame: PhysicalFrame, path: str) -> tuple[str, Array]:
+    def _place_frame(self, frame: PhysicalFrame, path: str) -> tuple[str, Array]:
         if isinstance(frame, Body | Ground):
             return path, np.eye(4)
         if isinstance(frame, PhysicalOffsetFrame):
-            base, matrix = self.frame(self.named(frame, "socket_parent"))
+            base, matrix = self.resolve_frame(self.follow_socket(frame, "socket_parent"))
             if not np.isfinite((*frame.translation, *frame.orientation)).all():
                 raise ModelError(
                     f"the frame '{path}' has a place or turning that is not finite; give numbers"
                 )
-            return base, matrix @ offset(frame.translation, frame.orientation)
+            return base, matrix @ make_offset(frame.translation, frame.orientation)
         if isinstance(frame, StationDefinedFrame):
-            return self._through_stations(frame, path)
+            return self._fit_frame_to_stations(frame, path)
         raise UnsupportedError(
             f"the frame '{path}' is a {type(frame).__name__}, which osimlite cannot place"
         )
 
-    def named(self, owner: Component, socket: str) -> PhysicalFrame:
+    def follow_socket(self, owner: Component, socket: str) -> PhysicalFrame:
         """The frame that a socket of `owner` leads to."""
         target = self.tree.target(owner, socket, getattr(owner, socket))
         if not isinstance(target, PhysicalFrame):
@@ -88,9 +96,9 @@ class Placements:
         return target
 
     @np.errstate(invalid="ignore")
-    def station(self, station: Station) -> tuple[str, Array]:
+    def resolve_station(self, station: Station) -> tuple[str, Array]:
         """The body (or ground) that a station is fixed to, and its place (3,) there."""
-        base, matrix = self.frame(self.named(station, "socket_parent_frame"))
+        base, matrix = self.resolve_frame(self.follow_socket(station, "socket_parent_frame"))
         return base, matrix[:3, :3] @ np.array(station.location, dtype=float) + matrix[:3, 3]
 
     def path(self, component: Component) -> str:
@@ -99,7 +107,7 @@ class Placements:
         assert path is not None
         return path
 
-    def _stations(self, frame: StationDefinedFrame) -> list[Station]:
+    def _list_stations(self, frame: StationDefinedFrame) -> list[Station]:
         """Points a, b, c and the origin of a frame."""
         stations = []
         for socket in ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point"):
@@ -112,8 +120,8 @@ class Placements:
             stations.append(target)
         return stations
 
-    def _through_stations(self, frame: StationDefinedFrame, path: str) -> tuple[str, Array]:
-        bases, points = zip(*map(self.station, self._stations(frame)), strict=True)
+    def _fit_frame_to_stations(self, frame: StationDefinedFrame, path: str) -> tuple[str, Array]:
+        bases, points = zip(*map(self.resolve_station, self._list_stations(frame)), strict=True)
         if len(set(bases)) > 1:
             raise ModelError(
                 f"the stations of the frame '{path}' are fixed to {listed(sorted(set(bases)))}; fix all to one body"
@@ -125,7 +133,7 @@ class Placements:
                 f"point_a, point_b and point_c of the frame '{path}' lie on a line; move one off it"
             )
         # The third vector completes the two, in the order of the two axes.
-        first, second = _axis(frame.ab_axis), _axis(frame.ab_x_ac_axis)
+        first, second = _parse_axis(frame.ab_axis), _parse_axis(frame.ab_x_ac_axis)
         first = np.eye(3)[0] if first is None else first
         if second is None or first @ second != 0.0:
             second = np.roll(np.abs(first), 1)
@@ -134,10 +142,10 @@ class Placements:
         ]
         axes = [first, second, cross(first, second)]
         rotation = np.array(vectors).T @ np.array(axes)
-        return bases[0], transform(rotation, origin)
+        return bases[0], make_transform(rotation, origin)
 
 
-def _axis(word: str) -> Array | None:
+def _parse_axis(word: str) -> Array | None:
     """The unit vector that a word like ``-y`` names, by its first letter as in OpenSim; None for another word."""
     sign, letter = (word[:1], word[1:2]) if word[:1] in ("+", "-") else ("+", word[:1])
     if letter.lower() not in ("x", "y", "z"):

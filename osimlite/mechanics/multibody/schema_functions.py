@@ -15,7 +15,7 @@ from osimlite.schema import functions as schema
 from osimlite.schema.base import Object, Unknown
 
 
-def numeric(
+def convert_function(
     function: Object | None, arguments: int, where: str, *, opensim_derivatives: bool = False
 ) -> f.Function:
     """The function that a component of a model describes.
@@ -32,12 +32,12 @@ def numeric(
     kind = type(function)
     try:
         if isinstance(function, schema.MultiplierFunction):
-            inner = numeric(
+            inner = convert_function(
                 function.function, arguments, where, opensim_derivatives=opensim_derivatives
             )
             return f.Scaled(function.scale, inner)
         if isinstance(function, schema.MultivariatePolynomialFunction):
-            _takes(function, function.dimension, arguments)
+            _converts(function, function.dimension, arguments)
             return f.MultivariatePolynomial.complete(
                 function.coefficients,
                 function.dimension,
@@ -45,7 +45,7 @@ def numeric(
                 opensim_derivatives=opensim_derivatives,
             )
         if isinstance(function, schema.LinearFunction):
-            return _linear(function, arguments)
+            return _convert_linear(function, arguments)
         if isinstance(function, schema.Constant):
             return f.Constant(function.value)
         if kind not in _UNIVARIATE:
@@ -61,7 +61,7 @@ def numeric(
                 f"{where} is a {name}, which osimlite cannot differentiate twice; "
                 f"the functions it can are {listed(can, most=len(can))}"
             )
-        _takes(function, 1, arguments)
+        _converts(function, 1, arguments)
         return _UNIVARIATE[kind](function)
     except _Impossible as problem:
         raise ModelError(f"{where} ({kind.__name__}): {problem}") from None
@@ -71,14 +71,14 @@ class _Impossible(Exception):
     """What is wrong with a function, and what to do, without its place."""
 
 
-def _takes(function: Object, wanted: int, given: int) -> None:
+def _converts(function: Object, wanted: int, given: int) -> None:
     if given != wanted:
         raise _Impossible(
             f"it is a function of {wanted} variables and gets {given}; list as many coordinates"
         )
 
 
-def _linear(function: schema.LinearFunction, arguments: int) -> f.Function:
+def _convert_linear(function: schema.LinearFunction, arguments: int) -> f.Function:
     count = len(function.coefficients)
     if count <= arguments:
         raise _Impossible(f"it has {count} coefficients; give {arguments + 1}, the constant last")
@@ -87,7 +87,7 @@ def _linear(function: schema.LinearFunction, arguments: int) -> f.Function:
     return f.Linear(weights[0], start) if arguments == 1 else f.WeightedSum(weights, start)
 
 
-def _points(
+def _read_points(
     function: Any, least: int, *, apart: bool = False
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the abscissae and ordinates of a function that goes through points, checked.
@@ -113,7 +113,7 @@ def _points(
 
 
 def _piecewise_linear(function: schema.PiecewiseLinearFunction) -> f.Function:
-    x, y = _points(function, 1)
+    x, y = _read_points(function, 1)
     if len(x) == 1:
         return f.Constant(y[0])
     if x[0] == x[1] or x[-1] == x[-2]:
@@ -123,22 +123,22 @@ def _piecewise_linear(function: schema.PiecewiseLinearFunction) -> f.Function:
 
 
 def _piecewise_constant(function: schema.PiecewiseConstantFunction) -> f.Function:
-    x, y = _points(function, 1)
+    x, y = _read_points(function, 1)
     return f.PiecewiseConstant(x, y) if len(x) > 1 else f.Constant(y[0])
 
 
-def _gcv(function: schema.GCVSpline) -> f.Function:
+def _convert_gcv_spline(function: schema.GCVSpline) -> f.Function:
     half_order = function.half_order
     if half_order < 1:
         raise _Impossible(f"its half_order is {half_order}; give 1 or more, 2 for a cubic spline")
-    x, y = _points(function, 2 * half_order, apart=True)
+    x, y = _read_points(function, 2 * half_order, apart=True)
     # The linter values what it can without numpy.
     splines: Any = import_module("osimlite.mechanics.multibody.smoothing_spline")
     made: f.Function = splines.smoothing_spline(x, y, half_order, function.error_variance)
     return made
 
 
-def _step(function: schema.StepFunction) -> f.Function:
+def _convert_step(function: schema.StepFunction) -> f.Function:
     start, end = function.transition_start_time, function.transition_end_time
     if start > end:
         # OpenSim follows the same curve from its other end.
@@ -148,18 +148,18 @@ def _step(function: schema.StepFunction) -> f.Function:
     return f.Step(start, end, function.start_value, function.end_value)
 
 
-def _floats(values: Sequence[float]) -> tuple[float, ...]:
+def _read_floats(values: Sequence[float]) -> tuple[float, ...]:
     if not values:
         raise _Impossible("it has no coefficients; give at least one")
     return tuple(float(value) for value in values)
 
 
 _UNIVARIATE: dict[type[Object], Callable[[Any], f.Function]] = {
-    schema.PolynomialFunction: lambda item: f.Polynomial(_floats(item.coefficients)),
+    schema.PolynomialFunction: lambda item: f.Polynomial(_read_floats(item.coefficients)),
     schema.Sine: lambda item: f.Sine(item.amplitude, item.omega, item.phase, item.offset),
-    schema.StepFunction: _step,
+    schema.StepFunction: _convert_step,
     schema.PiecewiseConstantFunction: _piecewise_constant,
     schema.PiecewiseLinearFunction: _piecewise_linear,
-    schema.SimmSpline: lambda item: f.SimmSpline(*_points(item, 2)),
-    schema.GCVSpline: _gcv,
+    schema.SimmSpline: lambda item: f.SimmSpline(*_read_points(item, 2)),
+    schema.GCVSpline: _convert_gcv_spline,
 }

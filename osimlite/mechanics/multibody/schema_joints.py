@@ -12,12 +12,12 @@ from osimlite.mechanics.multibody.joints import (
     MOTIONS,
     TransformAxis,
     constant_curvature,
-    custom,
-    ellipsoid,
-    scapulothoracic,
+    make_custom_motions,
+    make_ellipsoid_motions,
+    make_scapulothoracic_motions,
 )
 from osimlite.mechanics.multibody.motions import Motion
-from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.schema import custom_joint as schema
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.joints import (
@@ -47,12 +47,12 @@ def joint_motions(
     """
     kind, coordinates = type(joint).__name__, list(joint.coordinates)
     if isinstance(joint, schema.CustomJoint):
-        return _custom(joint, path, opensim_derivatives)
+        return _build_custom_motions(joint, path, opensim_derivatives)
     if isinstance(joint, EllipsoidJoint):
-        motions = ellipsoid(_radii(joint.radii_x_y_z, path))
+        motions = make_ellipsoid_motions(_read_radii(joint.radii_x_y_z, path))
     elif isinstance(joint, ScapulothoracicJoint):
-        motions = scapulothoracic(
-            _radii(joint.thoracic_ellipsoid_radii_x_y_z, path),
+        motions = make_scapulothoracic_motions(
+            _read_radii(joint.thoracic_ellipsoid_radii_x_y_z, path),
             joint.scapula_winging_axis_origin,
             joint.scapula_winging_axis_direction,
         )
@@ -80,7 +80,7 @@ def unknown_joint(path: str, kind: str) -> UnsupportedError:
     )
 
 
-def _custom(
+def _build_custom_motions(
     joint: schema.CustomJoint, path: str, opensim_derivatives: bool
 ) -> tuple[tuple[Motion, ...], Sequence[Coordinate]]:
     known = {coordinate.name: coordinate for coordinate in joint.coordinates}
@@ -99,7 +99,7 @@ def _custom(
         direction = np.array(axis.axis, dtype=float)
         if not np.isfinite(direction).all() or not direction.any():
             raise ModelError(f"the axis of {where} has no direction; give one that is not zero")
-        function = numeric(
+        function = convert_function(
             axis.function,
             len(words),
             f"the function of {where}",
@@ -112,11 +112,11 @@ def _custom(
             f"CustomJoint '{path}' has {len(known)} coordinates and needs {len(order)}: "
             f"nothing in its SpatialTransform depends on {listed(unused)}"
         )
-    motions = custom(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
+    motions = make_custom_motions(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
     return motions, [known[name] for name in order]
 
 
-def _radii(radii: Sequence[float], path: str) -> Sequence[float]:
+def _read_radii(radii: Sequence[float], path: str) -> Sequence[float]:
     # Models mirror an ellipsoid by negative radii: the point is then on the other side.
     if not np.isfinite(radii).all():
         words = " ".join(f"{radius:g}" for radius in radii)

@@ -51,7 +51,7 @@ def smoothing_spline(
     """
     points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     if error_variance != 0.0:
-        values = _smoothed(_unit_spacing(points)[0], values, half_order, error_variance)
+        values = _smooth_values(_unit_spacing(points)[0], values, half_order, error_variance)
     (spline,) = natural_splines(points, values[:, None], half_order)
     return spline
 
@@ -66,7 +66,9 @@ def natural_splines(x: ArrayLike, y: ArrayLike, half_order: int) -> list[Piecewi
     """
     points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     places, scale = _unit_spacing(points)
-    pieces = _pieces(places, values, half_order) / scale ** np.arange(2.0 * half_order)[:, None]
+    pieces = (
+        _compute_pieces(places, values, half_order) / scale ** np.arange(2.0 * half_order)[:, None]
+    )
     # The piece before the first point counts from there too.
     knots = np.append(points[0], points)
     return [
@@ -100,12 +102,15 @@ class SampledCurves:
         # found, says nothing.
         kept = np.diff(places, prepend=-1.0) > TOUCHING
         self._start, self._places = points[0], places[kept]
-        self._pieces = _pieces(self._places, values[kept], half_order)
+        self._pieces = _compute_pieces(self._places, values[kept], half_order)
 
     def derivatives(self, at: ArrayLike, orders: Sequence[int]) -> tuple[Array, ...]:
         """Derivatives of some orders (k, m) at k places."""
         own = (np.asarray(at, dtype=float) - self._start) / self._scale
-        found = ((order, _derivative(self._places, self._pieces, own, order)) for order in orders)
+        found = (
+            (order, _evaluate_derivative(self._places, self._pieces, own, order))
+            for order in orders
+        )
         return tuple(values / self._scale**order for order, values in found)
 
 
@@ -115,8 +120,8 @@ def _unit_spacing(points: Array) -> tuple[Array, float]:
     return (points - points[0]) / scale, scale
 
 
-def _derivative(points: Array, pieces: Array, at: Array, order: int) -> Array:
-    """A derivative (j, k) at j places of the splines of `_pieces`."""
+def _evaluate_derivative(points: Array, pieces: Array, at: Array, order: int) -> Array:
+    """A derivative (j, k) at j places of the splines of `_compute_pieces`."""
     place = np.searchsorted(points, at, side="right")
     t, own = (at - points[np.maximum(place - 1, 0)])[:, None], pieces[place]
     result = np.zeros_like(own[:, 0])
@@ -125,13 +130,13 @@ def _derivative(points: Array, pieces: Array, at: Array, order: int) -> Array:
     return result
 
 
-def _pieces(points: Array, values: Array, half_order: int) -> Array:
+def _compute_pieces(points: Array, values: Array, half_order: int) -> Array:
     """Coefficients (n + 1, 2 m, k) of natural splines through n points with values (n, k), from the constant up.
 
     Between two points they go with the distance from the first; before the first point and after
     the last, where the degree is m - 1, with that from there.
     """
-    derivatives = _derivatives(points, values, half_order)
+    derivatives = _compute_knot_derivatives(points, values, half_order)
     powers = np.arange(2.0 * half_order)[:, None]
     width = np.diff(points)[:, None, None] ** powers
     # What the polynomials are over a unit interval by their values and derivatives at its ends; the
@@ -148,7 +153,7 @@ def _pieces(points: Array, values: Array, half_order: int) -> Array:
     return pieces
 
 
-def _derivatives(points: Array, values: Array, half_order: int) -> Array:
+def _compute_knot_derivatives(points: Array, values: Array, half_order: int) -> Array:
     """Derivatives (n, m, k) of orders 0 .. m - 1 at the points of splines through them.
 
     They make the sum of the integrals of the squared m-th derivative a minimum: each interval is a
@@ -176,7 +181,7 @@ def _derivatives(points: Array, values: Array, half_order: int) -> Array:
     )
     right[:-1] -= stiffness[:, one, half_order, None] * rise
     right[1:] -= stiffness[:, two, half_order, None] * rise
-    result[:, 1:] = _chained(diagonal, stiffness[:, one, two], right)
+    result[:, 1:] = _solve_block_tridiagonal(diagonal, stiffness[:, one, two], right)
     return result
 
 
@@ -199,7 +204,7 @@ def _unit_interval(half_order: int) -> tuple[Array, Array]:
     return shapes, np.rint(bending)
 
 
-def _chained(diagonal: Array, beside: Array, right: Array) -> Array:
+def _solve_block_tridiagonal(diagonal: Array, beside: Array, right: Array) -> Array:
     """The solution (n, p, k) of symmetric equations in which each of n unknowns (p, k) meets its neighbours only.
 
     Every other unknown is eliminated, all at once, until one is left: cyclic reduction (R. Hockney,
@@ -227,14 +232,16 @@ def _chained(diagonal: Array, beside: Array, right: Array) -> Array:
     kept[1 : 1 + count] -= back @ from_behind[:count]
     sides[1 : 1 + count] -= back @ own[:count]
     result = np.empty_like(right)
-    result[::2] = half = _chained(kept, -before[:count] @ from_behind[:count], sides)
+    result[::2] = half = _solve_block_tridiagonal(
+        kept, -before[:count] @ from_behind[:count], sides
+    )
     own -= from_before @ half[: len(before)]
     own[:count] -= from_behind[:count] @ half[1 : 1 + count]
     result[1::2] = own
     return result
 
 
-def _smoothed(points: Array, values: Array, half_order: int, error_variance: float) -> Array:
+def _smooth_values(points: Array, values: Array, half_order: int, error_variance: float) -> Array:
     """Values at the points (n,) of the spline whose smoothing the criterion prefers."""
     n = len(values)
     # The penalty of the values s is sᵀ K s, by Gauss's rule, which is exact here; K's eigenvectors
@@ -242,7 +249,9 @@ def _smoothed(points: Array, values: Array, half_order: int, error_variance: flo
     nodes, weights = np.polynomial.legendre.leggauss(half_order)
     width, middle = np.diff(points) / 2.0, (points[1:] + points[:-1]) / 2.0
     places = (middle[:, None] + width[:, None] * nodes).ravel()
-    bends = _derivative(points, _pieces(points, np.eye(n), half_order), places, half_order)
+    bends = _evaluate_derivative(
+        points, _compute_pieces(points, np.eye(n), half_order), places, half_order
+    )
     roughness, vectors = np.linalg.eigh(
         bends.T @ ((width[:, None] * weights).ravel()[:, None] * bends)
     )
@@ -257,11 +266,11 @@ def _smoothed(points: Array, values: Array, half_order: int, error_variance: flo
             return error / trace**2
         return error - error_variance * (2.0 * trace - 1.0)
 
-    smoothing = math.exp(_minimum(criterion, -math.log(roughness[half_order:].mean())))
+    smoothing = math.exp(_find_minimum(criterion, -math.log(roughness[half_order:].mean())))
     return vectors @ (loads / (1.0 + smoothing * roughness))
 
 
-def _minimum(function: Callable[[float], float], start: float) -> float:
+def _find_minimum(function: Callable[[float], float], start: float) -> float:
     """Where a function of one number has a minimum: steps downhill from `start`, then golden sections."""
     step, limit = math.log(2.0), 60.0
     middle, right = start, start + step

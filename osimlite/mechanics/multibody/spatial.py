@@ -19,13 +19,13 @@ def cross(a: Array, b: Array) -> Array:
     return np.array((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))
 
 
-def skew(v: Array) -> Array:
+def skew_matrix(v: Array) -> Array:
     """The matrix [v] with [v] a = v × a."""
     x, y, z = v.tolist()
     return np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
 
 
-def skews(vectors: Array) -> Array:
+def skew_matrices(vectors: Array) -> Array:
     """The matrices [v] with [v] a = v × a of many vectors: (b, 3) to (b, 3, 3)."""
     result = np.zeros((len(vectors), 3, 3))
     for row, column, place, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
@@ -67,7 +67,7 @@ def angles_xyz(rotation: Array) -> Array:
     )
 
 
-def quaternion(rotation: ArrayLike) -> Array:
+def quaternion_of(rotation: ArrayLike) -> Array:
     """Unit quaternions (..., 4), scalar first, of rotation matrices (..., 3, 3), each by the largest of its parts."""
     m = np.asarray(rotation)
     trace = np.trace(m, axis1=-2, axis2=-1)[..., None, None]
@@ -108,7 +108,7 @@ def rotation_of(quaternions: ArrayLike) -> Array:
     )
 
 
-def transform(rotation: Any = None, translation: Any = None) -> Array:
+def make_transform(rotation: Any = None, translation: Any = None) -> Array:
     """Homogeneous matrix (4, 4) of a rotation matrix and a translation (m); identity for what is left out."""
     matrix = np.eye(4)
     if rotation is not None:
@@ -118,12 +118,12 @@ def transform(rotation: Any = None, translation: Any = None) -> Array:
     return matrix
 
 
-def offset(translation: Any, orientation: Any) -> Array:
+def make_offset(translation: Any, orientation: Any) -> Array:
     """Homogeneous matrix of a frame at `translation` (m), turned by body-fixed X-Y-Z `orientation` (rad)."""
-    return transform(rotation_xyz(np.asarray(orientation, dtype=float)), translation)
+    return make_transform(rotation_xyz(np.asarray(orientation, dtype=float)), translation)
 
 
-def inverse(matrix: Array) -> Array:
+def invert_transform(matrix: Array) -> Array:
     """Inverse of a homogeneous matrix."""
     rotation = matrix[:3, :3].T
-    return transform(rotation, -rotation @ matrix[:3, 3])
+    return make_transform(rotation, -rotation @ matrix[:3, 3])

@@ -12,7 +12,7 @@ from osimlite.derivatives.symbols import casadi
 from osimlite.errors import DocumentError
 from osimlite.io.tables.headers import suffixes
 from osimlite.io.tables.storage import StoTable, read_sto
-from osimlite.mechanics.multibody.spatial import Array, quaternion
+from osimlite.mechanics.multibody.spatial import Array, quaternion_of
 from osimlite.optimal.point import Formula, Frame, GoalTerms, Point, make_integral_terms
 from osimlite.optimal.tables import fit_splines, read_reference
 from osimlite.schema.base import Component
@@ -253,6 +253,6 @@ class FrameReference:
             x[indices] = row
             values = np.array(frames(t=time, x=x, p=functions.p)[self.part]).T
             if self.kind == "Quaternion":
-                values = quaternion(values.reshape(len(paths), 3, 3).transpose(0, 2, 1))
+                values = quaternion_of(values.reshape(len(paths), 3, 3).transpose(0, 2, 1))
             rows.append(values.ravel())
         return np.array(rows)

@@ -12,7 +12,7 @@ from osimlite.base.text import or_known
 from osimlite.errors import ModelError, SettingError, UnsupportedError
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
-from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.schema.base import Unknown
 from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
@@ -158,7 +158,7 @@ class ElementBuilder:
             UnsupportedError: it is none that osimlite knows.
         """
         try:
-            return numeric(function, 1, f"'{what}' of '{self.path(force)}'")
+            return convert_function(function, 1, f"'{what}' of '{self.path(force)}'")
         except UnsupportedError:
             raise self.unsupported(force, f" with the {kind_of(function)} '{what}'") from None
 

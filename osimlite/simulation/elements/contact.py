@@ -13,7 +13,7 @@ from osimlite.mechanics.kernels.layout import CONTACT_WORK, ITEM
 from osimlite.mechanics.laws.hunt_crossley import combine_materials, contact_energy
 from osimlite.mechanics.laws.vectors import cross, minus, plus, vector
 from osimlite.mechanics.multibody.links import Places
-from osimlite.mechanics.multibody.spatial import Array, offset
+from osimlite.mechanics.multibody.spatial import Array, make_offset
 from osimlite.schema.contact import (
     ContactEllipsoid,
     ContactGeometry,
@@ -339,4 +339,4 @@ def place_of(builder: ElementBuilder, geometry: ContactGeometry) -> tuple[str, i
             f"the contact geometry '{builder.path(geometry)}' on the {kind_of(frame)} '{builder.path(frame)}'"
         )
     body, placed = builder.placement(frame)
-    return frame.name, body, placed @ offset(geometry.location, geometry.orientation)
+    return frame.name, body, placed @ make_offset(geometry.location, geometry.orientation)

@@ -22,7 +22,7 @@ from osimlite.mechanics.laws.elastic_foundation import spring_load
 from osimlite.mechanics.laws.vectors import ZERO, Vector, minus, plus, times
 from osimlite.mechanics.multibody.links import Placement, Places
 from osimlite.mechanics.multibody.mechanism import GROUND
-from osimlite.mechanics.multibody.spatial import Array, transform
+from osimlite.mechanics.multibody.spatial import Array, make_transform
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.contact_forces import ElasticFoundationForce
 from osimlite.simulation.elements.builder import ElementBuilder, triple
@@ -220,7 +220,7 @@ class Pose(NamedTuple):
 
     def inverse_times(self, other: Pose) -> Array:
         """The other pose seen from this one, as a matrix (4, 4)."""
-        return transform(self.turn.T @ other.turn, self.turn.T @ (other.origin - self.origin))
+        return make_transform(self.turn.T @ other.turn, self.turn.T @ (other.origin - self.origin))
 
 
 def _inside(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.base.records import replace
-from osimlite.mechanics.multibody.spatial import Array, skew
+from osimlite.mechanics.multibody.spatial import Array, skew_matrix
 from osimlite.simulation.robot.robot import Link, Robot
 
 
@@ -68,5 +68,5 @@ def _with(link: Link, other: Link, placed: Array, *, massless: bool) -> Link:
 
 def _about(inertia: Array, mass: float, arm: Array) -> Array:
     """Inertia about a point from which the mass centre is `arm` away (parallel axes)."""
-    cross = skew(arm)
+    cross = skew_matrix(arm)
     return inertia - mass * cross @ cross

@@ -27,7 +27,7 @@ import numpy as np
 from osimlite.base.records import dataclass, field
 from osimlite.mechanics.multibody.functions import IDENTITY, Function
 from osimlite.mechanics.multibody.mechanism import Mechanism, Values
-from osimlite.mechanics.multibody.spatial import Array, rotation_about, transform
+from osimlite.mechanics.multibody.spatial import Array, make_transform, rotation_about
 
 WORLD = "world"
 """Name of the root link, which URDF readers that let robots float take as the sign that it is fixed."""
@@ -91,8 +91,8 @@ class RobotJoint:
         if self.kind == "fixed":
             return self.origin
         if self.kind == "revolute":
-            return self.origin @ transform(rotation_about(self.axis, value))
-        return self.origin @ transform(None, self.axis * value)
+            return self.origin @ make_transform(rotation_about(self.axis, value))
+        return self.origin @ make_transform(None, self.axis * value)
 
 
 @dataclass(frozen=True, eq=False)

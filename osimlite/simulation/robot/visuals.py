@@ -11,7 +11,7 @@ import numpy as np
 from osimlite.base.records import dataclass, field
 from osimlite.io.meshes.unit_shapes import ball, tube
 from osimlite.mechanics.multibody.mechanism import Mechanism
-from osimlite.mechanics.multibody.spatial import Array, rotation_about, transform
+from osimlite.mechanics.multibody.spatial import Array, make_transform, rotation_about
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import (
     Brick,
@@ -27,7 +27,7 @@ from osimlite.schema.tree import Tree
 from osimlite.simulation.robot.mesh_files import MeshFiles, MeshProblem
 from osimlite.simulation.robot.robot import Ball, Box, MeshFile, Shape, Tube, Visual
 
-_Y_TO_Z = transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
+_Y_TO_Z = make_transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
 """The frame, in OpenSim's cylinder frame, in which the cylinder lies along Z."""
 _Y_TO_Z[np.abs(_Y_TO_Z) < 1e-15] = 0.0
 

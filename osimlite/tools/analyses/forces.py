@@ -95,7 +95,7 @@ def _expand_words(
 def _find_base_path(model: Model, joint: Joint, end: str) -> str:
     """The path of the body (or ground) that an end of a joint is fixed to."""
     placements = Placements(model.tree())
-    return placements.frame(placements.named(joint, f"socket_{end}_frame"))[0]
+    return placements.resolve_frame(placements.follow_socket(joint, f"socket_{end}_frame"))[0]
 
 
 def _find_frame_path(motion: Motion, asked: str, bases: dict[str, str], tables: Tables) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from lxml.etree import _Element
 
-from osimlite.mechanics.multibody.spatial import Array, inverse, quaternion
+from osimlite.mechanics.multibody.spatial import Array, invert_transform, quaternion_of
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.joints import Joint
 from osimlite.simulation.robot.robot import Link, RobotJoint, breaks_triangle_rule, principal_axes
@@ -88,9 +88,9 @@ def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
     ends: dict[str, Array] = {}
     for joint in reversed(chain):
         if not joints:
-            ends[joint.child] = inverse(rest)
+            ends[joint.child] = invert_transform(rest)
         if joint.kind != "fixed":
-            joints.append((joint, rest[:3, :3].T @ joint.axis, inverse(rest)[:3, 3]))
+            joints.append((joint, rest[:3, :3].T @ joint.axis, invert_transform(rest)[:3, 3]))
         rest = joint.origin @ rest
     element = add(parent, "body", name=name, **pose(start @ rest))
     draft.frames |= {link: (element, placed) for link, placed in ends.items()}
@@ -134,7 +134,7 @@ def _add_inertia(draft: Draft, element: _Element, link: Link, path: str, *, move
             )
         mass, moments = max(mass, LEAST_MASS), np.maximum(moments, LEAST_MASS)
     if mass > 0.0:
-        quat = tidy(quaternion(axes))
+        quat = tidy(quaternion_of(axes))
         add(element, "inertial", pos=tidy(link.center), quat=quat, mass=mass, diaginertia=moments)
 
 

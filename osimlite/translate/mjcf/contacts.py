@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from osimlite.errors import ModelError
-from osimlite.mechanics.multibody.spatial import Array, offset
+from osimlite.mechanics.multibody.spatial import Array, make_offset
 from osimlite.schema.contact import (
     ContactEllipsoid,
     ContactGeometry,
@@ -68,7 +68,7 @@ def _add_surface(draft: Draft, geometry: ContactGeometry, path: str) -> None:
         return
     form, own = made
     name = draft.name("geom", path)
-    frame = placed @ offset(geometry.location, geometry.orientation) @ own
+    frame = placed @ make_offset(geometry.location, geometry.orientation) @ own
     add(draft.bodies[body], "geom", class_="touches", name=name, **form, **pose(frame))
     draft.fidelity.translated[path] = f"geom {name}"
 
@@ -85,7 +85,7 @@ def _form(
         case ContactHalfSpace() if still:
             return {"type": "plane", "size": (0.0, 0.0, 1.0)}, _PLANE
         case ContactHalfSpace():
-            middle = offset((SLAB[0] / 2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            middle = make_offset((SLAB[0] / 2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
             size = " x ".join(f"{edge:g}" for edge in SLAB)
             done = f"a box of {size} m whose face is its surface"
             draft.fidelity.add("contact-geometry", path, "a half space on a body that moves", done)

@@ -20,7 +20,7 @@ from osimlite.mechanics.multibody.mechanism import (
     Mechanism,
     StationPlacement,
 )
-from osimlite.mechanics.multibody.spatial import Array, quaternion
+from osimlite.mechanics.multibody.spatial import Array, quaternion_of
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
@@ -336,7 +336,7 @@ class Draft:
 
 def pose(matrix: Array) -> dict[str, Value]:
     """The attributes that place a frame (4, 4) in that of its parent; None where it is not moved, or not turned."""
-    place, turned = tidy(matrix[:3, 3]), tidy(quaternion(matrix[:3, :3]))
+    place, turned = tidy(matrix[:3, 3]), tidy(quaternion_of(matrix[:3, :3]))
     return {"pos": place if place.any() else None, "quat": turned if turned[1:].any() else None}
 
 

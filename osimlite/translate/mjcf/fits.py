@@ -9,7 +9,7 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.base.require import require
-from osimlite.mechanics.multibody.spatial import Array, offset
+from osimlite.mechanics.multibody.spatial import Array, make_offset
 from osimlite.translate.mjcf.routes import Router
 from osimlite.translate.mjcf.tendons import Around, Spot, Tendon
 
@@ -96,7 +96,7 @@ def _moved(piece: Tendon, x: Array) -> Tendon:
             parts.append(replace(part, place=part.place + SHIFT * x[:3]))
             x = x[3:]
         else:
-            frame = part.frame @ offset(SHIFT * x[:3], TURN * x[3:6])
+            frame = part.frame @ make_offset(SHIFT * x[:3], TURN * x[3:6])
             radius = part.radius * float(np.exp(np.clip(GROW * x[6], -5.0, 5.0)))
             parts.append(part.moved(frame, radius))
             x = x[7:]

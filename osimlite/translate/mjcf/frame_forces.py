@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.mechanics.multibody.mechanism import GROUND, FramePlacement
-from osimlite.mechanics.multibody.spatial import Array, angles_xyz, inverse
+from osimlite.mechanics.multibody.spatial import Array, angles_xyz, invert_transform
 from osimlite.schema.actuators import (
     BodyActuator,
     PointActuator,
@@ -127,7 +127,7 @@ def bushing(draft: Draft, force: BushingForce, path: str) -> str:
     name = draft.name("bushing", path)
     speck = draft.speck(name, draft.bodies[one], inner)
     state = draft.mechanism.at(draft.default_state[0])
-    apart = inverse(state.transform(one) @ inner) @ state.transform(second[0]) @ second[1]
+    apart = invert_transform(state.transform(one) @ inner) @ state.transform(second[0]) @ second[1]
     starts = (*angles_xyz(apart[:3, :3]), *apart[:3, 3])
     stiffness = (*force.rotational_stiffness, *force.translational_stiffness)
     damping = (*force.rotational_damping, *force.translational_damping)

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from osimlite.base.require import require
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.laws.deprecated_muscles import schutte_velocity
-from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated, Schutte1993Muscle_Deprecated
@@ -236,7 +236,7 @@ def _read_rates(force: Muscle) -> Rates:
 def _ends_of_velocity_curve(force: Delp1990Muscle_Deprecated) -> tuple[float, float]:
     """Return the normalised velocity at which the force ends, and the greatest force, of a curve of Delp's muscle."""
     try:
-        curve = numeric(force.force_velocity_curve, 1, "the force_velocity_curve")
+        curve = convert_function(force.force_velocity_curve, 1, "the force_velocity_curve")
         velocities = np.linspace(-2.0, 2.0, 401).tolist()
         factors = [curve.evaluate((velocity,))[0] for velocity in velocities]
     except OsimliteError:

@@ -15,7 +15,7 @@ import numpy as np
 
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.paths import CONDITIONAL, MOVING
-from osimlite.mechanics.multibody.spatial import Array, rotation_about, transform
+from osimlite.mechanics.multibody.spatial import Array, make_transform, rotation_about
 from osimlite.simulation.elements.geometries.paths.geometry_path import Node, ThroughPoints
 from osimlite.translate.mjcf.moving import composition
 from osimlite.translate.mjcf.poses import Places, Poses, Truth
@@ -247,7 +247,12 @@ class Router:
             )
             yield (
                 Around(
-                    point.body, transform(None, point.place), "sphere", SPECK, side, name=point.name
+                    point.body,
+                    make_transform(None, point.place),
+                    "sphere",
+                    SPECK,
+                    side,
+                    name=point.name,
                 ),
             )
 
@@ -273,7 +278,7 @@ class Router:
         )
         if not normal.any() or not into.any():
             return
-        frame = transform(z_to(normal))
+        frame = make_transform(z_to(normal))
         chord = frame[:3, :3].T @ (points[-1].place - points[0].place)
         into = np.array((*(frame[:3, :3].T @ into)[:2], 0.0))
         if len(run) > 1:
@@ -285,7 +290,7 @@ class Router:
         half = 0.5 * float(np.hypot(*chord[:2]))
         for radius in RADII:
             if radius > half:
-                placed = frame @ transform(None, np.sqrt(radius**2 - half**2) * into)
+                placed = frame @ make_transform(None, np.sqrt(radius**2 - half**2) * into)
                 around = Around(
                     body, placed, "cylinder", radius, length=4.0 * radius, name=points[0].name
                 )

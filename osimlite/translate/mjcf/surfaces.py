@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from osimlite.base.records import replace
-from osimlite.mechanics.multibody.spatial import Array, transform
+from osimlite.mechanics.multibody.spatial import Array, make_transform
 from osimlite.simulation.elements.geometries.paths.geometry_path import Surface
 from osimlite.translate.mjcf.tendons import Around, Spot
 
@@ -35,7 +35,7 @@ def stand_ins(surface: Surface, touched: Array) -> Iterator[Around]:
                 yield replace(own, radius=radius)
             for axis in range(3):
                 across = np.delete(touched, axis, axis=1)
-                turned = own.frame @ transform(z_to(np.eye(3)[axis]))
+                turned = own.frame @ make_transform(z_to(np.eye(3)[axis]))
                 for radius in {
                     *np.delete(sizes, axis).tolist(),
                     float(np.linalg.norm(across, axis=1).mean()),
@@ -48,7 +48,7 @@ def stand_ins(surface: Surface, touched: Array) -> Iterator[Around]:
             tube, ring = sizes
             x, y, _ = touched.mean(0)
             out = np.array((x, y, 0.0)) / np.hypot(x, y)
-            turned = transform(z_to(np.cross((0.0, 0.0, 1.0), out)), ring * out)
+            turned = make_transform(z_to(np.cross((0.0, 0.0, 1.0), out)), ring * out)
             yield replace(
                 own, kind="cylinder", frame=own.frame @ turned, radius=tube, length=2.0 * tube
             )

@@ -16,7 +16,7 @@ import numpy as np
 
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.kernels.constrained_dynamics import SAFE_MASS
-from osimlite.mechanics.multibody.linear import solutions, stacked
+from osimlite.mechanics.multibody.linear import solve_with_null_space, stack_equations
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.muscles import Muscle
@@ -76,8 +76,10 @@ def _fastest(draft: Draft) -> float:
     state = mechanism.at(q, u)
     rows, free = np.zeros((0, len(u))), np.eye(len(u))
     if mechanism.constraints:
-        rows, _ = stacked([item.velocity_equations(state) for item in mechanism.constraints])
-        _, free = solutions(rows, np.zeros(len(rows)))
+        rows, _ = stack_equations(
+            [item.velocity_equations(state) for item in mechanism.constraints]
+        )
+        _, free = solve_with_null_space(rows, np.zeros(len(rows)))
     mass = free.T @ mechanism.mass_matrix(q) @ free
     if not len(mass) or np.linalg.eigvalsh(mass)[0] < SAFE_MASS:
         return 0.0

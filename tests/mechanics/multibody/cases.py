@@ -17,10 +17,10 @@ from osimlite.mechanics.multibody.joints import (
     MOTIONS,
     Mobilizer,
     TransformAxis,
-    custom,
-    ellipsoid,
+    make_custom_motions,
+    make_ellipsoid_motions,
+    make_scapulothoracic_motions,
     motion_types,
-    scapulothoracic,
 )
 from osimlite.mechanics.multibody.mechanism import (
     CoordinateInfo,
@@ -29,8 +29,8 @@ from osimlite.mechanics.multibody.mechanism import (
     MobileBody,
 )
 from osimlite.mechanics.multibody.motions import Motion
-from osimlite.mechanics.multibody.schema_functions import numeric
-from osimlite.mechanics.multibody.spatial import offset
+from osimlite.mechanics.multibody.schema_functions import convert_function
+from osimlite.mechanics.multibody.spatial import make_offset
 from osimlite.schema import functions as schema
 
 FIXTURES = Path(__file__).parents[3] / "fixtures" / "kinematics"
@@ -47,7 +47,7 @@ def load(name: str) -> Any:
 
 def function(spec: dict[str, Any]) -> f.Function:
     """The function that a case describes."""
-    return numeric(_component(spec), 1, "the function of a case")
+    return convert_function(_component(spec), 1, "the function of a case")
 
 
 def _component(spec: dict[str, Any]) -> schema.Function:
@@ -65,9 +65,9 @@ def motions(joint_type: str, properties: dict[str, Any]) -> tuple[Motion, ...]:
     """The motions of a joint with the properties that a case gives."""
     match joint_type:
         case "EllipsoidJoint":
-            return ellipsoid(properties["radii_x_y_z"])
+            return make_ellipsoid_motions(properties["radii_x_y_z"])
         case "ScapulothoracicJoint":
-            return scapulothoracic(
+            return make_scapulothoracic_motions(
                 properties["thoracic_ellipsoid_radii_x_y_z"],
                 properties["scapula_winging_axis_origin"],
                 properties["scapula_winging_axis_direction"],
@@ -82,7 +82,7 @@ def motions(joint_type: str, properties: dict[str, Any]) -> tuple[Motion, ...]:
                 )
                 for axis in properties["axes"]
             ]
-            return custom(axes[:3], axes[3:])
+            return make_custom_motions(axes[:3], axes[3:])
     return MOTIONS[joint_type]
 
 
@@ -99,8 +99,8 @@ def mechanism_of(case: dict[str, Any], *, turned_round: bool = False) -> Mechani
         joint_type=case["joint_type"],
         motions=parts,
         coordinates=tuple(range(count)),
-        parent_frame=offset(**case["parent_offset"]),
-        child_frame=offset(**case["child_offset"]),
+        parent_frame=make_offset(**case["parent_offset"]),
+        child_frame=make_offset(**case["child_offset"]),
         reversed=turned_round,
     )
     coordinates = tuple(

@@ -15,10 +15,10 @@ from osimlite.mechanics.multibody.joints import (
     Mobilizer,
     TransformAxis,
     constant_curvature,
-    custom,
-    ellipsoid,
+    make_custom_motions,
+    make_ellipsoid_motions,
+    make_scapulothoracic_motions,
     motion_types,
-    scapulothoracic,
 )
 from osimlite.mechanics.multibody.mechanism import (
     CoordinateInfo,
@@ -29,7 +29,7 @@ from osimlite.mechanics.multibody.mechanism import (
     StationPlacement,
 )
 from osimlite.mechanics.multibody.motions import Motion
-from osimlite.mechanics.multibody.spatial import Array, offset
+from osimlite.mechanics.multibody.spatial import Array, make_offset
 
 KINDS = ("point", "distance", "line", "weld", "rolling", "coupler", "prescribed")
 """Of constraints."""
@@ -60,11 +60,13 @@ def _radii(rng: np.random.Generator) -> Array:
 def motions_of(joint_type: str, rng: np.random.Generator) -> tuple[Motion, ...]:
     """The motions of a joint type with random properties."""
     if joint_type == "EllipsoidJoint":
-        return ellipsoid(_radii(rng))
+        return make_ellipsoid_motions(_radii(rng))
     if joint_type == "ConstantCurvatureJoint":
         return constant_curvature(rng.uniform(0.2, 0.5), rng.uniform(-0.2, 0.2, 3).tolist())
     if joint_type == "ScapulothoracicJoint":
-        return scapulothoracic(_radii(rng), rng.uniform(-0.1, 0.1, 2), rng.uniform(-1.0, 1.0))
+        return make_scapulothoracic_motions(
+            _radii(rng), rng.uniform(-0.1, 0.1, 2), rng.uniform(-1.0, 1.0)
+        )
     if joint_type == "CustomJoint":
         spline = f.SimmSpline((-1.5, -0.4, 0.3, 1.6), rng.uniform(-0.5, 0.5, 4))
         axes = [
@@ -75,7 +77,7 @@ def motions_of(joint_type: str, rng: np.random.Generator) -> tuple[Motion, ...]:
             TransformAxis((1,), rng.normal(size=3), f.Scaled(-0.7, spline)),
             TransformAxis((), rng.normal(size=3), f.Constant(0.07)),
         ]
-        return custom(axes[:3], axes[3:])
+        return make_custom_motions(axes[:3], axes[3:])
     return MOTIONS[joint_type]
 
 
@@ -95,7 +97,7 @@ def _body(
     motions = motions_of(joint_type, rng)
     count = coordinates_of(motions)
     path = f"/jointset/j{index}"
-    frames = [offset(rng.uniform(-0.4, 0.4, 3), rng.uniform(-1.0, 1.0, 3)) for _ in range(2)]
+    frames = [make_offset(rng.uniform(-0.4, 0.4, 3), rng.uniform(-1.0, 1.0, 3)) for _ in range(2)]
     mobilizer = Mobilizer(
         path,
         joint_type,
@@ -150,7 +152,7 @@ def constraint_of(kind: str, mechanism: Mechanism, rng: np.random.Generator) -> 
             return b.PointOnLineConstraint(first, rng.normal(size=3), second)
         case "weld":
             inner, outer = (
-                offset(rng.uniform(-0.3, 0.3, 3), rng.uniform(-1.0, 1.0, 3)) for _ in range(2)
+                make_offset(rng.uniform(-0.3, 0.3, 3), rng.uniform(-1.0, 1.0, 3)) for _ in range(2)
             )
             return b.WeldConstraint(FramePlacement(one, inner), FramePlacement(two, outer))
         case "rolling":

@@ -8,8 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from osimlite.errors import SimulationError
-from osimlite.mechanics.multibody.body_constraints import carrier
-from osimlite.mechanics.multibody.linear import solutions
+from osimlite.mechanics.multibody.body_constraints import find_carrier
+from osimlite.mechanics.multibody.linear import solve_with_null_space
 from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_of
 
 
@@ -49,7 +49,7 @@ def test_equations_are_the_derivatives_of_the_errors(case: Case, kind, seed):
         changes[-3:] -= np.cross(state.velocities[body][:3], constraint.position_errors(state)[-3:])
         turning = (
             state.velocities[body][:3]
-            - 2.0 * state.velocities[carrier(mechanism, constraint.bodies)][:3]
+            - 2.0 * state.velocities[find_carrier(mechanism, constraint.bodies)][:3]
         )
         drifts[-3:] += np.cross(turning, slips(0.0)[-3:])
     assert slips(0.0)[: len(changes)] == pytest.approx(changes, abs=1e-6 * scale)
@@ -77,7 +77,7 @@ def test_assembled_states_fulfil_the_constraints_or_are_refused(case: Case, kind
     state = mechanism.at(q, u, 0.7)
     assert np.abs(constraint.position_errors(state)).max() < 1e-10
     rows, wanted = constraint.velocity_equations(state)
-    free = solutions(rows, wanted)[1]
+    free = solve_with_null_space(rows, wanted)[1]
     # What is kept up costs nothing beyond it: the change of speeds and the forces missing lie in
     # the rows. A change of a speed above 1 counts relative to it.
     change = (u - case.u) / np.maximum(np.abs(case.u), 1.0) ** 2

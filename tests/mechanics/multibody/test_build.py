@@ -10,7 +10,7 @@ import osimlite
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody import Mechanism, Wrench, build_mechanism
 from osimlite.mechanics.multibody.schema_frames import Placements
-from osimlite.mechanics.multibody.spatial import inverse, offset, transform
+from osimlite.mechanics.multibody.spatial import invert_transform, make_offset, make_transform
 from osimlite.schema.base import Unknown
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame, StationDefinedFrame
@@ -149,14 +149,17 @@ def test_frames_on_frames_end_at_the_body():
     model.add(base)
     model.add(_named(PinJoint(name="j", socket_parent_frame=base, socket_child_frame=outer)))
     mechanism = build_mechanism(model)
-    expected = offset((0.1, 0.2, 0.3), (0.1, 0, 0)) @ offset((0, 0.5, 0), (0, 0.2, 0.3))
+    expected = make_offset((0.1, 0.2, 0.3), (0.1, 0, 0)) @ make_offset((0, 0.5, 0), (0, 0.2, 0.3))
     placed = mechanism.placement("/bodyset/b/outer")
     assert placed.body == 0
     assert placed.transform == pytest.approx(expected, abs=1e-15)
     assert mechanism.placement("/componentset/base").body == -1
     result = mechanism.body_transforms({"j_0": 0.4})["b"]
     assert result == pytest.approx(
-        offset((1, 0, 0), (0, 0, 0)) @ offset((0, 0, 0), (0, 0, 0.4)) @ inverse(expected), abs=1e-15
+        make_offset((1, 0, 0), (0, 0, 0))
+        @ make_offset((0, 0, 0), (0, 0, 0.4))
+        @ invert_transform(expected),
+        abs=1e-15,
     )
 
 
@@ -182,7 +185,7 @@ def test_a_joint_whose_child_is_ground_is_reversed(kind):
     assert forward.coordinate_names == backward.coordinate_names
     q = np.linspace(0.2, 0.9, len(forward.coordinates))
     assert backward.body_transforms(q)["b"] == pytest.approx(
-        inverse(forward.body_transforms(q)["b"]), abs=1e-15
+        invert_transform(forward.body_transforms(q)["b"]), abs=1e-15
     )
 
 
@@ -261,7 +264,7 @@ def test_bodies_without_a_way_to_ground_float():
         f"free_b_coord_{index}": value for index, value in enumerate((0.1, 0.2, 0.3, 1.0, 2.0, 3.0))
     }
     assert mechanism.body_transforms(q)["b"] == pytest.approx(
-        offset((1.0, 2.0, 3.0), (0.1, 0.2, 0.3)), abs=1e-15
+        make_offset((1.0, 2.0, 3.0), (0.1, 0.2, 0.3)), abs=1e-15
     )
 
 
@@ -313,7 +316,9 @@ def test_a_chain_of_frames_may_be_of_any_length(through_stations):
         model.component_set.objects.append(base)
     path, matrix = Placements(Tree(model)).frame(base)
     assert path == "/bodyset/rod"
-    np.testing.assert_allclose(matrix, transform(np.eye(3), np.array([0, 0, 15.0])), atol=1e-12)
+    np.testing.assert_allclose(
+        matrix, make_transform(np.eye(3), np.array([0, 0, 15.0])), atol=1e-12
+    )
 
 
 def _loop(model: Model, body: Body, joint: Joint) -> None:

@@ -10,7 +10,7 @@ import pytest
 from osimlite.io.document.reader import read_text
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody import functions as f
-from osimlite.mechanics.multibody.joints import Mobilizer, TransformAxis, custom
+from osimlite.mechanics.multibody.joints import Mobilizer, TransformAxis, make_custom_motions
 from osimlite.mechanics.multibody.mechanism import (
     CoordinateInfo,
     MassProperties,
@@ -30,7 +30,7 @@ def _knee(*, opensim_derivatives: bool) -> Mechanism:
         TransformAxis((1,), (0.0, 1.0, 0.0), f.Sine(0.1, 2.0, 0.0, 0.0)),
         TransformAxis((), (0.0, 0.0, 1.0), f.Constant(0.05)),
     ]
-    motions = custom(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
+    motions = make_custom_motions(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
     properties = MassProperties(2.0, np.array((0.1, -0.3, 0.05)), np.diag((0.03, 0.02, 0.04)))
     body = MobileBody(
         "shank",
@@ -96,7 +96,7 @@ def test_where_each_coordinate_has_its_rotation_the_two_agree():
     q, u = np.array((0.4, -0.3, 0.2)), np.array((2.0, -1.0, 0.5))
     built = []
     for switch in (False, True):
-        motions = custom(axes, still, opensim_derivatives=switch)
+        motions = make_custom_motions(axes, still, opensim_derivatives=switch)
         state = alone(Mobilizer("/jointset/k", "CustomJoint", motions, (0, 1, 2))).at(q, u)
         built.append(np.column_stack((state.jacobians[0], state.velocities[0], state.biases[0])))
     assert built[0] == pytest.approx(built[1], abs=1e-15)

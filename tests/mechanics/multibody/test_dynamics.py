@@ -16,7 +16,7 @@ from osimlite.mechanics.multibody.mechanism import (
     Mechanism,
     MobileBody,
 )
-from osimlite.mechanics.multibody.spatial import skew
+from osimlite.mechanics.multibody.spatial import skew_matrix
 from tests.mechanics.multibody.cases import load, mixed_tree
 from tests.mechanics.multibody.strategies import Case, cases
 
@@ -156,7 +156,7 @@ def test_momentum_is_mass_times_velocity_of_the_mass_centre(case: Case):
         inertia = turn @ properties.inertia @ turn.T
         velocity = state.point_velocity(index, properties.center)
         expected += inertia @ state.velocities[index, :3]
-        expected += skew(state.origins[index] + arm) @ (properties.mass * velocity)
+        expected += skew_matrix(state.origins[index] + arm) @ (properties.mass * velocity)
     _close(angular, expected, 1e-11)
 
 

@@ -12,7 +12,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import ModelError, OsimliteError
-from osimlite.mechanics.multibody.extremes import any_numbers, extreme
+from osimlite.mechanics.multibody.extremes import any_numbers, find_extreme_number
 from osimlite.mechanics.multibody.functions import PiecewiseLinear, SimmSpline
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import StationDefinedFrame
@@ -151,14 +151,14 @@ def test_an_ellipsoid_of_any_size() -> None:
 
 def test_the_most_extreme_number_is_named() -> None:
     model = one_body(PinJoint)
-    assert extreme(model) == ""
+    assert find_extreme_number(model) == ""
     model.body_set.objects[0].mass = 1e30
     model.joint_set.objects[0].coordinates[0].prescribed_function = LinearFunction(
         coefficients=(1e-300, 0.0)
     )
-    assert extreme(model) == "prescribed_function of '/jointset/j/q0', 1e-300,"
+    assert find_extreme_number(model) == "prescribed_function of '/jointset/j/q0', 1e-300,"
     model.body_set.objects[0].mass = np.nan
-    assert extreme(model) == "mass of '/bodyset/b', nan,"
+    assert find_extreme_number(model) == "mass of '/bodyset/b', nan,"
 
     @any_numbers
     def fails(of: Model, fault: Exception) -> None:

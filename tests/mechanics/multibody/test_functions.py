@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.motions import EllipsoidPoint
-from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.schema_functions import convert_function
 from tests.mechanics.multibody.cases import function, load
 
 TABLE = load("functions_table.json")["functions"]
@@ -156,4 +156,4 @@ def test_a_function_that_is_not_there_is_named():
     with pytest.raises(
         ModelError, match=r"the function of '/constraintset/c' is missing; give one"
     ):
-        numeric(None, 1, "the function of '/constraintset/c'")
+        convert_function(None, 1, "the function of '/constraintset/c'")

@@ -12,11 +12,11 @@ from osimlite.mechanics.multibody.joints import (
     Mobilizer,
     TransformAxis,
     constant_curvature,
-    custom,
+    make_custom_motions,
     motion_types,
 )
 from osimlite.mechanics.multibody.motions import AxisMotion, Fixed
-from osimlite.mechanics.multibody.spatial import inverse, rotation_about, transform
+from osimlite.mechanics.multibody.spatial import invert_transform, make_transform, rotation_about
 from osimlite.schema import joints
 from tests.mechanics.multibody.cases import alone, load, mechanism_of
 from tests.mechanics.multibody.independent.motion import carrying
@@ -60,7 +60,7 @@ def test_a_reversed_joint_is_the_inverse(pair):
     q, u, _ = _state(case)
     # The joint's parent is the body now: what was the body in ground is ground in the body.
     forward, backward = mechanism_of(case).at(q, u), mechanism_of(case, turned_round=True).at(q, u)
-    assert backward.transform(0) == pytest.approx(inverse(forward.transform(0)), abs=1e-13)
+    assert backward.transform(0) == pytest.approx(invert_transform(forward.transform(0)), abs=1e-13)
     w, v = np.split(forward.velocities[0], 2)
     back, p = forward.rotations[0].T, forward.origins[0]
     assert backward.velocities[0] == pytest.approx(
@@ -74,7 +74,7 @@ def test_a_joint_is_a_chain_of_one_axis_motions(joint_type, seed, turned_round):
     motions = motions_of(joint_type, rng)
     count = coordinates_of(motions)
     frames = [
-        transform(rotation_about(np.eye(3)[k], rng.uniform(-2, 2)), rng.normal(size=3))
+        make_transform(rotation_about(np.eye(3)[k], rng.uniform(-2, 2)), rng.normal(size=3))
         for k in (0, 1)
     ]
     mobilizer = Mobilizer("/j", joint_type, motions, tuple(range(count)), *frames, turned_round)
@@ -84,9 +84,9 @@ def test_a_joint_is_a_chain_of_one_axis_motions(joint_type, seed, turned_round):
         if isinstance(part, Fixed):
             product = product @ part.matrix
         elif part.kind == "rotate":
-            product = product @ transform(rotation_about(part.axis, part.amount(q)))
+            product = product @ make_transform(rotation_about(part.axis, part.amount(q)))
         else:
-            product = product @ transform(None, part.axis * part.amount(q))
+            product = product @ make_transform(None, part.axis * part.amount(q))
     assert product == pytest.approx(alone(mobilizer).at(q).transform(0), abs=1e-13)
     assert product == pytest.approx(carrying(mobilizer, q, q).matrix, abs=1e-13)
 
@@ -144,7 +144,7 @@ def test_rates_are_refused_where_they_are_not_defined(joint_type):
 def test_an_axis_needs_a_direction():
     axes = [TransformAxis((0,), axis, IDENTITY) for axis in np.eye(3)]
     with pytest.raises(ModelError, match="no direction"):
-        custom(axes, [TransformAxis((1,), (0.0, 0.0, 0.0), IDENTITY)])
+        make_custom_motions(axes, [TransformAxis((1,), (0.0, 0.0, 0.0), IDENTITY)])
 
 
 @given(st.sampled_from(JOINT_TYPES), st.integers(0, 2**32 - 1), st.booleans())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from osimlite.errors import ModelError
-from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.schema.functions import (
     GCVSpline,
     LinearFunction,
@@ -54,14 +54,14 @@ MEASURED = [
 
 @pytest.mark.parametrize(("function", "values"), MEASURED, ids=lambda item: type(item).__name__)
 def test_a_function_has_the_values_of_opensim(function, values):
-    result = numeric(function, 1, "it")
+    result = convert_function(function, 1, "it")
     assert [result.evaluate((place,))[0] for place in PLACES] == pytest.approx(values, abs=1e-6)
 
 
 def test_a_linear_function_takes_the_coefficient_behind_the_weights_for_the_constant():
     # OpenSim's calcValue of (1, 5, 7) at (1, 1) is 13, of (1, 2, 3, 4) it is 6.
     for coefficients, value in (((1.0, 5.0, 7.0), 13.0), ((1.0, 2.0, 3.0, 4.0), 6.0)):
-        function = numeric(LinearFunction(coefficients=coefficients), 2, "it")
+        function = convert_function(LinearFunction(coefficients=coefficients), 2, "it")
         assert function.evaluate((1.0, 1.0))[0] == value
 
 
@@ -79,4 +79,4 @@ def test_a_linear_function_takes_the_coefficient_behind_the_weights_for_the_cons
 )
 def test_what_has_no_value_is_refused(function):
     with pytest.raises(ModelError):
-        numeric(function, 1, "it")
+        convert_function(function, 1, "it")

@@ -11,7 +11,7 @@ from hypothesis import given
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody.dynamics import Wrench
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
-from osimlite.mechanics.multibody.spatial import offset
+from osimlite.mechanics.multibody.spatial import make_offset
 from tests.mechanics.multibody.cases import mixed_tree
 from tests.mechanics.multibody.strategies import Case, cases
 
@@ -116,7 +116,9 @@ def test_a_mechanism_without_coordinates_still_answers():
 
 
 def _with_frame(mechanism: Mechanism) -> tuple[Mechanism, FramePlacement]:
-    placed = FramePlacement(len(mechanism.bodies) - 1, offset((0.1, -0.2, 0.3), (0.4, 0.5, -0.6)))
+    placed = FramePlacement(
+        len(mechanism.bodies) - 1, make_offset((0.1, -0.2, 0.3), (0.4, 0.5, -0.6))
+    )
     frames = {"/bodyset/last/frame": placed, "/ground/corner": FramePlacement(-1, placed.transform)}
     return dataclasses.replace(mechanism, frames=frames), placed
 

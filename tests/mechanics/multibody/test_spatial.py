@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from osimlite.mechanics.multibody.spatial import (
     angles_xyz,
     cross,
-    inverse,
-    offset,
-    quaternion,
+    invert_transform,
+    make_offset,
+    make_transform,
+    quaternion_of,
     rotation_about,
     rotation_xyz,
-    skew,
-    transform,
+    skew_matrix,
 )
 from tests.mechanics.multibody.independent.motion import RelativeMotion
 
@@ -26,7 +26,7 @@ AXES = np.eye(3)
 @given(vectors, vectors)
 def test_cross_and_skew_are_the_cross_product(a, b):
     assert cross(a, b) == pytest.approx(np.cross(a, b), abs=1e-15)
-    assert skew(a) @ b == pytest.approx(np.cross(a, b), abs=1e-14)
+    assert skew_matrix(a) @ b == pytest.approx(np.cross(a, b), abs=1e-14)
 
 
 @given(vectors)
@@ -41,10 +41,10 @@ def test_quaternions_turn_as_their_rotations(angles, third):
         # Half a turn: the scalar is zero.
         angles = np.array((0.0, 0.0, third))
     rotation = rotation_xyz(angles)
-    w, *v = quaternion(rotation)
-    about = skew(np.array(v))
+    w, *v = quaternion_of(rotation)
+    about = skew_matrix(np.array(v))
     assert np.eye(3) + 2.0 * about @ (w * np.eye(3) + about) == pytest.approx(rotation, abs=1e-15)
-    assert quaternion(np.array([np.eye(3), rotation]))[1] == pytest.approx((w, *v), abs=0.0)
+    assert quaternion_of(np.array([np.eye(3), rotation]))[1] == pytest.approx((w, *v), abs=0.0)
 
 
 @given(vectors, st.sampled_from([None, -np.pi / 2, np.pi / 2]))
@@ -67,10 +67,10 @@ def test_a_rotation_keeps_its_axis_and_turns_the_right_way():
 
 @given(vectors, vectors)
 def test_inverse_undoes_an_offset(translation, orientation):
-    matrix = offset(translation, orientation)
+    matrix = make_offset(translation, orientation)
     assert matrix[:3, 3] == pytest.approx(translation)
-    assert inverse(matrix) @ matrix == pytest.approx(np.eye(4), abs=1e-14)
-    assert transform() == pytest.approx(np.eye(4))
+    assert invert_transform(matrix) @ matrix == pytest.approx(np.eye(4), abs=1e-14)
+    assert make_transform() == pytest.approx(np.eye(4))
 
 
 def _motion(seed):

@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from osimlite.mechanics.multibody.spatial import Array, transform
+from osimlite.mechanics.multibody.spatial import Array, make_transform
 from osimlite.simulation.robot.robot import Link, Robot, principal_axes
 
 
@@ -61,7 +61,9 @@ class Bullet:
         state = self.pb.getLinkState(
             self.body, self.links[link], computeForwardKinematics=1, physicsClientId=self.client
         )
-        return transform(np.reshape(self.pb.getMatrixFromQuaternion(state[1]), (3, 3)), state[0])
+        return make_transform(
+            np.reshape(self.pb.getMatrixFromQuaternion(state[1]), (3, 3)), state[0]
+        )
 
     def mass_matrix(self, names: list[str]) -> Array:
         """Mass matrix for the joints in the order of `names`."""
@@ -106,7 +108,7 @@ def written(text: str, files: dict[str, bytes] | None = None) -> Iterator[Path]:
 
 def inertial_frame(link: Link) -> Array:
     """What Bullet calls the frame of a link, in the link frame."""
-    return transform(principal_axes(link.inertia)[1], link.center)
+    return make_transform(principal_axes(link.inertia)[1], link.center)
 
 
 def yourdfpy_poses(text: str, values: dict[str, float]) -> dict[str, Array]:
@@ -130,7 +132,7 @@ def mujoco_poses(text: str, values: dict[str, float]) -> tuple[dict[str, Array],
         data.qpos[model.joint(name).qposadr[0]] = value
     mujoco.mj_kinematics(model, data)
     bodies = [data.body(number) for number in range(1, model.nbody)]
-    poses = {body.name: transform(body.xmat.reshape(3, 3), body.xpos) for body in bodies}
+    poses = {body.name: make_transform(body.xmat.reshape(3, 3), body.xpos) for body in bodies}
     return {"world": np.eye(4), **poses}, float(model.body_mass.sum())
 
 

@@ -8,14 +8,14 @@ from hypothesis import given
 
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.functions import IDENTITY, Linear
-from osimlite.mechanics.multibody.joints import Mobilizer, TransformAxis, custom
+from osimlite.mechanics.multibody.joints import Mobilizer, TransformAxis, make_custom_motions
 from osimlite.mechanics.multibody.mechanism import (
     CoordinateInfo,
     MassProperties,
     Mechanism,
     MobileBody,
 )
-from osimlite.mechanics.multibody.spatial import offset, skew
+from osimlite.mechanics.multibody.spatial import make_offset, skew_matrix
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation.robot.build import build_robot
 from osimlite.simulation.robot.couplings import range_limits
@@ -51,7 +51,7 @@ def one_body(motions, count, *, child_frame=None, names=None, locked=()) -> Mech
         "CustomJoint",
         motions,
         tuple(range(count)),
-        offset((0.1, 0.2, 0.3), (0.3, -0.2, 0.5)),
+        make_offset((0.1, 0.2, 0.3), (0.3, -0.2, 0.5)),
         np.eye(4) if child_frame is None else child_frame,
     )
     body = MobileBody("B", "/bodyset/B", -1, MassProperties(2.0), mobilizer)
@@ -100,7 +100,11 @@ def _sum(parts):
     for matrix, mass, center, inertia in parts:
         turn, arm = matrix[:3, :3], matrix[:3, :3] @ center + matrix[:3, 3]
         total += np.concatenate(
-            ([mass], mass * arm, (turn @ inertia @ turn.T - mass * skew(arm) @ skew(arm)).ravel())
+            (
+                [mass],
+                mass * arm,
+                (turn @ inertia @ turn.T - mass * skew_matrix(arm) @ skew_matrix(arm)).ravel(),
+            )
         )
     return total
 
@@ -178,11 +182,13 @@ def test_a_locked_coordinate_is_fixed_at_the_value_asked_for():
 
 
 def test_a_turned_child_frame_takes_no_extra_link():
-    turned = offset((0.0, 0.0, 0.3), (0.4, 0.1, -0.7))
+    turned = make_offset((0.0, 0.0, 0.3), (0.4, 0.1, -0.7))
     for kind in ("rotations", "translations"):
         axes = [TransformAxis((0,), turned[:3, :3].T @ turned[:3, 3], IDENTITY)]
         # The child frame lies on the axis of the joint, or the joint only translates.
-        motions = custom(axes, ()) if kind == "rotations" else custom((), axes)
+        motions = (
+            make_custom_motions(axes, ()) if kind == "rotations" else make_custom_motions((), axes)
+        )
         mechanism = one_body(motions, 1, child_frame=turned)
         robot = build_robot(mechanism)
         assert len(robot.links) == 2
@@ -193,7 +199,7 @@ def test_a_turned_child_frame_takes_no_extra_link():
 def test_what_is_constant_in_a_function_goes_into_the_origin():
     x, y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
     axes = [TransformAxis((0,), x, Linear(-1.0, 0.3)), TransformAxis((0,), y, Linear(0.5, 0.2))]
-    robot = build_robot(one_body(custom(axes, ()), 1))
+    robot = build_robot(one_body(make_custom_motions(axes, ()), 1))
     first, second = robot.moving
     assert (first.name, first.coordinate, first.axis.tolist()) == ("q0", 0, [-1.0, 0.0, 0.0])
     assert (second.coordinate, second.function) == (None, Linear(0.5))
@@ -207,7 +213,7 @@ def test_ranges_become_limits_on_demand():
         TransformAxis((0,), (1.0, 0.0, 0.0), Linear(1.0)),
         TransformAxis((0,), (0.0, 1.0, 0.0), Linear(-0.5)),
     ]
-    robot = build_robot(one_body(custom(axes, ()), 1))
+    robot = build_robot(one_body(make_custom_motions(axes, ()), 1))
     assert [joint.limits for joint in robot.moving] == [None, None]
     assert [joint.limits for joint in range_limits(robot).moving] == [(-1.0, 2.0), (-1.0, 0.5)]
 
@@ -222,7 +228,7 @@ def test_names_are_made_legal(name, fit):
 
 def test_legal_names_stay_and_others_step_aside():
     x = (1.0, 0.0, 0.0)
-    motions = custom([TransformAxis((k,), x, IDENTITY) for k in range(3)], ())
+    motions = make_custom_motions([TransformAxis((k,), x, IDENTITY) for k in range(3)], ())
     mechanism = one_body(motions, 3, names=["knee angle", "knee_angle", "B"])
     robot = legal_names(build_robot(mechanism))
     assert [joint.name for joint in robot.moving] == ["knee_angle_1", "knee_angle", "B_1"]
@@ -234,7 +240,9 @@ def test_legal_names_stay_and_others_step_aside():
 
 
 def test_a_body_called_world_is_not_mistaken_for_ground():
-    mechanism = one_body(custom([TransformAxis((0,), (1.0, 0.0, 0.0), IDENTITY)], ()), 1)
+    mechanism = one_body(
+        make_custom_motions([TransformAxis((0,), (1.0, 0.0, 0.0), IDENTITY)], ()), 1
+    )
     (body,) = mechanism.bodies
     mechanism = Mechanism("one", (dataclasses.replace(body, name=WORLD),), mechanism.coordinates)
     robot = build_robot(mechanism)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from osimlite.mechanics.multibody.spatial import Array, transform
+from osimlite.mechanics.multibody.spatial import Array, make_transform
 from osimlite.simulation.robot.robot import principal_axes
 from osimlite.translate.mjcf.export import Mjcf
 
@@ -38,7 +38,7 @@ class Compiled:
     def body(self, name: str) -> Array:
         """Pose (4, 4) of a body in ground."""
         body = self.data.body(name)
-        return transform(body.xmat.reshape(3, 3), body.xpos)
+        return make_transform(body.xmat.reshape(3, 3), body.xpos)
 
     def mass_matrix(self, q: Array) -> Array:
         """Mass matrix (n, n) for the rates of the coordinates, at the pose that `place` was given."""

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from osimlite.mechanics.multibody import body_constraints as b
-from osimlite.mechanics.multibody.body_constraints import carrier
+from osimlite.mechanics.multibody.body_constraints import find_carrier
 from osimlite.mechanics.multibody.constraints import Constraint, Coupler, Lock, Prescribed
 from osimlite.mechanics.multibody.parts import StationPlacement
-from osimlite.mechanics.multibody.spatial import Array, cross, skew
+from osimlite.mechanics.multibody.spatial import Array, cross, skew_matrix
 from tests.mechanics.multibody.independent.motion import Moved
 
 
@@ -110,7 +110,9 @@ def slips(constraint: b.RollingConstraint, state: Moved) -> list[Bond]:
         station(state, StationPlacement(body, np.zeros(3))) for body in (roller, surface)
     )
     arm, w = foot.minus(centre), state.velocities[roller][:3]
-    jacobian = centre.jacobian - skew(arm.value) @ state.jacobians[roller][:3] - foot.jacobian
+    jacobian = (
+        centre.jacobian - skew_matrix(arm.value) @ state.jacobians[roller][:3] - foot.jacobian
+    )
     rate = centre.rate + cross(w, arm.value) - foot.rate
     bias = centre.bias + cross(state.biases[roller][:3], arm.value) + cross(w, arm.rate) - foot.bias
     bonds = []
@@ -164,7 +166,7 @@ def meeting(state: Moved, first: StationPlacement, second: StationPlacement) -> 
         state, StationPlacement(body, state.rotations[body].T @ (end.value - state.origins[body]))
     )
     apart = end.minus(start)
-    turning = state.velocities[carrier(state.mechanism, (body, second.body))][:3]
+    turning = state.velocities[find_carrier(state.mechanism, (body, second.body))][:3]
     bias = apart.bias - 2.0 * cross(turning, apart.rate)
     return apart._replace(value=end.value - station(state, first).value, bias=bias)
 
@@ -175,7 +177,7 @@ def direction(state: Moved, body: int, axis: Array) -> MovingVector:
     w = state.velocities[body][:3]
     rate = cross(w, value)
     bias = cross(state.biases[body][:3], value) + cross(w, rate)
-    return MovingVector(value, -skew(value) @ state.jacobians[body][:3], rate, bias)
+    return MovingVector(value, -skew_matrix(value) @ state.jacobians[body][:3], rate, bias)
 
 
 def product(a: MovingVector, b: MovingVector, wanted: float = 0.0) -> Bond:

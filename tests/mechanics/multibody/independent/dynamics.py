@@ -10,8 +10,8 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.constrained_dynamics import SAFE_MASS, SLIGHT
 from osimlite.mechanics.kernels.linear_algebra import ROUNDING
-from osimlite.mechanics.multibody.linear import shortest, solutions
-from osimlite.mechanics.multibody.spatial import Array, skews
+from osimlite.mechanics.multibody.linear import solve_least_norm, solve_with_null_space
+from osimlite.mechanics.multibody.spatial import Array, skew_matrices
 from tests.mechanics.multibody.independent.constraints import bond
 from tests.mechanics.multibody.independent.motion import Moved
 
@@ -34,7 +34,7 @@ class MassCentres:
         rotations, jacobians = state.rotations[:-1], state.jacobians[:-1]
         arms = (rotations @ centres[:, :, None])[:, :, 0]
         turning = jacobians[:, :3]
-        moving = jacobians[:, 3:] - skews(arms) @ turning
+        moving = jacobians[:, 3:] - skew_matrices(arms) @ turning
         return cls(
             state,
             masses,
@@ -87,10 +87,10 @@ def acceleration(state: Moved, applied: Array) -> Array:
             weighted = np.linalg.solve(factor, binding.T).T
             # The second time mends the rounding of the first.
             for _ in range(2):
-                push = shortest(weighted, values - rows @ udot, SLIGHT * sqrt(len(rows)))
+                push = solve_least_norm(weighted, values - rows @ udot, SLIGHT * sqrt(len(rows)))
                 udot = udot + np.linalg.solve(factor.T, push)
             return udot
-    particular, free = solutions(rows, values)
+    particular, free = solve_with_null_space(rows, values)
     reduced = np.linalg.solve(free.T @ matrix @ free, free.T @ (right - matrix @ particular))
     return particular + free @ reduced
 

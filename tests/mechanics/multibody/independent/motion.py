@@ -19,11 +19,11 @@ from osimlite.mechanics.multibody.motions import (
 from osimlite.mechanics.multibody.spatial import (
     Array,
     cross,
-    inverse,
+    invert_transform,
+    make_transform,
     rotation_about,
     rotation_xyz,
-    skew,
-    transform,
+    skew_matrix,
 )
 
 
@@ -59,7 +59,7 @@ class Moved:
     def point_jacobian(self, body: int, station: Array) -> Array:
         """Matrix (6, n) from the speeds to the body's angular velocity and the velocity of its `station`."""
         matrix: Array = self.jacobians[body].copy()
-        matrix[3:] -= skew(self.rotations[body] @ station) @ matrix[:3]
+        matrix[3:] -= skew_matrix(self.rotations[body] @ station) @ matrix[:3]
         return matrix
 
 
@@ -88,7 +88,7 @@ def carrying(mobilizer: Mobilizer, q: Array, u: Array) -> RelativeMotion:
     ends = (
         Fixed(mobilizer.parent_frame),
         *mobilizer.motions,
-        Fixed(inverse(mobilizer.child_frame)),
+        Fixed(invert_transform(mobilizer.child_frame)),
     )
     motion = reduce(RelativeMotion.then, (relative(part, q, u) for part in ends))
     return motion.inverse() if mobilizer.reversed else motion
@@ -116,7 +116,7 @@ def relative(motion: Motion, q: Array, u: Array) -> RelativeMotion:
             rotation = rotation_xyz(q[own])
             normal, w = rotation[:, 2], u[own]
             drift = cross(w, normal)
-            block[:3, own], block[3:, own] = np.eye(3), -radii[:, None] * skew(normal)
+            block[:3, own], block[3:, own] = np.eye(3), -radii[:, None] * skew_matrix(normal)
             block[:3, -2], block[3:, -2] = w, radii * drift
             block[3:, -1] = radii * cross(w, drift)
             return RelativeMotion(rotation, radii * normal, block)
@@ -143,7 +143,7 @@ def curvature(error: SimbodyAccelerationError, q: Array) -> Array:
         # less the true.
         theirs = np.zeros((3, count))
         theirs[:, :row] = along @ shares[:, :row]
-        wrong = -skew(axes[row]) @ (theirs - along[:, :row] @ shares[:row])
+        wrong = -skew_matrix(axes[row]) @ (theirs - along[:, :row] @ shares[:row])
         curvature += wrong[:, :, None] * shares[row]
     return curvature
 
@@ -174,7 +174,7 @@ class RelativeMotion:
     @property
     def matrix(self) -> Array:
         """The homogeneous matrix (4, 4) of B in A."""
-        return transform(self.rotation, self.translation)
+        return make_transform(self.rotation, self.translation)
 
     @property
     def jacobian(self) -> Array:
@@ -204,7 +204,7 @@ class RelativeMotion:
         back, p = self.rotation.T, self.translation
         w, v = self.block[:3, -2], self.block[3:, -2]
         block = self.block.copy()
-        block[3:] += skew(p) @ self.block[:3]
+        block[3:] += skew_matrix(p) @ self.block[:3]
         block[3:, -1] += cross(w, cross(w, p) - 2.0 * v)
         return RelativeMotion(back, -back @ p, -turned(back, block))
 
@@ -217,7 +217,7 @@ def carried(block: Array, arm: Array, relative_velocity: Array) -> Array:
         Coriolis acceleration.
     """
     result = block.copy()
-    result[3:] -= skew(arm) @ block[:3]
+    result[3:] -= skew_matrix(arm) @ block[:3]
     w = block[:3, -2]
     if w.any():
         result[:3, -1] += cross(w, relative_velocity[:3])

@@ -18,7 +18,7 @@ from osimlite.mechanics.multibody.functions import (
     WeightedSum,
 )
 from osimlite.mechanics.multibody.links import Places
-from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.schema.functions import Constant, ExpressionBasedFunction, MultiplierFunction
 from osimlite.schema.paths import FunctionBasedPath
 from osimlite.simulation.elements.builder import ElementBuilder
@@ -156,4 +156,4 @@ def _function(function: Any, arguments: int, where: str) -> Function | Formula:
                 f"{where} has {len(function.variables)} variables and gets {arguments}; name as many"
             )
         return Formula.parse(function.expression, function.variables, where)
-    return numeric(function, arguments, where)
+    return convert_function(function, arguments, where)

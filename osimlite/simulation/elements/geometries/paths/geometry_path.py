@@ -32,7 +32,7 @@ from osimlite.mechanics.kernels.wrapping import AXIAL, HYBRID, MIDPOINT
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.links import Places
-from osimlite.mechanics.multibody.spatial import Array, offset
+from osimlite.mechanics.multibody.spatial import Array, make_offset
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.paths import (
     AbstractPathPoint,
@@ -262,7 +262,7 @@ def _surface(
     while not isinstance(frame, PhysicalFrame):
         frame = builder.tree.parent_of(frame)
     body, placed = builder.placement(frame)
-    placed = placed @ offset(surface.translation, surface.xyz_body_rotation)
+    placed = placed @ make_offset(surface.translation, surface.xyz_body_rotation)
     tangent = Node(body, placed, np.zeros(3), TANGENT, name=surface.name)
     numbers = (*side, method, alone, *sizes)
     if builder.geodesic:

@@ -45,7 +45,7 @@ from osimlite.mechanics.kernels.paths import LENGTH
 from osimlite.mechanics.kernels.wrap_curves import MOST
 from osimlite.mechanics.multibody.links import Placement, Places
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
-from osimlite.mechanics.multibody.spatial import Array, offset
+from osimlite.mechanics.multibody.spatial import Array, make_offset
 from osimlite.schema.contact import (
     ContactCylinder,
     ContactEllipsoid,
@@ -242,7 +242,7 @@ def _is_enclosed(builder: ElementBuilder, point_item: Any, geometry: ContactGeom
         return False
     for q in poses:
         state = mechanism.at(q)
-        frame = state.transform(body) @ offset(geometry.location, geometry.orientation)
+        frame = state.transform(body) @ make_offset(geometry.location, geometry.orientation)
         placed = state.transform(point.body) @ np.array([*point.runs, 1.0])
         x, y, z = (frame[:3, :3].T @ (placed[:3] - frame[:3, 3])).tolist()
         # A half-space is solid where x is positive.
@@ -291,7 +291,7 @@ def _obstacle(builder: ElementBuilder, owner: Any, item: Any) -> Obstacle:
         for end in (START, END):
             begin[GEODESIC + end + POINT : GEODESIC + end + POINT + 3] = near
     begin[GEODESIC + STEP] = FIRST_STEP
-    return Obstacle(body, offset(geometry.location, geometry.orientation), surface, begin)
+    return Obstacle(body, make_offset(geometry.location, geometry.orientation), surface, begin)
 
 
 def _surface(geometry: ContactGeometry) -> tuple[float, ...] | None:
