@@ -314,7 +314,7 @@ def test_a_chain_of_frames_may_be_of_any_length(through_stations):
                 name=f"f{number}", socket_parent=base, translation=(0, 0, 0.01)
             )
         model.component_set.objects.append(base)
-    path, matrix = Placements(Tree(model)).frame(base)
+    path, matrix = Placements(Tree(model)).resolve_frame(base)
     assert path == "/bodyset/rod"
     np.testing.assert_allclose(
         matrix, make_transform(np.eye(3), np.array([0, 0, 15.0])), atol=1e-12
