@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.files import TABLES
+from osimlite.base.files import TABLE_SUFFIXES
 from osimlite.lint import Config, Finding
 from osimlite.lint.many import check_files
 from osimlite.lint.project_files import project_files
@@ -82,7 +82,7 @@ def read(file: str) -> dict[str, Any]:
             "print": len(frames),
             "numbers": [marker.get(axis) for marker in seen for axis in range(3)],
         }
-    if file.lower().endswith(TABLES):
+    if file.lower().endswith(TABLE_SUFFIXES):
         table = opensim.Storage(file)
         labels = [table.getColumnLabels().get(i) for i in range(table.getColumnLabels().size())]
         rows = [table.getStateVector(i) for i in range(table.getSize())]

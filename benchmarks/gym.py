@@ -14,7 +14,7 @@ import gymnasium
 import numpy as np
 
 import osimlite.gym
-from osimlite.base.cores import cores
+from osimlite.base.cores import count_cores
 
 STEPS = 100
 
@@ -36,7 +36,7 @@ def main() -> None:
         took, spent = time.perf_counter() - start, time.process_time() - spent
         rate, own = count * STEPS / took, count * STEPS / spent
         print(
-            f"{name:12s} {rate:10,.0f} steps/s, {count} copies, {cores()} cores; {own:,.0f} of one core"
+            f"{name:12s} {rate:10,.0f} steps/s, {count} copies, {count_cores()} cores; {own:,.0f} of one core"
         )
         envs.close()
 

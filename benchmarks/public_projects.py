@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from osimlite.lint import Finding, validate
-from osimlite.lint.project_files import TABLES, project_files
+from osimlite.lint.project_files import TABLE_SUFFIXES, project_files
 
 KINDS = ("models", "setups", "tables")
 
@@ -24,7 +24,7 @@ def kinds_of(files: Iterable[str]) -> Counter[str]:
     """How many of some files are models, setups, tables."""
     return Counter(
         "tables"
-        if file.lower().endswith(TABLES)
+        if file.lower().endswith(TABLE_SUFFIXES)
         else "models"
         if file.lower().endswith(".osim")
         else "setups"

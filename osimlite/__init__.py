@@ -135,10 +135,10 @@ def __getattr__(name: str) -> Any:
 
             if name.isidentifier() and find_spec(f"{__name__}.{name}"):
                 return import_module(f"{__name__}.{name}")
-            from osimlite.base.text import did_you_mean
+            from osimlite.base.text import suggest_name
             from osimlite.schema.registry import MODULES
 
-            near = did_you_mean(name, [*FUNCTIONS, *MODULES])
+            near = suggest_name(name, [*FUNCTIONS, *MODULES])
         raise AttributeError(f"module 'osimlite' has no attribute '{name}'{near}")
     return getattr(import_module(module), inner or name)
 

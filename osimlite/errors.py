@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any, ClassVar
 
-from osimlite.base.text import brief, visible
+from osimlite.base.text import escape_unprintable, shorten_message
 
 
 class OsimliteError(Exception):
@@ -31,7 +31,7 @@ class OsimliteError(Exception):
         column: int | None = None,
     ) -> None:
         super().__init__(message)
-        self.message = brief(message)
+        self.message = shorten_message(message)
         self.file = file
         self.line = line
         self.column = column
@@ -40,7 +40,7 @@ class OsimliteError(Exception):
         place = ":".join(
             str(part) for part in (self.file, self.line, self.column) if part is not None
         )
-        return visible(f"{place}: {self.message}" if place else self.message)
+        return escape_unprintable(f"{place}: {self.message}" if place else self.message)
 
 
 class DoubtfulWarning(UserWarning):
@@ -106,7 +106,7 @@ class MissingNameError(ModelError, AttributeError):
     @cached_property
     def message(self) -> str:  # type: ignore[override]
         """The sentence that says which name is missing."""
-        return brief(self._describe())
+        return shorten_message(self._describe())
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Functions do not pass from one process to another, sentences do.

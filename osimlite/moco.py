@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from typing import TYPE_CHECKING, Any
 
-from osimlite.base.lazy import imported_when_used
+from osimlite.base.lazy import make_lazy_getattr
 from osimlite.errors import DeprecatedWarning
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ _DEPRECATED = {
 
 __all__ = [*_MODULES]
 
-_import_name = imported_when_used(__name__, _MODULES)
+_import_name = make_lazy_getattr(__name__, _MODULES)
 
 
 def __getattr__(name: str) -> Any:

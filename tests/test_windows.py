@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from osimlite import validate
-from osimlite.base.files import from_folder, write_atomically
+from osimlite.base.files import get_relative_path, write_atomically
 from osimlite.base.pools import LocalPool
 from osimlite.cli import main
 from osimlite.cli._console import wants_colour
@@ -65,9 +65,9 @@ def test_results_that_another_program_holds_are_told(tmp_path: Path) -> None:
 
 
 def test_nothing_leads_from_one_drive_to_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert from_folder("/a/b/c.osim", "/a/d") == "../b/c.osim"
+    assert get_relative_path("/a/b/c.osim", "/a/d") == "../b/c.osim"
     monkeypatch.setattr(os.path, "relpath", ntpath.relpath)
-    assert from_folder("D:/geometry/bone.vtp", "C:/models").endswith("D:/geometry/bone.vtp")
+    assert get_relative_path("D:/geometry/bone.vtp", "C:/models").endswith("D:/geometry/bone.vtp")
 
 
 def test_files_are_checked_by_processes_that_begin_from_nothing(

@@ -1,4 +1,4 @@
-"""How much may run at once."""
+"""Number of processor cores for parallel work."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import os
 import sys
 
 
-def cores() -> int:
-    """How many processor cores this process may use: on Linux those that it was given, elsewhere all there are."""
+def count_cores() -> int:
+    """Return the number of processor cores that this process may use.
+
+    On Linux these are the cores of its affinity mask, elsewhere all cores.
+    """
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1

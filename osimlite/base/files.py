@@ -1,4 +1,4 @@
-"""Names of files and folders; reading and writing them under the names that most modules use."""
+"""Reading of files and folders, and the functions for writing that most modules use."""
 
 from __future__ import annotations
 
@@ -7,79 +7,90 @@ import sys
 from pathlib import Path
 from typing import BinaryIO
 
-from osimlite.base.project import LARGEST_FILE, largest_file
-from osimlite.base.reading import no_such as no_such
+from osimlite.base.project import DEFAULT_MAX_FILE_BYTES, get_max_file_size
+from osimlite.base.reading import make_missing_error as make_missing_error
 from osimlite.base.reading import open_file as open_file
 from osimlite.base.reading import read_at_most as read_at_most
 from osimlite.base.writing import WriteRefusedError as WriteRefusedError
 from osimlite.base.writing import expect_folder_of as expect_folder_of
-from osimlite.base.writing import folder_to_fill as folder_to_fill
 from osimlite.base.writing import make_folder as make_folder
-from osimlite.base.writing import put_in_place as put_in_place
+from osimlite.base.writing import open_atomically as open_atomically
+from osimlite.base.writing import prepare_folder as prepare_folder
+from osimlite.base.writing import replace_with as replace_with
 from osimlite.base.writing import write_atomically as write_atomically
-from osimlite.base.writing import written_atomically as written_atomically
 from osimlite.errors import MissingFileError, SpecialFileError
 
 GEOMETRY_VARIABLE = "OSIMLITE_GEOMETRY"
-"""Environment variable with folders to look for mesh files in, besides OpenSim's own places, separated as in PATH."""
+"""Environment variable with folders in which mesh files are searched, separated as in PATH.
 
-NAMED_SO = f"in the environment variable {GEOMETRY_VARIABLE}, or with --geometry"
-"""How people name such a folder, for messages."""
+They are searched after the folders of OpenSim's search.
+"""
+
+MESH_FOLDER_HINT = f"in the environment variable {GEOMETRY_VARIABLE}, or with --geometry"
+"""How users name a folder of meshes; part of messages."""
 
 
-def named_mesh_folders() -> tuple[Path, ...]:
-    """The folders that the environment names."""
+def list_mesh_folders() -> tuple[Path, ...]:
+    """Return the folders that `OSIMLITE_GEOMETRY` names.
+
+    Returns:
+        The folders in the order of the search.
+    """
     return tuple(
         Path(name) for name in os.environ.get(GEOMETRY_VARIABLE, "").split(os.pathsep) if name
     )
 
 
-TABLES = (".sto", ".mot", ".trc")
-"""How tables over time are called."""
+TABLE_SUFFIXES = (".sto", ".mot", ".trc")
+"""Suffixes of tables over time."""
 
 unsaved: dict[str, bytes] = {}
-"""What is read in place of files: their texts in an editor, not written yet, by real path."""
+"""Unsaved texts of files that are open in an editor, by real path; they are read instead."""
 
 
 def read_file(path: str | Path) -> bytes:
-    """What is in an ordinary file.
+    """Return the content of a regular file.
 
     Raises:
-        SpecialFileError: it is none, or larger than the settings of its folder allow.
-        MissingFileError: it is not there or may not be read.
+        SpecialFileError: the file is not regular, or larger than the settings of its folder allow.
+        MissingFileError: the file does not exist or is not readable.
     """
-    if unsaved and (held := unsaved.get(os.path.realpath(path))) is not None:
-        return held
+    if unsaved and (text := unsaved.get(os.path.realpath(path))) is not None:
+        return text
     with open_file(path) as stream:
         try:
-            return _content(stream, os.fstat(stream.fileno()).st_size, path)
+            return _read_stream(stream, os.fstat(stream.fileno()).st_size, path)
         except OSError as error:
             raise MissingFileError(
                 f"cannot read the file: {error.strerror}", file=str(path)
             ) from None
 
 
-def stamped(path: str | Path) -> int | None:
-    """What is another number of another file, and when its content has changed; None if there is no such file."""
-    if unsaved and (held := unsaved.get(os.path.realpath(path))) is not None:
-        return hash(held)
+def get_file_stamp(path: str | Path) -> int | None:
+    """Return a number that changes with the content of a file; None if the file does not exist."""
+    if unsaved and (text := unsaved.get(os.path.realpath(path))) is not None:
+        return hash(text)
     try:
         result = os.stat(path)
     except (OSError, ValueError):
         return None
-    # Whoever puts another file in the place of one may keep the time of its last change.
+    # A program that replaces a file can keep its time of last change.
     return hash(
         (result.st_mtime_ns, result.st_ctime_ns, result.st_size, result.st_ino, result.st_dev)
     )
 
 
 def read_standard_input() -> bytes:
-    """What comes from standard input; SpecialFileError if that is more than the settings of this folder allow."""
-    return _content(sys.stdin.buffer, 0, "<stdin>")
+    """Return the content of standard input.
+
+    Raises:
+        SpecialFileError: it is larger than the settings of the current folder allow.
+    """
+    return _read_stream(sys.stdin.buffer, 0, "<stdin>")
 
 
-def _content(stream: BinaryIO, size: int, path: str | Path) -> bytes:
-    """What is in a stream, which may be more than its `size` says."""
+def _read_stream(stream: BinaryIO, size: int, path: str | Path) -> bytes:
+    """Return the content of a stream, which can be longer than `size`."""
     expect_size(size, path)
     content = stream.read(size + 1) or b""
     while len(content) > size:
@@ -89,19 +100,27 @@ def _content(stream: BinaryIO, size: int, path: str | Path) -> bytes:
 
 
 def expect_size(size: int, path: str | Path) -> int:
-    """The most bytes that are read of a file; SpecialFileError if it has more."""
-    limit = LARGEST_FILE if size <= LARGEST_FILE else largest_file(Path(path).absolute().parent)
+    """Return the largest number of bytes that are read of a file.
+
+    Raises:
+        SpecialFileError: the file has more bytes.
+    """
+    limit = (
+        DEFAULT_MAX_FILE_BYTES
+        if size <= DEFAULT_MAX_FILE_BYTES
+        else get_max_file_size(Path(path).absolute().parent)
+    )
     if size > limit:
         raise SpecialFileError(
-            f"cannot read the file: there are more than {limit / 1e6:g} MB in it; allow them by 'largest-file' in "
+            f"cannot read the file: it is larger than {limit / 1e6:g} MB; allow it by 'largest-file' in "
             "osimlite.toml or in [tool.osimlite] of pyproject.toml",
             file=str(path),
         )
     return limit
 
 
-def from_folder(path: str | Path, folder: str | Path) -> str:
-    """A path as it leads there from a folder, with slashes; the whole path from another drive of Windows."""
+def get_relative_path(path: str | Path, folder: str | Path) -> str:
+    """Return a path relative to a folder, with slashes; on another drive of Windows the absolute path."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:

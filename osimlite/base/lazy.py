@@ -1,4 +1,4 @@
-"""What is imported when it is first used, so that importing the package costs nothing."""
+"""Imports at first use, so that importing the package is fast."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from importlib import import_module
 from typing import Any
 
 
-def imported_when_used(package: str, modules: Mapping[str, str]) -> Callable[[str], Any]:
-    """What a package takes as its ``__getattr__``.
+def make_lazy_getattr(package: str, modules: Mapping[str, str]) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` of a package that imports its names when they are first used.
 
     Args:
-        package: its name.
-        modules: by the name of what is offered, the module that it is in.
+        package: name of the package.
+        modules: module of each name that the package offers.
     """
 
     def get(name: str) -> Any:
@@ -23,11 +23,11 @@ def imported_when_used(package: str, modules: Mapping[str, str]) -> Callable[[st
     return get
 
 
-def shown_in_notebooks(by: str) -> Callable[[Any], str]:
-    """What a class takes as its ``_repr_html_``, by which Jupyter shows objects of it.
+def make_notebook_repr(by: str) -> Callable[[Any], str]:
+    """Return the ``_repr_html_`` of a class, by which Jupyter shows its objects.
 
     Args:
-        by: name of the function in :mod:`osimlite.view.notebook` that says it in HTML.
+        by: name of the function in :mod:`osimlite.view.notebook` that returns the HTML.
     """
 
     def _repr_html_(self: Any) -> str:

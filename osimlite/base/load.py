@@ -1,8 +1,8 @@
-"""Python code that a user names: a file, or a module that can be imported from the current folder.
+"""Import of Python files and modules that a user names.
 
-Python keeps what it compiled in a folder ``__pycache__`` beside a file, and tells versions of the
-file apart by second and size: a model that is built again at once with another digit would be the
-old one. What stands in a user's folder is compiled each time, and nothing is written there.
+Python caches compiled code in ``__pycache__`` and recognizes a new version of a file by time (s) and
+size: a model that is built again within a second with another digit would be the old one. Files in
+the folders of users are therefore compiled each time, and nothing is written there.
 """
 
 from __future__ import annotations
@@ -18,48 +18,47 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
 
-from osimlite.base.files import no_such
+from osimlite.base.files import make_missing_error
 from osimlite.errors import OsimliteError
 
 
-def module_of_file(path: Path) -> ModuleType:
-    """Run a Python file.
+def run_python_file(path: Path) -> ModuleType:
+    """Run a Python file and return it as a module.
 
     Raises:
-        MissingFileError: it is not there.
-        OsimliteError: it fails; with the line.
+        MissingFileError: the file does not exist.
+        OsimliteError: the code raises an error; with the line.
     """
     if not path.is_file():
-        raise no_such(path)
-    # A name of our own, so that a model in json.py does not take the place of a module that others
-    # import.
+        raise make_missing_error(path)
+    # A private name, so that a model in json.py does not replace the module json.
     name = f"_osimlite_source_{path.stem}"
-    place = str(path.absolute())
-    spec = importlib.util.spec_from_file_location(name, place, loader=_Loader(name, place))
+    location = str(path.absolute())
+    spec = importlib.util.spec_from_file_location(name, location, loader=_Loader(name, location))
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    _read_anew(str(path.resolve().parent))
+    _register_user_folder(str(path.resolve().parent))
     sys.modules[name] = module
-    with imports_beside(place), errors_placed(place):
+    with allow_local_imports(location), locate_errors(location):
         spec.loader.exec_module(module)
     return module
 
 
-def module_name(name: str) -> str:
-    """The module of what osimlite makes of a class: PathSpring is in path_spring, IMUPlacer in imu_placer."""
+def make_module_name(name: str) -> str:
+    """Return a class name in snake case: PathSpring is path_spring, IMUPlacer is imu_placer."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
 
 
-def module_named(name: str) -> ModuleType:
-    """Import a module.
+def import_user_module(name: str) -> ModuleType:
+    """Import a module that a user names, also from the current folder.
 
     Raises:
-        OsimliteError: it cannot be imported.
+        OsimliteError: the module cannot be imported.
     """
-    # `python -m osimlite` finds modules in the current folder; so must the command of that name.
+    # `python -m osimlite` finds modules in the current folder; the command osimlite must too.
     if "" not in sys.path:
         sys.path.insert(0, "")
-    _read_anew(os.getcwd())
+    _register_user_folder(os.getcwd())
     try:
         return importlib.import_module(name)
     except ImportError as error:
@@ -67,8 +66,8 @@ def module_named(name: str) -> ModuleType:
 
 
 @contextmanager
-def imports_beside(file: str) -> Iterator[None]:
-    """Let the user's code in a file import what stands beside it."""
+def allow_local_imports(file: str) -> Iterator[None]:
+    """Let the code of a user's file import modules of the same folder."""
     folder = str(Path(file).resolve().parent)
     sys.path.insert(0, folder)
     try:
@@ -79,15 +78,16 @@ def imports_beside(file: str) -> Iterator[None]:
 
 
 class _Loader(SourceFileLoader):
-    """Runs a file as it is now."""
+    """Loader that compiles a file without any cache."""
 
     def get_code(self, fullname: str) -> CodeType:
+        """Return the code of the present file."""
         path = self.get_filename(fullname)
         return self.source_to_code(self.get_data(path), path)
 
 
 class _Finder:
-    """Finds modules as Python does, and has those in the users' folders run as they are now."""
+    """Finder of modules that loads those in users' folders without a cache."""
 
     def __init__(self) -> None:
         self.folders: set[str] = set()
@@ -95,9 +95,9 @@ class _Finder:
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """The specification of a module; None leaves it to Python, as the parts of a package that Python has found."""
-        around = getattr(sys.modules.get(name.rpartition(".")[0]), "__spec__", None)
-        if type(getattr(around, "loader", None)) is SourceFileLoader:
+        """Return the specification of a module; None leaves the module to Python's finders."""
+        parent = getattr(sys.modules.get(name.rpartition(".")[0]), "__spec__", None)
+        if type(getattr(parent, "loader", None)) is SourceFileLoader:
             return None
         spec = PathFinder.find_spec(name, path, target)
         if (
@@ -109,17 +109,17 @@ class _Finder:
         return spec
 
     def _is_users(self, file: str) -> bool:
-        """Whether a file is in a user's folder; what is installed there, as in .venv, is not the user's."""
-        places = {*self.folders, *map(os.path.abspath, sys.path)}
-        around = [place for place in places if file.startswith(os.path.join(place, ""))]
-        return max(around, key=len, default="") in self.folders
+        """Return whether a file is a user's; packages installed in a user's folder, as in .venv, are not."""
+        folders = {*self.folders, *map(os.path.abspath, sys.path)}
+        parents = [folder for folder in folders if file.startswith(os.path.join(folder, ""))]
+        return max(parents, key=len, default="") in self.folders
 
 
 _FINDER = _Finder()
 
 
-def _read_anew(folder: str) -> None:
-    """From now on run what is in a folder as it is, and no module that was loaded from a user's folder before."""
+def _register_user_folder(folder: str) -> None:
+    """Add a folder to those of users, and forget the modules that were loaded from such folders."""
     _FINDER.folders.add(folder)
     if _FINDER not in sys.meta_path:
         sys.meta_path.insert(sys.meta_path.index(PathFinder), _FINDER)
@@ -133,8 +133,8 @@ def _read_anew(folder: str) -> None:
 
 
 @contextmanager
-def errors_placed(file: str) -> Iterator[None]:
-    """Tell of any error in the user's own code with the file and the line of it."""
+def locate_errors(file: str) -> Iterator[None]:
+    """Raise errors of the user's code as OsimliteError with file and line."""
     try:
         yield
     except OsimliteError as error:
@@ -148,7 +148,7 @@ def errors_placed(file: str) -> Iterator[None]:
 
 
 def _line_in(error: BaseException, file: str) -> int | None:
-    """The last line of `file` on the way to the error."""
+    """Return the last line of `file` in the traceback of an error."""
     line = getattr(error, "lineno", None) if isinstance(error, SyntaxError) else None
     trace = error.__traceback__
     while trace is not None:

@@ -1,4 +1,4 @@
-"""Pools of workers that share a list of work: processes of this machine, or the workers of a Dask cluster."""
+"""Pools of workers that process tasks: local processes, or the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -19,92 +19,105 @@ from queue import SimpleQueue
 from typing import Any, Protocol
 
 import osimlite
-from osimlite.base.cores import cores
+from osimlite.base.cores import count_cores
 from osimlite.base.require import protect_processes, require
 from osimlite.errors import OsimliteError, SettingError
 
-MOST_LOSSES = 20
-"""A task that was lost with its worker so often is not tried again."""
+MAX_TASK_LOSSES = 20
+"""Largest number of times that a task is submitted again after its worker was lost."""
 
-PATIENCE = 30
-"""So long a cluster may take to have its first worker, s."""
-
+CLUSTER_TIMEOUT_S = 30
+"""Time within which a cluster must have its first worker (s)."""
 
 WORKER_COUNT_AGE_S = 1.0
-"""A cluster is asked for its number of worker threads at most once in this time."""
+"""Smallest time between two queries for the number of worker threads of a cluster (s)."""
 
 
 class ClusterLostError(OsimliteError):
-    """The cluster cannot be reached any more; what was done is kept."""
+    """Error for a cluster that cannot be reached any more; finished results are saved."""
 
 
 class WorkerLostError(OsimliteError):
-    """A process has ended in the midst of its work, and takes all others with it."""
+    """Error for a process that ended during a task, which ends the pool."""
 
 
 class Pool(Protocol):
-    """Takes work, such as samples, and puts what came of it into a queue."""
+    """Pool of workers that accepts tasks, such as samples, and queues their results.
 
-    task_seconds: float  # how long a task should take
+    Attributes:
+        task_seconds: duration that a task should have (s).
+    """
+
+    task_seconds: float
 
     @property
     def workers(self) -> int:
-        """How much can be worked on at a time; may change."""
+        """Number of tasks that can run at a time; it can change."""
 
     def submit(self, tag: Any, values: Any) -> None:
-        """Have it done; the values of a sweep are samples (k, d)."""
+        """Submit a task.
+
+        Args:
+            tag: identifies the task in `result`.
+            values: argument of the work; in a sweep samples (k, d).
+        """
 
     def result(self, timeout: float | None = None) -> tuple[Any, Any]:
-        """The next tag that is done, and what came of it, of samples a block.
+        """Return the next finished task.
+
+        Args:
+            timeout: longest time to wait (s); None waits without limit.
+
+        Returns:
+            The tag of the task and its result, in a sweep a block of results.
 
         Raises:
-            OsimliteError: it could not be done; TimeoutError: nothing was done in time.
+            OsimliteError: the task failed.
+            TimeoutError: no task finished in time.
         """
 
     def close(self) -> None:
-        """Stop what has not begun."""
+        """Cancel the tasks that have not begun."""
 
 
 @contextmanager
-def processes(
+def open_process_pool(
     work: Callable[[Any], Any], *, workers: int | None = None, cluster: str | None = None
 ) -> Iterator[Pool]:
-    """Make a pool of processes, here or on a cluster, that do one thing with all that is submitted.
+    """Open a pool of local processes or of the workers of a cluster, and close it at the end.
 
     Args:
-        work: what is done; it can be pickled.
-        workers: processes here; by default one for each core.
-        cluster: address of a Dask scheduler.
+        work: function that runs for each task; it must be picklable.
+        workers: number of local processes; default one for each core.
+        cluster: address of a Dask scheduler; default local processes.
 
     Raises:
-        SettingError: a cluster is named and a number of workers, or the number is below one.
+        SettingError: both a cluster and a number of workers are given, or the number is below one.
         OsimliteError: the cluster cannot be reached.
         MissingDependency: dask.distributed is not installed.
     """
     if cluster is not None and workers is not None:
-        raise SettingError(
-            "a cluster has the workers that were started for it; leave out --workers"
-        )
-    made: Pool = (
+        raise SettingError("a cluster has a fixed number of workers; remove --workers")
+    pool: Pool = (
         ProcessPool(work, count_workers(workers)) if cluster is None else ClusterPool(work, cluster)
     )
-    with closing(made):
-        yield made
+    with closing(pool):
+        yield pool
 
 
 def count_workers(workers: int | None) -> int:
-    """Return the number of workers that is asked for, or by default that of the cores.
+    """Return the requested number of workers, by default the number of cores.
 
     Raises:
         SettingError: the number is below one.
     """
     if workers is not None and workers < 1:
-        raise SettingError(f"there is at least one worker, not {workers}")
-    return workers or cores()
+        raise SettingError(f"the number of workers must be at least 1, not {workers}")
+    return workers or count_cores()
 
 
 class LocalPool:
-    """An executor whose finished work queues up."""
+    """Executor that queues finished tasks."""
 
     task_seconds = 0.25
 
@@ -119,51 +132,57 @@ class LocalPool:
         self._done: SimpleQueue[tuple[Any, Any]] = SimpleQueue()
 
     def submit(self, tag: Any, values: Any) -> None:
-        """Have it done."""
-        # Processes that begin now inherit that Ctrl-C is not for them.
-        with _sigint_held(), _losses_told():
+        """Submit a task."""
+        # Processes that start now inherit the blocked signal, so that Ctrl-C does not reach them.
+        with _delay_interrupts(), _report_lost_workers():
             future = self._executor.submit(self._work, values)
         future.add_done_callback(lambda done: self._done.put((tag, done)))
 
     def result(self, timeout: float | None = None) -> tuple[Any, Any]:
-        """The next that is done."""
-        tag, future = _next(self._done, timeout)
-        with _losses_told():
+        """Return the tag and the result of the next finished task.
+
+        Returns:
+            The tag of the task and its result.
+        """
+        tag, future = _get_from_queue(self._done, timeout)
+        with _report_lost_workers():
             return tag, future.result()
 
     def close(self) -> None:
-        """Stop what has not begun, and wait for the rest."""
+        """Cancel the tasks that have not begun, and wait for the others."""
         self._executor.shutdown(cancel_futures=True)
 
 
 @contextmanager
-def _losses_told() -> Iterator[None]:
+def _report_lost_workers() -> Iterator[None]:
+    """Raise WorkerLostError with advice if a process has ended."""
     try:
         yield
     except BrokenExecutor:
-        # New processes run the module anew that the program began with.
+        # New processes import the main module of the program again.
         raise WorkerLostError(
-            "a process of the sweep has ended; a script begins a sweep under if __name__ == '__main__':, and what "
-            "was ended from outside goes on with --resume"
+            "a process of the sweep has ended; in a script, start the sweep under if __name__ == '__main__':, and "
+            "continue an interrupted sweep with --resume"
         ) from None
 
 
 class ProcessPool(LocalPool):
-    """Processes, for what keeps Python's lock."""
+    """Pool of processes, for work that holds Python's global lock."""
 
     def __init__(self, work: Callable[[Any], Any], count: int) -> None:
         protect_processes()
-        # Windows can wait for no more. Ctrl-C is for the process that gives out the work.
-        executor = ProcessPoolExecutor(min(count, 61), get_context("spawn"), _leave_sigint)
+        # Windows can wait for 61 processes at most. Ctrl-C is for the main process only.
+        executor = ProcessPoolExecutor(min(count, 61), get_context("spawn"), _ignore_interrupts)
         super().__init__(executor, work, count)
 
 
 class ClusterPool:
-    """The workers of a Dask cluster. A task that is lost with its worker is done by another.
+    """Pool of the workers of a Dask cluster; a task whose worker is lost is submitted again.
 
     Args:
-        work: what is done; it goes with every task, so that a new worker needs nothing from others.
-        address: of the scheduler.
+        work: function that runs for each task. It is sent with every task, so that new workers can
+            join at any time.
+        address: address of the scheduler.
     """
 
     task_seconds = 1.0
@@ -171,15 +190,16 @@ class ClusterPool:
     def __init__(self, work: Callable[[Any], Any], address: str) -> None:
         distributed = require("distributed", extra="sweep", purpose="a sweep on a cluster")
         _check_address(address)
-        # It has pages to say of a scheduler that has gone, which is one sentence here.
+        # Dask logs pages about a lost scheduler; one error message replaces them.
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         self._work, self._address = work, address
         self._done: SimpleQueue[tuple[Any, Any]] = SimpleQueue()
         self._tasks: dict[Any, tuple[Any, Any, int, Any]] = {}
-        self._threads, self._asked = 0, 0.0
+        self._threads = 0
+        self._query_time = 0.0
         try:
             self._client: Any = distributed.Client(
-                address, timeout=min(10, PATIENCE), set_as_default=False
+                address, timeout=min(10, CLUSTER_TIMEOUT_S), set_as_default=False
             )
         except (OSError, ValueError, TimeoutError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
@@ -187,7 +207,7 @@ class ClusterPool:
                 f"there is no Dask scheduler at '{address}' ({reason}); start one with: dask scheduler"
             ) from None
         try:
-            self._client.wait_for_workers(1, timeout=PATIENCE)
+            self._client.wait_for_workers(1, timeout=CLUSTER_TIMEOUT_S)
         except TimeoutError:
             self._client.close()
             raise ClusterLostError(
@@ -197,83 +217,94 @@ class ClusterPool:
     @property
     def workers(self) -> int:
         """Threads of all workers, at least one."""
-        if time.monotonic() - self._asked > WORKER_COUNT_AGE_S:
-            # A scheduler that does not answer may come back: the client tries for a while, and
+        if time.monotonic() - self._query_time > WORKER_COUNT_AGE_S:
+            # A scheduler that does not answer can come back: the client retries for some time, and
             # `result` raises an error if it gives up.
             with suppress(OSError, TimeoutError):
                 self._threads = sum(self._client.nthreads().values())
-            self._asked = time.monotonic()
+            self._query_time = time.monotonic()
         return max(1, self._threads)
 
     def submit(self, tag: Any, values: Any) -> None:
-        """Have it done."""
-        self._submit(tag, values, 0)
+        """Submit a task."""
+        self._submit_task(tag, values, 0)
 
-    def _submit(self, tag: Any, values: Any, losses: int) -> None:
+    def _submit_task(self, tag: Any, values: Any, losses: int) -> None:
+        """Submit a task that has lost its worker `losses` times."""
         try:
             future = self._client.submit(
-                elsewhere, self._work, values, osimlite.__version__, pure=False
+                run_remote_task, self._work, values, osimlite.__version__, pure=False
             )
         except Exception as error:
             if type(error).__name__ == "ClosedClientError":
-                raise self._lost() from None
+                raise self._make_lost_error() from None
             raise
         self._tasks[future.key] = tag, values, losses, future
         future.add_done_callback(self._done.put)
 
     def result(self, timeout: float | None = None) -> tuple[Any, Any]:
-        """The next that is done."""
+        """Return the tag and the result of the next finished task.
+
+        Returns:
+            The tag of the task and its result.
+        """
         from distributed.scheduler import KilledWorker
 
         while True:
-            future = _next(self._done, timeout)
+            future = _get_from_queue(self._done, timeout)
             tag, values, losses, _ = self._tasks.pop(future.key)
             try:
                 return tag, future.result(timeout=60)
             except KilledWorker:
-                if losses + 1 >= MOST_LOSSES:
+                if losses + 1 >= MAX_TASK_LOSSES:
                     raise OsimliteError(
-                        "the same task has ended worker after worker; look into their logs, then go on with --resume"
+                        f"a task has ended {MAX_TASK_LOSSES} workers; read their logs, then continue with --resume"
                     ) from None
-                self._submit(tag, values, losses + 1)
+                self._submit_task(tag, values, losses + 1)
             except (CancelledError, OSError, TimeoutError):
-                raise self._lost() from None
+                raise self._make_lost_error() from None
             except OsimliteError as error:
                 error.message = f"on the cluster: {error.message}"
                 raise
             except Exception as error:
                 if type(error).__name__ in ("FutureCancelledError", "CommClosedError"):
-                    raise self._lost() from None
+                    raise self._make_lost_error() from None
                 raise OsimliteError(
-                    f"a worker cannot do its task ({type(error).__name__}: {error}); it needs the modules that are "
-                    "here, then go on with --resume"
+                    f"a worker cannot run its task ({type(error).__name__}: {error}); install the modules of this "
+                    "machine there, then continue with --resume"
                 ) from error
 
-    def _lost(self) -> ClusterLostError:
+    def _make_lost_error(self) -> ClusterLostError:
+        """Return the error for a scheduler that has gone."""
         return ClusterLostError(
-            f"the Dask scheduler at '{self._address}' has gone; go on with --resume"
+            f"the Dask scheduler at '{self._address}' does not answer any more; continue with --resume"
         )
 
     def close(self) -> None:
-        """Stop what has not begun."""
-        # Futures that are let go are cancelled.
+        """Cancel the tasks that have not begun."""
+        # Dask cancels futures that nothing refers to.
         self._tasks.clear()
         self._client.close()
 
 
 def _check_address(address: str) -> None:
-    """Stop before a client is made, which takes long to give up."""
+    """Check an address before a client is created, because a client takes long to give up.
+
+    Raises:
+        SettingError: it is not the address of a scheduler.
+    """
     core = require("distributed.core", extra="sweep", purpose="a sweep on a cluster")
     comm = require("distributed.comm", extra="sweep", purpose="a sweep on a cluster")
     try:
         comm.get_address_host_port(core.coerce_to_address(address))
     except ValueError as error:
         raise SettingError(
-            f"'{address}' is no address of a Dask scheduler ({error}); give one such as tcp://127.0.0.1:8786"
+            f"'{address}' is not an address of a Dask scheduler ({error}); use one such as tcp://127.0.0.1:8786"
         ) from None
 
 
-def _next(queue: SimpleQueue[Any], timeout: float | None) -> Any:
+def _get_from_queue(queue: SimpleQueue[Any], timeout: float | None) -> Any:
+    """Return the next item of a queue; raise TimeoutError if there is none in time."""
     from queue import Empty
 
     try:
@@ -282,13 +313,14 @@ def _next(queue: SimpleQueue[Any], timeout: float | None) -> Any:
         raise TimeoutError from None
 
 
-def _leave_sigint() -> None:
+def _ignore_interrupts() -> None:
+    """Ignore Ctrl-C in this process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager
-def _sigint_held() -> Iterator[None]:
-    """Let interruptions by the keyboard wait, where the system has masks."""
+def _delay_interrupts() -> Iterator[None]:
+    """Delay Ctrl-C until the context ends, on systems with signal masks."""
     if sys.platform == "win32":
         yield
         return
@@ -299,14 +331,19 @@ def _sigint_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def elsewhere(work: Callable[[Any], Any], values: Any, version: str) -> Any:
-    """Do work that another program gives; what a worker of a cluster does.
+def run_remote_task(work: Callable[[Any], Any], values: Any, version: str) -> Any:
+    """Run a task on a worker of a cluster.
+
+    Args:
+        work: function of the task.
+        values: its argument.
+        version: version of osimlite that submitted the task.
 
     Raises:
-        OsimliteError: that program has another version of osimlite, or the work cannot be done.
+        OsimliteError: the version differs from that of the worker, or the work fails.
     """
     if version != osimlite.__version__:
         raise OsimliteError(
-            f"a worker has osimlite {osimlite.__version__}, and the sweep was begun by {version}; install the same"
+            f"a worker has osimlite {osimlite.__version__}, but the sweep was started by {version}; install the same version"
         )
     return work(values)

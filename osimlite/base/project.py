@@ -1,4 +1,4 @@
-"""The settings of a project: ``[tool.osimlite]`` of the nearest pyproject.toml, or an osimlite.toml."""
+"""Settings of a project: ``[tool.osimlite]`` of the nearest pyproject.toml, or an osimlite.toml."""
 
 from __future__ import annotations
 
@@ -9,61 +9,73 @@ from typing import Any
 from osimlite.base.reading import read_at_most
 from osimlite.errors import OsimliteError
 
-LARGEST_FILE = 100_000_000
-"""The most bytes that are read of a file where no settings allow more; models have some million at most."""
-LARGEST_SETTINGS = 10_000_000
-"""The most bytes of a file of settings: a pyproject.toml has some thousand."""
+DEFAULT_MAX_FILE_BYTES = 100_000_000
+"""Largest file that is read without settings (bytes); models have some million bytes at most."""
+MAX_SETTINGS_BYTES = 10_000_000
+"""Largest file of settings (bytes); a pyproject.toml has some thousand."""
 
 
-def settings_table(folder: Path) -> tuple[Path, dict[str, Any]] | None:
-    """The nearest file above a folder that has settings, and what it says; None if there is none.
+def find_settings(folder: Path) -> tuple[Path, dict[str, Any]] | None:
+    """Search the settings of a folder.
+
+    Returns:
+        The nearest file with settings in the folder or above it, and its table; None without one.
 
     Raises:
-        OsimliteError: the file is no TOML.
+        OsimliteError: the file is not valid TOML.
     """
-    for place in (folder, *folder.parents):
+    for parent in (folder, *folder.parents):
         for name in ("osimlite.toml", "pyproject.toml"):
-            file = place / name
+            file = parent / name
             if not file.is_file():
                 continue
-            table = _table(file, whole=name == "osimlite.toml")
+            table = _read_settings(file, whole=name == "osimlite.toml")
             if table is not None:
                 return file, table
     return None
 
 
-def largest_file(folder: Path) -> int:
-    """The most bytes that are read of a file in a folder; OsimliteError if the settings make no sense."""
-    result = settings_table(folder)
-    return LARGEST_FILE if result is None else largest_file_in(*result)
+def get_max_file_size(folder: Path) -> int:
+    """Return the largest number of bytes that are read of a file in a folder.
+
+    Raises:
+        OsimliteError: the setting `largest-file` is invalid.
+    """
+    result = find_settings(folder)
+    return DEFAULT_MAX_FILE_BYTES if result is None else parse_max_file_size(*result)
 
 
-def largest_file_in(file: Path, table: dict[str, Any]) -> int:
-    """The most bytes of a file by the settings in `file`; OsimliteError if they make no sense."""
-    given = table.get("largest-file", LARGEST_FILE / 1e6)
-    is_number = isinstance(given, int | float) and not isinstance(given, bool)
-    # TOML has integers of any length, most of them beyond the range of floats.
-    if not is_number or not LARGEST_FILE / 1e6 <= given <= sys.float_info.max / 1e6:
+def parse_max_file_size(file: Path, table: dict[str, Any]) -> int:
+    """Return the largest number of bytes of a file by the settings in `file`.
+
+    Raises:
+        OsimliteError: the setting `largest-file` is invalid.
+    """
+    value = table.get("largest-file", DEFAULT_MAX_FILE_BYTES / 1e6)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    # TOML allows integers beyond the range of floats.
+    if not is_number or not DEFAULT_MAX_FILE_BYTES / 1e6 <= value <= sys.float_info.max / 1e6:
         raise OsimliteError(
-            f"'largest-file' must be a number of MB, {LARGEST_FILE / 1e6:g} or more, not '{given}'",
+            f"'largest-file' must be a number of MB, {DEFAULT_MAX_FILE_BYTES / 1e6:g} or more, not '{value}'",
             file=str(file),
         )
-    return int(given * 1e6)
+    return int(value * 1e6)
 
 
-def _table(file: Path, *, whole: bool) -> dict[str, Any] | None:
+def _read_settings(file: Path, *, whole: bool) -> dict[str, Any] | None:
+    """Return the table of osimlite in a file, which is the complete file if `whole` is true."""
     import tomllib
 
-    text = read_at_most(file, LARGEST_SETTINGS + 1)
-    if len(text) > LARGEST_SETTINGS:
-        message = f"settings of more than {LARGEST_SETTINGS / 1e6:g} MB are not read"
+    text = read_at_most(file, MAX_SETTINGS_BYTES + 1)
+    if len(text) > MAX_SETTINGS_BYTES:
+        message = f"the file of settings is larger than {MAX_SETTINGS_BYTES / 1e6:g} MB"
         raise OsimliteError(message, file=str(file))
     try:
         data: Any = tomllib.loads(text.decode())
     except (ValueError, RecursionError) as error:
-        # A deep nesting of brackets ends the parser's recursion; its message says only that.
+        # Deeply nested brackets exceed Python's recursion limit; the parser's message is no help.
         reason = "brackets nest too deeply" if isinstance(error, RecursionError) else error
-        raise OsimliteError(f"this is no TOML: {reason}", file=str(file)) from None
+        raise OsimliteError(f"this is not valid TOML: {reason}", file=str(file)) from None
     for key in () if whole else ("tool", "osimlite"):
         data = data.get(key) if isinstance(data, dict) else None
     return data if isinstance(data, dict) else None

@@ -1,7 +1,7 @@
-"""Removal of entries of the user's cache that nothing has used for a long time.
+"""Removal of old entries of the user's cache.
 
-Every entry is a file `.json` in the tree of the cache folder. Its time of change says when it was
-written or last used, see :func:`mark_used`: file systems often keep no times of access.
+Every entry is a file `.json` in the tree of the cache folder. Its time of change is the time of its
+last use, see :func:`mark_used`, because many file systems record no times of access.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from typing import NamedTuple
 
 DAY_S = 86_400.0
 UNUSED_DAYS = 90.0
-"""After as many days without use an entry is removed."""
+"""Number of days without use after which an entry is removed."""
 
 MAX_CACHE_BYTES = 512 * 2**20
-"""A larger cache loses the entries that were used longest ago, until a fifth of this is free."""
+"""Largest size of the cache (bytes); a larger one is reduced to 80 % of this, oldest entries first."""
 
 MARKER = ".pruned"
-"""File in the cache folder whose time says when the cache was last looked through."""
+"""File in the cache folder whose time of change is that of the last removal."""
 
 
 class _Entry(NamedTuple):
-    """One entry of a cache: when it was last used (s), its size (bytes), the folder that holds it, its name."""
+    """Entry of a cache: time of last use (s), size (bytes), folder and name."""
 
     used: float
     size: int
@@ -35,7 +35,7 @@ class _Entry(NamedTuple):
 
 
 def mark_used(path: Path) -> None:
-    """Note that an entry was used today, unless that is noted; a link is never followed."""
+    """Set the time of last use of an entry unless it is of today; links are not followed."""
     with suppress(OSError, NotImplementedError):
         info = os.lstat(path)
         if stat.S_ISREG(info.st_mode) and time.time() - info.st_mtime > DAY_S:
@@ -43,7 +43,7 @@ def mark_used(path: Path) -> None:
 
 
 def is_due(folder: Path, now: float) -> bool:
-    """Return whether a cache was not looked through in the last day, or nobody knows when."""
+    """Return whether the last removal is more than a day ago or unknown."""
     try:
         return not 0.0 <= now - os.lstat(folder / MARKER).st_mtime < DAY_S
     except OSError:
@@ -51,9 +51,9 @@ def is_due(folder: Path, now: float) -> bool:
 
 
 def prune_cache(folder: Path, now: float, *, max_bytes: int = MAX_CACHE_BYTES) -> int:
-    """Remove the entries of a cache that are old, then those that are too many, and return how many.
+    """Remove old entries of a cache, then the oldest of too large a cache; return the number removed.
 
-    Several processes may do so at once, and others may write: what is gone already is passed over.
+    Several processes can do this at once while others write: entries that are gone are ignored.
     Links are neither followed nor removed.
 
     Args:
@@ -63,7 +63,7 @@ def prune_cache(folder: Path, now: float, *, max_bytes: int = MAX_CACHE_BYTES) -
     """
     entries = sorted(_find_entries(os.path.realpath(folder)))
     total = sum(entry.size for entry in entries)
-    # A little more than necessary goes, so that not every run has to remove something.
+    # Remove a little more than necessary, so that not every run has to remove entries.
     least = total if total <= max_bytes else 0.8 * max_bytes
     removed = 0
     for entry in entries:
@@ -75,25 +75,27 @@ def prune_cache(folder: Path, now: float, *, max_bytes: int = MAX_CACHE_BYTES) -
 
 
 def _find_entries(folder: str) -> Iterator[_Entry]:
-    for place, folders, names in os.walk(folder, followlinks=False):
-        # On Windows a junction is a folder that leads elsewhere, and is no link to Python.
-        folders[:] = [name for name in folders if not _leads_elsewhere(place, name)]
+    """Yield all entries in the tree of a folder."""
+    for parent, folders, names in os.walk(folder, followlinks=False):
+        # On Windows Python does not see that a junction is a link.
+        folders[:] = [name for name in folders if not _leads_elsewhere(parent, name)]
         for name in names:
             if not name.endswith(".json"):
                 continue
             with suppress(OSError):
-                info = os.lstat(os.path.join(place, name))
+                info = os.lstat(os.path.join(parent, name))
                 if stat.S_ISREG(info.st_mode):
-                    yield _Entry(info.st_mtime, info.st_size, place, name)
+                    yield _Entry(info.st_mtime, info.st_size, parent, name)
 
 
-def _leads_elsewhere(place: str, name: str) -> bool:
-    path = os.path.join(place, name)
-    return os.path.realpath(path) != os.path.join(os.path.realpath(place), name)
+def _leads_elsewhere(parent: str, name: str) -> bool:
+    """Return whether a folder is a link or a junction."""
+    path = os.path.join(parent, name)
+    return os.path.realpath(path) != os.path.join(os.path.realpath(parent), name)
 
 
 def _remove(entry: _Entry) -> bool:
-    """Remove an entry, unless its folder has become a link since it was found."""
+    """Remove an entry unless its folder has become a link meanwhile; return whether it was removed."""
     try:
         if os.unlink not in os.supports_dir_fd:
             if os.path.realpath(entry.folder) != entry.folder:
@@ -114,7 +116,7 @@ def _open_folder(folder: str) -> int:
     """Return a handle of a folder to which no part of the path is a link.
 
     Raises:
-        OSError: it is gone, or a part of the path is a link.
+        OSError: the folder is gone, or a part of the path is a link.
     """
     flags = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
     handle = os.open(os.sep, flags)

@@ -1,4 +1,4 @@
-"""Numbers as people write them, with or without a unit: ``0.5``, ``30deg``, ``2 cm``."""
+"""Numbers with or without a unit, as users write them: ``0.5``, ``30deg``, ``2 cm``."""
 
 from __future__ import annotations
 
@@ -16,32 +16,34 @@ _SIZES = {"deg": math.pi / 180.0, "rad": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
 class Quantity(NamedTuple):
-    """A number and the unit that was written after it, None if there was none."""
+    """Number with its unit; the unit is None if the user wrote none."""
 
     number: float
     unit: str | None
 
     @property
     def is_angle(self) -> bool | None:
-        """Whether the unit is one of angles; None without a unit."""
+        """True for a unit of angles; None without a unit."""
         return None if self.unit is None else self.unit in ("deg", "rad")
 
     @property
     def value(self) -> float:
-        """In rad or m; a number without a unit as it is."""
+        """The quantity in rad or m; a number without a unit is unchanged."""
         return self.number * _SIZES.get(self.unit or "rad", 1.0)
 
 
-def doubt(name: str, given: Quantity | None, range: tuple[float, float]) -> str:
-    """What is odd about the value of a coordinate that turns: more than a turn, out of its range, without a unit.
+def describe_unit_doubt(name: str, given: Quantity | None, range: tuple[float, float]) -> str:
+    """Describe why the value of a rotational coordinate is probably in degrees.
+
+    That is so if it has no unit, is more than a turn and is outside the range of the coordinate.
 
     Args:
-        name: of the coordinate.
-        given: as it was written.
-        range: of the coordinate, rad.
+        name: name of the coordinate.
+        given: value as the user wrote it.
+        range: range of the coordinate (rad).
 
     Returns:
-        A sentence, or "" if there is nothing odd.
+        A sentence, or "" for a plausible value.
     """
     if given is None or given.unit is not None or not 2.0 * math.pi < abs(given.number) < math.inf:
         return ""
@@ -52,21 +54,24 @@ def doubt(name: str, given: Quantity | None, range: tuple[float, float]) -> str:
     return f"{name} = {number} is in rad, and outside its range of {low:.3g} to {high:.3g} rad; did you mean {number}deg?"
 
 
-def tell_doubt(odd: str) -> None:
-    """Warn of what :func:`doubt` says; an empty text is nothing to tell of."""
-    if odd:
-        tell(odd, UnitWarning)
+def warn_of_unit(message: str) -> None:
+    """Issue the warning of :func:`describe_unit_doubt`; do nothing for an empty text."""
+    if message:
+        warn_caller(message, UnitWarning)
 
 
-def tell(odd: str, category: type[DoubtfulWarning] = DoubtfulWarning) -> None:
-    """Warn where the program of the user called."""
-    level, frame, ours = 1, sys._getframe(), str(Path(__file__).parents[1])
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(ours):
-        level, frame = level + 1, frame.f_back
-    warnings.warn(odd, category, stacklevel=level)
+def warn_caller(message: str, category: type[DoubtfulWarning] = DoubtfulWarning) -> None:
+    """Issue a warning at the line of the user's program that called osimlite."""
+    level = 1
+    frame = sys._getframe()
+    package_folder = str(Path(__file__).parents[1])
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(package_folder):
+        level += 1
+        frame = frame.f_back
+    warnings.warn(message, category, stacklevel=level)
 
 
-def quantity(text: str) -> Quantity | None:
-    """Read a quantity; None if the text is none."""
+def parse_quantity(text: str) -> Quantity | None:
+    """Return the quantity in a text, or None if the text is not a quantity."""
     match = _FORM.fullmatch(text.strip())
     return None if match is None else Quantity(float(match[1]), match[2])

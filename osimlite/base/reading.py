@@ -1,8 +1,8 @@
-"""Opening of files for reading: regular files only, never a pipe, a socket or a device.
+"""Opening of regular files for reading; pipes, sockets and devices are refused.
 
-A file that a user or a document names is opened through :func:`open_file` or through what is built
-on it, :func:`osimlite.base.files.read_file`. A pipe may never begin and a device may never
-end, so that a name in a stranger's document could stop the program or fill the memory.
+Files that a user or a document names are opened through :func:`open_file`, on which
+:func:`osimlite.base.files.read_file` builds. Without this check, the name of a pipe or of a device in
+an untrusted document could block the program or fill the memory.
 """
 
 from __future__ import annotations
@@ -23,26 +23,31 @@ _SPECIAL = {
 
 
 def open_file(path: str | Path) -> BinaryIO:
-    """Open an ordinary file for reading.
+    """Open a regular file for reading.
 
     Raises:
-        SpecialFileError: it is a pipe, a device or the like, which may never end or never begin.
-        MissingFileError: it is not there or may not be read.
+        SpecialFileError: the path is a pipe, a device or a similar file.
+        MissingFileError: the file does not exist or is not readable.
     """
     try:
-        # Opening a device may already do something; and what was there may be another thing a
-        # moment later.
-        _expect_ordinary(os.stat(path).st_mode, path)
+        # Check before opening, because opening a device can have effects, and after it, because
+        # the file can have been replaced meanwhile.
+        _expect_regular(os.stat(path).st_mode, path)
         return open(path, "rb", opener=_open_nonblocking)
     except (OSError, ValueError) as error:
         if isinstance(error, FileNotFoundError):
-            raise no_such(path) from None
+            raise make_missing_error(path) from None
         reason = getattr(error, "strerror", None) or error
         raise MissingFileError(f"cannot read the file: {reason}", file=str(path)) from None
 
 
-def no_such(path: str | Path, *, may_be_folder: bool = False) -> MissingFileError:
-    """The error that nothing is there: no folder, if the path ends as those do, else no file."""
+def make_missing_error(path: str | Path, *, may_be_folder: bool = False) -> MissingFileError:
+    """Return the error for a missing path: a missing folder if the path ends like one, else a file.
+
+    Args:
+        path: the missing path.
+        may_be_folder: whether a path without suffix means a folder.
+    """
     written = str(path)
     if written.endswith(("/", os.sep)) or (may_be_folder and not os.path.splitext(written)[1]):
         return MissingFolderError("there is no such folder", file=written)
@@ -53,8 +58,8 @@ def read_at_most(path: str | Path, limit: int) -> bytes:
     """Return the first `limit` bytes of a regular file, or all of it if it is shorter.
 
     Raises:
-        SpecialFileError: it is a pipe, a device or the like.
-        MissingFileError: it does not exist or may not be read.
+        SpecialFileError: the path is a pipe, a device or a similar file.
+        MissingFileError: the file does not exist or is not readable.
     """
     with open_file(path) as stream:
         try:
@@ -66,17 +71,18 @@ def read_at_most(path: str | Path, limit: int) -> bytes:
 
 
 def _open_nonblocking(path: str, flags: int) -> int:
-    """Open a file, and refuse it without waiting if it has become a pipe since it was checked."""
+    """Open a file without waiting; refuse it if it has become a pipe since it was checked."""
     handle = os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
     try:
-        _expect_ordinary(os.fstat(handle).st_mode, path)
+        _expect_regular(os.fstat(handle).st_mode, path)
     except BaseException:
         os.close(handle)
         raise
     return handle
 
 
-def _expect_ordinary(mode: int, path: str | Path) -> None:
+def _expect_regular(mode: int, path: str | Path) -> None:
+    """Raise an error unless a mode is that of a regular file."""
     if stat.S_ISDIR(mode):
         raise MissingFileError(
             "cannot read the file: this is a folder; name a model file in it", file=str(path)
@@ -84,5 +90,5 @@ def _expect_ordinary(mode: int, path: str | Path) -> None:
     if not stat.S_ISREG(mode):
         kind = _SPECIAL.get(stat.S_IFMT(mode), "something else")
         raise SpecialFileError(
-            f"cannot read the file: this is {kind}, and only files are read", file=str(path)
+            f"cannot read the file: this is {kind}; only regular files are read", file=str(path)
         )

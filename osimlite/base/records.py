@@ -1,9 +1,9 @@
-"""Records: classes declared as dataclasses are, whose methods are made when the first object is.
+"""Records: classes like dataclasses whose methods are compiled with the first object.
 
 ``dataclasses.dataclass`` writes and compiles half a dozen methods of each class when its module is
-imported. A command loads some 150 records and makes objects of few: here ``__init__`` is compiled
-with the first object, what compares and prints is the same function for all. Everything else is as
-with dataclasses, whose `replace` and `fields` take records.
+imported. A command loads some 150 records and creates objects of few. Here ``__init__`` is compiled
+with the first object, and all classes share the functions that compare and print. Everything else
+equals dataclasses, whose `replace` and `fields` accept records.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ _NOTHING: Any = object()
 
 
 class _Field:
-    """What `field` says of an attribute."""
+    """Arguments of `field` for one attribute."""
 
-    __slots__ = "choice", "compare", "default", "default_factory", "init", "kw_only", "repr"
+    __slots__ = "compare", "default", "default_factory", "init", "kw_only", "option", "repr"
 
     def __init__(
         self,
@@ -29,28 +29,36 @@ class _Field:
         init: bool = True,
         repr: bool = True,
         compare: bool = True,
-        choice: Any = None,
+        option: Any = None,
     ) -> None:
-        self.default, self.default_factory = default, default_factory
-        self.init, self.repr, self.compare, self.kw_only, self.choice = (
-            init,
-            repr,
-            compare,
-            False,
-            choice,
-        )
+        self.default = default
+        self.default_factory = default_factory
+        self.init = init
+        self.repr = repr
+        self.compare = compare
+        self.kw_only = False
+        self.option = option
 
 
 def field(
     *, default: Any = _NOTHING, default_factory: Any = _NOTHING, init: bool = True, repr: bool = True,
-    compare: bool = True, choice: Any = None,
+    compare: bool = True, option: Any = None,
 ) -> Any:  # fmt: skip
-    """As ``dataclasses.field``; `choice` is what else is said of the attribute, see :mod:`osimlite.base.choices`."""
-    return _Field(default, default_factory, init=init, repr=repr, compare=compare, choice=choice)
+    """Return the declaration of an attribute, as ``dataclasses.field``.
+
+    Args:
+        default: default value.
+        default_factory: function that creates the default value.
+        init: whether ``__init__`` has a parameter for the attribute.
+        repr: whether ``__repr__`` shows it.
+        compare: whether ``__eq__`` compares it.
+        option: its description as an option, see :mod:`osimlite.base.options`.
+    """
+    return _Field(default, default_factory, init=init, repr=repr, compare=compare, option=option)
 
 
 def replace(item: T, /, **changes: Any) -> T:
-    """A record with other values of some attributes."""
+    """Return a copy of a record with new values of some attributes."""
     for name, each in cast(Any, item).__record_fields__.items():
         if each.init and name not in changes:
             changes[name] = getattr(item, name)
@@ -73,29 +81,30 @@ def dataclass(
     kw_only: bool = False,
     slots: bool = False,
 ) -> Any:
-    """As ``dataclasses.dataclass``."""
+    """Make a class a record; the arguments are those of ``dataclasses.dataclass``."""
 
-    def made(cls: type) -> type:
-        return _made(cls, frozen, eq, kw_only, slots)
+    def decorate(cls: type) -> type:
+        return _build_record(cls, frozen, eq, kw_only, slots)
 
-    return made if cls is None else made(cls)
+    return decorate if cls is None else decorate(cls)
 
 
-def _made(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool) -> type:
-    space = cls.__dict__
+def _build_record(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool) -> type:
+    """Add the methods of a record to a class; return a new class if it has slots."""
+    namespace = cls.__dict__
     fields: dict[str, _Field] = {}
     for base in reversed(cls.__mro__[1:]):
         fields |= base.__dict__.get("__record_fields__", {})
-    own = [
+    annotated = [
         name
-        for name, kind in space.get("__annotations__", {}).items()
+        for name, kind in namespace.get("__annotations__", {}).items()
         if not str(kind).startswith("ClassVar")
     ]
-    for name in own:
-        given = space.get(name, _NOTHING)
-        fields[name] = given if isinstance(given, _Field) else _Field(given)
+    for name in annotated:
+        value = namespace.get(name, _NOTHING)
+        fields[name] = value if isinstance(value, _Field) else _Field(value)
         fields[name].kw_only = kw_only
-        if given is not _NOTHING and not slots:
+        if value is not _NOTHING and not slots:
             if fields[name].default is _NOTHING:
                 delattr(cls, name)
             else:
@@ -103,49 +112,53 @@ def _made(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool) -> type
     if slots:
         left = {
             name: value
-            for name, value in space.items()
-            if name not in (*own, "__dict__", "__weakref__")
+            for name, value in namespace.items()
+            if name not in (*annotated, "__dict__", "__weakref__")
         }
         cls = type(cls)(
             cls.__name__,
             cls.__bases__,
-            {**left, "__slots__": tuple(own), "__qualname__": cls.__qualname__},
+            {**left, "__slots__": tuple(annotated), "__qualname__": cls.__qualname__},
         )
-        space = cls.__dict__
-    methods: dict[str, Any] = {"__init__": _first(cls, frozen), "__repr__": _shown}
+        namespace = cls.__dict__
+    methods: dict[str, Any] = {
+        "__init__": _make_first_init(cls, frozen),
+        "__repr__": _format_record,
+    }
     if eq:
         names = [name for name, each in fields.items() if each.compare]
         methods["__record_key__"] = attrgetter(*names) if names else repr
-        methods["__eq__"] = _equal
-        if "__eq__" not in space:
-            methods["__hash__"] = _hashed if frozen else None
+        methods["__eq__"] = _compare_records
+        if "__eq__" not in namespace:
+            methods["__hash__"] = _hash_record if frozen else None
     if frozen:
-        methods |= {"__setattr__": _refuse, "__delattr__": _refuse}
+        methods |= {"__setattr__": _refuse_change, "__delattr__": _refuse_change}
         if slots:
-            methods |= {"__getstate__": _state, "__setstate__": _take_state}
+            methods |= {"__getstate__": _get_state, "__setstate__": _set_state}
     for name, method in methods.items():
-        # Python itself says that what has __eq__ has no hash.
-        if name not in space or (name == "__hash__" and space[name] is None):
+        # Python sets __hash__ to None in classes that define __eq__.
+        if name not in namespace or (name == "__hash__" and namespace[name] is None):
             setattr(cls, name, method)
-    setattr(cls, "__record_fields__", fields)  # noqa: B010 - a class of anybody's
-    setattr(cls, "__dataclass_fields__", _AsDataclass())  # noqa: B010
+    setattr(cls, "__record_fields__", fields)  # noqa: B010 - mypy does not know the attribute
+    setattr(cls, "__dataclass_fields__", _DataclassFields())  # noqa: B010
     setattr(cls, "__match_args__", tuple(name for name, each in fields.items() if each.init))  # noqa: B010
     return cls
 
 
-def _first(cls: Any, frozen: bool) -> Callable[..., None]:
-    """What stands for ``__init__`` until there is an object."""
+def _make_first_init(cls: Any, frozen: bool) -> Callable[..., None]:
+    """Return an ``__init__`` that compiles the final one when the first object is created."""
 
     def __init__(self: Any, *values: Any, **named: Any) -> None:
-        cls.__init__ = _compiled(cls, frozen)
+        cls.__init__ = _compile_init(cls, frozen)
         cls.__init__(self, *values, **named)
 
     return __init__
 
 
-def _compiled(cls: Any, frozen: bool) -> Callable[..., None]:
-    given: list[str] = []
-    named: list[str] = []
+def _compile_init(cls: Any, frozen: bool) -> Callable[..., None]:
+    """Return the compiled ``__init__`` of a record."""
+    positional: list[str] = []
+    keyword_only: list[str] = []
     lines: list[str] = []
     names: dict[str, Any] = {"_nothing": _NOTHING, "_set": object.__setattr__}
     for name, each in cls.__record_fields__.items():
@@ -167,39 +180,42 @@ def _compiled(cls: Any, frozen: bool) -> Callable[..., None]:
                 if each.default is _NOTHING
                 else f"=_default_{name}"
             )
-            (named if each.kw_only else given).append(name + default)
+            (keyword_only if each.kw_only else positional).append(name + default)
         lines.append(f'_set(self, "{name}", {value})' if frozen else f"self.{name} = {value}")
     if hasattr(cls, "__post_init__"):
         lines.append("self.__post_init__()")
-    arguments = ", ".join(["self", *given, *(["*", *named] if named else [])])
+    arguments = ", ".join(["self", *positional, *(["*", *keyword_only] if keyword_only else [])])
     body = "\n    ".join(lines or ["pass"])
     exec(f"def __init__({arguments}):\n    {body}", names)
-    made: Callable[..., None] = names["__init__"]
-    made.__qualname__ = f"{cls.__qualname__}.__init__"
-    return made
+    result: Callable[..., None] = names["__init__"]
+    result.__qualname__ = f"{cls.__qualname__}.__init__"
+    return result
 
 
-class _AsDataclass:
-    """The fields of a record as dataclasses know them."""
+class _DataclassFields:
+    """Descriptor of ``__dataclass_fields__``, which creates the fields of dataclasses when needed."""
 
     def __get__(self, item: object, cls: Any) -> dict[str, Any]:
         import dataclasses as d
 
-        made = []
+        fields = []
         for name, each in cls.__record_fields__.items():
-            told = {word: getattr(each, word) for word in ("init", "repr", "compare", "kw_only")}
+            arguments = {
+                word: getattr(each, word) for word in ("init", "repr", "compare", "kw_only")
+            }
             defaults = {word: getattr(each, word) for word in ("default", "default_factory")}
-            told |= {word: value for word, value in defaults.items() if value is not _NOTHING}
-            made.append((name, Any, d.field(**told)))
-        result: dict[str, Any] = d.make_dataclass(cls.__name__, made).__dict__[
+            arguments |= {word: value for word, value in defaults.items() if value is not _NOTHING}
+            fields.append((name, Any, d.field(**arguments)))
+        result: dict[str, Any] = d.make_dataclass(cls.__name__, fields).__dict__[
             "__dataclass_fields__"
         ]
-        # The next one asks the class itself: to make them costs more than many a motion.
+        # Replace this descriptor by its result, because creating the fields takes long.
         cls.__dataclass_fields__ = result
         return result
 
 
-def _shown(self: Any) -> str:
+def _format_record(self: Any) -> str:
+    """Return the text of ``__repr__``."""
     values = (
         f"{name}={getattr(self, name)!r}"
         for name, each in self.__record_fields__.items()
@@ -208,26 +224,31 @@ def _shown(self: Any) -> str:
     return f"{type(self).__qualname__}({', '.join(values)})"
 
 
-def _equal(self: Any, other: Any) -> bool:
+def _compare_records(self: Any, other: Any) -> bool:
+    """Return whether two records of one class have equal attributes."""
     if other.__class__ is not self.__class__:
         return NotImplemented
     return bool(self.__record_key__(self) == self.__record_key__(other))
 
 
-def _hashed(self: Any) -> int:
+def _hash_record(self: Any) -> int:
+    """Return the hash of the attributes that are compared."""
     return hash(self.__record_key__(self))
 
 
-def _refuse(self: Any, name: str, *_: Any) -> None:
+def _refuse_change(self: Any, name: str, *_: Any) -> None:
+    """Raise the error for a change of a frozen record."""
     from dataclasses import FrozenInstanceError
 
     raise FrozenInstanceError(f"cannot change '{name}' of {type(self).__name__}")
 
 
-def _state(self: Any) -> list[Any]:
+def _get_state(self: Any) -> list[Any]:
+    """Return the values for pickle."""
     return [getattr(self, name) for name in self.__record_fields__]
 
 
-def _take_state(self: Any, values: list[Any]) -> None:
+def _set_state(self: Any, values: list[Any]) -> None:
+    """Set the values from pickle."""
     for name, value in zip(self.__record_fields__, values, strict=True):
         object.__setattr__(self, name, value)

@@ -1,4 +1,4 @@
-"""Optional packages: imported where they are used, and missed in words a user can act on."""
+"""Import of optional packages, with messages that say how to install them."""
 
 from __future__ import annotations
 
@@ -16,27 +16,31 @@ from osimlite.errors import MissingDependency
 
 
 @cache
-def absent(*packages: str) -> tuple[str, ...]:
-    """Those of some packages that are not installed."""
+def find_missing_packages(*packages: str) -> tuple[str, ...]:
+    """Return those packages that are not installed.
+
+    Returns:
+        Names in the order of the arguments.
+    """
     return tuple(name for name in packages if find_spec(name) is None)
 
 
 def require(module: str, *, extra: str, purpose: str, instead: str = "") -> ModuleType:
-    """Import an optional package, or say which extra of osimlite brings it.
+    """Import an optional package, or raise an error that names the extra of osimlite with it.
 
     Args:
         module: name to import, e.g. ``"numpy"`` or ``"matplotlib.pyplot"``.
-        extra: the extra of osimlite that installs it, e.g. ``"sim"``.
-        purpose: what it is needed for, as the subject of a sentence: ``"the PyBullet engine"``.
-        instead: what does as well without it, if anything does.
+        extra: extra of osimlite that installs it, e.g. ``"sim"``.
+        purpose: what needs it, as the subject of a sentence: ``"the PyBullet engine"``.
+        instead: alternative that works without it, if any.
 
     Raises:
-        MissingDependency: the package is absent, or present and cannot be loaded.
+        MissingDependency: the package is not installed, or cannot be loaded.
     """
     package = module.partition(".")[0]
     if (loaded := sys.modules.get(module)) is not None:
         return loaded
-    cure = (f"take {instead}, or " if instead else "") + f"run: pip install 'osimlite[{extra}]'"
+    cure = (f"use {instead}, or " if instead else "") + f"run: pip install 'osimlite[{extra}]'"
     try:
         with leave_current_folder():
             return import_module(module)
@@ -46,7 +50,7 @@ def require(module: str, *, extra: str, purpose: str, instead: str = "") -> Modu
                 f"{purpose} needs {package}, which is not installed; {cure}"
             ) from error
         raise MissingDependency(
-            f"{purpose} needs {package}, which is installed without its own dependency {error.name}; {cure}"
+            f"{purpose} needs {package}, which is installed without its dependency {error.name}; {cure}"
         ) from error
     except ImportError as error:
         raise MissingDependency(
@@ -55,35 +59,35 @@ def require(module: str, *, extra: str, purpose: str, instead: str = "") -> Modu
 
 
 SAFE_PATH = "PYTHONSAFEPATH"
-"""Environment variable by which Python finds no modules in the folder that it is started in."""
+"""Environment variable that stops Python from importing modules of the current folder."""
 
 
 def protect_processes() -> None:
-    """Let no Python process that this one starts find modules in the current folder.
+    """Stop Python processes that this one starts from importing modules of the current folder.
 
-    The folder may be a stranger's, and packages start processes of their own: glfw, which mujoco
-    imports, runs `python -c` without `-P`.
+    The folder can be untrusted, and packages start processes: glfw, which mujoco imports, runs
+    `python -c` without `-P`.
     """
     os.environ.setdefault(SAFE_PATH, "1")
 
 
 @contextmanager
 def leave_current_folder() -> Iterator[None]:
-    """Work from the folder of this package, for the time of an import.
+    """Change to the folder of this package during an import.
 
-    Some look for files in the current folder while they are loaded: glfw for libraries, numba for
-    `.numba_config.yaml`, matplotlib for `matplotlibrc`.
+    Some packages search files in the current folder when they are imported: glfw libraries, numba
+    `.numba_config.yaml`, matplotlib `matplotlibrc`.
     """
     before = os.environ.get(SAFE_PATH)
     try:
         folder = os.getcwd()
     except OSError:
-        # It was removed, so that nothing is in it.
+        # The folder was removed, so that it has no files.
         yield
         return
     os.environ[SAFE_PATH] = "1"
     path = list(sys.path)
-    # An empty entry stands for the current folder.
+    # An empty entry means the current folder.
     away = [os.path.abspath(entry) for entry in path if entry not in ("", ".")]
     sys.path[:] = away
     os.chdir(Path(__file__).parent)

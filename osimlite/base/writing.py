@@ -1,15 +1,14 @@
-"""The one place that decides whether a file may be written, and writes it whole or not at all.
+"""Checks and atomic writing of all files that osimlite writes.
 
-Who chose the path decides how much is allowed (SECURITY.md states the rule for users):
+What is allowed depends on who chose the path (SECURITY.md has the rule for users):
 
 - :func:`write_atomically`: the user named the file or its folder. A link is followed only if it
-  stays in its project, or without one in its folder; a pipe that is read or a device takes the
+  stays in its project, or without one in its folder; a pipe with a reader or a device receives the
   text.
 - :func:`write_into`: the program chose the name. Never through a link, and never into anything but
   a regular file.
-- :class:`ResultWriter`: a document names the file. As the last, and only in the trees of the
-  project and the current folder, under no hidden name, and over nothing but a result of the same
-  kind.
+- :class:`ResultWriter`: a document names the file. As :func:`write_into`, and only in the trees of the
+  project and the current folder, under no hidden name, and only over a result of the same type.
 - :func:`write_cached`: nobody named the file. A cache is in the user's cache folder, which no
   project can fill with links.
 """
@@ -33,48 +32,50 @@ from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
 
 RESULT_ENDINGS = (".sto", ".mot", ".trc", ".osim", ".xml", ".omoco", ".csv", ".txt")
-"""Endings of names that a document may give to a new file: no other program runs such files."""
+"""Suffixes that a document may give to a new file; no program executes such files."""
 
-BEGINNING = 65_536
-"""Bytes of an existing file that are read to see what it is."""
+BEGINNING_BYTES = 65_536
+"""Number of bytes of an existing file that are read to recognize its type."""
 
 _PROJECT_MARKS = (".git", "osimlite.toml", "pyproject.toml")
 """Names whose presence marks the top folder of a project."""
 
 
 class WriteRefusedError(OsimliteError):
-    """A document names a file as output that must not be written without the user's word."""
+    """Error for an output file of a document that needs the user's permission."""
 
 
 def expect_folder_of(path: str | Path) -> None:
-    """Say before long work that a file cannot be written because its folder is not there.
+    """Check before long work that the folder of an output file exists.
 
     Raises:
-        OsimliteError: it is not.
+        OsimliteError: the folder does not exist.
     """
     if not os.path.isdir(os.path.dirname(os.path.realpath(path))):
-        raise _nowhere(path)
+        raise _make_folder_error(path)
 
 
-def _nowhere(path: str | Path) -> OsimliteError:
+def _make_folder_error(path: str | Path) -> OsimliteError:
+    """Return the error for an output folder that does not exist."""
     return OsimliteError("cannot write here: the folder does not exist", file=str(path))
 
 
 def write_atomically(path: str | Path, content: str | bytes) -> None:
-    """Write a file beside its place and move it there.
+    """Write a file under a temporary name, then rename it.
 
     Raises:
         OsimliteError: the folder is missing or cannot be written to; nothing has changed then.
     """
-    with written_atomically(path) as stream:
-        stream.write(_encode(content, path) if isinstance(content, str) else content)
+    with open_atomically(path) as stream:
+        stream.write(_encode_text(content, path) if isinstance(content, str) else content)
 
 
-def _encode(content: str, path: str | Path) -> bytes:
+def _encode_text(content: str, path: str | Path) -> bytes:
+    """Return a text in UTF-8; raise OsimliteError if it has lone surrogates."""
     try:
         return content.encode()
     except UnicodeEncodeError as error:
-        # Half of a character: JSON can hold it, UTF-8 cannot.
+        # A lone surrogate, which JSON can contain and UTF-8 cannot.
         odd = content[max(0, error.start - 20) : error.end]
         raise OsimliteError(
             f"cannot write the file: '{odd}' ends in half a character", file=str(path)
@@ -82,33 +83,32 @@ def _encode(content: str, path: str | Path) -> bytes:
 
 
 @contextmanager
-def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
-    """Yield a stream whose content becomes the file that the user named when all is written.
+def open_atomically(path: str | Path) -> Iterator[BinaryIO]:
+    """Yield a stream whose content becomes the file that the user named when the context ends.
 
-    A file that was there keeps its owner, its mode and all of its names. A link stays a link to the
-    file that is written. A pipe or a device takes the text as it is.
+    An existing file keeps its owner, its mode and its hard links. A symbolic link stays a link to
+    the written file. A pipe or a device receives the text directly.
 
     Raises: OsimliteError: the folder is missing or cannot be written to, or the path is a link that
         leads out of its project; nothing has changed then.
     """
     target = Path(os.path.realpath(path))
-    # Unlike those of Path, these functions take a name that is too long for a file.
+    # Unlike those of Path, these functions accept names that are too long for a file.
     exists = os.path.exists(target)
     if exists and not target.is_file():
         with _open_special(target) as stream:
             yield stream
         return
     _expect_link_inside(path, target)
-    with _stage(target, target.stat() if exists else None) as stream:
+    with _open_temporary(target, target.stat() if exists else None) as stream:
         yield stream
 
 
 @contextmanager
-def written_into(folder: str | Path, name: str) -> Iterator[BinaryIO]:
+def open_into(folder: str | Path, name: str) -> Iterator[BinaryIO]:
     """Yield a stream whose content becomes a file in a folder, under a name that the program chose.
 
-    The new file takes the place of a regular file or of a link; what the link led to stays as it
-    is.
+    The new file replaces a regular file or a link; the target of the link stays unchanged.
 
     Raises: OsimliteError: the folder is missing or cannot be written to, or something else than a
         regular file has the name; nothing has changed then.
@@ -116,7 +116,7 @@ def written_into(folder: str | Path, name: str) -> Iterator[BinaryIO]:
     target = Path(os.path.realpath(folder)) / name
     _expect_regular_or_none(target)
     there = target.lstat() if os.path.isfile(target) and not target.is_symlink() else None
-    with _stage(target, there, in_place=False) as stream:
+    with _open_temporary(target, there, in_place=False) as stream:
         yield stream
 
 
@@ -124,11 +124,11 @@ def write_into(folder: str | Path, name: str, content: str | bytes) -> Path:
     """Write a file in a folder under a name that the program chose, and return its path.
 
     Raises:
-        OsimliteError: as of :func:`written_into`.
+        OsimliteError: as of :func:`open_into`.
     """
     path = Path(folder) / name
-    with written_into(folder, name) as stream:
-        stream.write(_encode(content, path) if isinstance(content, str) else content)
+    with open_into(folder, name) as stream:
+        stream.write(_encode_text(content, path) if isinstance(content, str) else content)
     return path
 
 
@@ -204,11 +204,17 @@ def expect_folder_inside(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class ResultWriter:
-    """Decides about files that a document names as its results."""
+    """Writer of files that a document names as its results.
 
-    trees: tuple[str, ...]  # real paths of the folders in whose trees files may be written
-    overwrite: bool = False  # whether any regular file or link may be replaced
-    outside: bool = False  # whether files may be written outside of the trees
+    Attributes:
+        trees: real paths of the folders in whose trees files may be written.
+        overwrite: whether any regular file or link may be replaced.
+        outside: whether files may be written outside of the trees.
+    """
+
+    trees: tuple[str, ...]
+    overwrite: bool = False
+    outside: bool = False
 
     @classmethod
     def for_document(
@@ -276,20 +282,20 @@ class ResultWriter:
         return real
 
     def expect_replaceable(self, path: Path, beginning: bytes) -> None:
-        """Refuse to replace what is not a result of the same kind.
+        """Check that an existing file is a result of the same type, so that it can be replaced.
 
         Args:
             path: real path of the result.
-            beginning: the first bytes of what is to be written.
+            beginning: first bytes of the new content.
 
         Raises:
-            WriteRefusedError: something else is there.
+            WriteRefusedError: another file exists.
         """
         _expect_regular_or_none(path)
         if self.overwrite or not os.path.lexists(path):
             return
-        there, kind = read_at_most(path, BEGINNING), kind_of(beginning)
-        if there and not _are_alike(kind_of(there), kind):
+        there, kind = read_at_most(path, BEGINNING_BYTES), describe_content(beginning)
+        if there and not _are_alike(describe_content(there), kind):
             raise WriteRefusedError(
                 f"a result would replace this file, which is not {kind or 'such a text'}; move it, "
                 "let the document name another file, or replace it with --overwrite",
@@ -298,10 +304,10 @@ class ResultWriter:
 
     @contextmanager
     def written(self, path: str | Path, lines: Iterable[str]) -> Iterator[BinaryIO]:
-        """Write a result beside its place; it takes its place when the context ends without an error.
+        """Write a result under a temporary name, and rename it when the context ends without an error.
 
         Args:
-            path: as the document names it.
+            path: path in the document.
             lines: the text in parts.
 
         Raises:
@@ -313,14 +319,14 @@ class ResultWriter:
         first = b""
         # The parts of a table may be its lines, and its head says what it is.
         for part in parts:
-            first += _encode(part, real)
-            if len(first) >= BEGINNING:
+            first += _encode_text(part, real)
+            if len(first) >= BEGINNING_BYTES:
                 break
         self.expect_replaceable(real, first)
         make_folder(real.parent)
-        with written_into(real.parent, real.name) as stream:
+        with open_into(real.parent, real.name) as stream:
             stream.write(first)
-            stream.writelines(_encode(part, real) for part in parts)
+            stream.writelines(_encode_text(part, real) for part in parts)
             stream.close()
             yield stream
 
@@ -342,19 +348,19 @@ def project_folder(document: str | Path) -> str:
 
 
 UNNAMED_TABLE = "a table 'UNKNOWN' of OpenSim"
-"""The kind of a table to which OpenSim gave no name, as RRA and CMC do with their states."""
+"""Type of a table without a name, as RRA and CMC write their states."""
 
 
 def _are_alike(present: str | None, new: str | None) -> bool:
-    """Return whether a result of one kind may take the place of a text of another."""
+    """Return whether a new text of one type may replace a result of another type."""
     if present is None or new is None:
         return False
     is_table = present == UNNAMED_TABLE and new.startswith("a table '")
     return present == new or is_table
 
 
-def kind_of(beginning: bytes) -> str | None:
-    """Return what a text is, in words, by its beginning; None of what is no result of a tool.
+def describe_content(beginning: bytes) -> str | None:
+    """Return the type of a text in words by its beginning; None if it is no result of a tool.
 
     Args:
         beginning: the first bytes, with the head of a table or the first element of a document.
@@ -385,7 +391,8 @@ _DOCUMENT = re.compile(
 _RESIDUALS = re.compile(r"Average Residuals:\s")
 
 
-def _lineage(folder: str | Path) -> tuple[Path, ...]:
+def _list_ancestors(folder: str | Path) -> tuple[Path, ...]:
+    """Return a folder and all folders above it."""
     path = Path(folder)
     return (path, *path.parents)
 
@@ -395,12 +402,12 @@ def find_shared_folders() -> set[str]:
     import tempfile
 
     places = [os.path.expanduser("~"), tempfile.gettempdir(), os.sep]
-    return {str(part) for place in places for part in _lineage(os.path.realpath(place))}
+    return {str(part) for place in places for part in _list_ancestors(os.path.realpath(place))}
 
 
 def _find_marked_folder(folder: Path, shared: set[str]) -> str | None:
     """Return the nearest folder above that is marked as the top of a project."""
-    for place in _lineage(folder):
+    for place in _list_ancestors(folder):
         if str(place) in shared:
             return None
         if any((place / mark).exists() for mark in _PROJECT_MARKS):
@@ -444,16 +451,18 @@ def _expect_regular_or_none(path: Path, *, links: bool = True) -> None:
 
 
 @contextmanager
-def _stage(
+def _open_temporary(
     target: Path, there: os.stat_result | None, *, in_place: bool = True
 ) -> Iterator[BinaryIO]:
     """Yield a stream to a temporary file that replaces the target when the context ends.
 
-    Args: target: the place. there: what is there now; None if there is nothing, or what is to be
-        replaced whatever it is. in_place: whether a file with several names, or whose owner cannot
-        be kept, is written into instead of replaced.
+    Args:
+        target: path of the file.
+        there: status of the present file; None if there is none or if it may be replaced anyway.
+        in_place: whether a file with several hard links, or whose owner cannot be copied, is
+            overwritten instead of replaced.
     """
-    # To those who may do everything the mode says it all the same.
+    # The mode counts too, because root may write read-only files.
     if there is not None and not (there.st_mode & 0o222 and os.access(target, os.W_OK)):
         raise OsimliteError(
             "cannot write the file: it is read-only; make it writable first", file=str(target)
@@ -464,13 +473,13 @@ def _stage(
         handle, name = mkstemp(dir=target.parent, prefix=".osimlite-")
     except OSError as error:
         if isinstance(error, FileNotFoundError):
-            raise _nowhere(target) from None
+            raise _make_folder_error(target) from None
         raise OsimliteError(f"cannot write here: {error.strerror}", file=str(target)) from None
     try:
         with os.fdopen(handle, "wb") as stream:
             yield stream
         if there is None:
-            Path(name).chmod(0o666 & ~_umask())
+            Path(name).chmod(0o666 & ~_get_umask())
         is_alike = there is None or _copy_attributes(name, target, there)
         if not is_alike and not in_place and there is not None:
             os.chmod(name, stat.S_IMODE(there.st_mode))
@@ -486,21 +495,25 @@ def _stage(
         _copy_into(name, target)
 
 
-def put_in_place(path: Path, target: Path) -> None:
-    """Replace a file by a finished one.
+def replace_with(path: Path, target: Path) -> None:
+    """Replace a file by another one.
+
+    Args:
+        path: the new file, which loses its name.
+        target: the file to replace.
 
     Raises:
-        OSError, OsimliteError: it cannot.
+        OSError, OsimliteError: the file cannot be replaced.
     """
     if not _replace_file(path, target):
         _copy_into(path, target)
 
 
 def make_folder(path: str | Path) -> Path:
-    """Make a folder, and those above it, unless it is there.
+    """Make a folder and those above it unless they exist, and return its path.
 
     Raises:
-        OsimliteError: it cannot be made; the message says why.
+        OsimliteError: the folder cannot be made; the message says why.
     """
     folder = Path(path)
     try:
@@ -522,11 +535,11 @@ def make_folder(path: str | Path) -> Path:
 
 
 @contextmanager
-def folder_to_fill(path: str | Path) -> Iterator[Path]:
+def prepare_folder(path: str | Path) -> Iterator[Path]:
     """Make a folder before long work begins, and remove it if the work fails without a file.
 
     Raises:
-        OsimliteError: it cannot be made or written to; the message says why.
+        OsimliteError: the folder cannot be made or written to; the message says why.
     """
     is_new = not os.path.exists(path)
     folder = make_folder(path)
@@ -587,10 +600,10 @@ def _replace_file(name: str | Path, target: Path) -> bool:
 
 
 def _copy_into(name: str | Path, target: Path) -> None:
-    """Write what is in one file into another, which stays itself, and remove the first.
+    """Copy the content of one file into another, and remove the first.
 
     Raises:
-        OsimliteError: it cannot be written whole; the first file is kept then.
+        OsimliteError: the copy is incomplete; the first file stays then.
     """
     import shutil
 
@@ -600,13 +613,14 @@ def _copy_into(name: str | Path, target: Path) -> None:
             stream.truncate()
     except OSError as error:
         raise OsimliteError(
-            f"cannot write the file: {error.strerror}; what was to be written is in {name}",
+            f"cannot write the file: {error.strerror}; the new content is in {name}",
             file=str(target),
         ) from None
     os.unlink(name)
 
 
-def _umask() -> int:
+def _get_umask() -> int:
+    """Return the umask of this process."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

@@ -94,7 +94,7 @@ def _suggest_built_in(error: OsimliteError, command: str) -> str:
 
     if not isinstance(error, MissingFileError) or error.file is None or os.path.exists(error.file):
         return ""
-    from osimlite.base.text import nearest
+    from osimlite.base.text import find_nearest
     from osimlite.models import BUILT_IN
 
     name = error.file.removesuffix(".osim")
@@ -105,11 +105,11 @@ def _suggest_built_in(error: OsimliteError, command: str) -> str:
 
         return (
             f"; did you mean '{SCENARIO}', the built-in scenario?"
-            if nearest(name, [SCENARIO])
+            if find_nearest(name, [SCENARIO])
             else ""
         )
     # Names of files are often near by chance, such as arm26 and arm.
-    similar = nearest(name, BUILT_IN, cutoff=80.0)
+    similar = find_nearest(name, BUILT_IN, cutoff=80.0)
     if similar is None:
         return ""
     return f"; did you mean the built-in model '{similar}'? 'osimlite build {similar} -o {similar}.osim' writes it"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.cli._console import add_row, plain_console, plain_table, say
 
 
@@ -18,10 +18,10 @@ def check(file: Path, mjcf: Path, output: Path | None) -> None:
     result = check_mjcf(read(file), mjcf)
     plain_console().print(_table(result, mjcf.name))
     if result.missing:
-        say(f"not in it: {listed(list(result.missing), most=6)}")
+        say(f"not in it: {join_words(list(result.missing), most=6)}")
     if result.coordinates:
         say(
-            f"no joint has the name of {listed(list(result.coordinates), most=6)}: it stands where it stands"
+            f"no joint has the name of {join_words(list(result.coordinates), most=6)}: it stands where it stands"
         )
     if result.bodies is not None:
         say(f"origins of bodies are off by {1e3 * result.bodies.rms:.2g} mm (root mean square)")

@@ -14,7 +14,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, NamedTuple, get_args, get_origin
 
 if TYPE_CHECKING:
-    from osimlite.base.choices import Choice
+    from osimlite.base.options import OptionSpec
 
 _NUMBERS = {
     int: re.compile(r"[0-9]+", re.ASCII),
@@ -105,7 +105,7 @@ class Command:
     """
 
     def __init__(
-        self, function: Callable[..., None], more: Callable[[], Iterable[Choice]] = tuple
+        self, function: Callable[..., None], more: Callable[[], Iterable[OptionSpec]] = tuple
     ) -> None:
         self.function, self._more = function, more
         self.__name__, self.__doc__, self.__module__ = (
@@ -235,7 +235,7 @@ def _names(function: Any) -> tuple[str, ...]:
     return code.co_varnames[: code.co_argcount]
 
 
-def _declared(choice: Choice) -> Declared:
+def _declared(choice: OptionSpec) -> Declared:
     shown: Any = choice.shown or (choice.default is not None and choice.type is not bool)
     told = {
         "help": choice.help,
@@ -251,6 +251,8 @@ def command(function: Callable[..., None]) -> Command:
     return Command(function)
 
 
-def command_with(more: Callable[[], Iterable[Choice]]) -> Callable[[Callable[..., None]], Command]:
+def command_with(
+    more: Callable[[], Iterable[OptionSpec]],
+) -> Callable[[Callable[..., None]], Command]:
     """Make a command of a function that takes these options too, as keyword arguments."""
     return lambda function: Command(function, more)

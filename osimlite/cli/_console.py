@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from osimlite.base.text import harmless, visible
+from osimlite.base.text import escape_control_sequences, escape_unprintable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -26,7 +26,7 @@ class Guarded:
 
     def write(self, text: str) -> int:
         """Write text, lines or parts of them."""
-        self.stream.write(harmless(text, starts_line=self._starts_line))
+        self.stream.write(escape_control_sequences(text, starts_line=self._starts_line))
         last = text[text.rfind("\n") + 1 :]
         self._starts_line = not last.strip() and (self._starts_line or "\n" in text)
         return len(text)
@@ -49,7 +49,7 @@ def guarded_output() -> Iterator[None]:
 
 def say(text: object = "", *, err: bool = False) -> None:
     """Print one line: whatever names in it hold, it stays one."""
-    print(visible(str(text)), file=sys.stderr if err else sys.stdout, flush=True)
+    print(escape_unprintable(str(text)), file=sys.stderr if err else sys.stdout, flush=True)
 
 
 def complain(text: object, cure: str = "") -> None:
@@ -61,7 +61,7 @@ def complain(text: object, cure: str = "") -> None:
 
 
 def show(lines: str, *, err: bool = False) -> None:
-    """Print lines whose names have gone through :func:`osimlite.base.text.visible`."""
+    """Print lines whose names have gone through :func:`osimlite.base.text.escape_unprintable`."""
     (sys.stderr if err else sys.stdout).write(lines)
 
 
@@ -75,7 +75,7 @@ def print_diff(before: str, after: str, old: str, new: str) -> None:
     for line in difflib.unified_diff(first, second, old, new):
         body = line.rstrip("\r\n")
         end = line[len(body) :] if line.endswith("\n") else "\n\\ No newline at end of file\n"
-        show("\t".join(map(visible, body.split("\t"))) + end)
+        show("\t".join(map(escape_unprintable, body.split("\t"))) + end)
 
 
 def hand_over(text: str) -> None:
@@ -139,12 +139,12 @@ def plain_table(title: str = "", **choices: Any) -> Table:
         "header_style": "bold",
         "title_justify": "left",
     }
-    return Table(title=visible(title) or None, **{**style, **choices})
+    return Table(title=escape_unprintable(title) or None, **{**style, **choices})
 
 
 def add_row(table: Table, *cells: str) -> None:
     """Add a row to a table of the console, whatever names its cells hold."""
-    table.add_row(*map(visible, cells))
+    table.add_row(*map(escape_unprintable, cells))
 
 
 class Facts:
@@ -164,7 +164,7 @@ class Facts:
         A word is never broken: a path of a file stays whole, so that it can be copied and searched
         for.
         """
-        rows = [(visible(name), visible(words)) for name, words in self.rows]
+        rows = [(escape_unprintable(name), escape_unprintable(words)) for name, words in self.rows]
         width = max((len(name) for name, _ in rows), default=0)
         room = columns() - width - 2
         if room < 30 or not all(name.isascii() and words.isascii() for name, words in rows):
@@ -174,7 +174,7 @@ class Facts:
 
         italic, bold, end = ("\033[3m", "\033[1m", "\033[0m") if wants_colour() else ("", "", "")
         if self.title:
-            show(f"{italic}{visible(self.title)}{end}\n")
+            show(f"{italic}{escape_unprintable(self.title)}{end}\n")
         for name, words in rows:
             for line in wrap(words, room, break_on_hyphens=False, break_long_words=False) or [""]:
                 show(f"{bold}{name:{width}}{end}  {line}".rstrip() + "\n")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from osimlite.cli._command import Argument, Option
 
 if TYPE_CHECKING:
-    from osimlite.base.choices import Choice
+    from osimlite.base.options import OptionSpec
     from osimlite.io.document.printer import Numbers as NumberStyle
     from osimlite.mechanics.multibody.mechanism import Mechanism
     from osimlite.schema.model import Model
@@ -194,14 +194,14 @@ Geometry = Annotated[
 Browser = Annotated[bool, Option("--browser/--no-browser", help="Open the page in the browser.")]
 
 
-def simulating(*names: str) -> Callable[[], Iterator[Choice]]:
+def simulating(*names: str) -> Callable[[], Iterator[OptionSpec]]:
     """The options of a simulation, or those of these names, for :func:`osimlite.cli._command.command_with`."""
 
-    def chosen() -> Iterator[Choice]:
-        from osimlite.base.choices import choices
+    def chosen() -> Iterator[OptionSpec]:
+        from osimlite.base.options import list_options
         from osimlite.simulation.options import Options
 
-        return (each for each in choices(Options) if not names or each.name in names)
+        return (each for each in list_options(Options) if not names or each.name in names)
 
     return chosen
 
@@ -295,7 +295,7 @@ def quantities(
     Raises: OsimliteError: a word is not of that form, there is no such coordinate, the unit does
         not fit it, or a value of ``--set`` without a unit can hardly be meant in rad.
     """
-    from osimlite.base.text import did_you_mean
+    from osimlite.base.text import suggest_name
     from osimlite.errors import ModelError, OsimliteError, SettingError
     from osimlite.simulation.initial_state import in_units_of, suspect_value
 
@@ -313,7 +313,7 @@ def quantities(
                 raise SettingError(f"{option}: {odd} (if not, write {text.strip()}rad)")
         except ModelError as error:
             # The model is as it should be; it is the command that asks for what is not there.
-            raise OsimliteError(f"{option}: {error.message}{did_you_mean(name, states)}") from None
+            raise OsimliteError(f"{option}: {error.message}{suggest_name(name, states)}") from None
         except ValueError:
             raise SettingError(
                 f"{option}: the state '{name}' takes a number, not '{text}'"

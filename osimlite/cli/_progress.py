@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
-from osimlite.base.text import visible
+from osimlite.base.text import escape_unprintable
 from osimlite.cli._console import complain, plain_console, unguarded
 
 if TYPE_CHECKING:
@@ -112,6 +112,6 @@ def _started(title: str) -> Progress:
         transient=True,
         auto_refresh=False,
     )
-    bar.add_task(visible(title), total=None, more="")
+    bar.add_task(escape_unprintable(title), total=None, more="")
     bar.start()
     return bar

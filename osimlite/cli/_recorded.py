@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from osimlite.base.files import make_folder
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.cli._console import say
 from osimlite.io.tables.storage import StoTable, write_sto
 from osimlite.simulation.recorded_motion import RecordedMotion
@@ -40,9 +40,9 @@ def written(
 def say_motion(recorded: RecordedMotion, files: Iterable[Path]) -> None:
     """Say what was made from a motion, and what of it counted."""
     if recorded.missing:
-        say(f"not in the motion, kept at the default value: {listed(recorded.missing)}")
+        say(f"not in the motion, kept at the default value: {join_words(recorded.missing)}")
     if recorded.ignored:
-        say(f"columns that name no coordinate, ignored: {listed(recorded.ignored)}")
+        say(f"columns that name no coordinate, ignored: {join_words(recorded.ignored)}")
     times = recorded.times
-    paths = listed([str(file) for file in files])
+    paths = join_words([str(file) for file in files])
     say(f"{len(times)} times from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")

@@ -160,12 +160,12 @@ def _make(source: str, given: Mapping[str, str], parameters: Mapping[str, float]
 
 
 def _levels(words: Sequence[str] | None, option: str) -> dict[str, str]:
-    from osimlite.base.quantity import quantity
+    from osimlite.base.quantity import parse_quantity
     from osimlite.errors import SettingError
 
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
     result = named_words(words, option, form)
     for text in result.values():
-        if quantity(text) is None:
+        if parse_quantity(text) is None:
             raise SettingError(f"{option} takes {form}, got '{text}'")
     return result

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from osimlite.base.files import read_standard_input, unsaved
-from osimlite.base.text import counted, listed
+from osimlite.base.text import format_count, join_words
 from osimlite.cli._console import complain, hand_over, print_diff, say, show, wants_colour
 from osimlite.cli._options import named_folders
 from osimlite.cli._progress import progress_bar
@@ -68,11 +68,11 @@ def run(
     if diff:
         shown = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
         count, left, unread = (sum(counts[index] for counts in shown) for index in range(3))
-        say(f"Would mend {counted(count, 'place')}{_more(left)}.", err=True)
+        say(f"Would mend {format_count(count, 'place')}{_more(left)}.", err=True)
         return 2 if unread else int(count > 0)
     if fix or unsafe_fixes:
         count, left, failed = _mend_all(files, given, unsafe=unsafe_fixes)
-        say(f"Mended {counted(count, 'place')}{_more(left)}.", err=True)
+        say(f"Mended {format_count(count, 'place')}{_more(left)}.", err=True)
     with progress_bar("checking", len(files)) as progress:
         report = check_files(files, given, cached=not no_cache, progress=progress)
     report.passed = passed
@@ -80,7 +80,7 @@ def run(
         from osimlite.lint.baseline import write_baseline as write
 
         count = write(write_baseline, report)
-        say(f"{write_baseline}: {counted(count, 'finding')}")
+        say(f"{write_baseline}: {format_count(count, 'finding')}")
         return 0
     if baseline is not None:
         from osimlite.lint.baseline import without_baseline
@@ -107,7 +107,7 @@ def expect_known(format: str, fail_on: str | None) -> None:
         ("--format", format, FORMATS),
     ):
         if word is not None and word not in known:
-            raise OsimliteError(f"{option} is one of {listed(known)}, not '{word}'")
+            raise OsimliteError(f"{option} is one of {join_words(known)}, not '{word}'")
 
 
 def _source(path: str) -> Source:
@@ -176,10 +176,10 @@ def _mend_all(files: list[str], given: Config, unsafe: bool) -> tuple[int, int, 
 
 def _mend(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
     """Mend a file; how many mends that took, and how many guesses are left."""
-    from osimlite.base.files import written_atomically
+    from osimlite.base.files import open_atomically
 
     def put(pieces: list[bytes | memoryview]) -> Source:
-        with written_atomically(path) as stream:
+        with open_atomically(path) as stream:
             stream.writelines(pieces)
         pieces.clear()
         return _source(path)
@@ -193,7 +193,7 @@ UNREADABLE = ("OSIM001", "OSIM801")
 
 
 def _more(left: int) -> str:
-    return f"; --unsafe-fixes would mend {counted(left, 'place')} more" if left else ""
+    return f"; --unsafe-fixes would mend {format_count(left, 'place')} more" if left else ""
 
 
 def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int, bool]:

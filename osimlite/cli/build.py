@@ -42,7 +42,7 @@ def build(
 
     Example: osimlite build dynamic-walker -p thigh_length=0.42 -o walker.osim
     """
-    from osimlite.base.text import counted
+    from osimlite.base.text import format_count
     from osimlite.cli._console import complain, hand_over, say, show
     from osimlite.errors import OsimliteError
     from osimlite.io.document.printer import to_text, write
@@ -74,7 +74,9 @@ def build(
     write(model, target, numbers=style)
     count = sum(1 for _ in model.components())
     warned = len(report.warnings)
-    advice = f"; {counted(warned, 'warning')}: see osimlite validate {target}" if warned else ""
+    advice = (
+        f"; {format_count(warned, 'warning')}: see osimlite validate {target}" if warned else ""
+    )
     say(f"{target}: {count} components{advice}")
     for path in write_beside(source, model, target):
         say(f"wrote {path}")

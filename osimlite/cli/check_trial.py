@@ -55,9 +55,9 @@ def check_trial(
             *paths, select=select, ignore=ignore, progress=lambda done, of: progress(done, of)
         )
     if format == "json":
-        from osimlite.base.text import json_lines
+        from osimlite.base.text import format_json
 
-        hand_over(json_lines(report.as_dict()))
+        hand_over(format_json(report.as_dict()))
     elif format not in FOR_PEOPLE:
         hand_over(render(report, format))
     else:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from osimlite.base.records import dataclass, replace
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command
 from osimlite.cli._console import say, show
@@ -158,7 +158,7 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
                 for motion in MOTIONS
             ]
             tell(
-                f"{listed(motion.model for motion in MOTIONS)}, computed by {ready[0].engine.version}"
+                f"{join_words(motion.model for motion in MOTIONS)}, computed by {ready[0].engine.version}"
             )
         for motion, simulation in zip(MOTIONS, ready, strict=True):
             with (

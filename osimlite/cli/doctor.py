@@ -12,7 +12,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from osimlite.base.cores import cores
+from osimlite.base.cores import count_cores
 from osimlite.base.require import SAFE_PATH
 from osimlite.cli._command import Argument, command
 from osimlite.cli._console import add_row, plain_console, plain_table, say
@@ -134,7 +134,7 @@ def doctor(
     result = {}
     with (
         progress_bar("loading each package", len(every)) as progress,
-        ThreadPoolExecutor(2 * cores()) as pool,
+        ThreadPoolExecutor(2 * count_cores()) as pool,
     ):
         # Each in a process of its own, side by side.
         for count, package in enumerate(pool.map(examine, every), 1):

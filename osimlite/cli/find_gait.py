@@ -106,7 +106,7 @@ def find_gait(
 
 
 def _told(gait: Gait) -> Facts:
-    from osimlite.base.text import counted, listed
+    from osimlite.base.text import format_count, join_words
     from osimlite.studies.gait.cycle_search import STARTS, STEPS
 
     cycle, walk = gait.found.cycle, gait.walk
@@ -117,14 +117,14 @@ def _told(gait: Gait) -> Facts:
     facts.add("step length", f"{cycle.length:.6g} m")
     facts.add("period", f"{cycle.period:.6g} s")
     end = "walking" if walk.walks else f"{walk.ending} {walk.fell_on}".strip()
-    done = f"{counted(len(walk.steps), 'step')}, {counted(len(walk.scuffs), 'scuff')}; {end} after {walk.end:.4g} s"
+    done = f"{format_count(len(walk.steps), 'step')}, {format_count(len(walk.scuffs), 'scuff')}; {end} after {walk.end:.4g} s"
     facts.add("walk", done)
     facts.add(
         "near it", f"{round(STARTS * gait.found.walking)} of {STARTS} starts make {STEPS} steps"
     )
     facts.add(
         "search",
-        f"{gait.candidates} random walkers made two steps; {counted(gait.cycles, 'cycle')} found",
+        f"{gait.candidates} random walkers made two steps; {format_count(gait.cycles, 'cycle')} found",
     )
-    facts.add("files", listed([str(path) for path in gait.files]))
+    facts.add("files", join_words([str(path) for path in gait.files]))
     return facts

@@ -86,7 +86,7 @@ def gait(
 
     Example: osimlite gait steady-walker --perturb 0.05 --basin -o gait
     """
-    from osimlite.base.files import folder_to_fill
+    from osimlite.base.files import prepare_folder
     from osimlite.base.require import require
     from osimlite.simulation.run import Simulation
     from osimlite.studies.gait.basin import basin_places, find_basin, perturbed, walks_from
@@ -97,7 +97,7 @@ def gait(
     _check_numbers(to, accuracy, reach, perturb or (), seed)
     model, folder = options.read_source(source, parameter)
     with ExitStack() as work:
-        where = None if output is None else work.enter_context(folder_to_fill(output))
+        where = None if output is None else work.enter_context(prepare_folder(output))
         simulation = work.enter_context(
             Simulation(model, "compiled", skip_unsupported=skip_unsupported, folder=folder)
         )
@@ -211,7 +211,7 @@ def simulate_walk(
 
 
 def _told(found: GaitReport, files: Sequence[Path]) -> Facts:
-    from osimlite.base.text import counted
+    from osimlite.base.text import format_count
     from osimlite.simulation.elements import by_class
 
     walk, cycle = found.walk, found.cycle
@@ -223,7 +223,7 @@ def _told(found: GaitReport, files: Sequence[Path]) -> Facts:
     )
     facts.add(
         "walk",
-        f"{counted(len(walk.steps), 'step')}, {counted(len(walk.scuffs), 'scuff')}, {walk.distance:.4g} m; {end}",
+        f"{format_count(len(walk.steps), 'step')}, {format_count(len(walk.scuffs), 'scuff')}, {walk.distance:.4g} m; {end}",
     )
     if cycle is None:
         facts.add("cycle", found.why_not)
@@ -244,7 +244,7 @@ def _told(found: GaitReport, files: Sequence[Path]) -> Facts:
         facts.add("multipliers", f"{sizes} ...; {cycle.neutral} neutral directions left out")
         facts.add(
             "fixed point",
-            f"to {cycle.residual:.2g} after {counted(cycle.iterations, 'step')} of Newton",
+            f"to {cycle.residual:.2g} after {format_count(cycle.iterations, 'step')} of Newton",
         )
     for near in found.nearby:
         facts.add(

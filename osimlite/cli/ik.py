@@ -45,7 +45,7 @@ def ik(
     Example: osimlite ik gait2392.osim walk.trc --weight RASI=10 -o results
     """
     from osimlite.base.files import make_folder, write_atomically
-    from osimlite.base.text import listed
+    from osimlite.base.text import join_words
     from osimlite.cli._console import say
     from osimlite.fitting.fit_messages import IGNORED, describe_unknown, told
     from osimlite.fitting.ik_tool import motion_table
@@ -91,7 +91,7 @@ def ik(
     if data is not None:
         known = {marker.name: None for marker in model.components(Marker)}
         if missing := [name for name in known if name not in data.names]:
-            say(f"of the model, not in the data: {listed(missing)}")
+            say(f"of the model, not in the data: {join_words(missing)}")
         if unknown := [name for name in data.names if name not in known]:
-            say(f"in the data, not of the model: {listed(unknown)}")
+            say(f"in the data, not of the model: {join_words(unknown)}")
     say(f"wrote {folder / 'ik.mot'} and {folder / f'{what}_errors.sto'}")

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.cli._command import Argument, Option, command
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def info(
             ),
             ("muscles", str(len(muscles))),
             ("other forces", str(len(model.force_set.objects) - len(muscles))),
-            ("wrap surfaces", f"{surfaces}, for {counted(len(wraps), 'wrap')}"),
+            ("wrap surfaces", f"{surfaces}, for {format_count(len(wraps), 'wrap')}"),
             ("markers", str(len(model.marker_set.objects))),
             ("controllers", str(len(model.controller_set.objects))),
             ("probes", str(len(model.probe_set.objects))),
@@ -180,12 +180,12 @@ def _classes(objects: Sequence[Object], everything: bool) -> None:
 
 def _listed(title: str, items: Sequence[str], everything: bool) -> None:
     """Print some items, or the first of them."""
-    from osimlite.base.text import visible
+    from osimlite.base.text import escape_unprintable
     from osimlite.cli._console import columns, say, show
 
     shown = items if everything else items[:15]
     # The words of an item stay together.
-    text = f"{title}: " + ", ".join(visible(item).replace(" ", "\0") for item in shown)
+    text = f"{title}: " + ", ".join(escape_unprintable(item).replace(" ", "\0") for item in shown)
     lines = textwrap.fill(text, columns(), subsequent_indent="  ", break_long_words=False)
     show("\n" + lines.replace("\0", " ") + "\n")
     if len(items) > len(shown):
@@ -230,8 +230,8 @@ def _muscles(muscles: Sequence[Any]) -> Iterator[str]:
             laid = type(path).__name__
             if isinstance(path, GeometryPath):
                 wraps = len(path.path_wrap_set.objects)
-                laid = counted(len(path.path_point_set.objects), "point")
-                laid += f", {counted(wraps, 'wrap')}" if wraps else ""
+                laid = format_count(len(path.path_point_set.objects), "point")
+                laid += f", {format_count(wraps, 'wrap')}" if wraps else ""
             lengths = f"{muscle.optimal_fiber_length:>7.4g} m {muscle.tendon_slack_length:>7.4g} m"
             yield f"    {muscle.name:{width}} {muscle.max_isometric_force:>7.5g} N {lengths}  {laid}"
 
@@ -239,7 +239,7 @@ def _muscles(muscles: Sequence[Any]) -> Iterator[str]:
 def _simulation(model: Model, folder: Path, text: str) -> tuple[str, bool]:
     """What of a model cannot be simulated, and whether that follows from its file alone."""
     from osimlite.base.require import require
-    from osimlite.base.text import listed
+    from osimlite.base.text import join_words
     from osimlite.errors import OsimliteError
 
     try:
@@ -255,6 +255,8 @@ def _simulation(model: Model, folder: Path, text: str) -> tuple[str, bool]:
         return f"not possible: {error}", False
     answer = "possible, nothing is left out"
     if forces.skipped:
-        answer = f"not without leaving out (--skip-unsupported) {listed(by_class(forces.skipped))}"
+        answer = (
+            f"not without leaving out (--skip-unsupported) {join_words(by_class(forces.skipped))}"
+        )
     # An element with this attribute stands in a file of its own.
     return answer, not forces.reads_files and re.search(r"\sfile\s*=", text) is None

@@ -46,7 +46,7 @@ def modify(
     Example: osimlite modify gait.osim --replace muscles=degroote --replace tendon=rigid --replace
         paths=polynomial
     """
-    from osimlite.base.text import counted
+    from osimlite.base.text import format_count
     from osimlite.cli._console import add_row, plain_console, plain_table, say
     from osimlite.errors import DocumentError, SettingError
     from osimlite.fitting.modifying.operators import processed
@@ -100,4 +100,4 @@ def modify(
                 *(f"{1e3 * number:.3f}" for number in numbers),
             )
         plain_console().print(table)
-    say(f"{target}: {counted(len(list(model.components())), 'component')}")
+    say(f"{target}: {format_count(len(list(model.components())), 'component')}")

@@ -76,7 +76,7 @@ def muscles(
     Example: osimlite muscles gait2392.osim --coordinate knee_angle_r=-120deg:0 --plot
     """
     from osimlite.base.files import expect_folder_of
-    from osimlite.base.text import listed
+    from osimlite.base.text import join_words
     from osimlite.cli._console import say
     from osimlite.cli._progress import progress_bar
     from osimlite.errors import ModelError, SettingError
@@ -116,7 +116,7 @@ def muscles(
     if not first.muscles:
         raise ModelError(
             f"'{file.name}' has no muscle"
-            + (f" that moves with {listed(list(values))}" if values else "s")
+            + (f" that moves with {join_words(list(values))}" if values else "s")
         )
     if others:
         first, second = _common(first, others[0])
@@ -172,7 +172,7 @@ def _swept(mechanism: Mechanism, words: Sequence[str], points: int) -> dict[str,
 
 def _common(first: MuscleCurves, second: MuscleCurves) -> tuple[MuscleCurves, MuscleCurves]:
     """Both with the muscles whose names both have."""
-    from osimlite.base.text import listed
+    from osimlite.base.text import join_words
     from osimlite.cli._console import say
     from osimlite.errors import ModelError
 
@@ -182,7 +182,7 @@ def _common(first: MuscleCurves, second: MuscleCurves) -> tuple[MuscleCurves, Mu
     if not both:
         raise ModelError("the two models have no muscle of the same name")
     if alone:
-        say(f"of one model only: {listed(alone)}")
+        say(f"of one model only: {join_words(alone)}")
     one, other = (
         curves.of([own.index(name) for name in both])
         for curves, own in zip((first, second), names, strict=True)
@@ -194,7 +194,7 @@ def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> 
     """A table that fits a terminal: what is least and greatest, or the largest differences."""
     import numpy as np
 
-    from osimlite.base.text import span
+    from osimlite.base.text import format_range
     from osimlite.cli._console import add_row, plain_console, plain_table, say
 
     first, *others = curves
@@ -223,7 +223,7 @@ def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> 
             low = high = np.fmax.reduce(np.abs(others[0].columns[name] - first.columns[name]))
         columns.append(
             [
-                span(factor * least, factor * most, form)
+                format_range(factor * least, factor * most, form)
                 for least, most in zip(low, high, strict=True)
             ]
         )

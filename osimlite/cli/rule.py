@@ -24,7 +24,7 @@ def rule(
 
     Example: osimlite rule OSIM301
     """
-    from osimlite.base.text import did_you_mean
+    from osimlite.base.text import suggest_name
     from osimlite.cli._console import show
     from osimlite.errors import OsimliteError
     from osimlite.lint.registry import all_rules, groups
@@ -34,7 +34,7 @@ def rule(
     result = [known for known in rules if code is None or known.matches(code)]
     if code is not None and not result:
         names = [word for known in (*rules, *groups()) for word in (known.code, known.name)]
-        near = did_you_mean(code, names) or "; 'osimlite rule' lists all rules"
+        near = suggest_name(code, names) or "; 'osimlite rule' lists all rules"
         raise OsimliteError(f"there is no rule '{code}'{near}")
     from osimlite.lint.pages import group_page, page_of
 

@@ -219,7 +219,7 @@ def _show_findings(report: Report) -> None:
 
 
 def _show(setup: Path, outcome: Outcome) -> None:
-    from osimlite.base.text import counted
+    from osimlite.base.text import format_count
     from osimlite.cli._console import Facts
 
     facts = Facts(str(setup), outcome.told)
@@ -229,7 +229,8 @@ def _show(setup: Path, outcome: Outcome) -> None:
     if (more := len(unsaid) - MOST_WARNINGS) > 0:
         files = " ".join(dict.fromkeys(finding.file or str(setup) for finding in unsaid))
         facts.add(
-            "check", f"{counted(more, 'warning')} more; see them with: osimlite validate {files}"
+            "check",
+            f"{format_count(more, 'warning')} more; see them with: osimlite validate {files}",
         )
     facts.add("files", ", ".join(str(path) for path in outcome.files) or "none")
     facts.show()
@@ -238,7 +239,7 @@ def _show(setup: Path, outcome: Outcome) -> None:
 def _show_trials(trials: list[Trial]) -> None:
     from collections import Counter
 
-    from osimlite.base.text import counted
+    from osimlite.base.text import format_count
     from osimlite.cli._console import add_row, plain_console, plain_table, show
     from osimlite.tools.many import STATUSES
 
@@ -256,7 +257,7 @@ def _show_trials(trials: list[Trial]) -> None:
         words = trial.message or "; ".join(f"{name} {said}" for name, said in trial.told[:2])
         if trial.warnings:
             more = (
-                f"; and {counted(len(trial.warnings) - 1, 'warning')} more"
+                f"; and {format_count(len(trial.warnings) - 1, 'warning')} more"
                 if len(trial.warnings) > 1
                 else ""
             )
@@ -279,4 +280,4 @@ def _show_trials(trials: list[Trial]) -> None:
         if shown is not trials
         else ""
     )
-    show(f"{counted(len(trials), 'setup')}: {told}{more}\n")
+    show(f"{format_count(len(trials), 'setup')}: {told}{more}\n")

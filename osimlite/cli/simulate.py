@@ -160,7 +160,7 @@ def write_files(
     import shutil
     import tempfile
 
-    from osimlite.base.files import make_folder, put_in_place
+    from osimlite.base.files import make_folder, replace_with
     from osimlite.errors import OsimliteError
 
     is_new = not folder.exists()
@@ -178,7 +178,7 @@ def write_files(
         if film is not None:
             written.append(film(beside / "animation.gif"))
         for path in written:
-            put_in_place(path, folder / path.name)
+            replace_with(path, folder / path.name)
         # Files of an earlier simulation would be taken for those of this one.
         for name in SOME - {path.name for path in written}:
             (folder / name).unlink(missing_ok=True)

@@ -119,11 +119,11 @@ def sweep(
 
 
 def _told(plan: Plan, outcome: Outcome) -> Facts:
-    from osimlite.base.text import counted
+    from osimlite.base.text import format_count
     from osimlite.studies.sweep.measures import measure_name
     from osimlite.studies.sweep.results import ranges
 
-    facts = Facts(counted(outcome.count, "run"))
+    facts = Facts(format_count(outcome.count, "run"))
     new = sum(outcome.status.values())
     if outcome.before:
         facts.add("there before", str(outcome.before))
@@ -136,11 +136,11 @@ def _told(plan: Plan, outcome: Outcome) -> Facts:
         )
     told = outcome.reasons.most_common(3)
     for reason, count in told:
-        facts.add("failed", f"{counted(count, 'run')}: {reason}")
+        facts.add("failed", f"{format_count(count, 'run')}: {reason}")
     if others := outcome.status["failed"] - sum(count for _, count in told):
         facts.add(
             "failed",
-            f"{counted(others, 'run')} for other reasons; the column 'reason' has them all",
+            f"{format_count(others, 'run')} for other reasons; the column 'reason' has them all",
         )
     for name, result in ranges(
         outcome.path, [measure_name(spec) for spec in plan.measures]

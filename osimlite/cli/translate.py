@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import add_row, plain_console, plain_table, say
 from osimlite.translate.exporters import list_exporters
 
 if TYPE_CHECKING:
-    from osimlite.base.choices import Choice
+    from osimlite.base.options import OptionSpec
     from osimlite.translate.fidelity import Fidelity
 
 
@@ -21,7 +21,7 @@ WRITTEN = "the file that is written"
 """Value of --check without a file."""
 
 
-def _choices() -> Iterator[Choice]:
+def _choices() -> Iterator[OptionSpec]:
     for exporter in list_exporters("translate").values():
         yield from exporter.choices
 
@@ -98,7 +98,7 @@ def translate(
     say(f"{same} components as they are, {otherwise} in another way, {lost} left out")
     say(
         f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move; wrote "
-        + listed([str(path) for path in written], most=4)
+        + join_words([str(path) for path in written], most=4)
     )
     if getattr(made, "start_note", ""):
         say(made.start_note)
@@ -126,7 +126,7 @@ def tabulate(fidelity: Fidelity, target: str) -> Any:
             table,
             group.cannot_say,
             group.done,
-            listed(list(names), most=3),
+            join_words(list(names), most=3),
             *([", ".join(worst)] if measured else []),
         )
     return table

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.cli import _options as options
 from osimlite.cli._command import Argument, Option, command
 from osimlite.cli._console import add_row, plain_console, plain_table, say
@@ -61,7 +61,7 @@ def upgrade(
     write(document.top, target, numbers=style)
     _report(document)
     say(
-        f"{target}: version {document.version} to {CURRENT_VERSION}, {counted(len(document.changes), 'change')}"
+        f"{target}: version {document.version} to {CURRENT_VERSION}, {format_count(len(document.changes), 'change')}"
     )
 
 
@@ -97,5 +97,5 @@ def _report(document: Document) -> None:
             lost.setdefault(change.lost, []).append(change)
     for what, changes in lost.items():
         first = document.source.of_tag(changes[0].number).line
-        more = f" and {counted(len(changes) - 1, 'more place')}" if len(changes) > 1 else ""
+        more = f" and {format_count(len(changes) - 1, 'more place')}" if len(changes) > 1 else ""
         say(f"lost: {what} (line {first}, {changes[0].where}{more})")

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from osimlite.base.choices import Choice
+from osimlite.base.options import OptionSpec
 from osimlite.cli import _options as options
 from osimlite.cli._command import Argument, Option, command_with
 from osimlite.translate.exporters import list_exporters
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from osimlite.view.shown import Shown
 
 
-def _choices() -> Iterator[Choice]:
+def _choices() -> Iterator[OptionSpec]:
     yield from options.simulating("wrapping")()
     for name, exporter in list_exporters("view").items():
-        yield Choice(name, Path | None, exporter.help, unit="FILE")
+        yield OptionSpec(name, Path | None, exporter.help, unit="FILE")
         yield from exporter.choices
 
 

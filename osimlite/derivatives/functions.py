@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from osimlite.base.files import make_folder
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.base.writing import write_into
 from osimlite.derivatives.stated import StatedModel
 from osimlite.derivatives.tangents import TangentModel
@@ -430,7 +430,7 @@ class CasadiModel(StatedModel):
         }
         for path in paths:
             if path not in places:
-                raise SettingError(f"the model has no frame '{path}'{did_you_mean(path, places)}")
+                raise SettingError(f"the model has no frame '{path}'{suggest_name(path, places)}")
             chosen.append((places[path][0], numbers[path]))
         given = "t", "x", "p"
         symbols = [self._symbols[name] for name in given]

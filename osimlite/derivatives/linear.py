@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import did_you_mean, did_you_mean_path
+from osimlite.base.text import suggest_name, suggest_path
 from osimlite.derivatives.functions import CasadiModel
 from osimlite.derivatives.tangents import TangentModel, tangents
 from osimlite.errors import SettingError, SimulationError
@@ -139,7 +139,7 @@ def _chosen(
     known, result = {**groups, **single}, list[tuple[str, int]]()
     for name in names:
         if name not in known:
-            raise SettingError(f"the model has no output '{name}'{did_you_mean(name, known)}")
+            raise SettingError(f"the model has no output '{name}'{suggest_name(name, known)}")
         result += known[name]
     return result
 
@@ -149,9 +149,7 @@ def _filled(what: str, names: Sequence[str], default: Array, given: Any) -> Arra
     if isinstance(given, Mapping):
         for name, value in given.items():
             if name not in names:
-                raise SettingError(
-                    f"the model has no {what} '{name}'{did_you_mean_path(name, names)}"
-                )
+                raise SettingError(f"the model has no {what} '{name}'{suggest_path(name, names)}")
             result[names.index(name)] = value
     elif given is not None:
         if len(given) != len(names):

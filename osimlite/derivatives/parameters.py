@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import OsimliteError, SettingError, UnsupportedError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
@@ -119,7 +119,7 @@ def _setters(model: Model, name: str) -> list[Setter]:
     setters = [place.setter(model) for place in places(model, name)]
     if not setters:
         raise SettingError(
-            f"the model has no number '{name}'{did_you_mean(name, spellings(model))}"
+            f"the model has no number '{name}'{suggest_name(name, spellings(model))}"
         )
     return setters
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import did_you_mean_path
+from osimlite.base.text import suggest_path
 from osimlite.derivatives.parameters import number_of
 from osimlite.derivatives.stated import StatedModel
 from osimlite.derivatives.tangents import Steps, TangentModel, tangents
@@ -333,5 +333,5 @@ def _moving(simulation: Simulation, choices: Mapping[str, Any]) -> dict[str, flo
 
 def _place(what: str, names: Sequence[str], name: str) -> int:
     if name not in names:
-        raise SettingError(f"there is no {what} '{name}'{did_you_mean_path(name, names)}")
+        raise SettingError(f"there is no {what} '{name}'{suggest_path(name, names)}")
     return names.index(name)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from osimlite.base.text import counted, did_you_mean, listed
+from osimlite.base.text import format_count, join_words, suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.inverse_kinematics import check_weight
 from osimlite.fitting.marker_data import MarkerData
@@ -43,7 +43,7 @@ class ChosenFrames:
     ) -> None:
         for name, weight in weights.items():
             if name not in known:
-                raise SettingError(f"the model has no marker '{name}'{did_you_mean(name, known)}")
+                raise SettingError(f"the model has no marker '{name}'{suggest_name(name, known)}")
             check_weight(weight, f"'{name}'")
         if count < 1:
             raise SettingError(f"{count} frames are none; give at least 1")
@@ -100,9 +100,9 @@ class ChosenFrames:
             far = (distances > np.maximum(LOST * usual, FAR)) & (distances > 0.5 * worst)
         for place in np.flatnonzero(far.any(axis=0)):
             where = sorted({self.trials[frame] for frame in np.flatnonzero(far[:, place])})
-            number = counted(int(far[:, place].sum()), "frame")
+            number = format_count(int(far[:, place].sum()), "frame")
             self.notes.append(
-                f"{self.markers[place]} is left out in {number} of {listed(where)}: up to "
+                f"{self.markers[place]} is left out in {number} of {join_words(where)}: up to "
                 f"{100.0 * np.nanmax(distances[:, place]):.0f} cm away; it may have been taken for another"
             )
         self.measured[far] = np.nan

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from osimlite.base.text import counted, listed
+from osimlite.base.text import format_count, join_words
 from osimlite.fitting.fitted_motion import ADVICE, FittedMotion
 from osimlite.schema.base import Unknown
 from osimlite.schema.model import Model
@@ -33,7 +33,7 @@ def told(motion: FittedMotion, advice: tuple[float, float] = ADVICE, of: str = "
         )
         advised += "; check the units of the data" if rms > ABSURD else ""
         yield (
-            f"{counted(result['frames'], 'frame')}, {counted(result['markers'], 'marker')}: "
+            f"{format_count(result['frames'], 'frame')}, {format_count(result['markers'], 'marker')}: "
             f"errors of {100.0 * rms:.2f} cm (root mean square), "
             f"at most {100.0 * largest:.2f} cm ({result['worst_marker']} at {result['worst_time']:g} s){advised}"
         )
@@ -47,17 +47,17 @@ def told(motion: FittedMotion, advice: tuple[float, float] = ADVICE, of: str = "
         )
     if result["partly_unseen"]:
         parts = [f"{name} ({100.0 * part:.3g} %)" for name, part in result["partly_unseen"].items()]
-        yield f"not seen in every frame: {listed(parts)}"
+        yield f"not seen in every frame: {join_words(parts)}"
     if result["frames_unseen"]:
-        frames = counted(result["frames_unseen"], "frame")
+        frames = format_count(result["frames_unseen"], "frame")
         yield f"{frames} in which nothing with a weight was seen: the pose stays as it was before"
     if motion.undetermined:
         yield (
-            f"no measurement determines {listed(motion.undetermined, most=MAX_NAMED_COORDINATES)}: they stay near the default "
-            "pose (OpenSim may end elsewhere, as in the middle of their ranges); lock them, or give them a task"
+            f"no measurement determines {join_words(motion.undetermined, most=MAX_NAMED_COORDINATES)}: they stay near the "
+            "default pose (OpenSim may end elsewhere, as in the middle of their ranges); lock them, or give them a task"
         )
     if result["frames_unsettled"]:
-        yield f"in {counted(result['frames_unsettled'], 'frame')} the best pose was not reached"
+        yield f"in {format_count(result['frames_unsettled'], 'frame')} the best pose was not reached"
 
 
 def find_unknown(model: Model) -> list[str]:
@@ -82,6 +82,6 @@ def describe_unknown(model: Model, consequence: str) -> str:
     if not parts:
         return ""
     return (
-        f"{consequence}: {counted(len(parts), 'part')} of classes that osimlite does not know, "
-        f"{listed(parts, most=MAX_NAMED_PARTS)}; OpenSim refuses the model unless the plug-in of these classes is loaded"
+        f"{consequence}: {format_count(len(parts), 'part')} of classes that osimlite does not know, "
+        f"{join_words(parts, most=MAX_NAMED_PARTS)}; OpenSim refuses the model unless the plug-in of these classes is loaded"
     )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.inverse_kinematics import first_pose, marker_stations, without_slides
 from osimlite.fitting.orientation_data import rotations
@@ -54,7 +54,7 @@ class FrameSolver:
         for name in (*self.markers, *(weights or {})):
             if name not in stations and name not in self.sensors:
                 raise SettingError(
-                    f"'{model.name}' has no marker '{name}'{did_you_mean(name, stations)}"
+                    f"'{model.name}' has no marker '{name}'{suggest_name(name, stations)}"
                 )
         if not self.markers and not sensors:
             raise SettingError(f"'{model.name}' has no markers; add some, or name those to fit")

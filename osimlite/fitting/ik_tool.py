@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.fitted_motion import FittedMotion
 from osimlite.fitting.inverse_kinematics import check_weight, fitted, marker_stations
@@ -95,7 +95,7 @@ def _values(
             else f"'{coordinates.file}' has no such column"
         )
         raise SettingError(
-            f"the value of '{task.name}' is to be from a file, and {where}{did_you_mean(task.name, columns)}"
+            f"the value of '{task.name}' is to be from a file, and {where}{suggest_name(task.name, columns)}"
         )
     values = (
         np.deg2rad(coordinates[task.name])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import replace
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.fitted_motion import FittedMotion
 from osimlite.fitting.marker_data import MarkerData, Measured
@@ -90,7 +90,7 @@ def inverse_kinematics(
         if name not in stations and name not in frames:
             known = [*stations, *frames]
             what = "marker" if not frames else "sensor" if markers is None else "marker or sensor"
-            raise SettingError(f"'{model.name}' has no {what} '{name}'{did_you_mean(name, known)}")
+            raise SettingError(f"'{model.name}' has no {what} '{name}'{suggest_name(name, known)}")
         check_weight(weight, f"'{name}'")
         for kind in (weighed, sensed):
             if name in kind:

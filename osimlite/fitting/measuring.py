@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.inverse_kinematics import marker_stations
 from osimlite.fitting.marker_data import MarkerData
@@ -99,21 +99,21 @@ class Measuring:
                 if marker not in self._stations:
                     return (
                         0.0,
-                        f"the model has no marker '{marker}'{did_you_mean(marker, self._stations)}",
+                        f"the model has no marker '{marker}'{suggest_name(marker, self._stations)}",
                     )
                 if marker not in data.names:
                     return (
                         0.0,
-                        f"the data have no marker '{marker}'{did_you_mean(marker, data.names)}",
+                        f"the data have no marker '{marker}'{suggest_name(marker, data.names)}",
                     )
             one, two = (self._state.point(*self._stations[marker]) for marker in names)
             length = float(np.linalg.norm(one - two))
             places = data.only(names)[frames]
             measured = float(np.mean(np.linalg.norm(places[:, 0] - places[:, 1], axis=1)))
             if not np.isfinite(measured):
-                return 0.0, f"{listed(names)} were not seen in every frame of the time range"
+                return 0.0, f"{join_words(names)} were not seen in every frame of the time range"
             if not length > 0.0:
-                return 0.0, f"{listed(names)} are at one place in the model"
+                return 0.0, f"{join_words(names)} are at one place in the model"
             ratios.append(measured / length)
         return (float(np.mean(ratios)), "") if ratios else (0.0, "it has no pairs of markers")
 
@@ -121,7 +121,7 @@ class Measuring:
         """Whether there is a frame of a name; if not it is noted."""
         if name not in self.found.factors:
             self.found.notes.append(
-                f"{what}: the model has no body '{name}'{did_you_mean(name, self.found.factors)}"
+                f"{what}: the model has no body '{name}'{suggest_name(name, self.found.factors)}"
             )
         return name in self.found.factors
 

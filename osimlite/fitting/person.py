@@ -15,7 +15,7 @@ from math import sqrt
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.chosen_frames import STATIC, ChosenFrames
 from osimlite.fitting.inverse_kinematics import first_pose, marker_stations
@@ -133,7 +133,7 @@ def fit(
         unknown = [name for name in held if name not in stations]
         if unknown:
             raise SettingError(
-                f"'{model.name}' has no marker '{unknown[0]}'{did_you_mean(unknown[0], stations)}"
+                f"'{model.name}' has no marker '{unknown[0]}'{suggest_name(unknown[0], stations)}"
             )
         moving = set(stations) - set(held)
     names = [body.name for body in mechanism.bodies]
@@ -202,7 +202,7 @@ def _named(
 def _at_ends(factors: Mapping[str, Sequence[float]]) -> Iterator[str]:
     ends = [body for body, own in factors.items() if min(own) <= SMALLEST or max(own) >= LARGEST]
     if ends:
-        yield f"{listed(ends)}: factors at an end of what is allowed; look at the names and the units of the markers"
+        yield f"{join_words(ends)}: factors at an end of what is allowed; look at the names and the units of the markers"
 
 
 @dataclass(frozen=True, eq=False)

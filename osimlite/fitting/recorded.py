@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import DocumentError, OsimliteError, SettingError
 from osimlite.mechanics.multibody.spatial import Array
 
@@ -29,7 +29,8 @@ class Recording:
         twice = sorted({name for name in self.names if self.names.count(name) > 1})
         if twice:
             raise DocumentError(
-                f"two {self.noun}s are called {listed(twice)}; rename one of each", file=self.file
+                f"two {self.noun}s are called {join_words(twice)}; rename one of each",
+                file=self.file,
             )
         if len(self.times) == 0:
             raise DocumentError(f"there are {self.noun}s but no frames", file=self.file)
@@ -100,7 +101,7 @@ class Recording:
         for name in names:
             if name not in places:
                 raise SettingError(
-                    f"there is no {self.noun} '{name}' in {self.source}{did_you_mean(name, self.names)}"
+                    f"there is no {self.noun} '{name}' in {self.source}{suggest_name(name, self.names)}"
                 )
         return self.values[:, [places[name] for name in names]]
 
@@ -119,8 +120,8 @@ class Recording:
         ]
         if not names:
             raise OsimliteError(
-                f"no {self.noun} of {self.source} ({listed([*self.names])}) is one of the model "
-                f"({listed([*model]) or 'none'}); give what it is in the model the name that it has in the data"
+                f"no {self.noun} of {self.source} ({join_words([*self.names])}) is one of the model "
+                f"({join_words([*model]) or 'none'}); give what it is in the model the name that it has in the data"
             )
         return names
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import DocumentError, SettingError
 from osimlite.fitting.fit_messages import describe_unknown
 from osimlite.fitting.ik_tool import UNNAMED, coordinate_table
@@ -97,7 +97,7 @@ def scale(
     def expect_body(name: str) -> None:
         if name not in measuring.frames:
             raise SettingError(
-                f"'{model.name}' has no body '{name}'{did_you_mean(name, measuring.frames)}"
+                f"'{model.name}' has no body '{name}'{suggest_name(name, measuring.frames)}"
             )
 
     if isinstance(measurements, Mapping):
@@ -216,7 +216,7 @@ def _scaled(tool: ScaleTool, model: Model, folder: Path) -> Measured:
         elif word == BY_HAND:
             measuring.by_hand(scaler.scale_set.objects)
         elif word != MEASUREMENTS:
-            near = did_you_mean(word, (MEASUREMENTS, BY_HAND))
+            near = suggest_name(word, (MEASUREMENTS, BY_HAND))
             raise SettingError(
                 f"scaling_order has '{word}'; it consists of {MEASUREMENTS} and {BY_HAND}{near}"
             )

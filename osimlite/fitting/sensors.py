@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.orientation_data import OrientationData
 from osimlite.mechanics.multibody import build_mechanism
@@ -55,9 +55,9 @@ def sensor_frames(
                 )
             result[name] = mechanism.frames[path]
     if not result:
-        near = did_you_mean(wanted[0], [name for name, _ in frames]) if wanted else ""
+        near = suggest_name(wanted[0], [name for name, _ in frames]) if wanted else ""
         raise SettingError(
-            f"'{model.name}' has no frame that is called as a sensor ({listed(wanted)}){near}"
+            f"'{model.name}' has no frame that is called as a sensor ({join_words(wanted)}){near}"
         )
     return result
 
@@ -85,7 +85,7 @@ def place_sensors(
     if base and axis:
         if base not in measured:
             raise SettingError(
-                f"there is no sensor '{base}' in {data.source}{did_you_mean(base, data.names)}"
+                f"there is no sensor '{base}' in {data.source}{suggest_name(base, data.names)}"
             )
         faced = _axis_of(measured[base], axis)
         heading = _heading(_forwards(model, mechanism, state.rotations), faced)
@@ -107,7 +107,7 @@ def place_sensors(
     if not placed:
         example = f", as '{frames[-1].name}{ENDING}' is" if frames else ""
         raise SettingError(
-            f"no sensor of {data.source} ({listed(data.names)}) is called as a frame of '{model.name}' with '{ENDING}' "
+            f"no sensor of {data.source} ({join_words(data.names)}) is called as a frame of '{model.name}' with '{ENDING}' "
             f"behind{example}"
         )
     for name, worn, angles in placed:

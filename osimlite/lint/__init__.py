@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from osimlite.base.files import named_mesh_folders
+from osimlite.base.files import list_mesh_folders
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Finding, Report, Severity
 from osimlite.lint.project_files import project_files
@@ -58,7 +58,7 @@ def validate(
     from osimlite.schema.model import Model
 
     if config is None:
-        meshes = tuple(map(str, named_mesh_folders()))
+        meshes = tuple(map(str, list_mesh_folders()))
         named = [classes] if isinstance(classes, str | os.PathLike) else classes
         files = tuple(map(os.path.abspath, named))
         config = Config(

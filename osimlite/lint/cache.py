@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
 from osimlite import __version__
-from osimlite.base.files import read_file, stamped
+from osimlite.base.files import get_file_stamp, read_file
 from osimlite.base.pruning import mark_used
-from osimlite.base.require import absent
+from osimlite.base.require import find_missing_packages
 from osimlite.base.writing import write_cached
 from osimlite.errors import OsimliteError
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report, Severity
@@ -134,9 +134,9 @@ def key_of(file: str, config: Config) -> str:
         severity,
         config.mesh_paths,
         thresholds,
-        [(path, stamped(path)) for path in config.classes],
+        [(path, get_file_stamp(path)) for path in config.classes],
         config.target_version,
-        absent("numpy"),
+        find_missing_packages("numpy"),
     )
     return ascii(setting)
 

@@ -67,14 +67,14 @@ class Config:
 
 
 def _check_thresholds(given: Mapping[str, float]) -> None:
-    from osimlite.base.text import did_you_mean
+    from osimlite.base.text import suggest_name
     from osimlite.lint.registry import all_rules
 
     known = [threshold.name for rule in all_rules() for threshold in rule.thresholds]
     for name, number in given.items():
         if name not in known:
             raise OsimliteError(
-                f"no rule has a threshold '{name}'{did_you_mean(name, known)} `osimlite rule CODE` shows what there is"
+                f"no rule has a threshold '{name}'{suggest_name(name, known)} `osimlite rule CODE` shows what there is"
             )
         if (
             isinstance(number, bool)
@@ -104,9 +104,9 @@ def checked_words(words: tuple[str, ...] | list[str] | str | None) -> tuple[str,
 
     for word in cleaned:
         if not any(rule.matches(word) for rule in all_rules()):
-            from osimlite.base.text import did_you_mean
+            from osimlite.base.text import suggest_name
 
             known = [name for rule in (*all_rules(), *groups()) for name in (rule.code, rule.name)]
-            near = did_you_mean(word, known) or "; 'osimlite rule' lists all rules"
+            near = suggest_name(word, known) or "; 'osimlite rule' lists all rules"
             raise OsimliteError(f"no rule has the code or name '{word}'{near}")
     return cleaned

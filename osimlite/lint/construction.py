@@ -13,7 +13,7 @@ from hashlib import blake2b
 from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple, cast
 
-from osimlite.base.require import absent
+from osimlite.base.require import find_missing_packages
 from osimlite.errors import OsimliteError
 from osimlite.lint.measures import MECHANISM, NEEDS_SIM
 
@@ -129,7 +129,7 @@ def find_obstacles(subject: Subject, *, anew: bool = True) -> str:
     """
     if CONSTRUCTION in subject.kept:
         return ""
-    if missing := absent("numpy"):
+    if missing := find_missing_packages("numpy"):
         return f"{NEEDS_SIM} ({' and '.join(missing)} is not installed); run: pip install 'osimlite[sim]'"
     key = None if subject.source is None else _digest(subject)
     obstacles = _memory.get(key) if key is not None else None

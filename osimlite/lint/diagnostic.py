@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from osimlite.base.lazy import shown_in_notebooks
+from osimlite.base.lazy import make_notebook_repr
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import visible
+from osimlite.base.text import escape_unprintable
 
 
 class Severity(StrEnum):
@@ -100,7 +100,7 @@ class Finding:
 
     def __str__(self) -> str:
         hint = f" (did you mean '{self.suggestion}'?)" if self.suggestion is not None else ""
-        return visible(f"{self.place}: {self.severity} {self.code} {self.message}{hint}")
+        return escape_unprintable(f"{self.place}: {self.severity} {self.code} {self.message}{hint}")
 
 
 NOT_MEASURED = " not measured: "
@@ -133,7 +133,7 @@ class Report:
     unmeasured: list[str] = field(default_factory=list)
     passed: list[str] = field(default_factory=list)
 
-    _repr_html_ = shown_in_notebooks("findings")
+    _repr_html_ = make_notebook_repr("findings")
 
     @property
     def errors(self) -> list[Finding]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.errors import SpecialFileError
 from osimlite.io.document.reader import collector_paused
 from osimlite.io.document.source import Source
@@ -114,7 +114,7 @@ def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Repo
     why_not = why_not or unbuilt
     unmeasured = []
     if why_not and measure:
-        families = listed(dict.fromkeys(sorted(known.code[:6] for known in left_out)))
+        families = join_words(dict.fromkeys(sorted(known.code[:6] for known in left_out)))
         unmeasured.append(f"{subject.file or 'the model'}: rules {families}{NOT_MEASURED}{why_not}")
     return Report(unique, unmeasured=unmeasured)
 

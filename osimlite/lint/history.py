@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.errors import OsimliteError
 from osimlite.schema.base import Object
 from osimlite.schema.model import CURRENT_VERSION
@@ -49,7 +49,7 @@ def later_than(release: str) -> Later:
     )
     if release not in known["formats"]:
         raise OsimliteError(
-            f"of OpenSim '{release}' nothing is known; known are {listed(known['formats'], most=20)}"
+            f"of OpenSim '{release}' nothing is known; known are {join_words(known['formats'], most=20)}"
         )
     numbers = _numbers(release)
     return Later(

@@ -10,7 +10,7 @@ from pathlib import Path
 from time import time_ns
 from typing import NamedTuple
 
-from osimlite.base.cores import cores
+from osimlite.base.cores import count_cores
 from osimlite.base.files import read_standard_input
 from osimlite.base.records import replace
 from osimlite.base.writing import user_cache_folder
@@ -138,7 +138,7 @@ def count_processes(jobs: list[Job]) -> int:
             continue
     if size < WORTH_SHARING or len(jobs) < 2:
         return 1
-    return min(cores(), len(jobs), 61)
+    return min(count_cores(), len(jobs), 61)
 
 
 def check_one(job: Job) -> Report:

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from osimlite.base.files import read_file
 from osimlite.base.pruning import mark_used
-from osimlite.base.require import absent
-from osimlite.base.text import listed
+from osimlite.base.require import find_missing_packages
+from osimlite.base.text import join_words
 from osimlite.base.writing import write_cached
 from osimlite.errors import OsimliteError
 from osimlite.schema.specs import lineage
@@ -69,7 +69,7 @@ class Pose(NamedTuple):
     values: tuple[Value, ...] = ()
 
     def __str__(self) -> str:
-        return f"at {listed(map(str, self.values))}" if self.values else "in the default pose"
+        return f"at {join_words(map(str, self.values))}" if self.values else "in the default pose"
 
 
 class Wrapping(NamedTuple):
@@ -184,10 +184,10 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
     from osimlite.schema.tree import lent
 
     compiles = sum(1 for _ in subject.named("PathWrap")) > FEW
-    missing = absent("numpy")
+    missing = find_missing_packages("numpy")
     if missing:
         verb = "is" if len(missing) == 1 else "are"
-        return f"{NEEDS_SIM} ({listed(missing)} {verb} not installed); run: pip install 'osimlite[sim]'"
+        return f"{NEEDS_SIM} ({join_words(missing)} {verb} not installed); run: pip install 'osimlite[sim]'"
     mechanism = subject.kept.pop(MECHANISM, None)
     parts = parts_of(subject)
     known = None if parts is None else recall(parts, subject.kept_in)

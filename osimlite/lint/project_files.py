@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
-from osimlite.base.files import TABLES as TABLES
-from osimlite.base.files import no_such, read_at_most, unsaved
+from osimlite.base.files import TABLE_SUFFIXES as TABLE_SUFFIXES
+from osimlite.base.files import make_missing_error, read_at_most, unsaved
 from osimlite.errors import OsimliteError
 
 BEGINNING = 1 << 16
@@ -102,13 +102,13 @@ def _is_property(owner: str, tag: str) -> bool:
 
 DOCUMENTS = (".xml", ".omoco")
 """Setups of tools and what they consist of."""
-PROJECT = (".osim", *DOCUMENTS, *TABLES)
+PROJECT = (".osim", *DOCUMENTS, *TABLE_SUFFIXES)
 """Everything that belongs to a project."""
 
 
 def is_table(file: str | None) -> bool:
     """Whether a file is a table, by its name."""
-    return file is not None and file.lower().endswith(TABLES)
+    return file is not None and file.lower().endswith(TABLE_SUFFIXES)
 
 
 def is_document(file: str | None) -> bool:
@@ -148,7 +148,7 @@ def project_files(
         elif (
             str(path) != "-" and not os.path.lexists(path) and os.path.realpath(path) not in unsaved
         ):
-            raise no_such(path, may_be_folder=True)
+            raise make_missing_error(path, may_be_folder=True)
         elif not only_ours or begins_as_ours(str(path)):
             result.append(str(path))
         else:

@@ -13,7 +13,7 @@ from inspect import cleandoc
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack
 
 from osimlite.base.records import dataclass, replace
-from osimlite.base.text import brief
+from osimlite.base.text import shorten_message
 from osimlite.lint.diagnostic import Finding, Fix, Severity
 from osimlite.lint.faults import Fault, faults_in
 
@@ -99,7 +99,7 @@ class FindingSink:
                 rule.code,
                 rule.name,
                 subject.config.severity_of(rule, severity or rule.severity_in(subject.version)),
-                brief(message),
+                shorten_message(message),
                 subject.file,
                 line,
                 column,

@@ -16,7 +16,7 @@ from operator import lt
 from typing import NamedTuple
 
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, shapes
 
 _TOLD = 50
@@ -44,10 +44,14 @@ class Fault(NamedTuple):
     def more(self, noun: str = "row") -> str:
         """What to say of further rows, and of further columns."""
         rows = (
-            [f"; so it is in {counted(self.times - 1, f'more {noun}')}"] if self.times > 1 else []
+            [f"; so it is in {format_count(self.times - 1, f'more {noun}')}"]
+            if self.times > 1
+            else []
         )
         columns = (
-            [f"; there is such in {counted(self.others, 'more column')}"] if self.others else []
+            [f"; there is such in {format_count(self.others, 'more column')}"]
+            if self.others
+            else []
         )
         return "".join(rows + columns)
 

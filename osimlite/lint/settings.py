@@ -8,10 +8,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from osimlite.base.files import named_mesh_folders
-from osimlite.base.project import largest_file_in, settings_table
+from osimlite.base.files import list_mesh_folders
+from osimlite.base.project import find_settings, parse_max_file_size
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import OsimliteError
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Severity
@@ -43,7 +43,7 @@ class Settings:
             overriding.select or self.select,
             (*self.ignore, *self._ignored_in(Path(path)), *overriding.ignore),
             {**self.severity, **overriding.severity},
-            (*overriding.mesh_paths, *self.mesh_paths, *map(str, named_mesh_folders())),
+            (*overriding.mesh_paths, *self.mesh_paths, *map(str, list_mesh_folders())),
             {**self.thresholds, **overriding.thresholds},
             (*self.classes, *overriding.classes),
             overriding.target_version or self.target_version,
@@ -71,17 +71,17 @@ def settings_for(folder: Path) -> Settings:
     Raises:
         OsimliteError: the file is no TOML, or has a setting that does not exist or makes no sense.
     """
-    result = settings_table(folder)
+    result = find_settings(folder)
     return Settings() if result is None else _settings(*result)
 
 
 def _settings(file: Path, table: dict[str, Any]) -> Settings:
-    largest_file_in(file, table)
+    parse_max_file_size(file, table)
     for key in table:
         if key not in _KNOWN:
-            every = listed(_KNOWN, most=len(_KNOWN))
+            every = join_words(_KNOWN, most=len(_KNOWN))
             raise OsimliteError(
-                f"there is no setting '{key}'{did_you_mean(key, _KNOWN)} Settings are {every}",
+                f"there is no setting '{key}'{suggest_name(key, _KNOWN)} Settings are {every}",
                 file=str(file),
             )
     try:
@@ -123,5 +123,5 @@ def _mapping(table: dict[str, Any], key: str) -> dict[str, Any]:
 
 def _severity(word: object) -> Severity:
     if word not in tuple(Severity):
-        raise OsimliteError(f"a severity is one of {listed(Severity)}, not '{word}'")
+        raise OsimliteError(f"a severity is one of {join_words(Severity)}, not '{word}'")
     return Severity(str(word))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from osimlite.base.text import listed, nearest
+from osimlite.base.text import find_nearest, join_words
 from osimlite.io.document.lexical import shortest
 from osimlite.schema.base import Object, Unknown
 
@@ -43,10 +43,10 @@ def shown(value: object) -> str:
 
 def nearest_name(text: str, right: list[str]) -> str | None:
     """The nearest right text; of paths the last names are compared, so that a long way there does not hide them."""
-    whole = nearest(text, right, cutoff=70)
+    whole = find_nearest(text, right, cutoff=70)
     last = text.rstrip("/").rpartition("/")[2]
     by_last = {word.rpartition("/")[2]: word for word in reversed(right)}
-    near = nearest(last, by_last, cutoff=70)
+    near = find_nearest(last, by_last, cutoff=70)
     if near is None:
         return whole
     if whole is not None and whole.rpartition("/")[2] == near:
@@ -58,9 +58,9 @@ def meant(wrong: Iterable[str], right: Iterable[str]) -> str:
     """What some texts may stand for, asked at the end of a sentence; nothing if no right one is like them."""
     known = sorted(right)
     near = [f"'{name}' for '{text}'" for text in wrong if (name := nearest_name(text, known))]
-    return f"; is it {listed(near)}?" if near else ""
+    return f"; is it {join_words(near)}?" if near else ""
 
 
 def closest(text: str, right: list[str]) -> str:
     """The one of some texts that is most like another."""
-    return right[0] if len(right) == 1 else nearest(text, right, cutoff=0) or right[0]
+    return right[0] if len(right) == 1 else find_nearest(text, right, cutoff=0) or right[0]

@@ -10,8 +10,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, get_type_hints
 
-from osimlite.base.load import errors_placed, imports_beside, module_named, module_of_file
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.load import (
+    allow_local_imports,
+    import_user_module,
+    locate_errors,
+    run_python_file,
+)
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import MissingDependency, OsimliteError
 from osimlite.io.document.data import SUFFIXES, read_data
 from osimlite.models import BUILT_IN, STUDIES
@@ -40,8 +45,8 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
     arguments = _arguments(function, parameters or {}, source)
     file = inspect.getsourcefile(function)
     with (
-        errors_placed(str(file)),
-        nullcontext() if source in BUILT_IN else imports_beside(str(file)),
+        locate_errors(str(file)),
+        nullcontext() if source in BUILT_IN else allow_local_imports(str(file)),
     ):
         model = function(**arguments)
     if not isinstance(model, Model):
@@ -98,11 +103,13 @@ def _function(source: str) -> Callable[..., Any]:
     if source in BUILT_IN:
         module = _import_built_in(place, source)
     elif place.endswith(".py"):
-        module = module_of_file(Path(place))
+        module = run_python_file(Path(place))
     elif ":" in target:
-        module = module_named(place)
+        module = import_user_module(place)
     else:
-        known = did_you_mean(source, BUILT_IN) or f"; the built-in models are {listed(BUILT_IN)}"
+        known = (
+            suggest_name(source, BUILT_IN) or f"; the built-in models are {join_words(BUILT_IN)}"
+        )
         raise OsimliteError(
             f"'{source}' is no built-in model, Python file, module:function or data file{known}"
         )
@@ -110,7 +117,7 @@ def _function(source: str) -> Callable[..., Any]:
         result = getattr(module, name, None)
         if not callable(result):
             raise OsimliteError(
-                f"'{place}' has no function '{name}'{did_you_mean(name, _functions(module))}"
+                f"'{place}' has no function '{name}'{suggest_name(name, _functions(module))}"
             )
         return result
     return _only_function(module, place)
@@ -154,7 +161,7 @@ def _only_function(module: ModuleType, place: str) -> Callable[..., Any]:
     if not candidates:
         raise OsimliteError("the file has no function that returns a Model", file=place)
     raise OsimliteError(
-        f"the file has several functions ({listed(candidates)}); say which one with {place}:FUNCTION",
+        f"the file has several functions ({join_words(candidates)}); say which one with {place}:FUNCTION",
         file=place,
     )
 
@@ -173,7 +180,7 @@ def _arguments(
     arguments = {}
     for name, text in parameters.items():
         if name not in known:
-            hint = did_you_mean(name, known) or f"; it has {listed(known) or 'none'}"
+            hint = suggest_name(name, known) or f"; it has {join_words(known) or 'none'}"
             raise OsimliteError(f"'{source}' has no parameter '{name}'{hint}")
         arguments[name] = _value(name, text, known[name])
     for name, parameter in known.items():

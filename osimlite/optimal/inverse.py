@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.base.records import replace
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.fitting.modifying.operators import processed
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
@@ -93,7 +93,7 @@ def build_inverse_problem(
         known = (*problem.functions.tabulate_states(table.times[:1]), *problem.functions.states)
         for label in table.columns:
             if label not in known:
-                near = did_you_mean(label, known)
+                near = suggest_name(label, known)
                 raise asked.invalid_error(
                     tool,
                     f"'{label}' is not a state{near}; set kinematics_allow_extra_columns to ignore it",

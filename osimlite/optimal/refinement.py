@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import or_known
+from osimlite.base.text import suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.ipopt import Progress, SolverResult
@@ -73,7 +73,7 @@ class Refinement:
             raise SettingError(f"the tolerance of mesh refinement must be positive, not {text}")
         if result.hessian not in HESSIAN_METHODS:
             raise SettingError(
-                f"mesh refinement has no second derivatives '{hessian}'{or_known(hessian, HESSIAN_METHODS)}"
+                f"mesh refinement has no second derivatives '{hessian}'{suggest_or_list(hessian, HESSIAN_METHODS)}"
             )
         return result
 

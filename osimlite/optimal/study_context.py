@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from osimlite.base.files import read_file
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import DocumentError, OsimliteError, UnsupportedError
 from osimlite.io.tables.storage import beside
 from osimlite.schema.base import Component, Object, Unknown
@@ -96,7 +96,7 @@ class StudyContext:
         known = [*known]
         if name not in known:
             raise self.invalid_error(
-                part, f"{whose} has no {what} '{name}'{did_you_mean(name, known)}"
+                part, f"{whose} has no {what} '{name}'{suggest_name(name, known)}"
             )
 
     def check_values(self, whole: Object) -> None:
@@ -110,7 +110,7 @@ class StudyContext:
                 continue
             if isinstance(part, Unknown):
                 near = (
-                    did_you_mean(part.class_name, MODULES) if part.class_name not in MODULES else ""
+                    suggest_name(part.class_name, MODULES) if part.class_name not in MODULES else ""
                 )
                 raise self.invalid_error(part, f"objects of this class are not allowed here{near}")
             for spec in value_specs(type(part)):
@@ -158,7 +158,7 @@ def _describe_invalid_value(spec: FieldSpec, word: Any) -> str:
     if not isinstance(kind, Value) or word is None:
         return ""
     if kind.choices and word not in kind.choices:
-        return f"; expected {listed(map(repr, kind.choices))}{did_you_mean(str(word), map(str, kind.choices))}"
+        return f"; expected {join_words(map(repr, kind.choices))}{suggest_name(str(word), map(str, kind.choices))}"
     if isinstance(word, float) and word != word:
         return ", which is not a number"
     if kind.domain and kind.scalar in ("double", "int") and not domain_test(kind.domain)(word):

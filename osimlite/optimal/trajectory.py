@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.base.files import make_folder, written_atomically
+from osimlite.base.files import make_folder, open_atomically
 from osimlite.base.records import dataclass, field
 from osimlite.errors import DocumentError
 from osimlite.io.tables.storage import StoTable, adapter_lines, read_sto
@@ -151,5 +151,5 @@ class MocoTrajectory:
             OsimliteError: the file cannot be written.
         """
         make_folder(Path(path).parent)
-        with written_atomically(path) as stream:
+        with open_atomically(path) as stream:
             stream.writelines(line.encode() for line in adapter_lines(self.table()))

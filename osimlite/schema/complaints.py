@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def misspelt(cls: type[Object], name: str) -> str:
     """There is no property of this name; with the nearest ones."""
-    from osimlite.base.text import did_you_mean
+    from osimlite.base.text import suggest_name
 
     known = [field_name for field_name in cls.model_fields]
     # Sockets are known by the middle of their names: ``frame`` is ``socket_frame``.
@@ -21,7 +21,7 @@ def misspelt(cls: type[Object], name: str) -> str:
     better = (
         f"; did you mean '{min(within, key=len)}'?"
         if within and len(name) > 3
-        else did_you_mean(name, known)
+        else suggest_name(name, known)
     )
     return f"{cls.__name__} has no property '{name}'{better}"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.errors import ModelError
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Reference
@@ -72,7 +72,7 @@ def remove(model: Model, component: Component) -> None:
     )
     if users:
         raise ModelError(
-            f"cannot remove '{path}': {listed(users)} {'names' if len(users) == 1 else 'name'} it"
+            f"cannot remove '{path}': {join_words(users)} {'names' if len(users) == 1 else 'name'} it"
         )
     for holder in model.walk():
         for spec, item in holder.objects_held():

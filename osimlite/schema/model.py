@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, cast, overload
 
-from osimlite.base.lazy import shown_in_notebooks
+from osimlite.base.lazy import make_notebook_repr
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.schema.base import Component, ModelComponent, made
 from osimlite.schema.constraints import ConstraintSet
@@ -87,7 +87,7 @@ class Model(ModelComponent):
     )
     """What a viewer should show of the model."""
 
-    _repr_html_ = shown_in_notebooks("model")
+    _repr_html_ = make_notebook_repr("model")
 
     @property
     def document_version(self) -> int:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from weakref import WeakSet
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError
 from osimlite.schema.base import Component, Object, put_model
 from osimlite.schema.fields import Held, ObjectList, Reference
@@ -180,7 +180,7 @@ class Tree:
         result = self.by_path.get(normalised(path if path.startswith("/") else "/" + path) or "")
         if result is None:
             named = [known for known in self.by_path if last_name(known) == last_name(f"/{path}")]
-            better = f"; did you mean '{named[0]}'?" if named else did_you_mean(path, self.by_path)
+            better = f"; did you mean '{named[0]}'?" if named else suggest_name(path, self.by_path)
             raise ModelError(f"no component at '{path}'{better}")
         return result
 
@@ -238,7 +238,7 @@ class Tree:
                 )
             raise ModelError(
                 f"{type(owner).__name__} '{self.path_of(owner) or owner.name}': {name} names '{text}', "
-                f"but the model has no such {use.reference.target}{did_you_mean(text, self.spellings(use))}"
+                f"but the model has no such {use.reference.target}{suggest_name(text, self.spellings(use))}"
             )
         return result
 

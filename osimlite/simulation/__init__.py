@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from osimlite.base.lazy import imported_when_used
+from osimlite.base.lazy import make_lazy_getattr
 
 if TYPE_CHECKING:
     from osimlite.io.tables.storage import StoTable as StoTable
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from osimlite.simulation.trajectory import Interrupted as Interrupted
     from osimlite.simulation.trajectory import Trajectory as Trajectory
 
-__getattr__ = imported_when_used(
+__getattr__ = make_lazy_getattr(
     __name__,
     {
         "Interrupted": "osimlite.simulation.trajectory",

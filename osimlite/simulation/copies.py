@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite.base.cores import cores
+from osimlite.base.cores import count_cores
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.multibody.functions import Constant
 from osimlite.mechanics.multibody.spatial import Array
@@ -70,7 +70,7 @@ class Copies:
         self._parts = [(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE)]
         # Each core works on numbers of the model of its own, which are few enough to be near.
         self._rooms = [
-            (self.batch.room(), engine.numbers.copy()) for _ in range(min(cores(), count))
+            (self.batch.room(), engine.numbers.copy()) for _ in range(min(count_cores(), count))
         ]
         self._pool = ThreadPoolExecutor(len(self._rooms) - 1) if len(self._rooms) > 1 else None
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from osimlite.base.quantity import Quantity, doubt, quantity
+from osimlite.base.quantity import Quantity, describe_unit_doubt, parse_quantity
 from osimlite.errors import DocumentError, SettingError, SimulationError
 from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -29,7 +29,7 @@ def in_units_of(mechanism: Mechanism, name: str, given: float | str) -> float:
     kind = mechanism.coordinates[mechanism.coordinate_index(name)].motion_type
     if not isinstance(given, str):
         return float(given)
-    read = quantity(given)
+    read = parse_quantity(given)
     if read is None:
         raise SettingError(
             f"coordinate '{name}' takes a number such as 0.5 or 30deg, not '{given}'"
@@ -53,9 +53,9 @@ def suspect_value(info: CoordinateInfo, name: str, given: float | str) -> str:
     """
     if info.motion_type == "translational":
         return ""
-    return doubt(
+    return describe_unit_doubt(
         name,
-        quantity(given) if isinstance(given, str) else Quantity(float(given), None),
+        parse_quantity(given) if isinstance(given, str) else Quantity(float(given), None),
         info.range,
     )
 

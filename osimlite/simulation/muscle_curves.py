@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from osimlite.base.lazy import shown_in_notebooks
+from osimlite.base.lazy import make_notebook_repr
 from osimlite.base.records import dataclass, replace
 from osimlite.base.require import require
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError, SimulationError
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
@@ -57,7 +57,7 @@ class MuscleCurves(Tabular):
     values: Mapping[str, Sequence[float]]
     columns: Mapping[str, Array]
 
-    _repr_html_ = shown_in_notebooks("muscle_curves")
+    _repr_html_ = make_notebook_repr("muscle_curves")
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -145,7 +145,7 @@ def muscle_curves(
     mechanism = build_mechanism(model)
     places = [mechanism.coordinate_index(name) for name in values]
     if len(set(places)) < len(places):
-        raise SettingError(f"{listed(values)} are one coordinate; leave one out")
+        raise SettingError(f"{join_words(values)} are one coordinate; leave one out")
     forces = force_elements(
         model, mechanism, skip_unsupported=True, wrapping=wrapping, folder=folder
     )
@@ -201,7 +201,7 @@ def _chosen(paths: list[str], names: Sequence[str]) -> list[str]:
     known = {key: path for path in reversed(paths) for key in (path.rpartition("/")[2], path)}
     for name in names:
         if name not in known:
-            raise SettingError(f"the model has no muscle '{name}'{did_you_mean(name, known)}")
+            raise SettingError(f"the model has no muscle '{name}'{suggest_name(name, known)}")
     wanted = {known[name] for name in names}
     return [path for path in paths if path in wanted or not names]
 

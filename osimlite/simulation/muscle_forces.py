@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from osimlite.base.files import make_folder, written_atomically
+from osimlite.base.files import make_folder, open_atomically
 from osimlite.base.records import dataclass, field
 from osimlite.io.tables.control_nodes import control_set
 from osimlite.io.tables.storage import StoTable, write_sto
@@ -79,7 +79,7 @@ class MuscleForces(StoTable):
                 table.rows.tolist(),
                 has_missing=has_missing,
             )
-        with written_atomically(paths[-1]) as stream:
+        with open_atomically(paths[-1]) as stream:
             stream.writelines(line.encode() for line in control_set(self))
         return paths
 

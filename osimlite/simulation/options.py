@@ -8,9 +8,9 @@ from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from osimlite.base.choices import described, option
+from osimlite.base.options import define_option, describe_options
 from osimlite.base.records import dataclass, replace
-from osimlite.base.text import or_known
+from osimlite.base.text import suggest_or_list
 from osimlite.errors import SettingError
 
 if TYPE_CHECKING:
@@ -44,54 +44,54 @@ class Options:
     of ``osimlite simulate`` too.
     """
 
-    accuracy: float | None = option(
+    accuracy: float | None = define_option(
         None, "Of the integrator, as in OpenSim.", shown="0.001", more="0.001 if left out."
     )
-    integrator: str | None = option(
+    integrator: str | None = define_option(
         None,
         "'merson', whose steps are OpenSim's; 'euler2', whose steps are SCONE's; 'adams' for smooth motion, as of few "
         "muscles; 'bdf' for stiff motion, as of many; 'rosenbrock' for stiff motion at loose accuracy.",
         shown="merson",
     )
-    fixed_step: float | None = option(
+    fixed_step: float | None = define_option(
         None,
         "Steps of this length (semi-implicit Euler), without error control.",
         unit="SECONDS",
         more="They are the engine's own, s.",
     )
-    report_interval: float = option(
+    report_interval: float = define_option(
         0.01,
         "Time between the rows of the result files.",
         unit="SECONDS",
         more="The recorded moments are so far apart, s; the last one is the end in any case.",
     )
-    initial: Mapping[str, float | str] | str | Path | None = option(
+    initial: Mapping[str, float | str] | str | Path | None = define_option(
         None,
         more='values (rad, m, or a text such as "40deg") of coordinates by name or path that do not start at their '
         "default. The path of a state (``/jointset/knee/flexion/speed``, ``/forceset/stop/dissipatedEnergy``) stands "
         "for what it is in ``states.sto``; what it says of coordinates gives way to locks and constraints. A file of "
         "states stands for its last row.",
     )
-    initial_speeds: Mapping[str, float | str] | None = option(
+    initial_speeds: Mapping[str, float | str] | None = define_option(
         None, more="generalized speeds that do not start at their default, likewise."
     )
-    equilibrate: bool = option(
+    equilibrate: bool = define_option(
         False,
         "Start muscles in equilibrium of fibers and tendon.",
         more="So does OpenSim's `equilibrateMuscles`; states that `initial` names stay as it says.",
     )
-    controls: Mapping[str, Any] | StoTable | str | Path | None = option(
+    controls: Mapping[str, Any] | StoTable | str | Path | None = define_option(
         None,
         more="what drives actuators besides the controllers of the model, as a PrescribedController more would: by "
         "name or path a number, a function of time (s) or ``(times, values)``; or a table of such columns, or its "
         "file. What nothing drives has a control of 0.",
     )
-    controller: Controller | None = option(
+    controller: Controller | None = define_option(
         None,
         more="what drives actuators by what it feels, beside all else that does: :class:`osimlite.Feedback`. Steps are "
         "those of an integrator.",
     )
-    resume: Trajectory | str | Path | None = option(
+    resume: Trajectory | str | Path | None = define_option(
         None,
         "Go on where an earlier simulation ended, whose folder this is.",
         unit="FOLDER",
@@ -99,57 +99,57 @@ class Options:
         more="Or the trajectory of one; the time goes on, too. With a controller that began a control step there, to "
         "the last bit as if it had not ended.",
     )
-    progress: Progress | None = option(
+    progress: Progress | None = define_option(
         None,
         more="called with the simulated time reached and the length of the steps there (both in s), after every step, "
         "or after several that are quick.",
     )
-    route: str = option(
+    route: str = define_option(
         "auto",
         more='how the accelerations are computed: by Bullet\'s "mass-matrix", which "auto" stands for, or its '
         '"articulated-body" algorithm.',
     )
-    wrapping: str = option(
+    wrapping: str = define_option(
         "opensim",
         "How paths bend around surfaces: 'opensim', as there; 'geodesic', smoothly, the shortest way.",
         more="Along a geodesic (where a side is asked for at least a stationary one), all surfaces of a path are taken "
         "together, so that speed and moment arms are derivatives of the length.",
     )
-    skip_unsupported: bool = option(
+    skip_unsupported: bool = define_option(
         False, "Leave out forces that cannot be computed.", more="The summary lists them."
     )
-    opensim_derivatives: bool = option(
+    opensim_derivatives: bool = define_option(
         False,
         "Repeat OpenSim's mistakes in joints with several turns.",
         more="Two second derivatives there are wrong; see :func:`osimlite.mechanics.multibody.build_mechanism`.",
     )
-    rolling: bool = option(
+    rolling: bool = define_option(
         False,
         "Let rolling constraints act, which OpenSim leaves off.",
         more="So they are until a program turns them on.",
     )
-    external_loads: str | Path | None = option(
+    external_loads: str | Path | None = define_option(
         None,
         "Measured forces that act too: a file of ExternalLoads.",
         unit="FILE",
         type=Path | None,
     )
-    simbody_early_return: bool = option(
+    simbody_early_return: bool = define_option(
         False,
         more="reproduce a defect of Simbody in contact forces of several surfaces: the first contact that separates "
         "too fast to push takes the force of those after it.",
     )
-    own_activation_times: bool = option(
+    own_activation_times: bool = define_option(
         False,
         more="let the activation of every DeGrooteFregly2016Muscle have its own time constants and smoothing; OpenSim "
         "takes those of the first one for all.",
     )
-    folder: str | Path | None = option(
+    folder: str | Path | None = define_option(
         None,
         more="where the model's file is; files that the model names (of contact meshes) are looked for there. The "
         "folder that the program runs in if left out.",
     )
-    show: bool = option(
+    show: bool = define_option(
         False,
         more="show the motion in Bullet's window, in real time, and return when it is closed; needs `fixed_step`.",
     )
@@ -171,7 +171,7 @@ class Options:
         for name in choices:
             if name not in known:
                 raise SettingError(
-                    f"there is no option '{name}' of a simulation{or_known(name, known)}"
+                    f"there is no option '{name}' of a simulation{suggest_or_list(name, known)}"
                 )
         return replace(self, **choices)
 
@@ -190,7 +190,7 @@ class Options:
         return made
 
 
-Options.__doc__ = f"{Options.__doc__}\n    Attributes:\n{described(Options)}\n    "
+Options.__doc__ = f"{Options.__doc__}\n    Attributes:\n{describe_options(Options)}\n    "
 
 
 MOST_STEPS = 1_000_000_000
@@ -277,4 +277,4 @@ NO_BOUNDS = 0.0, inf
 def check_integrator(name: str) -> None:
     """SettingError if there is no such integrator."""
     if name not in INTEGRATORS:
-        raise SettingError(f"there is no integrator '{name}'{or_known(name, INTEGRATORS)}")
+        raise SettingError(f"there is no integrator '{name}'{suggest_or_list(name, INTEGRATORS)}")

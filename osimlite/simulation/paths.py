@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.base.lazy import shown_in_notebooks
+from osimlite.base.lazy import make_notebook_repr
 from osimlite.mechanics.kernels.paths import LENGTH, SPEED
 from osimlite.mechanics.kernels.projection import REDUNDANT
 from osimlite.mechanics.multibody import build_mechanism
@@ -71,7 +71,7 @@ class Paths:
         mechanism: of the model.
     """
 
-    _repr_html_ = shown_in_notebooks("paths")
+    _repr_html_ = make_notebook_repr("paths")
 
     def __init__(
         self,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass, replace
-from osimlite.base.text import counted, did_you_mean, listed
+from osimlite.base.text import format_count, join_words, suggest_name
 from osimlite.errors import DocumentError, ModelError, SettingError
 from osimlite.io.tables.storage import StoTable, expect_numbers, read_sto
 from osimlite.mechanics.multibody.dynamics import MassCentres
@@ -69,7 +69,7 @@ def excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
         members = [force for force in forces.values() if is_a(force, kind)] if kind else []
         if not kind:
             if name not in groups and name not in forces:
-                near = did_you_mean(name, [*forces, *groups])
+                near = suggest_name(name, [*forces, *groups])
                 raise SettingError(
                     f"'{model.name}' has no force and no group of forces '{name}'{near}"
                 )
@@ -126,7 +126,7 @@ class RecordedMotion(Movement):
                 if column.shape != moments.shape:
                     had = " × ".join(map(str, column.shape)) or "one"
                     raise SettingError(
-                        f"'{name}' has {had} values for {counted(len(moments), 'time')}; give one each"
+                        f"'{name}' has {had} values for {format_count(len(moments), 'time')}; give one each"
                     )
             rows = np.column_stack([np.empty((len(moments), 0)), *columns])
             return cls.of_table(mechanism, StoTable("arrays", moments, tuple(source), rows))
@@ -196,7 +196,7 @@ class RecordedMotion(Movement):
         if not result:
             raise DocumentError(
                 f"no column is a coordinate of '{mechanism.name}'; its coordinates are "
-                f"{listed(mechanism.coordinate_names)}",
+                f"{join_words(mechanism.coordinate_names)}",
                 file=table.file,
             )
         close = (np.abs(np.diff(values, axis=0)) < ALIKE).all(axis=1)
@@ -289,7 +289,7 @@ class RecordedMotion(Movement):
         count = len(self.around[0] if self.around else self.times)
         if count < 2 * _HALF_ORDER:
             raise SettingError(
-                f"the motion has {counted(count, 'time')}; {what} at least {2 * _HALF_ORDER}"
+                f"the motion has {format_count(count, 'time')}; {what} at least {2 * _HALF_ORDER}"
             )
 
     def assembled(self) -> RecordedMotion:

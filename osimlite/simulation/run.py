@@ -11,7 +11,7 @@ from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
-from osimlite.base.quantity import tell, tell_doubt
+from osimlite.base.quantity import warn_caller, warn_of_unit
 from osimlite.base.records import replace
 from osimlite.errors import SettingError, SimulationError
 from osimlite.mechanics.multibody import build_mechanism
@@ -275,7 +275,7 @@ class Simulation:
         integrator = MERSON if chosen.integrator is None else chosen.integrator
         check_integrator(integrator)
         if fixed_step is None and LOOSE < accuracy < 1.0:
-            tell(
+            warn_caller(
                 f"an accuracy of {accuracy:g} is so loose that a motion may end far from the model's own; "
                 f"take {LOOSE:g} or less"
             )
@@ -286,7 +286,7 @@ class Simulation:
         for name, value in (initial or {}).items():
             if name not in self.paths:
                 info = self.mechanism.coordinates[self.mechanism.coordinate_index(name)]
-                tell_doubt(suspect_value(info, name, value))
+                warn_of_unit(suspect_value(info, name, value))
         initial, initial_speeds = (
             {
                 name: float(value)

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.quantity import tell
+from osimlite.base.quantity import warn_caller
 from osimlite.base.records import dataclass
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError, SimulationError
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.kernels.layout import ITEM, MODEL
@@ -84,12 +84,12 @@ def driven(
     for key, value in _by_name(given).items():
         if key not in known:
             raise SettingError(
-                f"the model has no actuator '{key}' to control{did_you_mean(key, known)}"
+                f"the model has no actuator '{key}' to control{suggest_name(key, known)}"
             )
         paths = [name for name in controls.names if name.endswith(f"/{key}")]
         if len(paths) > 1:
             raise SettingError(
-                f"{len(paths)} actuators are called '{key}': {listed(paths)}; give the path of one"
+                f"{len(paths)} actuators are called '{key}': {join_words(paths)}; give the path of one"
             )
         if known[key] in functions:
             raise SettingError(
@@ -101,7 +101,7 @@ def driven(
         else:
             functions[known[key]] = _function(key, value)
     if begin > start + PRINTED_S or end < to - PRINTED_S:
-        tell(
+        warn_caller(
             f"the {what} are given from {max(begin, start):g} to {min(end, to):g} s of a motion from {start:g} to "
             f"{to:g} s; their first and last values hold before and after"
         )

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import counted, listed, or_known
+from osimlite.base.text import format_count, join_words, suggest_or_list
 from osimlite.errors import ModelError, SettingError, UnsupportedError
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.kernels.effort import effort_room
@@ -97,7 +97,7 @@ class Shared:
         """What is missing at a time without a solution, the worst coordinate first."""
         sizes = np.abs(self.lacking[row])
         worst = [place for place in np.argsort(-sizes) if sizes[place] > 0.1 * sizes.max()]
-        return listed(
+        return join_words(
             [f"{self.lacking[row, k]:.4g} at {self.coordinates[k]}" for k in worst], most=3
         )
 
@@ -108,7 +108,7 @@ class Shared:
             return ""
         worst = failed[np.argmax(np.abs(self.lacking[failed]).max(axis=1))]
         return (
-            f"no solution at {len(failed)} of {counted(len(self.times), 'time')}, from {self.times[failed[0]]:g} s "
+            f"no solution at {len(failed)} of {format_count(len(self.times), 'time')}, from {self.times[failed[0]]:g} s "
             f"on, where nothing is written; at {self.times[worst]:g} s the actuators lack {self.lacks(worst)}"
         )
 
@@ -150,7 +150,7 @@ class StaticOptimization:
             )
         if muscles not in MUSCLES:
             raise SettingError(
-                f"muscles pull with no '{muscles}' force{or_known(muscles, MUSCLES)}"
+                f"muscles pull with no '{muscles}' force{suggest_or_list(muscles, MUSCLES)}"
             )
         self.mechanism, self._exponent = mechanism, exponent
         model = model.copy_deep()
@@ -401,7 +401,7 @@ class StaticOptimization:
                 if index not in self._free
             ]
             raise UnsupportedError(
-                f"{listed(names)} can move apart from all coordinates that are to be accelerated"
+                f"{join_words(names)} can move apart from all coordinates that are to be accelerated"
             )
         start = np.linalg.pinv(equations) @ targets
         back = np.linalg.pinv(free)

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.files import make_folder, write_atomically
-from osimlite.base.lazy import shown_in_notebooks
+from osimlite.base.lazy import make_notebook_repr
 from osimlite.base.require import require
-from osimlite.base.text import json_lines
+from osimlite.base.text import format_json
 from osimlite.io.tables.storage import StoTable, sto_text
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -37,7 +37,7 @@ class Trajectory(Tabular):
         recorded at each control step of a controller, None without one.
     """
 
-    _repr_html_ = shown_in_notebooks("trajectory")
+    _repr_html_ = make_notebook_repr("trajectory")
 
     def __init__(
         self,
@@ -228,7 +228,7 @@ class Trajectory(Tabular):
             "forces.sto": self.forces_text(),
             **({"probes.sto": text} if (text := self.probes_text()) else {}),
             **({} if self.controller is None else {"controller.sto": text_of(self.controller)}),
-            "summary.json": json_lines(self.summary),
+            "summary.json": format_json(self.summary),
         }
         make_folder(base)
         for name, text in texts.items():

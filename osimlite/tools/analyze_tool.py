@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.io.tables.storage import read_sto
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
@@ -127,7 +127,7 @@ def _spans(times: Array, chosen: BoolArray) -> str:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
     spans = [(times[first], times[last - 1]) for first, last in edges.reshape(-1, 2)]
     words = [f"at {a:g} s" if a == b else f"from {a:g} s to {b:g} s" for a, b in spans]
-    return listed(words, most=MOST_SPANS)
+    return join_words(words, most=MOST_SPANS)
 
 
 def _followed(
@@ -143,7 +143,7 @@ def _followed(
     }:
         # Not their default values: so OpenSim's analyses have it, unlike its inverse dynamics.
         recorded.values[:, [*absent.values()]] = 0.0
-        outcome.tell("not in the file", f"{listed([*absent])}: 0 is taken, as in OpenSim")
+        outcome.tell("not in the file", f"{join_words([*absent])}: 0 is taken, as in OpenSim")
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
         recorded = recorded.lowpassed(cutoff, continued=True)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -82,7 +82,7 @@ def describe_gaps(motion: Motion) -> str:
     """Return what the header of a table says of numbers that are missing for want of an equilibrium; "" for nothing."""
     if not motion.unbalanced:
         return ""
-    names = listed([path.rpartition("/")[2] for path in motion.unbalanced])
+    names = join_words([path.rpartition("/")[2] for path in motion.unbalanced])
     return f"NaN stands where no equilibrium of fibers and tendon was found of {names}, and for what depends on it.\n"
 
 
@@ -218,7 +218,9 @@ class StateRows(NamedTuple):
     def tell(self, outcome: Outcome) -> None:
         """Say which states were not in the file."""
         if self.missing:
-            outcome.tell("not in the file", f"{listed(self.missing)}: the default values are taken")
+            outcome.tell(
+                "not in the file", f"{join_words(self.missing)}: the default values are taken"
+            )
 
 
 def report_rows(job: Job, outcome: Outcome, motion: Motion) -> None:

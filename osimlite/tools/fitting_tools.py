@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.base.records import replace
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.fitting.fit_messages import IGNORED, describe_unknown, told
 from osimlite.fitting.ik_tool import motion_table, run_inverse_kinematics
 from osimlite.fitting.inverse_kinematics import inverse_kinematics
@@ -84,7 +84,7 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     ):
         if names:
             outcome.summary[what.replace(" ", "_")] = names
-            outcome.tell(what, listed(names))
+            outcome.tell(what, join_words(names))
 
 
 def run_scale_tool(job: Job, outcome: Outcome) -> None:
@@ -116,10 +116,10 @@ def run_imu_placer(job: Job, outcome: Outcome) -> None:
     if setup.output_model_file.strip() not in NONE:
         outcome.text(job.result(setup.output_model_file), to_text(model, numbers="opensim"))
     outcome.summary |= placed._asdict()
-    outcome.tell("placed", listed(placed.names, most=100))
+    outcome.tell("placed", join_words(placed.names, most=100))
     if placed.left_out:
         outcome.tell(
-            "left out", f"{listed(placed.left_out)}: the model has no frame of these names"
+            "left out", f"{join_words(placed.left_out)}: the model has no frame of these names"
         )
     if placed.heading is not None:
         outcome.tell(
@@ -186,4 +186,4 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     for words in told(motion):
         outcome.tell("sensors", words)
     if silent := [name for name in data.names if name not in frames]:
-        outcome.tell("left out", f"{listed(silent)}: the model has no frame of these names")
+        outcome.tell("left out", f"{join_words(silent)}: the model has no frame of these names")

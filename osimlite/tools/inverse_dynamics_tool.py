@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.records import replace
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.io.tables.storage import StoTable
 from osimlite.io.tables.times import both_of
 from osimlite.mechanics.multibody import build_mechanism
@@ -41,7 +41,7 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     if by_path:
         outcome.warn(
             "columns",
-            f"'{setup.coordinates_file}' names {listed(by_path)} by paths, which are understood here; OpenSim's "
+            f"'{setup.coordinates_file}' names {join_words(by_path)} by paths, which are understood here; OpenSim's "
             "inverse dynamics takes the default values of these coordinates instead: its moments are other ones",
         )
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
@@ -113,7 +113,7 @@ def _find_reported_joints(job: Job, model: Model, outcome: Outcome) -> list[Join
         if name in known:
             result.append(known[name])
         else:
-            message = f"there is no joint '{name}'{did_you_mean(name, known)}: its loads are left out, as in OpenSim"
+            message = f"there is no joint '{name}'{suggest_name(name, known)}: its loads are left out, as in OpenSim"
             outcome.tell("joints_to_report_body_forces", message)
     return result
 

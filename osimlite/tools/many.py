@@ -15,7 +15,7 @@ from typing import Any
 
 from osimlite.base.files import read_file
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import counted, listed
+from osimlite.base.text import format_count, join_words
 from osimlite.base.writing import write_into
 from osimlite.errors import OsimliteError
 from osimlite.io.document.kept import top_at
@@ -132,7 +132,7 @@ def run_many(
             work.share(do, workers, cluster)
     except KeyboardInterrupt:
         journal.save()
-        message = f"interrupted after {len(work.trials)} of {counted(len(setups), 'setup')}"
+        message = f"interrupted after {len(work.trials)} of {format_count(len(setups), 'setup')}"
         raise Interrupted(f"{message}; go on with --resume") from None
     trials = [work.trials[setup] for setup in setups]
     _tell_clashes(trials)
@@ -347,7 +347,7 @@ class _Work:
                     one for one in needed if self.trials[Path(one)].status in (FAILED, WAITED)
                 ]
                 if broken:
-                    message = f"it needs what {listed(broken)} should have made"
+                    message = f"it needs what {join_words(broken)} should have made"
                     self.note(Trial(str(setup), WAITED, message=message))
                 elif (trial := self.journal.done(setup)) is not None:
                     self.note(trial)
@@ -362,13 +362,13 @@ class _Work:
 
     def share(self, do: Callable[[Path], Trial], workers: int | None, cluster: str | None) -> None:
         """Run setups side by side. Those that were under way when a process ended are run again, each alone."""
-        from osimlite.base.pools import WorkerLostError, processes
+        from osimlite.base.pools import WorkerLostError, open_process_pool
 
         alone: list[Path] = []
         while len(self.trials) < len(self.setups):
             under_way: list[Path] = []
             try:
-                with processes(do, workers=workers, cluster=cluster) as pool:
+                with open_process_pool(do, workers=workers, cluster=cluster) as pool:
                     while len(self.trials) < len(self.setups):
                         while (
                             len(under_way) < 2 * pool.workers
@@ -386,7 +386,7 @@ class _Work:
             while alone:
                 setup = alone.pop(0)
                 try:
-                    with processes(do, workers=1) as pool:
+                    with open_process_pool(do, workers=1) as pool:
                         pool.submit(setup, setup)
                         self.note(pool.result()[1])
                 except WorkerLostError:

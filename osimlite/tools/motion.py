@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.base.records import dataclass, field, replace
-from osimlite.base.text import counted, did_you_mean
+from osimlite.base.text import format_count, suggest_name
 from osimlite.errors import SettingError
 from osimlite.io.tables.headers import suffixes
 from osimlite.io.tables.storage import StoTable
@@ -245,7 +245,7 @@ class Motion:
         assert self.record is not None
         times, speeds = self.record()
         if len(times) < LEAST_TIMES:
-            message = f"the motion has {counted(len(times), 'time')}; accelerations need at least {LEAST_TIMES}"
+            message = f"the motion has {format_count(len(times), 'time')}; accelerations need at least {LEAST_TIMES}"
             raise SettingError(message)
         (result,) = derivatives_of_samples(times, speeds, self.times, (1,), LEAST_TIMES // 2)
         return result
@@ -274,7 +274,7 @@ class Motion:
             return list(range(len(names)))
         for name in asked:
             if name not in names:
-                raise SettingError(f"there is no '{name}' for {what}{did_you_mean(name, names)}")
+                raise SettingError(f"there is no '{name}' for {what}{suggest_name(name, names)}")
         return [names.index(name) for name in asked]
 
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.quantity import tell
+from osimlite.base.quantity import warn_caller
 from osimlite.base.records import dataclass, field, replace
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.base.writing import ResultWriter
 from osimlite.errors import DocumentError, SettingError, SimulationError
 from osimlite.io.tables.old_storage import PRECISION, printed
@@ -95,7 +95,7 @@ class Outcome:
     def warn(self, name: str, words: str) -> None:
         """Say something of what came out that makes it doubtful, also on standard error."""
         self.tell(name, words)
-        tell(words)
+        warn_caller(words)
 
     def _note_missing(self, path: Path, table: StoTable) -> str:
         """Return what a table says of the values that it lacks, and tell the user; "" if it lacks none.
@@ -106,7 +106,7 @@ class Outcome:
         missing = np.isnan(table.rows).any(axis=0) if table.rows.size else np.zeros(0, dtype=bool)
         if not missing.any():
             return ""
-        names = listed([f"'{table.columns[place]}'" for place in np.flatnonzero(missing)])
+        names = join_words([f"'{table.columns[place]}'" for place in np.flatnonzero(missing)])
         if not any("NaN" in words for _, words in self.told):
             self.tell("not a number", f"{path.name} has NaN where there is no value: {names}")
         return f"NaN stands where there is no value: {names}"

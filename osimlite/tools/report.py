@@ -13,7 +13,7 @@ import numpy as np
 
 from osimlite.base.files import write_atomically
 from osimlite.base.records import replace
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.errors import OsimliteError
 from osimlite.fitting.fitted_motion import ADVICE
 from osimlite.io.document.kept import top_at
@@ -113,7 +113,7 @@ def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
         raise OsimliteError("there is nothing to report: none of the setups has a motion")
     with plain_lettering():
         parts = "".join([*_parts(trials), *_verdicts(outcomes)])
-    title = html.escape(listed([trial.name for trial in trials]))
+    title = html.escape(join_words([trial.name for trial in trials]))
     page = (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" '
         f'content="width=device-width, initial-scale=1"><title>{title}</title>'

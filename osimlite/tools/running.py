@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from osimlite.base.files import from_folder
-from osimlite.base.text import counted, listed
+from osimlite.base.files import get_relative_path
+from osimlite.base.text import format_count, join_words
 from osimlite.base.writing import ResultWriter
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
 from osimlite.io.document.reader import collector_paused, read_any
@@ -48,7 +48,7 @@ class FaultySetup(DocumentError):
 
     def __init__(self, report: Report) -> None:
         first, *others = report.errors
-        more = f"; and {counted(len(others), 'error')} more" if others else ""
+        more = f"; and {format_count(len(others), 'error')} more" if others else ""
         super().__init__(
             f"{first.message}{more}", file=first.file, line=first.line, column=first.column
         )
@@ -99,7 +99,7 @@ def run(
     tag = type(top).__name__
     if tag not in TOOLS:
         raise NotRunnable(
-            f"setups of {tag} cannot be run; those of {listed(runnable())} can", file=str(file)
+            f"setups of {tag} cannot be run; those of {join_words(runnable())} can", file=str(file)
         )
     if refine is not None and not tag.startswith("Moco"):
         raise SettingError(f"a {tag} has no mesh to refine; leave out --refine")
@@ -113,7 +113,7 @@ def run(
         ]:
             raise FaultySetup(Report(errors, report.texts))
         if away:
-            outcome.tell("taken from here", f"{listed(away)}, not beside the setup")
+            outcome.tell("taken from here", f"{join_words(away)}, not beside the setup")
         outcome.warnings = sorted(
             report.errors + report.warnings, key=lambda found: found.suggestion is None
         )
@@ -133,7 +133,9 @@ def run(
         error.file = error.file or str(file)
         subject = subject_of(str(file), Config()) if isinstance(error, MissingFileError) else None
         if isinstance(subject, Setup) and (maker := subject.writer_of(error.file)) is not None:
-            error.message += f"; run '{from_folder(maker, Path.cwd())}' first, which should make it"
+            error.message += (
+                f"; run '{get_relative_path(maker, Path.cwd())}' first, which should make it"
+            )
         raise
     return outcome
 

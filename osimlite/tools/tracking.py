@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from osimlite.base.records import dataclass, replace
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import SampledCurves, derivatives_of_samples
@@ -80,7 +80,7 @@ class Desired:
             ]
             recorded.values[:, places] = 0.0
             outcome.tell(
-                "not in the file", f"{listed(recorded.missing)}: 0 is taken, as in OpenSim"
+                "not in the file", f"{join_words(recorded.missing)}: 0 is taken, as in OpenSim"
             )
         start, end = float(recorded.times[0]), float(recorded.times[-1])
         times, values = continued(recorded.times, PADDING), continued(recorded.values, PADDING)
@@ -201,7 +201,7 @@ class Tasks:
                 continue
             for name in (item.name, str(item.coordinate)):
                 if name not in names:
-                    near = did_you_mean(name, names)
+                    near = suggest_name(name, names)
                     raise job.error(
                         f"the task '{item.name}' of '{path}' follows no coordinate: '{name}'{near}"
                     )
@@ -264,7 +264,7 @@ class Sharing:
         if not self.optimal.all():
             lame = [name for name, force in zip(self.names, self.optimal, strict=True) if not force]
             raise job.error(
-                f"{listed(lame)} can have no force: the optimal force is 0; give another"
+                f"{join_words(lame)} can have no force: the optimal force is 0; give another"
             )
 
     def accelerations(self, t: float, q: Array, u: Array) -> tuple[Array, Array, Array]:
@@ -341,7 +341,7 @@ class Sharing:
         worst = [
             f"{lacking[k]:.4g} at {names[k]}" for k in np.argsort(-off) if off[k] > 0.1 * off.max()
         ]
-        return forces, listed(worst, most=3)
+        return forces, join_words(worst, most=3)
 
 
 def require_no_controllers(job: Job, model: Model) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.io.document.printer import to_text
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
@@ -75,7 +75,7 @@ def _move_mass_center(
     bodies = {body.name: body for body in model.components(Body)}
     if name not in bodies:
         raise job.error(
-            f"adjusted_com_body is '{name}', which is no body of the model{did_you_mean(name, bodies)}"
+            f"adjusted_com_body is '{name}', which is no body of the model{suggest_name(name, bodies)}"
         )
     body, gravity = bodies[name], model.gravity
     weight = abs(gravity[1]) * body.mass

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from osimlite.base.lazy import imported_when_used
+from osimlite.base.lazy import make_lazy_getattr
 
 if TYPE_CHECKING:
     from osimlite.simulation.robot.build import build_robot as build_robot
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from osimlite.translate.mjcf.export import Mjcf as Mjcf
     from osimlite.translate.mjcf.export import to_mjcf as to_mjcf
 
-__getattr__ = imported_when_used(
+__getattr__ = make_lazy_getattr(
     __name__,
     {
         "Fidelity": "osimlite.translate.fidelity",

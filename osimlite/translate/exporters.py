@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from osimlite.base.choices import Choice
+from osimlite.base.options import OptionSpec
 from osimlite.base.records import dataclass
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Exporter:
     command: str  # "translate" or "view"
     help: str  # what is written
     write: Callable[..., Any]
-    choices: tuple[Choice, ...] = ()  # options that this format has
+    choices: tuple[OptionSpec, ...] = ()  # options that this format has
     is_default: bool = False  # whether the command writes it if no format is named
 
 
@@ -83,35 +83,35 @@ def _megabytes(path: Path) -> str:
 
 
 URDF_CHOICES = (
-    Choice(
+    OptionSpec(
         "limits",
         str | None,
         "'range' writes coordinate ranges as hard limits, which they are not in OpenSim.",
         shown="none",
         group="URDF",
     ),
-    Choice(
+    OptionSpec(
         "merge",
         bool | None,
         "Make bodies that do not move relative to each other one link.",
         group="URDF",
         spelled=("--merge",),
     ),
-    Choice(
+    OptionSpec(
         "collision",
         bool | None,
         "Write contact geometry as collision shapes (a half space as a large box).",
         group="URDF",
         spelled=("--collision",),
     ),
-    Choice(
+    OptionSpec(
         "effort",
         float | None,
         "Greatest force (N, N m) of joints whose coordinate has no actuators that limit it.",
         shown="no limit",
         group="URDF",
     ),
-    Choice(
+    OptionSpec(
         "velocity",
         float | None,
         "Greatest rate (m/s, rad/s) of all joints.",
@@ -122,29 +122,29 @@ URDF_CHOICES = (
 """Options of the format URDF."""
 
 MJCF_CHOICES = (
-    Choice("mujoco", int | None, "The version to write for, 3 or 4.", shown="4", group="MJCF"),
-    Choice(
+    OptionSpec("mujoco", int | None, "The version to write for, 3 or 4.", shown="4", group="MJCF"),
+    OptionSpec(
         "contact",
         str | None,
         "'native' writes contact forces as contacts of MuJoCo's own law, 'none' leaves them out.",
         shown="native",
         group="MJCF",
     ),
-    Choice(
+    OptionSpec(
         "fit",
         str | None,
         "'wraps' fits what tendons go around to the paths, 'force' muscles too (up to a minute).",
         shown="none",
         group="MJCF",
     ),
-    Choice(
+    OptionSpec(
         "spline",
         str | None,
         "What joints follow that move by splines: a 'quartic', or 'series': a quartic of a quartic.",
         shown="series",
         group="MJCF",
     ),
-    Choice(
+    OptionSpec(
         "driver",
         bool | None,
         "Write what osimlite.mjcf.Driver moves by OpenSim's own laws: the file itself has no forces.",
@@ -174,7 +174,7 @@ EXPORTERS: list[Exporter] = [
         "Write a picture (.png); needs no display.",
         write_screenshot,
         (
-            Choice(
+            OptionSpec(
                 "at",
                 float | None,
                 "The moment of the screenshot.",

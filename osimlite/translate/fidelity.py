@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import json_lines
+from osimlite.base.text import format_json
 from osimlite.mechanics.multibody.spatial import Array
 
 LEFT_OUT = "left out"
@@ -161,4 +161,4 @@ class Fidelity:
             "records": records,
             "translated": self.translated,
         }
-        return json_lines({**content, "renamed": self.renamed} if self.renamed else content)
+        return format_json({**content, "renamed": self.renamed} if self.renamed else content)

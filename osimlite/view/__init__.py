@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from osimlite.base.lazy import imported_when_used
+from osimlite.base.lazy import make_lazy_getattr
 
 if TYPE_CHECKING:
     from osimlite.view.animation import animate as animate
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from osimlite.view.plots import plot_simulation as plot_simulation
     from osimlite.view.shown import Shown as Shown
 
-__getattr__ = imported_when_used(
+__getattr__ = make_lazy_getattr(
     __name__,
     {
         "Shown": "osimlite.view.shown",

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.files import NAMED_SO
+from osimlite.base.files import MESH_FOLDER_HINT
 from osimlite.errors import ModelError, OsimliteError, UnsupportedError
 from osimlite.io.meshes import unit_shapes
 from osimlite.io.meshes.folders import MeshFolders
@@ -370,7 +370,7 @@ class _Collector:
         result = self.folders.find(name)
         if result is None:
             raise ModelError(
-                f"the mesh file {name} is in none of the folders searched; name its folder {NAMED_SO}"
+                f"the mesh file {name} is in none of the folders searched; name its folder {MESH_FOLDER_HINT}"
             )
         if result not in self.meshes:
             self.meshes[result] = read_surface(result)

@@ -3,7 +3,7 @@
 The page stands in an ``<iframe>`` whose text is all there: it asks no network for anything, has no
 more rights than to run its own program, and so works in the sandboxed frames of VS Code and Colab
 as well. A class says which of these functions shows its objects, see
-:func:`osimlite.base.lazy.shown_in_notebooks`.
+:func:`osimlite.base.lazy.make_notebook_repr`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from osimlite.base.require import require
-from osimlite.base.text import counted, listed, span
+from osimlite.base.text import format_count, format_range, join_words
 from osimlite.errors import OsimliteError
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def model(item: Model) -> str:
         inner = "".join(map(branch, parts))
         return f"<details style='margin-left:1.1em'><summary>{words} ({len(parts)})</summary>{inner}</details>"
 
-    head = f"<b>{escape(item.name) or 'a model'}</b>: {counted(len(own), 'component')}"
+    head = f"<b>{escape(item.name) or 'a model'}</b>: {format_count(len(own), 'component')}"
     inner = "".join(map(branch, below.get(id(item), [])))
     return f"<details><summary>{head}</summary>{inner}{_left(len(own), MOST_COMPONENTS)}</details>{_space(item)}"
 
@@ -80,7 +80,7 @@ def findings(item: Report) -> str:
     """A table of the findings, the worst first."""
     rows = sorted(item.findings, key=lambda finding: finding.severity.rank)
     parts = ("error", item.errors), ("warning", item.warnings), ("remark", item.infos)
-    counts = ", ".join(counted(len(part), kind) for kind, part in parts)
+    counts = ", ".join(format_count(len(part), kind) for kind, part in parts)
     cells = (
         [
             f"<b style='color:{COLORS[finding.severity]}'>{finding.severity}</b>",
@@ -91,7 +91,7 @@ def findings(item: Report) -> str:
         ]
         for finding in rows
     )
-    words = f"<div>{counts} in {counted(item.checked, 'file')}</div>"
+    words = f"<div>{counts} in {format_count(item.checked, 'file')}</div>"
     return words + (
         _table(("", "code", "place", "message", "suggestion"), cells, len(rows)) if rows else ""
     )
@@ -119,10 +119,12 @@ def muscle_curves(item: MuscleCurves) -> str:
     """What is least and greatest of each muscle."""
     from osimlite.simulation.muscle_curves import QUANTITIES
 
-    spans = (map(span, *item.bounds(name), [".4g"] * len(item.muscles)) for name in item.columns)
+    spans = (
+        map(format_range, *item.bounds(name), [".4g"] * len(item.muscles)) for name in item.columns
+    )
     cells = zip(map(escape, item.muscles), *spans, strict=True)
-    over = f" over {escape(listed(item.coordinates))}" if item.coordinates else ""
-    words = f"<div>{counted(len(item.muscles), 'muscle')} in {counted(len(item.poses), 'pose')}{over}</div>"
+    over = f" over {escape(join_words(item.coordinates))}" if item.coordinates else ""
+    words = f"<div>{format_count(len(item.muscles), 'muscle')} in {format_count(len(item.poses), 'pose')}{over}</div>"
     units = ((name, QUANTITIES.get(name, "m")) for name in item.columns)
     heads = [escape(f"{name} ({unit})" if unit else name) for name, unit in units]
     return words + _table(("muscle", *heads), cells, len(item.muscles))
@@ -133,7 +135,9 @@ def runs(item: Outcome) -> str:
     table = item.to_arrow()
     rows = table.slice(0, FIRST_ROWS).to_pylist()
     cells = ([_number(value) for value in row.values()] for row in rows)
-    words = f"<div>{counted(table.num_rows, 'run')} in <code>{escape(str(item.path))}</code></div>"
+    words = (
+        f"<div>{format_count(table.num_rows, 'run')} in <code>{escape(str(item.path))}</code></div>"
+    )
     return words + _table(
         [escape(name) for name in table.column_names], cells, table.num_rows, FIRST_ROWS
     )

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from osimlite.base.cores import cores
+from osimlite.base.cores import count_cores
 
 
 @pytest.mark.skipif(
@@ -17,7 +17,7 @@ def test_only_cores_that_this_process_was_given_count() -> None:
     given = os.sched_getaffinity(0)
     try:
         os.sched_setaffinity(0, {min(given)})
-        assert cores() == 1
+        assert count_cores() == 1
     finally:
         os.sched_setaffinity(0, given)
 
@@ -25,7 +25,7 @@ def test_only_cores_that_this_process_was_given_count() -> None:
 def test_elsewhere_all_that_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.platform", "win32")
     monkeypatch.setattr("os.cpu_count", lambda: 7)
-    assert cores() == 7
+    assert count_cores() == 7
 
 
 def test_nobody_else_asks() -> None:

@@ -66,7 +66,7 @@ def special(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path]:
 
 def test_what_is_no_file_is_not_read(special: Path) -> None:
     with pytest.raises(
-        SpecialFileError, match=r"this is a (pipe|socket|device), and only files are read"
+        SpecialFileError, match=r"this is a (pipe|socket|device); only regular files are read"
     ):
         read_file(special)
 
@@ -102,7 +102,10 @@ def test_every_command_says_so(tmp_path: Path, command: str) -> None:
     os.mkfifo(tmp_path / "special.osim")
     done = run(command, "special.osim", folder=tmp_path)
     assert done.code == 2
-    assert "special.osim: cannot read the file: this is a pipe, and only files are read" in done.err
+    assert (
+        "special.osim: cannot read the file: this is a pipe; only regular files are read"
+        in done.err
+    )
 
 
 def test_the_rest_of_a_folder_is_checked(tmp_path: Path) -> None:
@@ -155,7 +158,7 @@ def test_a_file_whose_system_does_not_know_its_size(tmp_path: Path) -> None:
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("osimlite.base.files", "osimlite.base.project"):
-        monkeypatch.setattr(f"{module}.LARGEST_FILE", 1_000_000)
+        monkeypatch.setattr(f"{module}.DEFAULT_MAX_FILE_BYTES", 1_000_000)
 
 
 def test_a_large_file_is_not_read(
@@ -166,11 +169,11 @@ def test_a_large_file_is_not_read(
         stream.truncate(2_000_000)
     with pytest.raises(
         SpecialFileError,
-        match=r"more than 1 MB in it; allow them by 'largest-file' in osimlite.toml",
+        match=r"larger than 1 MB; allow it by 'largest-file' in osimlite.toml",
     ):
         read_file(place)
     (tmp_path / "osimlite.toml").write_text("largest-file = 1.5\n")
-    with pytest.raises(SpecialFileError, match=r"more than 1.5 MB"):
+    with pytest.raises(SpecialFileError, match=r"larger than 1.5 MB"):
         read_file(place)
     (tmp_path / "osimlite.toml").write_text("largest-file = 2\n")
     assert len(read_file(place)) == 2_000_000
@@ -180,7 +183,7 @@ def test_a_large_file_is_not_read(
     assert len(read_file(place)) == 2_000_000
     with place.open("ab") as stream:
         stream.write(b"x")
-    with pytest.raises(SpecialFileError, match="more than 2 MB"):
+    with pytest.raises(SpecialFileError, match="larger than 2 MB"):
         read_file(place)
 
 
@@ -201,7 +204,7 @@ def test_an_endless_standard_input_is_not_read_to_the_end(
     with open("/dev/zero", encoding="latin-1") as endless:
         monkeypatch.setattr(sys, "stdin", endless)
         with pytest.raises(
-            SpecialFileError, match="<stdin>: cannot read the file: there are more than 1 MB in it"
+            SpecialFileError, match="<stdin>: cannot read the file: it is larger than 1 MB"
         ):
             files.read_standard_input()
 
@@ -305,9 +308,7 @@ def test_what_cannot_be_given_to_a_new_file_stays_on_the_old(
     files.write_atomically(place, "after")
     assert place.read_text() == "after" and place.stat().st_ino == number
     monkeypatch.setattr("shutil.copyfileobj", refuse)
-    with pytest.raises(
-        OsimliteError, match=r"not permitted; what was to be written is in (.*)"
-    ) as caught:
+    with pytest.raises(OsimliteError, match=r"not permitted; the new content is in (.*)") as caught:
         files.write_atomically(place, "later")
     assert Path(str(caught.value).rpartition(" ")[2]).read_text() == "later"
 

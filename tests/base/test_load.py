@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.base.load import module_named, module_of_file
+from osimlite.base.load import import_user_module, run_python_file
 from osimlite.models.source import make_model
 from tests.cli.command import run
 
@@ -48,7 +48,7 @@ def left_in(folder: Path) -> list[str]:
 def test_a_file_is_run_as_it_is_now(tmp_path: Path) -> None:
     for number in (1, 2):
         write(tmp_path / "mine.py", f"value = {number}\n")
-        assert module_of_file(tmp_path / "mine.py").value == number
+        assert run_python_file(tmp_path / "mine.py").value == number
     assert not left_in(tmp_path)
 
 
@@ -65,7 +65,7 @@ def test_what_it_imports_from_beside_as_well(tmp_path: Path, statement: str, fil
     write(tmp_path / "mine.py", statement)
     for number in (1, 2):
         write(tmp_path / file, f"value = {number}\n")
-        assert module_of_file(tmp_path / "mine.py").value == number
+        assert run_python_file(tmp_path / "mine.py").value == number
     assert not left_in(tmp_path)
 
 
@@ -74,7 +74,7 @@ def test_what_python_has_kept_before_does_not_count(tmp_path: Path) -> None:
     write(tmp_path / "helper.py", "value = 1\n")
     py_compile.compile(str(tmp_path / "helper.py"))
     write(tmp_path / "helper.py", "value = 2\n")
-    assert module_of_file(tmp_path / "mine.py").value == 2
+    assert run_python_file(tmp_path / "mine.py").value == 2
 
 
 def test_files_of_one_name_in_two_folders(tmp_path: Path) -> None:
@@ -82,7 +82,7 @@ def test_files_of_one_name_in_two_folders(tmp_path: Path) -> None:
         folder = tmp_path / str(number)
         write(folder / "mine.py", "from helper import value\n")
         write(folder / "helper.py", f"value = {number}\n")
-        assert module_of_file(folder / "mine.py").value == number
+        assert run_python_file(folder / "mine.py").value == number
 
 
 def test_a_module_of_the_current_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -90,7 +90,7 @@ def test_a_module_of_the_current_folder(tmp_path: Path, monkeypatch: pytest.Monk
     for name, file in (("mine", "mine.py"), ("kit.mine", "kit/mine.py")):
         for number in (1, 2):
             write(tmp_path / file, f"value = {number}\n")
-            assert module_named(name).value == number
+            assert import_user_module(name).value == number
     assert not left_in(tmp_path)
 
 
@@ -100,10 +100,10 @@ def test_what_is_installed_in_the_folder_is_left_to_python(tmp_path: Path) -> No
     write(installed / "tool" / "part.py", "value = 1\n")
     sys.path.append(str(installed))
     write(tmp_path / "mine.py", "from tool import value\n")
-    assert module_of_file(tmp_path / "mine.py").value == 1
+    assert run_python_file(tmp_path / "mine.py").value == 1
     assert len(left_in(installed)) == 3
     first = sys.modules["tool.part"]
-    module_of_file(tmp_path / "mine.py")
+    run_python_file(tmp_path / "mine.py")
     assert sys.modules["tool.part"] is first
 
 

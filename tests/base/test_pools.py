@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from osimlite.base.pools import WorkerLostError, processes
+from osimlite.base.pools import WorkerLostError, open_process_pool
 
 
 def end(seconds: float) -> None:
@@ -16,7 +16,7 @@ def end(seconds: float) -> None:
 
 
 def test_a_process_that_ended_is_told_where_results_are_awaited_and_where_work_is_given() -> None:
-    with processes(end, workers=1) as pool:
+    with open_process_pool(end, workers=1) as pool:
         pool.submit("one", 0.0)
         with pytest.raises(WorkerLostError, match="has ended"):
             pool.result(60.0)

@@ -28,7 +28,7 @@ def test_names_purpose_package_and_command_of_an_absent_package():
 @pytest.mark.parametrize(
     ("source", "part"),
     [
-        ("import no_such_dependency", "without its own dependency no_such_dependency"),
+        ("import no_such_dependency", "without its dependency no_such_dependency"),
         (
             "raise ImportError('libx.so: wrong ELF class')",
             "cannot be loaded (libx.so: wrong ELF class)",

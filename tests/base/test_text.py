@@ -10,7 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rapidfuzz import fuzz
 
-from osimlite.base.text import FEW_NAMES, harmless, json_lines, measure_similarity, nearest, visible
+from osimlite.base.text import (
+    MAX_COMPARED_NAMES,
+    escape_control_sequences,
+    escape_unprintable,
+    find_nearest,
+    format_json,
+    measure_similarity,
+)
 from osimlite.errors import OsimliteError
 
 OBEYED = re.compile(
@@ -37,13 +44,13 @@ anything = st.text(
     ],
 )
 def test_visible(text: str, seen: str) -> None:
-    assert visible(text) == seen
+    assert escape_unprintable(text) == seen
 
 
 @given(anything)
 def test_what_is_visible_is_one_line_and_stays_so(text: str) -> None:
-    seen = visible(text)
-    assert seen.isprintable() and visible(seen) == seen
+    seen = escape_unprintable(text)
+    assert seen.isprintable() and escape_unprintable(seen) == seen
     assert text.isprintable() == (seen == text)
 
 
@@ -59,16 +66,16 @@ def test_what_is_visible_is_one_line_and_stays_so(text: str) -> None:
     ],
 )
 def test_harmless(text: str, seen: str) -> None:
-    assert harmless(text) == seen
+    assert escape_control_sequences(text) == seen
 
 
 def test_a_line_that_goes_on_holds_no_command_at_its_start() -> None:
-    assert harmless("::error::x", starts_line=False) == "::error::x"
+    assert escape_control_sequences("::error::x", starts_line=False) == "::error::x"
 
 
 @given(anything)
 def test_nothing_is_obeyed(text: str) -> None:
-    seen = harmless(text)
+    seen = escape_control_sequences(text)
     left = re.sub(r"\x1b\[[0-9;]*m|\r\n", "", seen)
     assert not OBEYED.search(left) and not re.search(r"##\w*\[", seen)
     assert not any(line.lstrip().startswith("::") for line in seen.split("\n"))
@@ -76,10 +83,10 @@ def test_nothing_is_obeyed(text: str) -> None:
 
 @given(anything)
 def test_json_for_programs_keeps_everything_and_passes_everywhere(text: str) -> None:
-    written = json_lines({text: [text]})
+    written = format_json({text: [text]})
     # Halves of characters are in no text that is exchanged: RFC 8259, 8.2.
     whole = text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "surrogatepass")
-    whole = "".join(visible(c) if "\ud800" <= c <= "\udfff" else c for c in whole)
+    whole = "".join(escape_unprintable(c) if "\ud800" <= c <= "\udfff" else c for c in whole)
     assert written.isascii() and json.loads(written) == {whole: [whole]}
     assert next(iter(json.loads(written))).encode().decode() == whole
     assert not OBEYED.search(written) and "##" not in written
@@ -106,12 +113,12 @@ def test_similarity_is_that_of_rapidfuzz(word: str, text: str) -> None:
 
 @given(names, st.lists(names, max_size=8))
 def test_few_names_are_compared_as_many_are(word: str, known: list[str]) -> None:
-    many = [*known, *("%" for _ in range(FEW_NAMES + 1))]
-    assert nearest(word, known) == nearest(word, many)
+    many = [*known, *("%" for _ in range(MAX_COMPARED_NAMES + 1))]
+    assert find_nearest(word, known) == find_nearest(word, many)
 
 
 def test_the_nearest_name() -> None:
-    assert nearest("Tibia_R", ["femur_r", "tibia_l", "tibia_r"]) == "tibia_r"
-    assert nearest("tibia", ["femur_r", "tibia_l", "tibia_r"]) == "tibia_l"
-    assert nearest("xyz", ["femur_r", "tibia_l"]) is None
-    assert nearest("xyz", []) is None
+    assert find_nearest("Tibia_R", ["femur_r", "tibia_l", "tibia_r"]) == "tibia_r"
+    assert find_nearest("tibia", ["femur_r", "tibia_l", "tibia_r"]) == "tibia_l"
+    assert find_nearest("xyz", ["femur_r", "tibia_l"]) is None
+    assert find_nearest("xyz", []) is None

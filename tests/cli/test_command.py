@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from osimlite.base.choices import choices
+from osimlite.base.options import list_options
 from osimlite.cli import COMMANDS, app
 from osimlite.cli._command import Command
 from osimlite.simulation.options import Options
@@ -103,7 +103,7 @@ def test_what_is_wrong_is_left_to_typer() -> None:
 
 def test_an_option_of_a_simulation_is_declared_once() -> None:
     taken = {each.name: each for each in loaded("simulate").parameters()}
-    for choice in choices(Options):
+    for choice in list_options(Options):
         assert taken[choice.name].default == getattr(Options(), choice.name) == choice.default
         assert f"{choice.name}: {choice.help.split()[0]}" in (Options.__doc__ or "")
     for name in ("sweep", "optimize", "gait", "muscles"):

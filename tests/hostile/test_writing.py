@@ -14,7 +14,7 @@ from osimlite import __version__
 from osimlite.base.writing import (
     ResultWriter,
     WriteRefusedError,
-    kind_of,
+    describe_content,
     project_folder,
     write_atomically,
     write_into,
@@ -333,7 +333,7 @@ def test_a_program_that_chooses_a_name_replaces_a_link(tmp_path: Path) -> None:
     ],
 )
 def test_kinds_of_results(text: str, kind: str | None) -> None:
-    found = kind_of(text.encode())
+    found = describe_content(text.encode())
     assert found is None if kind is None else kind in (found or "")
 
 

@@ -128,7 +128,7 @@ def test_an_osimlite_toml_goes_first_and_a_pyproject_without_a_section_is_passed
             '[severity]\nOSIM101 = "fatal"',
             "a severity is one of error, warning and info, not 'fatal'",
         ),
-        ("select = [", "this is no TOML"),
+        ("select = [", "this is not valid TOML"),
         (
             "[thresholds]\nlargest-gravty = 3",
             "no rule has a threshold 'largest-gravty'; did you mean 'largest-",

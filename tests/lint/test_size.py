@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from osimlite.base.text import LONGEST
+from osimlite.base.text import MAX_MESSAGE_LENGTH
 from osimlite.io.document.source import Source
 from osimlite.lint.engine import check_source
 from tests.suite import choose
@@ -94,4 +94,4 @@ def test_long_values_are_cut(value):
         Source.of_characters(model(BODY.format("b", "", "").replace(">1<", f">{value}<")))
     )
     assert report.findings
-    assert all(len(finding.message) <= LONGEST for finding in report.findings)
+    assert all(len(finding.message) <= MAX_MESSAGE_LENGTH for finding in report.findings)

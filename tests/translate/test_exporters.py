@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from osimlite.base.choices import Choice
+from osimlite.base.options import OptionSpec
 from osimlite.cli import main
 from osimlite.io.document.printer import write
 from osimlite.models.dynamic_walker import dynamic_walker
@@ -53,7 +53,7 @@ def forget() -> Iterator[None]:
 
 @pytest.fixture
 def names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    choices = (Choice("ending", str | None, "Of the file."),)
+    choices = (OptionSpec("ending", str | None, "Of the file."),)
     exporter = Exporter("names", "translate", "a list of bodies", write_names, choices)
     monkeypatch.setattr(exporters, "EXPORTERS", [*exporters.EXPORTERS, exporter])
     monkeypatch.chdir(tmp_path)

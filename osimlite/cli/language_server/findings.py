@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from lsprotocol import types
 
-from osimlite.base.text import visible
+from osimlite.base.text import escape_unprintable
 from osimlite.cli.language_server.analysis import Analysis
 from osimlite.io.document.source import Position
 from osimlite.lint.diagnostic import Edit, Finding, Severity
@@ -34,7 +34,7 @@ def _diagnostic(analysis: Analysis, finding: Finding) -> types.Diagnostic:
     hint = f"; did you mean '{finding.suggestion}'?" if finding.suggestion is not None else ""
     return types.Diagnostic(
         analysis.text.range(*_offsets(analysis, finding)),
-        visible(f"{finding.message}{hint}"),
+        escape_unprintable(f"{finding.message}{hint}"),
         severity=_SEVERITIES[finding.severity],
         code=finding.code,
         source=SOURCE,
@@ -98,7 +98,7 @@ def _title(finding: Finding) -> str:
     assert finding.fix is not None
     doubt = "" if finding.fix.safe else " (look at the result)"
     if finding.suggestion is not None:
-        return visible(f"Change to '{finding.suggestion}'{doubt}")
+        return escape_unprintable(f"Change to '{finding.suggestion}'{doubt}")
     return f"Mend {finding.code} ({finding.name}){doubt}"
 
 

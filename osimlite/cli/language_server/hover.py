@@ -6,7 +6,7 @@ import os
 
 from lsprotocol import types
 
-from osimlite.base.files import from_folder
+from osimlite.base.files import get_relative_path
 from osimlite.cli.language_server.analysis import Analysis
 from osimlite.cli.language_server.cursor import Element
 from osimlite.cli.language_server.names import measured
@@ -66,7 +66,7 @@ def _led_to(analysis: Analysis, offset: int) -> str:
     target = analysis.target_at(offset)
     if target is None:
         return ""
-    file = from_folder(target.file, os.path.dirname(analysis.file) or ".")
+    file = get_relative_path(target.file, os.path.dirname(analysis.file) or ".")
     if target.item is None:
         return (
             f"In `{file}`, line {target.at.line}." if target.at is not None else f"File `{file}`."

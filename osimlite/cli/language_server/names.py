@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from osimlite.base.files import from_folder
+from osimlite.base.files import get_relative_path
 from osimlite.cli.language_server.analysis import Analysis
 from osimlite.cli.language_server.cursor import Cursor, Element
 from osimlite.lint.beside import beginning, folders_in
@@ -163,7 +163,7 @@ def _files(folder: str, content: str) -> Iterator[Name]:
     for place in (folder, *map(str, folders_in(Path(folder))[:50])):
         for path in _listed(place, suffixes):
             likely = content in _SUFFIXES or f"<{content}".encode() in beginning(path)
-            yield Name(from_folder(path, folder), content if likely else "", likely)
+            yield Name(get_relative_path(path, folder), content if likely else "", likely)
 
 
 def _listed(folder: str, suffixes: tuple[str, ...]) -> list[str]:

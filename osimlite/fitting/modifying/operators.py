@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.io.document.kept import read_anew
 from osimlite.io.document.reader import read_document
@@ -230,7 +230,7 @@ def _welds(model: Model, operator: p.ModOpReplaceJointsWithWelds, folder: Path) 
         joint = joints.get(path) or names.get(path) or names.get(path.rpartition("/")[2])
         if joint is None:
             raise ModelError(
-                f"the model has no joint '{path}'{did_you_mean(path, [*joints, *names])}"
+                f"the model has no joint '{path}'{suggest_name(path, [*joints, *names])}"
             )
         frames: list[PhysicalOffsetFrame] = []
         for socket in ("socket_parent_frame", "socket_child_frame"):
@@ -273,7 +273,7 @@ def put_paths(model: Model, paths: Any) -> None:
         force = forces.get(path.name)
         if force is None or not hasattr(force, "geometry_path"):
             raise ModelError(
-                f"the model has no force with a path '{path.name}'{did_you_mean(path.name, [*forces])}"
+                f"the model has no force with a path '{path.name}'{suggest_name(path.name, [*forces])}"
             )
         force.geometry_path = path.copy_deep()
         force.geometry_path.name = "path"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from osimlite.base.text import or_known
+from osimlite.base.text import suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.fitting.modifying.contact import smooth_contacts
 from osimlite.fitting.modifying.operators import apply, put_paths
@@ -101,10 +101,10 @@ def change_of(name: str, value: str) -> Change:
     names = sorted({*CHOICES, *GIVEN})
     if name not in names:
         raise SettingError(
-            f"nothing is called '{name}' that could be replaced{or_known(name, names)}"
+            f"nothing is called '{name}' that could be replaced{suggest_or_list(name, names)}"
         )
     raise SettingError(
-        f"{name} cannot be replaced with '{value}'{or_known(value, sorted(CHOICES[name]))}"
+        f"{name} cannot be replaced with '{value}'{suggest_or_list(value, sorted(CHOICES[name]))}"
     )
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from osimlite.base.files import read_file, write_atomically
 from osimlite.base.require import require
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import DocumentError, MissingFileError, ModelError
 from osimlite.io.document.lexical import Unclean, real
 from osimlite.io.document.objects import layout_of
@@ -197,7 +197,7 @@ class _Reader:
             spec = by_name.get(key) or specs.get(key)
             if spec is None:
                 raise ModelError(
-                    f"{where}: a {cls.tag} has no property '{key}'{did_you_mean(str(key), by_name)}"
+                    f"{where}: a {cls.tag} has no property '{key}'{suggest_name(str(key), by_name)}"
                 )
             if spec.name in values:
                 raise ModelError(f"{where}: '{spec.name}' is given twice, also as '{spec.tag}'")
@@ -226,7 +226,7 @@ class _Reader:
         cls = class_for(tag) if isinstance(tag, str) else None
         if cls is None:
             raise ModelError(
-                f"{where}.class: there is no class '{tag}'{did_you_mean(str(tag), tags())}"
+                f"{where}.class: there is no class '{tag}'{suggest_name(str(tag), tags())}"
             )
         if not issubclass(cls, accepts):
             raise ModelError(f"{where}.class: a {tag} cannot stand here, only a {accepts.tag}")

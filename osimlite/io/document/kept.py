@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from osimlite.base.files import stamped
+from osimlite.base.files import get_file_stamp
 from osimlite.errors import OsimliteError
 from osimlite.io.document.objects import layout_of
 from osimlite.io.document.reader import read_document
@@ -30,7 +30,7 @@ class Kept(Generic[T]):
     def __call__(self, path: str) -> T | None:
         """What the file at a path makes."""
         # A file is the same by a relative and by an absolute path.
-        stamp, place = stamped(path), os.path.abspath(path)
+        stamp, place = get_file_stamp(path), os.path.abspath(path)
         if stamp is None:
             return None
         known = self._kept.pop(place, None)
@@ -44,11 +44,11 @@ class Kept(Generic[T]):
     def has(self, path: str) -> bool:
         """Whether it is known of a file as it is now."""
         known = self._kept.get(os.path.abspath(path))
-        return known is not None and known[0] == stamped(path)
+        return known is not None and known[0] == get_file_stamp(path)
 
     def keep(self, path: str, made: T) -> None:
         """Keep what somebody else has made of the file at a path, as it is now."""
-        stamp, place = stamped(path), os.path.abspath(path)
+        stamp, place = get_file_stamp(path), os.path.abspath(path)
         if stamp is None:
             return
         self._kept.pop(place, None)

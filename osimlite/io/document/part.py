@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeVar
 
-from osimlite.base.text import nearest
+from osimlite.base.text import find_nearest
 from osimlite.errors import DocumentError
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
@@ -28,7 +28,7 @@ def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
         if (
             note.kind == "unknown-tag"
             and note.owner
-            and (near := nearest(note.word, field_specs(type(note.owner))))
+            and (near := find_nearest(note.word, field_specs(type(note.owner))))
         ):
             message = f"<{note.word}> means nothing in this document; did you mean <{near}>?"
             raise document.source.fault(DocumentError, message, document.source.of_tag(note.number))

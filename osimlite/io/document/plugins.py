@@ -11,8 +11,8 @@ from keyword import iskeyword
 from os import PathLike, fspath
 from typing import Annotated, Any, ClassVar, cast
 
-from osimlite.base.files import read_file, stamped
-from osimlite.base.text import did_you_mean, listed, or_known
+from osimlite.base.files import get_file_stamp, read_file
+from osimlite.base.text import join_words, suggest_name, suggest_or_list
 from osimlite.errors import OsimliteError
 from osimlite.io.document.lexical import Unclean, converter
 from osimlite.schema.base import Component, Object, made, none
@@ -89,7 +89,7 @@ def classes_in(*paths: str | PathLike[str]) -> dict[str, type[Object]]:
         MissingFileError: a file is not there.
     """
     return dict(
-        _declared(tuple((name, stamped(name)) for name in [fspath(path) for path in paths]))
+        _declared(tuple((name, get_file_stamp(name)) for name in [fspath(path) for path in paths]))
     )
 
 
@@ -145,7 +145,7 @@ class _Declarations:
             rule = entry.get("resolution")
             if not isinstance(rule, str) or rule not in RULES:
                 raise self.error(
-                    f"there is no resolution '{rule}'{or_known(str(rule), RULES)}",
+                    f"there is no resolution '{rule}'{suggest_or_list(str(rule), RULES)}",
                     "references",
                     str(rule),
                 )
@@ -166,7 +166,7 @@ class _Declarations:
             return cast("type[Object]", getattr(import_module(MODULES[name]), name))
         if name not in self.found:
             if name not in self.entries:
-                near = did_you_mean(name, [*MODULES, *self.entries, *self.found])
+                near = suggest_name(name, [*MODULES, *self.entries, *self.found])
                 raise self.error(f"there is no class '{name}'{near}", *words)
             if name in MODULES:
                 raise self.error(f"'{name}' is a class of OpenSim itself", name)
@@ -174,7 +174,7 @@ class _Declarations:
                 raise self.error(f"more than {MAX_LINEAGE} classes derive from each other", name)
             if name in self.pending:
                 raise self.error(
-                    f"{listed(self.pending)} derive from each other, or hold each other", name
+                    f"{join_words(self.pending)} derive from each other, or hold each other", name
                 )
             self.pending.append(name)
             self.found[name] = self.made(name)
@@ -266,7 +266,10 @@ class _Declarations:
         name, typed, shape = row["name"], str(row.get("type")), row.get("kind", "single")
         if shape not in _KINDS:
             raise self.error(
-                f"there is no kind '{shape}'{or_known(str(shape), _KINDS)}", owner, name, str(shape)
+                f"there is no kind '{shape}'{suggest_or_list(str(shape), _KINDS)}",
+                owner,
+                name,
+                str(shape),
             )
         legacy = bool(row.get("legacy"))
         if row.get("object") or typed not in (*_SCALARS, *_VECTORS):
@@ -399,7 +402,7 @@ class _Declarations:
             raise self.error(f"{what} must be an object of JSON, in braces", *words)
         for key in value:
             if known is not None and key not in known:
-                raise self.error(f"{what} has no '{key}'{or_known(key, known)}", *words, key)
+                raise self.error(f"{what} has no '{key}'{suggest_or_list(key, known)}", *words, key)
         return value
 
     def error(self, message: str, *words: str) -> OsimliteError:

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
-from osimlite.base.files import from_folder, write_atomically
+from osimlite.base.files import get_relative_path, write_atomically
 from osimlite.io.document.escape import escape, quoted
 from osimlite.io.document.foreign import relaid
 from osimlite.io.document.lexical import formatter
@@ -158,7 +158,7 @@ class _Printer:
         """The file of an included object as it is found from where the document will stand."""
         if self.folder is None or Path(self.folder, include.file).resolve() == Path(include.path):
             return include.file
-        return from_folder(include.path, self.folder)
+        return get_relative_path(include.path, self.folder)
 
     def _property(self, item: Object, spec: FieldSpec, value: Any, depth: int) -> None:
         kind = spec.kind

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, cast
 
 from lxml import etree
 
-from osimlite.base.files import TABLES, expect_size
+from osimlite.base.files import TABLE_SUFFIXES, expect_size
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import nearest
+from osimlite.base.text import find_nearest
 from osimlite.errors import (
     DocumentError,
     MissingFileError,
@@ -365,7 +365,7 @@ def _not_well_formed(source: Source, line: int, column: int, message: str) -> No
     """The error for what the parser says of a place in the text that it was given."""
     line, column, _ = place_of(source, line, column, message)
     words = plain_words(message) if "<" in source.text else "there is no element in it"
-    if source.file is not None and source.file.lower().endswith(TABLES):
+    if source.file is not None and source.file.lower().endswith(TABLE_SUFFIXES):
         words += "; of tables, 'validate', 'info' and 'diff' know more"
     return NotWellFormedError(
         f"not well-formed XML: {words}", file=source.file, line=line, column=column
@@ -424,11 +424,11 @@ def _root_meant(tag: str, root: etree._Element) -> str | None:
     """What a root should be called: as that of a document, or as the class of a setup of old releases."""
     name = tag.rpartition(":")[2]
     first = _first(root)
-    held = first is not None and nearest(as_written(first.tag), tags(), cutoff=85) is not None
+    held = first is not None and find_nearest(as_written(first.tag), tags(), cutoff=85) is not None
     return (
         ROOT
-        if held or nearest(name, [ROOT], cutoff=85) is not None
-        else nearest(name, tags(), cutoff=85)
+        if held or find_nearest(name, [ROOT], cutoff=85) is not None
+        else find_nearest(name, tags(), cutoff=85)
     )
 
 
@@ -459,7 +459,7 @@ def _top_in(source: Source, root: etree._Element, reader: ObjectReader, of: type
         meant = (
             None
             if first is None or cls is not None
-            else nearest(tag, tags() if of is Object else [of.tag])
+            else find_nearest(tag, tags() if of is Object else [of.tag])
         )
         raise _meaning(source.fault(DocumentError, f"the document holds {what}", at), meant)
     reader.count = 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from osimlite.base.files import NAMED_SO, named_mesh_folders
+from osimlite.base.files import MESH_FOLDER_HINT, list_mesh_folders
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
 
@@ -30,7 +30,7 @@ class MeshFolders:
 
     @property
     def _trusted_elsewhere(self) -> tuple[Path, ...]:
-        return (*map(Path, self.named), *named_mesh_folders())
+        return (*map(Path, self.named), *list_mesh_folders())
 
     def find(self, name: str) -> Path | None:
         """The first file of this name; failing that, one spelled with other capitals or slashes; None without any.
@@ -53,7 +53,7 @@ class MeshFolders:
         if elsewhere is not None:
             raise OutsideError(
                 f"the file '{name}' is in '{elsewhere.resolve().parent}', outside the model's folder; if you trust the "
-                f"model, name that folder {NAMED_SO}"
+                f"model, name that folder {MESH_FOLDER_HINT}"
             )
         return None
 

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from osimlite.base.files import written_atomically
+from osimlite.base.files import open_atomically
 from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError, SimulationError
 from osimlite.io.tables.headers import suffixes
@@ -105,7 +105,7 @@ def write_sto(
             body.write(line.encode())
             count += 1
         body.seek(0)
-        with written_atomically(path) as stream:
+        with open_atomically(path) as stream:
             stream.write("".join(_header(name, columns, count, in_degrees, kind)).encode())
             shutil.copyfileobj(body, stream)
 

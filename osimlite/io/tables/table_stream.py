@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from osimlite.base.files import open_file
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.errors import DocumentError
 from osimlite.io.tables.headers import LONGEST_HEADER, StorageHeader, suffixes
 
@@ -72,7 +72,7 @@ class TableStream:
                 continue
             if len(row) != size:
                 raise DocumentError(
-                    f"the row has {counted(len(row), 'number')} and needs {size}",
+                    f"the row has {format_count(len(row), 'number')} and needs {size}",
                     file=self.file,
                     line=number,
                     column=len(line.rstrip()) + 1 if len(row) < size else start_of_word(text, size),

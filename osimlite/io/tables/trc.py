@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from osimlite.base.files import written_atomically
+from osimlite.base.files import open_atomically
 from osimlite.io.tables.headers import MARKER_KEYS
 from osimlite.io.tables.storage import number_text
 
@@ -32,7 +32,7 @@ def write_trc(
     Raises:
         OsimliteError: the file cannot be written.
     """
-    with written_atomically(path) as stream:
+    with open_atomically(path) as stream:
         for line in _lines(Path(path).name, times, markers, rows, units):
             stream.write(f"{line}\n".encode())
 

@@ -7,7 +7,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from osimlite import __version__
-from osimlite.base.text import harmless, json_lines, visible
+from osimlite.base.text import escape_control_sequences, escape_unprintable, format_json
 from osimlite.lint.diagnostic import Finding, Report, Severity
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def _format_command(finding: Finding) -> str:
 
 def _escape_data(text: str) -> str:
     """Escape a message as GitHub's runner unescapes it."""
-    return visible(text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A"))
+    return escape_unprintable(text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A"))
 
 
 def _escape_property(text: str) -> str:
@@ -76,7 +76,7 @@ def render_json(report: Report) -> str:
         }
         for note in report.missing_package_notes()
     ]
-    return json_lines([finding.as_dict() for finding in report.findings] + notes)
+    return format_json([finding.as_dict() for finding in report.findings] + notes)
 
 
 def render_junit(report: Report) -> str:
@@ -98,7 +98,9 @@ def render_junit(report: Report) -> str:
     suites = etree.Element("testsuites", {"name": "osimlite", **counts})
     suite = etree.SubElement(suites, "testsuite", {"name": "osimlite", **counts})
     for file, findings in by_file.items():
-        case = etree.SubElement(suite, "testcase", name=visible(file), classname="osimlite")
+        case = etree.SubElement(
+            suite, "testcase", name=escape_unprintable(file), classname="osimlite"
+        )
         bad = [finding for finding in findings if _is_failure(finding)]
         if bad:
             message = f"{len(bad)} finding{'s' if len(bad) != 1 else ''}"
@@ -110,7 +112,7 @@ def render_junit(report: Report) -> str:
         etree.SubElement(
             suite, "testcase", name=f"without findings {number + 1}", classname="osimlite"
         )
-    body = harmless(etree.tostring(suites, encoding="unicode", pretty_print=True))
+    body = escape_control_sequences(etree.tostring(suites, encoding="unicode", pretty_print=True))
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + body
 
 
@@ -150,7 +152,7 @@ def render_sarif(report: Report) -> str:
         run["invocations"] = [
             {"executionSuccessful": True, "toolExecutionNotifications": notifications}
         ]
-    return json_lines({"$schema": _SARIF_SCHEMA, "version": "2.1.0", "runs": [run]})
+    return format_json({"$schema": _SARIF_SCHEMA, "version": "2.1.0", "runs": [run]})
 
 
 def _describe_rule(rule: Rule) -> dict[str, Any]:

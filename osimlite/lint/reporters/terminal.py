@@ -12,7 +12,7 @@ from collections.abc import Callable, Hashable, Iterable
 from itertools import groupby
 from typing import NamedTuple, TypeVar
 
-from osimlite.base.text import listed, visible
+from osimlite.base.text import escape_unprintable, join_words
 from osimlite.lint.diagnostic import Finding, Report, Severity
 
 _CODES = {
@@ -56,7 +56,7 @@ def describe_unmeasured(report: Report) -> str:
         return ""
     count = len(report.unmeasured) - 1
     more = f" (and {count} more {_pluralize('file', count)})" if count else ""
-    return visible(f"{report.unmeasured[0]}{more}.")
+    return escape_unprintable(f"{report.unmeasured[0]}{more}.")
 
 
 def describe_skipped(report: Report, everything: bool) -> str:
@@ -72,7 +72,7 @@ def describe_skipped(report: Report, everything: bool) -> str:
     if not report.passed:
         return ""
     if everything:
-        return visible(f"Skipped, not OpenSim files: {', '.join(report.passed)}.")
+        return escape_unprintable(f"Skipped, not OpenSim files: {', '.join(report.passed)}.")
     count = len(report.passed)
     return f"{count} {_pluralize('file', count)} skipped ({'not an OpenSim file' if count == 1 else 'not OpenSim files'})."
 
@@ -111,13 +111,15 @@ class Fold(NamedTuple):
                     str(finding.line) for finding in self.more if finding.line is not None
                 )
             )
-            places = f", on line{'s' * (len(lines) > 1)} {listed(lines, most=4)}" if lines else ""
+            places = (
+                f", on line{'s' * (len(lines) > 1)} {join_words(lines, most=4)}" if lines else ""
+            )
             result.append(f"{len(self.more)} more like this{places}")
         if self.elsewhere:
             files = dict.fromkeys(
                 os.path.basename(finding.file or "") for finding in self.elsewhere
             )
-            result.append(f"{len(self.elsewhere)} more in other files: {listed(files, most=3)}")
+            result.append(f"{len(self.elsewhere)} more in other files: {join_words(files, most=3)}")
         return result
 
 
@@ -204,9 +206,9 @@ def _format_line(fold: Fold, colour: bool) -> str:
     counts = (("like this", fold.more), ("in other files", fold.elsewhere))
     more = "".join(f"; {len(result)} more {what}" for what, result in counts if result)
     hint = f" (did you mean '{finding.suggestion}'?)" if finding.suggestion is not None else ""
-    words = visible(f"{finding.message}{hint}{more}")
+    words = escape_unprintable(f"{finding.message}{hint}{more}")
     severity = paint(finding.severity.value, finding.severity, colour)
-    place = paint(visible(finding.place), "strong", colour)
+    place = paint(escape_unprintable(finding.place), "strong", colour)
     return f"{place}: {severity} {finding.code} {words}"
 
 
@@ -275,17 +277,21 @@ def _format_block(fold: Fold, lines: list[str] | None, colour: bool, width: int)
     head = (
         f"{paint(finding.severity.value, finding.severity, colour)} {finding.code} {finding.name}"
     )
-    place = paint(visible(finding.place), "strong", colour)
+    place = paint(escape_unprintable(finding.place), "strong", colour)
     rows = [f"{place}: {head}" if finding.place else head]
     if (
-        len(f"{visible(finding.place)}: {finding.severity.value} {finding.code} {finding.name}")
+        len(
+            f"{escape_unprintable(finding.place)}: {finding.severity.value} {finding.code} {finding.name}"
+        )
         > width
     ):
         # Break after the position, before the terminal breaks the line anywhere.
         rows = [f"{place}:", f"  {head}"]
     rows += [
         f"  {row}"
-        for row in textwrap.wrap(visible(finding.message), width - 4, break_on_hyphens=False)
+        for row in textwrap.wrap(
+            escape_unprintable(finding.message), width - 4, break_on_hyphens=False
+        )
     ]
     if finding.line is not None and lines is not None and finding.line <= len(lines):
         rows += _format_snippet(finding, lines[finding.line - 1], colour, width)
@@ -302,7 +308,9 @@ def _format_block(fold: Fold, lines: list[str] | None, colour: bool, width: int)
         for it in fold.remarks
     ]
     for note, style in notes:
-        rows.append(f"{margin} {paint('=', 'dim', colour)} {paint(visible(note), style, colour)}")
+        rows.append(
+            f"{margin} {paint('=', 'dim', colour)} {paint(escape_unprintable(note), style, colour)}"
+        )
     return "\n".join(rows)
 
 
@@ -319,7 +327,7 @@ def _format_snippet(finding: Finding, line: str, colour: bool, width: int) -> li
     margin = len(str(finding.line))
     room = max(20, width - margin - 3)
     before, marked, after = map(
-        visible, (shown[:start], shown[start : start + length], shown[start + length :])
+        escape_unprintable, (shown[:start], shown[start : start + length], shown[start + length :])
     )
     shown, start, length = before + marked + after, len(before), max(1, len(marked))
     if len(shown) > room:

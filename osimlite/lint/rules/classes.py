@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
-from osimlite.base.text import nearest
+from osimlite.base.text import find_nearest
 from osimlite.io.document.notes import Note
 from osimlite.lint.fixes import renamed, replaced
 from osimlite.lint.old_tags import successor
@@ -85,7 +85,7 @@ def _nearest_class(subject: Subject, note: Note, accepted: Iterable[str]) -> str
     whole = {note.word.lower(), word.lower()}
     same = [tag for tag in known if tag.lower() in whole]
     candidates = same or [tag for tag in known if _is_slip(note.word, tag) or _is_slip(word, tag)]
-    best = nearest(note.word, candidates, cutoff=0) if candidates else None
+    best = find_nearest(note.word, candidates, cutoff=0) if candidates else None
     if best is None or subject.source is None:
         return best
     children = [subject.source.spans[child].tag for child in subject.source.children(note.number)]

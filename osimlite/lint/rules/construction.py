@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.lint.construction import CONSTRUCTION, Obstacle, Stage, obstacles_of
 from osimlite.lint.diagnostic import Severity
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
@@ -213,7 +213,7 @@ def not_computed(subject: Subject, report: FindingSink) -> None:
             continue
         groups.setdefault(type(item), []).append(obstacle)
     for first, *others in groups.values():
-        more = f"; {counted(len(others), 'other')} of its class" if others else ""
+        more = f"; {format_count(len(others), 'other')} of its class" if others else ""
         known = subject.tree.by_path.get(first.path)
         reason = first.message.partition(";")[0]
         if known is not None and reason.startswith(f"'{first.path}' ("):

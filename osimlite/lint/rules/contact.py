@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from itertools import combinations
 from typing import Any
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.rules.references import broken_references
 from osimlite.lint.skeleton import base_of
@@ -84,7 +84,7 @@ def _reason_for_no_contact(subject: Subject, force: Component, uses: list[Use]) 
         for first, second in pairs
     ):
         return ""
-    shapes = listed([f"{type(surface).__name__} '{surface.name}'" for surface in known], most=3)
+    shapes = join_words([f"{type(surface).__name__} '{surface.name}'" for surface in known], most=3)
     return f"{shapes}, between which OpenSim computes no contact"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, cast
 
-from osimlite.base.text import listed, nearest
+from osimlite.base.text import find_nearest, join_words
 from osimlite.lint.axes import axes_of, axes_refused, coordinates_of
 from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
@@ -66,7 +66,7 @@ def made_up_coordinate(subject: Subject, report: FindingSink) -> None:
                     tag="coordinates",
                     word=word,
                     nth=nth,
-                    suggestion=nearest(name, declared),
+                    suggestion=find_nearest(name, declared),
                     severity=None if declared else WARNING,
                 )
 
@@ -182,7 +182,7 @@ def idle_coordinate(subject: Subject, report: FindingSink) -> None:
         idle = [coordinate for coordinate in coordinates if not any(columns[coordinate.name])]
         for coordinate in idle:
             axes = [axis.name for axis in axes_of(joint) if coordinate.name in axis.names]
-            state = f"does not change {listed(axes)} of it" if axes else "is on no axis of it"
+            state = f"does not change {join_words(axes)} of it" if axes else "is on no axis of it"
             report(
                 f"{called(coordinate)} of {called(joint)} {state}: accelerations become NaN, without a message",
                 coordinate,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any, NamedTuple
 
-from osimlite.base.text import listed, nearest
+from osimlite.base.text import find_nearest, join_words
 from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject, once
 from osimlite.lint.words import quantity, shown
@@ -175,13 +175,13 @@ def unknown_choice(subject: Subject, report: FindingSink) -> None:
                 for word in value if isinstance(value, tuple) else (value,):
                     if word not in choices:
                         report(
-                            f"{subject.titled(item, spec)} is '{word}'; OpenSim knows {listed(map(str, choices))}",
+                            f"{subject.titled(item, spec)} is '{word}'; OpenSim knows {join_words(map(str, choices))}",
                             item,
                             tag=spec.tag,
                             word=str(word) if isinstance(value, tuple) else None,
                             # Some properties take any letter case.
                             severity=WARNING if str(word).lower() in choices else None,
-                            suggestion=nearest(str(word), map(str, choices)),
+                            suggestion=find_nearest(str(word), map(str, choices)),
                         )
 
 

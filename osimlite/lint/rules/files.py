@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from functools import lru_cache
 
-from osimlite.base.files import NAMED_SO
-from osimlite.base.text import counted, listed
+from osimlite.base.files import MESH_FOLDER_HINT
+from osimlite.base.text import format_count, join_words
 from osimlite.io.document.source import Source
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
@@ -44,8 +44,8 @@ def missing_mesh(subject: Subject, report: FindingSink) -> None:
         return
     beside = (folder, folder / "Geometry", *(folder / path for path in subject.config.mesh_paths))
     places = [str(path) for path in beside]
-    tried = listed(dict.fromkeys(places))
-    remedy = f"name its folder {NAMED_SO}"
+    tried = join_words(dict.fromkeys(places))
+    remedy = f"name its folder {MESH_FOLDER_HINT}"
     folders = _Folders()
     for item, tag, name in items:
         severity = ERROR if isinstance(item, ContactMesh) else None
@@ -125,7 +125,7 @@ def included_file(subject: Subject, report: FindingSink) -> None:
         uses = subject.uses if note.why and subject.model is not None else []
         wanted = sum(subject.resolution(use).target is note.owner for use in uses)
         if wanted:
-            fate += f", while {counted(wanted, 'reference')} to it {'leads' if wanted == 1 else 'lead'} nowhere"
+            fate += f", while {format_count(wanted, 'reference')} to it {'leads' if wanted == 1 else 'lead'} nowhere"
         report(
             f"{called(note.owner)} {state} '{note.value}'{why}{fate}",
             note.owner,

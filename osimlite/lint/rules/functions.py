@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import comb
 from typing import Final, cast
 
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.lint.axes import axes_of
 from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
@@ -170,7 +170,7 @@ def too_few_points(subject: Subject, report: FindingSink) -> None:
             fate = "it has no value"
             if is_off or isinstance(function, GCVSpline):
                 fate = _describe_refusal(subject, function)
-            given = counted(len(function.x), "point")
+            given = format_count(len(function.x), "point")
             report(
                 f"{subject.called_with(function)} has {given} and needs {least}: {fate}",
                 function,
@@ -224,8 +224,8 @@ def coefficient_count(subject: Subject, report: FindingSink) -> None:
             is_off = is_unused(subject, polynomial)
             fate = UNUSED if is_off else "OpenSim fails when it needs a value"
             report(
-                f"{subject.called_with(polynomial)} has {counted(given, 'coefficient')}; "
-                f"{counted(dimension, 'variable')} to order {order} need {wanted}: {fate}",
+                f"{subject.called_with(polynomial)} has {format_count(given, 'coefficient')}; "
+                f"{format_count(dimension, 'variable')} to order {order} need {wanted}: {fate}",
                 polynomial,
                 tag="coefficients",
                 severity=WARNING if is_off else ERROR,
@@ -239,8 +239,8 @@ def coefficient_count(subject: Subject, report: FindingSink) -> None:
                 else "OpenSim ignores the rest"
             )
             report(
-                f"the LinearFunction of {called(holder)} has {counted(given, 'coefficient')} for "
-                f"{counted(names, 'coordinate')}: {wanted} belong there; {fate}",
+                f"the LinearFunction of {called(holder)} has {format_count(given, 'coefficient')} for "
+                f"{format_count(names, 'coordinate')}: {wanted} belong there; {fate}",
                 function,
                 tag="coefficients",
                 severity=ERROR if given < wanted else None,
@@ -282,8 +282,8 @@ def function_of_several(subject: Subject, report: FindingSink) -> None:
         ):
             continue
         report(
-            f"the {type(function).tag} of {called(holder)} is a function of {counted(wanted, 'variable')} and stands "
-            f"on {counted(count, 'coordinate')}: OpenSim computes what is meant for neither",
+            f"the {type(function).tag} of {called(holder)} is a function of {format_count(wanted, 'variable')} and stands "
+            f"on {format_count(count, 'coordinate')}: OpenSim computes what is meant for neither",
             holder,
         )
 
@@ -328,7 +328,7 @@ def missing_function(subject: Subject, report: FindingSink) -> None:
         for name in ("forceFunctions", "pointFunctions", "torqueFunctions"):
             functions = getattr(force, name)
             if isinstance(functions, FunctionSet) and len(functions.objects) not in (0, 3):
-                given = counted(len(functions.objects), "function")
+                given = format_count(len(functions.objects), "function")
                 report(
                     f"{name} of {called(force)} has {given}, not three or none: OpenSim refuses to load the file",
                     functions,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.base.text import counted, listed
+from osimlite.base.text import format_count, join_words
 from osimlite.lint.axes import axes_refused, coordinates_of, names_on_axes
 from osimlite.lint.placement import turning_axes
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
@@ -68,7 +68,7 @@ def wrong_coordinate_count(subject: Subject, report: FindingSink) -> None:
         )
         if axes_refused(custom) and all(name in declared_names for name in names):
             unused = [f"'{name}'" for name in declared_names if name not in names]
-            reason = f"no axis of {called(custom)} uses {listed(unused)}"
+            reason = f"no axis of {called(custom)} uses {join_words(unused)}"
             if not unused:
                 reason = f"{called(custom)} declares more coordinates than its axes use"
             report(
@@ -98,7 +98,7 @@ def wrong_coordinate_count(subject: Subject, report: FindingSink) -> None:
             )
         elif given != wanted and (declared or given):
             report(
-                f"{called(joint)} has {counted(given, 'coordinate')}, {a(type(joint).tag)} has {wanted}: "
+                f"{called(joint)} has {format_count(given, 'coordinate')}, {a(type(joint).tag)} has {wanted}: "
                 "OpenSim refuses the model",
                 joint,
                 number=subject.element_of(joint, "coordinates"),
@@ -146,7 +146,7 @@ def shared_coordinate_name(subject: Subject, report: FindingSink) -> None:
         users = [called(use.owner) for use in named if use.value == component.name]
         message = f"{called(component)} has the name of a coordinate of {called(tree.parent_of(known) or known)}"
         if users:
-            message += f"; {listed(dict.fromkeys(users), most=3)} {'finds' if len(users) == 1 else 'all find'} that one"
+            message += f"; {join_words(dict.fromkeys(users), most=3)} {'finds' if len(users) == 1 else 'all find'} that one"
         report(message, component, attribute="name", severity=None if users else WARNING)
 
 

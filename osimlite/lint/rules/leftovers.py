@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from math import isfinite
 
-from osimlite.base.text import nearest
+from osimlite.base.text import find_nearest
 from osimlite.io.document.lexical import ABSENT, Unclean, converter
 from osimlite.io.document.names import ATTRIBUTE
 from osimlite.io.document.source import Source
@@ -41,7 +41,9 @@ def unknown_attribute(subject: Subject, report: FindingSink) -> None:
         if note.word in field_specs(type(owner)):
             message += f"; write <{note.word}>{note.value}</{note.word}> inside"
         suggestion = (
-            "name" if nearest(note.word, ["name", "file"]) == "name" and not owner.name else None
+            "name"
+            if find_nearest(note.word, ["name", "file"]) == "name" and not owner.name
+            else None
         )
         fix = (
             without_attribute(subject.source, note.number, note.word)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.lint.measures import MEASURES, MovingPoint, measures_of
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, Threshold, rule
 from osimlite.lint.subject import Subject
@@ -65,7 +65,7 @@ def wrong_wrapping(subject: Subject, report: FindingSink) -> None:
         if abs(wrapping.worst) >= most and wrapping.owner not in told:
             owner, surfaces = (
                 subject.tree.at(wrapping.owner),
-                listed([f"'{name}'" for name in wrapping.surfaces]),
+                join_words([f"'{name}'" for name in wrapping.surfaces]),
             )
             by_default = f"{1000.0 * wrapping.default:.3g} mm in the default pose and by "
             default = by_default if wrapping.pose.values and abs(wrapping.default) >= SHOWN else ""
@@ -108,7 +108,7 @@ def path_jump(subject: Subject, report: FindingSink) -> None:
         if jump.size < subject.config.value_of(JUMP):
             continue
         owner = subject.tree.at(jump.owner)
-        parts = listed([f"'{part}'" for part in jump.parts])
+        parts = join_words([f"'{part}'" for part in jump.parts])
         why = (
             f"{parts} {'come or go' if len(jump.parts) > 1 else 'comes or goes'}"
             if parts

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import chain
 from typing import Any
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.lint.posture import angles_of, coordinate_of
 from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, members
@@ -216,9 +216,9 @@ def _fault_of_guess(setup: Setup, tree: Tree, guess: Table) -> str:
     missing, more = sorted(wanted - columns), sorted(columns - wanted)
     if missing or more:
         return (
-            f"lacks {listed(missing)}"
+            f"lacks {join_words(missing)}"
             if missing
-            else f"has {listed(more)}, which the model has not"
+            else f"has {join_words(more)}, which the model has not"
         )
     said = {
         what: guess.entries[key].value.text if (key := f"num_{what}") in guess.entries else ""

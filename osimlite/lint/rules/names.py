@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.base.text import counted, listed
+from osimlite.base.text import format_count, join_words
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.rules.references import Broken, broken_references
 from osimlite.lint.subject import Subject, once
@@ -47,7 +47,7 @@ def duplicate_name(subject: Subject, report: FindingSink) -> None:
         users = list(_holders(subject).get(id(renamed.first), ()))
         message = f"another {called(renamed.first)} stands beside this one; OpenSim renames this to '{renamed.name}'"
         if users:
-            message += f", and {listed(users, most=3)} then {'uses' if len(users) == 1 else 'use'} the first"
+            message += f", and {join_words(users, most=3)} then {'uses' if len(users) == 1 else 'use'} the first"
         report(message, item, attribute="name", suggestion=None)
 
 
@@ -79,7 +79,7 @@ def illegal_name(subject: Subject, report: FindingSink) -> None:
             for character in dict.fromkeys(component.name)
             if character in ILLEGAL_CHARACTERS
         ]
-        shown = listed(
+        shown = join_words(
             ["white space" if character.isspace() else f"'{character}'" for character in bad]
         )
         report(
@@ -151,7 +151,7 @@ def missing_name(subject: Subject, report: FindingSink) -> None:
         last = _last(tree.path_of(component) or "")
         message = f"this {type(component).tag} has no name; OpenSim calls it '{last}'"
         if wanted:
-            count = counted(
+            count = format_count(
                 sum(_last(b.text) == wanted[0] for b in _leading_nowhere(subject, component)),
                 "reference",
             )

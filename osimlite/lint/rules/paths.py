@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 from math import pi, radians
 
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, Threshold, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
@@ -43,7 +43,7 @@ def short_path(subject: Subject, report: FindingSink) -> None:
             continue
         if path._index is not None or subject.source is None:
             report(
-                f"the path of {called(owner)} has {counted(len(points), 'point')} and needs two",
+                f"the path of {called(owner)} has {format_count(len(points), 'point')} and needs two",
                 path,
             )
         elif not any(note.owner is owner and note.kind in _NOT_READ for note in subject.notes):
@@ -53,7 +53,10 @@ def short_path(subject: Subject, report: FindingSink) -> None:
         count = sum(item.tag == _CABLE_POINT for item in elements)
         owner = subject.tree.parent_of(path) or path
         if count < 2:
-            report(f"the path of {called(owner)} has {counted(count, 'point')} and needs two", path)
+            report(
+                f"the path of {called(owner)} has {format_count(count, 'point')} and needs two",
+                path,
+            )
             continue
         for item, end in ((elements[0], "begins"), (elements[-1], "ends")):
             if item.tag != _CABLE_POINT:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple, cast
 
-from osimlite.base.text import listed, nearest
+from osimlite.base.text import find_nearest, join_words
 from osimlite.io.document.source import Source
 from osimlite.lint.axes import axes_refused, made_up_paths
 from osimlite.lint.fixes import replaced
@@ -75,7 +75,7 @@ def reference_to_wrong_type(subject: Subject, report: FindingSink) -> None:
             _contacts_on(subject, other) if broken.use.reference.target == "ContactGeometry" else []
         )
         if fixed:
-            message += f"; contact geometry fixed to it: {listed(fixed)}"
+            message += f"; contact geometry fixed to it: {join_words(fixed)}"
         _report(subject, report, broken, message)
 
 
@@ -287,7 +287,7 @@ def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) ->
         # A coordinate, but of another joint.
         other = None
     if other is not None and not same_name:
-        return Broken(use, text, "wrong-type", other, nearest(text, right, cutoff=75))
+        return Broken(use, text, "wrong-type", other, find_nearest(text, right, cutoff=75))
     if same_name and resolution.failure == "wrong-type":
         if other is not None and text.startswith("/"):
             return Broken(use, text, "wrong-type", other, closest(text, same_name))

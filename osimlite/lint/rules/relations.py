@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.rules.domains import outside
 from osimlite.lint.subject import Subject
@@ -131,7 +131,7 @@ def _function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]:
         yield "coordinate_paths", f"coordinate_paths names '{name}' twice"
     arms, count = path.moment_arm_functions, len(coordinates)
     if arms and len(arms) != count:
-        given = f"{len(arms)} functions for {counted(count, 'coordinate')}"
+        given = f"{len(arms)} functions for {format_count(count, 'coordinate')}"
         yield "moment_arm_functions", f"moment_arm_functions has {given}"
     functions = [("length_function", path.length_function, count)]
     functions += [("moment_arm_functions", arm, count) for arm in arms]
@@ -141,7 +141,7 @@ def _function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]:
         if result is not None and result != wanted:
             yield (
                 tag,
-                f"a function of its {tag} takes {counted(result, 'argument')} instead of {wanted}",
+                f"a function of its {tag} takes {format_count(result, 'argument')} instead of {wanted}",
             )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, content_of, members
 from osimlite.lint.table import Table
@@ -63,7 +63,7 @@ def missing_column(setup: Setup, report: FindingSink) -> None:
             )
         elif lacking:
             report(
-                f"'{getattr(item, tag)}' has no column {listed(map(repr, lacking))}: OpenSim takes "
+                f"'{getattr(item, tag)}' has no column {join_words(map(repr, lacking))}: OpenSim takes "
                 f"{'0' if is_a(item, 'AbstractTool') else 'the default value'}{meant(lacking, columns - names)}",
                 item,
                 tag=tag,
@@ -77,7 +77,7 @@ def missing_column(setup: Setup, report: FindingSink) -> None:
         )
         if unknown and setup.tree is not None:
             report(
-                f"the model has no state {listed(map(repr, unknown))} of '{item.states_file}': "
+                f"the model has no state {join_words(map(repr, unknown))} of '{item.states_file}': "
                 "OpenSim leaves the column out",
                 item,
                 tag="states_file",
@@ -85,7 +85,7 @@ def missing_column(setup: Setup, report: FindingSink) -> None:
         lacking = _lacking_states(setup, states) if states is not None and states.labels else []
         if lacking:
             report(
-                f"'{item.states_file}' has no column for {listed(lacking)}: OpenSim takes the default value",
+                f"'{item.states_file}' has no column for {join_words(lacking)}: OpenSim takes the default value",
                 item,
                 tag="states_file",
             )

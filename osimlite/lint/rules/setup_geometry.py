@@ -7,7 +7,7 @@ from collections.abc import Sequence, Set
 from itertools import islice
 from typing import Any
 
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.io.tables.headers import METRES
 from osimlite.lint.posture import marker_places
 from osimlite.lint.registry import WARNING, FindingSink, rule
@@ -132,7 +132,7 @@ def swapped_sides(setup: Setup, report: FindingSink) -> None:
             if rows and wrong >= 0.8 * rows:
                 task = next((task for task in user.ik_task_set.objects if task.name == right), None)
                 report(
-                    f"in {wrong} of {counted(rows, 'row')} of '{user.marker_file}' that were looked at, '{right}' and "
+                    f"in {wrong} of {format_count(rows, 'row')} of '{user.marker_file}' that were looked at, '{right}' and "
                     f"'{left}' are the other way round than other markers of both sides: are they swapped?",
                     task or user,
                     tag=None if task else "marker_file",

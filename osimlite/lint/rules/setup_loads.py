@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.lint.placement import Pose, on_base
 from osimlite.lint.posture import model_subject, poses_in
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
@@ -93,7 +93,7 @@ def load_columns(setup: Setup, report: FindingSink) -> None:
                     continue
                 own = [column for column in columns if column.startswith(prefix)]
                 if len(own) != 3 or len(set(own)) != 3:
-                    what = listed(own) if own else "none"
+                    what = join_words(own) if own else "none"
                     report(
                         f"'{loads.datafile}' must have three columns that begin with '{prefix}' ({tag} of "
                         f"{called(force)}), it has {what}: OpenSim refuses the loads",
@@ -105,7 +105,7 @@ def load_columns(setup: Setup, report: FindingSink) -> None:
                     column[-1:].lower() for column in own
                 } == {"x", "y", "z"}:
                     report(
-                        f"'{loads.datafile}' has {listed(own)} in this order: OpenSim takes the first for x",
+                        f"'{loads.datafile}' has {join_words(own)} in this order: OpenSim takes the first for x",
                         force,
                         tag=tag,
                         severity=WARNING,

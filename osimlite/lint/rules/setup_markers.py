@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import islice
 from typing import Any
 
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.scan import number_in
 from osimlite.lint.setup import Setup, members
@@ -76,7 +76,7 @@ def marker_not_measured(setup: Setup, report: FindingSink) -> None:
         others = sum(task.apply for task in members(user.ik_task_set, "IKCoordinateTask"))
         if 3 * len(both) + others < free:
             report(
-                f"{counted(len(both), 'marker')} and {counted(others, 'coordinate task')} cannot tell the {free} free "
+                f"{format_count(len(both), 'marker')} and {format_count(others, 'coordinate task')} cannot tell the {free} free "
                 "coordinates of the model",
                 user.ik_task_set,
             )

@@ -6,7 +6,7 @@ import re
 from functools import cache
 from typing import Any
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.lint.checked import Where
 from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup
@@ -179,7 +179,7 @@ def _look_up_controls(setup: Setup, tool: Object, plain: set[str], report: Findi
     ):
         if lost := [column for column in table.columns if column not in actuators]:
             report(
-                f"the model has no actuator for the columns {listed(map(repr, lost))} of "
+                f"the model has no actuator for the columns {join_words(map(repr, lost))} of "
                 f"'{controller.controls_file}': OpenSim refuses it",
                 controller,
                 tag="controls_file",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup
 from osimlite.lint.table import Table
@@ -87,7 +87,7 @@ def sensor_without_frame(setup: Setup, report: FindingSink) -> None:
             )
         elif lost:
             report(
-                f"the model has no frame for {listed(map(repr, lost))} of '{file}': OpenSim leaves them out"
+                f"the model has no frame for {join_words(map(repr, lost))} of '{file}': OpenSim leaves them out"
                 f"{meant(lost, frames)}",
                 item,
                 tag=tag,

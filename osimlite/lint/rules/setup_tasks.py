@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from typing import Any
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.lint.posture import angles_of
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, members
@@ -150,7 +150,7 @@ def unreachable_task(setup: Setup, report: FindingSink) -> None:
         ]
         if still:
             report(
-                f"{listed(still)} {'is' if len(still) == 1 else 'are'} locked in the model, and moves in "
+                f"{join_words(still)} {'is' if len(still) == 1 else 'are'} locked in the model, and moves in "
                 f"'{user.coordinate_file}'",
                 user,
                 tag="coordinate_file",

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, is_given, members
 from osimlite.lint.words import called, nearest_name
@@ -249,7 +249,7 @@ def tool_setting(setup: Setup, report: FindingSink) -> None:
             carrying = _carried_by_none(setup)
             if carrying:
                 report(
-                    f"no actuator moves {listed(carrying)}: without residual actuators the optimizer fails",
+                    f"no actuator moves {join_words(carrying)}: without residual actuators the optimizer fails",
                     analysis,
                     fault="unactuated-root",
                 )

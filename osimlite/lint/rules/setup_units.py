@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import Any
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.io.tables.headers import METRES
 from osimlite.lint.placement import on_base
 from osimlite.lint.posture import marker_places, model_subject
@@ -192,8 +192,8 @@ def ground_twice(setup: Setup, report: FindingSink) -> None:
             for body in sorted(bodies & loaded)
         ]
         if twice:
-            names = listed([f"'{force.name}'" for force, _ in twice], most=3)
-            bodies = listed(sorted({body for _, body in twice}), most=3)
+            names = join_words([f"'{force.name}'" for force, _ in twice], most=3)
+            bodies = join_words(sorted({body for _, body in twice}), most=3)
             tag = (
                 "forces_to_exclude" if hasattr(tool, "forces_to_exclude") else "external_loads_file"
             )

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import combinations
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.lint.placement import Pose, default_poses, fixed, on_base
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, Threshold, rule
 from osimlite.lint.skeleton import base_of
@@ -122,7 +122,7 @@ def _fate_of_circle(subject: Subject, circle: Sequence[PhysicalOffsetFrame]) -> 
     """Return what frames in a circle are fixed to, and what OpenSim 4.6 does (measured)."""
     if len(circle) == 1:
         return "itself: OpenSim refuses the model"
-    names = listed([f"'{frame.name}'" for frame in circle])
+    names = join_words([f"'{frame.name}'" for frame in circle])
     through = f"itself, through {names}"
     members = {id(frame) for frame in circle}
     for joint in subject.each(Joint):

@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from osimlite.base.text import counted, listed, nearest
+from osimlite.base.text import find_nearest, format_count, join_words
 from osimlite.io.document.lexical import reads_as
 from osimlite.io.document.notes import Note
 from osimlite.io.document.source import Source
@@ -59,7 +59,9 @@ def unknown_tag(subject: Subject, report: FindingSink) -> None:
         item = _describe_unknown(subject, note, owner)
         groups.setdefault((note.word, item.suggestion, item.severity), []).append(item)
     for first, *others in groups.values():
-        more = f"; {counted(len(others), 'more element')} <{first.note.word}>" if others else ""
+        more = (
+            f"; {format_count(len(others), 'more element')} <{first.note.word}>" if others else ""
+        )
         report(
             first.message + more,
             first.owner,
@@ -92,7 +94,7 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _Unknown:
         message = f"<{note.word}> in {called(owner)} is a comment written as an element; OpenSim ignores it"
         return _Unknown(note, owner, message, INFO, fix=as_comment(subject.source, note.number))
     specs = field_specs(type(owner))
-    suggestion = nearest(_FORMER.get(note.word, note.word), specs, cutoff=70)
+    suggestion = find_nearest(_FORMER.get(note.word, note.word), specs, cutoff=70)
     if suggestion is not None and not _can_hold(subject, note, specs[suggestion]):
         suggestion = None
     message = f"{called(owner)} has no property <{note.word}>; OpenSim ignores it"
@@ -109,7 +111,7 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _Unknown:
         message += f"; it belongs in the {home}" if home and isinstance(owner, Model) else ""
     else:
         homes = list_homes(note.word, type(owner))
-        message += f": it is a property of {listed(homes, most=3)}" if homes else ""
+        message += f": it is a property of {join_words(homes, most=3)}" if homes else ""
     same = suggestion is not None and suggestion.lower() == note.word.lower()
     free = suggestion is not None and suggestion not in _present(owner)
     fix = renamed(subject.source, note.number, suggestion, safe=same) if free else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.io.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
@@ -75,7 +75,7 @@ def ragged_row(table: Table, report: FindingSink) -> None:
                 if table.is_markers and fault.number > rows.cells
                 else None
             )
-            has = counted(fault.number, "cell")
+            has = format_count(fault.number, "cell")
             report(
                 f"the row has {has} and needs {rows.cells}{fault.text}{fault.more()}",
                 at=at,
@@ -87,7 +87,7 @@ def ragged_row(table: Table, report: FindingSink) -> None:
             if table.is_markers or table.is_strict:
                 lost = rows.line_of(rows.count - 1) - fault.line
                 report(
-                    f"a blank line ends the table for OpenSim: {counted(lost, 'row')} behind it are lost",
+                    f"a blank line ends the table for OpenSim: {format_count(lost, 'row')} behind it are lost",
                     at=at,
                     fix=_without_blank_lines(table, fault.line),
                 )
@@ -155,7 +155,7 @@ def not_a_number(table: Table, report: FindingSink) -> None:
             fate = "OpenSim takes it for NaN"
         else:
             lost = max(0, end - fault.line)
-            fate = f"OpenSim takes it for 0 and loses the rest of the table without a word, {counted(lost, 'row')}"
+            fate = f"OpenSim takes it for 0 and loses the rest of the table without a word, {format_count(lost, 'row')}"
         what = f"'{fault.text}' is no number" if fault.text else "there is no number"
         report(
             f"{what} (column '{label}'): {fate}{fault.more()}",
@@ -249,7 +249,7 @@ def time_gap(table: Table, report: FindingSink) -> None:
         for row in gaps[:20]:
             missing = steps[row - 1] / table.step - 1
             lost = (
-                f": {counted(round(missing), 'row')} seem to be missing"
+                f": {format_count(round(missing), 'row')} seem to be missing"
                 if 0.5 <= missing < 1e9
                 else ""
             )

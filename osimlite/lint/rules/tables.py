@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from math import nan
 
-from osimlite.base.text import counted, nearest
+from osimlite.base.text import find_nearest, format_count
 from osimlite.io.document.source import Position
 from osimlite.io.tables.headers import COUNTS, MARKER_KEYS, SUFFIXES, Entry, MarkerHeader
 from osimlite.lint.diagnostic import Edit, Fix
@@ -74,7 +74,7 @@ def table_header(table: Table, report: FindingSink) -> None:
     elif not table.is_strict:
         for key, count in (("nRows", table.rows.count), ("nColumns", len(table.labels))):
             if key not in table.entries:
-                near = nearest(key, table.entries, cutoff=75)
+                near = find_nearest(key, table.entries, cutoff=75)
                 entry = table.entries[near] if near else None
                 at = entry.key.at if entry else header.end.at
                 fix = (
@@ -336,7 +336,7 @@ def _cells(table: Table, report: FindingSink) -> None:
         report(
             f"OpenSim knows no tables of '{kind.value.text}', and refuses the file",
             at=kind.value.at,
-            suggestion=nearest(kind.value.text, SUFFIXES),
+            suggestion=find_nearest(kind.value.text, SUFFIXES),
             severity=None if table.is_strict else WARNING,
         )
     for key, entry in table.entries.items() if table.is_strict else ():
@@ -442,7 +442,7 @@ def column_label(table: Table, report: FindingSink) -> None:
                 report(
                     f"the label '{word.text}' must be '{right}': OpenSim refuses the file",
                     at=word.at,
-                    suggestion=nearest(word.text, [right], cutoff=60),
+                    suggestion=find_nearest(word.text, [right], cutoff=60),
                     certain=True,
                     fault="frame-and-time-label",
                 )
@@ -501,7 +501,7 @@ def column_label(table: Table, report: FindingSink) -> None:
         if again:
             fate = "refuses the file" if table.is_markers else "does not find this one by its name"
             more = (
-                f"; there are {counted(len(again) - 1, 'more column')} of this name"
+                f"; there are {format_count(len(again) - 1, 'more column')} of this name"
                 if again[1:]
                 else ""
             )

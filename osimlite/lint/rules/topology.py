@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.skeleton import Link, Skeleton, growth, has_unknown_joints, skeleton
 from osimlite.lint.subject import Subject
@@ -55,7 +55,7 @@ def unconnected_body(subject: Subject, report: FindingSink) -> None:
     for body, *others in loose.values():
         message = f"no joint connects {called(body)}"
         if others:
-            names = listed((f"'{other.name}'" for other in others), most=3)
+            names = join_words((f"'{other.name}'" for other in others), most=3)
             message = f"{called(body)} is not connected to ground, nor {names}, which joints connect with it"
         elif bones.of(body):
             message = f"{called(body)} is not connected to ground, only with itself"
@@ -168,7 +168,7 @@ def massless_leaf(subject: Subject, report: FindingSink) -> None:
         return
     for body, members, joint in _massless_leaves(bones):
         welded = (
-            f" with the bodies welded to it ({listed(item.name for item in members)})"
+            f" with the bodies welded to it ({join_words(item.name for item in members)})"
             if members
             else ""
         )

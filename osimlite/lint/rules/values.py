@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from osimlite.base.text import listed, nearest
+from osimlite.base.text import find_nearest, join_words
 from osimlite.io.document.lexical import Unclean, flag, reads_as, real, split, whole
 from osimlite.io.document.notes import Note
 from osimlite.lint.fixes import replaced
@@ -226,14 +226,14 @@ def _foreign(text: str) -> str:
     import unicodedata
 
     names = [f"U+{ord(c):04X} ({unicodedata.name(c, 'without a name').lower()})" for c in odd]
-    return f" (there is {listed(names, most=3)} in it)"
+    return f" (there is {join_words(names, most=3)} in it)"
 
 
 def _readable(text: str, kind: Value) -> str | None:
     """The same value as OpenSim would read it, if that is plain."""
     if kind.scalar == "bool":
         known = {"yes": "true", "on": "true", "1": "true", "no": "false", "off": "false"}
-        return known.get(text.lower()) or nearest(text.lower(), ("true", "false"))
+        return known.get(text.lower()) or find_nearest(text.lower(), ("true", "false"))
     if kind.scalar == "double":
         words = re.sub(r"[,;()\[\]{}~\u200b\ufeff]", " ", _plain_digits(text)).split()
         try:

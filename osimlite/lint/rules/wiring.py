@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from osimlite.base.text import counted, nearest
+from osimlite.base.text import find_nearest, format_count
 from osimlite.lint.fixes import replaced
 from osimlite.lint.registry import ERROR, FindingSink, rule
 from osimlite.lint.subject import Subject
@@ -54,8 +54,8 @@ def control_function_count(subject: Subject, report: FindingSink) -> None:
             )
         if controller.controls_file is None and functions != actuators:
             report(
-                f"{called(controller)} has {counted(functions, 'control function')} for "
-                f"{counted(actuators, 'actuator')}: OpenSim refuses the model",
+                f"{called(controller)} has {format_count(functions, 'control function')} for "
+                f"{format_count(actuators, 'actuator')}: OpenSim refuses the model",
                 controller.ControlFunctions if functions else controller,
             )
 
@@ -162,7 +162,7 @@ def _fault_of(subject: Subject, use: Use, text: str) -> _Fault | None:
     if component is None:
         if subject.has_unknown:
             return None
-        right = nearest(
+        right = find_nearest(
             path, [known for known, item in tree.by_path.items() if outputs_of(type(item))]
         )
         return _Fault(
@@ -174,7 +174,7 @@ def _fault_of(subject: Subject, use: Use, text: str) -> _Fault | None:
     kind = use.reference.target
     known = outputs.get(match["output"])
     if known is None:
-        right = nearest(
+        right = find_nearest(
             match["output"], [name for name, output in outputs.items() if output.type == kind]
         )
         suggestion = None if right is None else f"{path}|{right}" + text[match.end("output") :]

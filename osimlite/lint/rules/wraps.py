@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.lint.placement import Pose, fixed, on_base
 from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
@@ -98,7 +98,7 @@ def wrap_range(subject: Subject, report: FindingSink) -> None:
                 fate = "OpenSim fails when it computes its length"
                 fate += ", unless an earlier wrap has no points there" if may_leave else ""
                 report(
-                    f"{tells} ends beyond the {counted(count, 'point')} of the path: {fate}",
+                    f"{tells} ends beyond the {format_count(count, 'point')} of the path: {fate}",
                     wrap,
                     tag="range",
                     # Nobody asks for the length of a force that is off.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from osimlite.base.lazy import imported_when_used
+from osimlite.base.lazy import make_lazy_getattr
 from osimlite.base.require import require
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ _NUMERIC = {
 }
 """Names of this package whose modules need numpy, and these modules."""
 
-_get = imported_when_used(__name__, _NUMERIC)
+_get = make_lazy_getattr(__name__, _NUMERIC)
 
 
 def __getattr__(name: str) -> Any:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.errors import SimulationError
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.kinematics import Kinematics
@@ -49,7 +49,7 @@ class UnmetConstraintsError(SimulationError):
     def __init__(self, model: str, errors: Mapping[str, float]) -> None:
         self.errors = dict(errors)
         super().__init__(
-            f"no pose of '{model}' near the given one fulfils {listed([*self.errors])}; change the "
+            f"no pose of '{model}' near the given one fulfils {join_words([*self.errors])}; change the "
             "coordinate values, unlock or unclamp coordinates, or set isEnforced of a constraint "
             "to false"
         )
@@ -129,7 +129,7 @@ def project_speeds(state: Kinematics, kept: Collection[int] = ()) -> Array:
     ):
         names = [state.mechanism.coordinates[place].name for place in kept]
         raise SimulationError(
-            f"the constraints of '{state.mechanism.name}' do not allow the speeds given for {listed(names)}; "
+            f"the constraints of '{state.mechanism.name}' do not allow the speeds given for {join_words(names)}; "
             "leave some of them out"
         )
     return u

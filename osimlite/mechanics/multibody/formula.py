@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import counted, did_you_mean, listed
+from osimlite.base.text import format_count, join_words, suggest_name
 from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.programs import STEPS
 from osimlite.mechanics.laws import formulas
@@ -414,8 +414,10 @@ class _Reader:
         """Refuse a step that stands for an unknown name, or for NaN: Lepton then never ends to simplify."""
         if step.law == _UNKNOWN:
             word = self.unknown[int(step.value)]
-            near = did_you_mean(word, self.known)
-            there = f"there is {listed(list(self.known))}" if self.known else "it has no variables"
+            near = suggest_name(word, self.known)
+            there = (
+                f"there is {join_words(list(self.known))}" if self.known else "it has no variables"
+            )
             raise _UnknownName(f"there is no '{word}'{near}; {there}")
         if step.law == "number" and math.isnan(step.value):
             raise _Wrong("a part of it without variables is not a number, such as 0/0; remove it")
@@ -467,7 +469,7 @@ class _Reader:
 
     def _open(self, called: str) -> None:
         if called and called not in FUNCTIONS:
-            raise _Wrong(f"there is no function '{called}'{did_you_mean(called, FUNCTIONS)}")
+            raise _Wrong(f"there is no function '{called}'{suggest_name(called, FUNCTIONS)}")
         self._wait(FUNCTIONS.get(called, ""), OPEN, 0, called)
 
     def _apply(self, least: int) -> None:
@@ -490,7 +492,7 @@ class _Reader:
         if name := opened.name:
             wanted, given = 2 if name in OF_TWO else 1, len(self._operands) - opened.before
             if given != wanted:
-                raise _Wrong(f"'{name}' takes {counted(wanted, 'argument')}, not {given}")
+                raise _Wrong(f"'{name}' takes {format_count(wanted, 'argument')}, not {given}")
             self._take(opened)
         return False
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass, field, replace
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody import dynamics
 from osimlite.mechanics.multibody.assembly import assemble_pose, project_speeds
@@ -120,7 +120,7 @@ class Mechanism:
                 raise ModelError(
                     f"'{self.name}' has several coordinates '{name}'; name it {' or '.join(alike)}"
                 ) from None
-            near = did_you_mean(name, self.coordinate_names)
+            near = suggest_name(name, self.coordinate_names)
             raise ModelError(f"'{self.name}' has no coordinate '{name}'{near}") from None
 
     def placement(self, name: str) -> FramePlacement:
@@ -128,7 +128,7 @@ class Mechanism:
         try:
             return self._placements[name]
         except KeyError:
-            near = did_you_mean(name, self._placements)
+            near = suggest_name(name, self._placements)
             raise ModelError(f"'{self.name}' has no body or frame '{name}'{near}") from None
 
     def default_state(self, time: float = 0.0) -> tuple[Array, Array]:

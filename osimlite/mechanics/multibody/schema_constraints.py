@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.mechanics.multibody.constraints import Constraint, Coupler
@@ -143,7 +143,7 @@ def unknown_constraint(path: str, kind: str) -> UnsupportedError:
     """The error for a constraint that cannot be computed."""
     return UnsupportedError(
         f"the constraint '{path}' ({kind}) cannot be computed; set its isEnforced to false or remove it; "
-        f"those osimlite computes are {listed([item.__name__ for item in _READERS], most=len(_READERS))}"
+        f"those osimlite computes are {join_words([item.__name__ for item in _READERS], most=len(_READERS))}"
     )
 
 

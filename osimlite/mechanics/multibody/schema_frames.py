@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody.spatial import Array, cross, make_offset, make_transform
 from osimlite.schema.base import Component
@@ -51,7 +51,7 @@ class Placements:
                 del waiting[path]
             elif (place := self.path(below)) in waiting:
                 raise ModelError(
-                    f"the frame '{place}' is fixed to itself, through {listed(waiting)}; fix it to a body"
+                    f"the frame '{place}' is fixed to itself, through {join_words(waiting)}; fix it to a body"
                 )
             else:
                 waiting[place] = below
@@ -124,7 +124,7 @@ class Placements:
         bases, points = zip(*map(self.resolve_station, self._list_stations(frame)), strict=True)
         if len(set(bases)) > 1:
             raise ModelError(
-                f"the stations of the frame '{path}' are fixed to {listed(sorted(set(bases)))}; fix all to one body"
+                f"the stations of the frame '{path}' are fixed to {join_words(sorted(set(bases)))}; fix all to one body"
             )
         a, b, c, origin = points
         along, across = b - a, cross(b - a, c - a)

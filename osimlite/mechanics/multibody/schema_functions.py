@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import isfinite
 from typing import Any
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody import functions as f
 from osimlite.schema import functions as schema
@@ -59,7 +59,7 @@ def convert_function(
             can += [item.__name__ for item in _UNIVARIATE]
             raise UnsupportedError(
                 f"{where} is a {name}, which osimlite cannot differentiate twice; "
-                f"the functions it can are {listed(can, most=len(can))}"
+                f"the functions it can are {join_words(can, most=len(can))}"
             )
         _converts(function, 1, arguments)
         return _UNIVARIATE[kind](function)

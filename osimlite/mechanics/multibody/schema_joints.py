@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody.joints import (
     MOTIONS,
@@ -76,7 +76,7 @@ def unknown_joint(path: str, kind: str) -> UnsupportedError:
     """The error for a joint that cannot be computed."""
     return UnsupportedError(
         f"'{path}' is a {kind}, whose motion osimlite cannot compute; the joints it can are "
-        f"{listed(JOINT_TYPES, most=len(JOINT_TYPES))}"
+        f"{join_words(JOINT_TYPES, most=len(JOINT_TYPES))}"
     )
 
 
@@ -110,7 +110,7 @@ def _build_custom_motions(
     if unused:
         raise ModelError(
             f"CustomJoint '{path}' has {len(known)} coordinates and needs {len(order)}: "
-            f"nothing in its SpatialTransform depends on {listed(unused)}"
+            f"nothing in its SpatialTransform depends on {join_words(unused)}"
         )
     motions = make_custom_motions(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
     return motions, [known[name] for name in order]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.derivatives.symbols import casadi
 from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.optimal.goals.contact_tracking import find_contact
@@ -115,7 +115,7 @@ def _find_foot(
     names = [str(name) for name in group.contact_force_paths]
     selected = group.foot_position_contact_force_path
     if selected not in names:
-        near = did_you_mean(selected, names)
+        near = suggest_name(selected, names)
         raise problem.invalid_error(
             goal,
             f"contact_force_paths of '{group.name}' do not contain foot_position_contact_force_path '{selected}'{near}",

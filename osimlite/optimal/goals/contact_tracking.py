@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.derivatives.symbols import casadi
 from osimlite.io.document.kept import read_anew
 from osimlite.mechanics.multibody.spatial import Array
@@ -113,7 +113,7 @@ def read_contact_groups(goal: ContactGoal, problem: Problem) -> list[ContactGrou
     for group in goal.contact_groups:
         force = force_by_name.get(group.external_force_name)
         if force is None:
-            near = did_you_mean(group.external_force_name, force_by_name)
+            near = suggest_name(group.external_force_name, force_by_name)
             raise problem.invalid_error(
                 goal, f"the loads have no force '{group.external_force_name}'{near}"
             )
@@ -158,7 +158,7 @@ def find_contact(goal: MocoGoal, problem: Problem, name: str) -> tuple[str, Cont
             if isinstance(part, SmoothSphereHalfSpaceForce)
         ]
         raise problem.invalid_error(
-            goal, f"the model has no SmoothSphereHalfSpaceForce '{path}'{did_you_mean(path, known)}"
+            goal, f"the model has no SmoothSphereHalfSpaceForce '{path}'{suggest_name(path, known)}"
         )
     sphere = problem.model.tree().target(contact, "socket_sphere", contact.socket_sphere)
     assert isinstance(sphere, ContactSphere)

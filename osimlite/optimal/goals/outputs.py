@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.derivatives.symbols import casadi
 from osimlite.optimal.point import COST_FIRST, Formula, GoalTerms, Point, make_integral_terms
 from osimlite.schema.coordinates import Coordinate
@@ -175,7 +175,7 @@ def _find_output(
     component: Any = problem.model if path == "/" else problem.components.get(path)
     if component is None:
         raise problem.invalid_error(
-            part, f"the model has no component '{path}'{did_you_mean(path, problem.components)}"
+            part, f"the model has no component '{path}'{suggest_name(path, problem.components)}"
         )
     for component_class, formulas in OUTPUT_FORMULAS.items():
         if isinstance(component, component_class) and name in formulas:

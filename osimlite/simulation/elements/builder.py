@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from osimlite.base.text import or_known
+from osimlite.base.text import suggest_or_list
 from osimlite.errors import ModelError, SettingError, UnsupportedError
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
@@ -58,7 +58,9 @@ class ElementBuilder:
         rigid_tendons: bool = False,
     ) -> None:
         if wrapping not in WRAPPINGS:
-            raise SettingError(f"there is no wrapping '{wrapping}'{or_known(wrapping, WRAPPINGS)}")
+            raise SettingError(
+                f"there is no wrapping '{wrapping}'{suggest_or_list(wrapping, WRAPPINGS)}"
+            )
         self.model = model
         self.tree = model.tree()
         self.mechanism = mechanism

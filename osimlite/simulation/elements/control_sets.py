@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError
 from osimlite.io.document.part import read_object
 from osimlite.io.tables.storage import beside
@@ -135,7 +135,7 @@ def drive_by_control_set(
         if name not in actuators:
             raise ModelError(
                 f"'{builder.path(controller)}' has no actuator for the control '{name}' of its file"
-                f"{did_you_mean(name, actuators)}",
+                f"{suggest_name(name, actuators)}",
                 file=str(path),
             )
         if all(item.name != name for item in driven):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.io.tables.storage import beside
 from osimlite.schema.actuators import Actuator
@@ -71,7 +71,7 @@ def _from_file(
         if label not in actuators:
             names = [item.name for item in actuators.values()]
             raise ModelError(
-                f"the column '{label}' of the file of '{path}' is no actuator of the model{did_you_mean(label, names)}",
+                f"the column '{label}' of the file of '{path}' is no actuator of the model{suggest_name(label, names)}",
                 file=table.file,
             )
         actuator = actuators[label]

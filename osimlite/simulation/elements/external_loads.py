@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.base.text import listed, nearest
+from osimlite.base.text import find_nearest, join_words
 from osimlite.errors import DocumentError, ModelError, SettingError
 from osimlite.io.document.kept import while_unchanged
 from osimlite.io.document.part import read_object
@@ -249,11 +249,11 @@ class _Columns:
     def _why(self, identifier: str, places: Sequence[int]) -> str:
         file, labels = self.table.file, self.table.columns
         if places:
-            result = listed([labels[place] for place in places])
+            result = join_words([labels[place] for place in places])
             return f"exactly three columns must begin so, and '{file}' has {result}"
         starts = [label[:-1] for label in labels if label[-1:] in ("x", "X", "1")]
-        near = nearest(identifier, starts) or nearest(identifier, labels)
-        hint = f"; did you mean '{near}'?" if near else f"; its columns are {listed(labels)}"
+        near = find_nearest(identifier, starts) or find_nearest(identifier, labels)
+        hint = f"; did you mean '{near}'?" if near else f"; its columns are {join_words(labels)}"
         return f"no column of '{file}' begins so{hint}"
 
 

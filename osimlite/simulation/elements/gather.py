@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
@@ -84,7 +84,7 @@ def force_elements(
             skipped.append(error.message)
     if skipped and not skip_unsupported:
         raise UnsupportedError(
-            f"osimlite cannot compute {listed(by_class(skipped))}; set appliesForce to false{SKIP_ADVICE}"
+            f"osimlite cannot compute {join_words(by_class(skipped))}; set appliesForce to false{SKIP_ADVICE}"
         )
     if external_loads is not None:
         from osimlite.simulation.elements.external_loads import read_external_loads
@@ -116,4 +116,6 @@ def by_class(skipped: Sequence[str]) -> list[str]:
     for words in skipped:
         path, _, kind = words.partition(" (")
         groups.setdefault(kind.removesuffix(")") or "others", []).append(path)
-    return [f"{len(paths)} of {kind}: {listed(paths, most=2)}" for kind, paths in groups.items()]
+    return [
+        f"{len(paths)} of {kind}: {join_words(paths, most=2)}" for kind, paths in groups.items()
+    ]

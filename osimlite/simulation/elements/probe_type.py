@@ -17,9 +17,9 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from osimlite.base.quantity import tell
+from osimlite.base.quantity import warn_caller
 from osimlite.base.records import dataclass
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.table import GIVEN, written
@@ -189,7 +189,7 @@ def probe_elements(
         try:
             result.append(_made(probe_type, builder, probe, by_path))
         except UnsupportedError as error:
-            tell(f"{error.message} is left out of the probes")
+            warn_caller(f"{error.message} is left out of the probes")
     return result
 
 
@@ -276,6 +276,6 @@ def members_of(
         if name not in known:
             raise ModelError(
                 f"'{builder.path(probe)}' names the {probe_type.lower()} '{name}', which the model does not have"
-                f"{did_you_mean(name, known)}"
+                f"{suggest_name(name, known)}"
             )
     return [known[name] for name in names]

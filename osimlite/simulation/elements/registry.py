@@ -15,7 +15,7 @@ from functools import cache
 from importlib import import_module
 from typing import Any, TypeVar
 
-from osimlite.base.load import module_name
+from osimlite.base.load import make_module_name
 
 T = TypeVar("T")
 
@@ -151,4 +151,4 @@ def register_path(component: type) -> Callable[[T], T]:
 @cache
 def kernel_name(component: str) -> str:
     """Return the name of the kernel that computes a component of a class: `path_spring` for PathSpring."""
-    return module_name(component)
+    return make_module_name(component)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.io.tables.storage import beside
 from osimlite.mechanics.multibody.functions import Function, PiecewiseLinear, Scaled
@@ -45,7 +45,7 @@ def read_signal(builder: ElementBuilder, controller: Any, text: str) -> Function
         table = read_controls(beside(builder.folder, source.filename))
         if channel not in table.columns:
             raise ModelError(
-                f"'{builder.path(source)}' has no column '{channel}'{did_you_mean(channel, table.columns)}",
+                f"'{builder.path(source)}' has no column '{channel}'{suggest_name(channel, table.columns)}",
                 file=table.file,
             )
         if len(table.times) < 2:

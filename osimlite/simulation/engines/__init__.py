@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from osimlite.base.require import require
-from osimlite.base.text import or_known
+from osimlite.base.text import suggest_or_list
 from osimlite.errors import DeprecatedWarning, OsimliteError
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def engine_name(name: str | None = None) -> str:
         )
         return DEFAULT_ENGINE
     if name not in ENGINES:
-        raise OsimliteError(f"there is no engine '{name}'{or_known(name, [*ENGINES])}")
+        raise OsimliteError(f"there is no engine '{name}'{suggest_or_list(name, [*ENGINES])}")
     return name
 
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.base.cores import cores
-from osimlite.base.text import did_you_mean
+from osimlite.base.cores import count_cores
+from osimlite.base.text import suggest_name
 from osimlite.errors import OsimliteError, SimulationError
 from osimlite.mechanics.kernels import record
 from osimlite.mechanics.kernels.contacts import RADIUS
@@ -82,7 +82,7 @@ def run_many(
     def work(first: int) -> None:
         batch.run(batch.room(), first, min(first + AT_ONCE, count))
 
-    with ThreadPoolExecutor(options.threads or cores()) as pool:
+    with ThreadPoolExecutor(options.threads or count_cores()) as pool:
         list(pool.map(work, range(0, count, AT_ONCE)))
     names = [*engine.contacts, *(watch.name for watch in options.watches)]
     kept = [
@@ -152,7 +152,7 @@ def _watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[Ints, Fl
             levels[row, 6] = watch.level
         elif watch.contact:
             if watch.contact not in engine.contacts:
-                near = did_you_mean(watch.contact, engine.contacts)
+                near = suggest_name(watch.contact, engine.contacts)
                 raise OsimliteError(f"the model has no contact '{watch.contact}'{near}")
             kinds[row] = record.TOUCH, engine.contacts.index(watch.contact), watch.stops
         else:

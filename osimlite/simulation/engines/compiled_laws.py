@@ -19,7 +19,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from osimlite.base.cores import cores
+from osimlite.base.cores import count_cores
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.codegen import cplusplus, reader
 from osimlite.mechanics.codegen.processor import machine_name, processor_features
@@ -88,7 +88,7 @@ def compile_laws(names: Sequence[str]) -> dict[str, int]:
     """
     find_compiler()
     _log.info("compiling %d kernels", len(names))
-    with ThreadPoolExecutor(max(1, min(cores(), len(names)))) as pool:
+    with ThreadPoolExecutor(max(1, min(count_cores(), len(names)))) as pool:
         addresses = pool.map(lambda name: compile_function(symbol_of(name), *law_of(name)), names)
         return dict(zip(names, addresses, strict=True))
 

@@ -12,7 +12,7 @@ import os
 import platform
 from collections.abc import Iterable, Sequence
 
-from osimlite.base.text import or_known
+from osimlite.base.text import suggest_or_list
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.codegen.toolchain import CompilationError, find_compiler
 from osimlite.simulation.elements.laws import law_of
@@ -45,7 +45,7 @@ def allows(source: str) -> bool:
     only = os.environ.get(VARIABLE, "")
     if only and only not in SOURCES:
         raise OsimliteError(
-            f"{VARIABLE} is '{only}', which is no source of kernels{or_known(only, SOURCES)}"
+            f"{VARIABLE} is '{only}', which is no source of kernels{suggest_or_list(only, SOURCES)}"
         )
     return only in ("", source)
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from osimlite.base.records import replace
-from osimlite.base.text import unused
+from osimlite.base.text import make_unique_name
 from osimlite.mechanics.multibody.functions import IDENTITY, Constant, Function, Linear, Scaled
 from osimlite.mechanics.multibody.joints import Mobilizer
 from osimlite.mechanics.multibody.mechanism import Mechanism, Values
@@ -198,7 +198,7 @@ class _Builder:
             )
 
     def _unique(self, name: str) -> str:
-        unique = unused(name, self.taken)
+        unique = make_unique_name(name, self.taken)
         self.taken.add(unique)
         return unique
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from osimlite.base.files import NAMED_SO, read_file
+from osimlite.base.files import MESH_FOLDER_HINT, read_file
 from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError
 from osimlite.io.meshes.folders import MeshFolders
@@ -65,7 +65,7 @@ class MeshFiles:
             if source is None:
                 raise MeshProblem(
                     "left out: the file is neither beside the model, nor in its folder Geometry, nor in the folders "
-                    f"named {NAMED_SO}"
+                    f"named {MESH_FOLDER_HINT}"
                 )
             content, converted = _written(source, kind, signs)
         except OsimliteError as error:

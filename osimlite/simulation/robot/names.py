@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from osimlite.base.records import replace
-from osimlite.base.text import unused
+from osimlite.base.text import make_unique_name
 from osimlite.simulation.robot.robot import WORLD, Robot
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class UniqueNames:
 
     def __call__(self, name: str) -> str:
         """The name made legal, with a number behind it if it was given out before."""
-        word = unused(legal(name), self._taken)
+        word = make_unique_name(legal(name), self._taken)
         self._taken.add(word)
         return word
 
@@ -53,7 +53,7 @@ def distinct(names: Sequence[str], spell: Callable[[str], str]) -> list[str]:
     """The names as they are spelt, no two alike; one that keeps its spelling comes before those that turn into it."""
     result, taken = [*names], set[str]()
     for place in sorted(range(len(names)), key=lambda place: spell(names[place]) != names[place]):
-        result[place] = unused(spell(names[place]), taken)
+        result[place] = make_unique_name(spell(names[place]), taken)
         taken.add(result[place])
     return result
 
@@ -71,7 +71,7 @@ def coordinate_names(robot: Robot) -> Robot:
     # Coordinates without a joint may get one.
     taken = set(names)
     for name in others:
-        own[name] = unused(xml_name(name), taken)
+        own[name] = make_unique_name(xml_name(name), taken)
         taken.add(own[name])
     links = [link.name for link in robot.links]
     return _renamed(robot, dict(zip(links, distinct(links, xml_name), strict=True)), own)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import counted, listed, or_known
+from osimlite.base.text import format_count, join_words, suggest_or_list
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.batches import BatchEngine
@@ -67,7 +67,7 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
             if contact not in known:
                 raise OsimliteError(
                     f"no sphere touches a half space in '{contact}'"
-                    f"{or_known(contact, known) if known else '; none does'}"
+                    f"{suggest_or_list(contact, known) if known else '; none does'}"
                 )
             if named.count(contact) > 1:
                 raise OsimliteError(
@@ -93,9 +93,9 @@ def _feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...]
             f"no sphere of '{mechanism.name}' touches a half space; feet are spheres on the ground"
         )
     if len(ends) != 2:
-        names = listed(mechanism.bodies[end].name for end in ends)
+        names = join_words(mechanism.bodies[end].name for end in ends)
         raise OsimliteError(
-            f"'{mechanism.name}' touches the ground with the ends of {counted(len(ends), 'leg')} ({names}), not of "
+            f"'{mechanism.name}' touches the ground with the ends of {format_count(len(ends), 'leg')} ({names}), not of "
             "two; say which contacts are feet with --foot"
         )
     result = []

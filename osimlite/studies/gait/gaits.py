@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.files import folder_to_fill, read_file, write_atomically
+from osimlite.base.files import prepare_folder, read_file, write_atomically
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.io.document.printer import write
@@ -100,7 +100,7 @@ def find_gait(
     }
     _check_numbers(settings)
     tell = stage or (lambda *_: None)
-    with folder_to_fill(folder) as where:
+    with prepare_folder(folder) as where:
         if not force:
             _spare(where, settings)
         search = CycleSearch(plan, feet, stable=stable, perturb=perturb, threads=threads)

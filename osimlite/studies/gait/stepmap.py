@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.errors import OsimliteError, UnsupportedError
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.batches import BatchEngine, Floats, Ints, Watch, run_many
@@ -44,7 +44,7 @@ def refuse_constraints(mechanism: Mechanism) -> None:
     """
     if kept := kept_constraints(mechanism):
         raise UnsupportedError(
-            f"gaits are looked for in all directions of the state, some of which {listed(kept)} takes away; set "
+            f"gaits are looked for in all directions of the state, some of which {join_words(kept)} takes away; set "
             "isEnforced of a constraint and prescribed of a coordinate to false"
         )
 

@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from osimlite.base.records import replace
-from osimlite.base.text import did_you_mean, or_known
+from osimlite.base.text import suggest_name, suggest_or_list
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.copies import Copies
 from osimlite.studies.gym.tasks import TASKS, Seen, Task, of_model
@@ -41,7 +41,7 @@ class _Observed:
         ]
         for name in task.hidden:
             if name not in self.shown:
-                near = did_you_mean(name, self.shown)
+                near = suggest_name(name, self.shown)
                 raise gymnasium.error.Error(
                     f"nothing is called '{name}' that could be hidden{near}"
                 )
@@ -107,7 +107,7 @@ def _task(
     known = [field.name for field in fields(Task) if field.name not in ("model", "reward")]
     for name in choices:
         if name not in known:
-            raise gymnasium.error.Error(f"a task has no '{name}'{or_known(name, known)}")
+            raise gymnasium.error.Error(f"a task has no '{name}'{suggest_or_list(name, known)}")
     if task is not None:
         if model is not None:
             raise gymnasium.error.Error(

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from osimlite.base.quantity import tell
-from osimlite.base.text import listed, or_known
+from osimlite.base.quantity import warn_caller
+from osimlite.base.text import join_words, suggest_or_list
 from osimlite.mechanics.kernels.pointers import Ints
 from osimlite.mechanics.kernels.reflexes import FREE, LIMITS, OF_RESULT, OF_SENSOR, REFLEXES, TERM
 from osimlite.mechanics.kernels.walks import LEGS
@@ -177,7 +177,7 @@ class Reflexes:
                 raise node.error(f"'{key}' must not be negative, and is {width:g}")
         node.expect_all_asked(f"a {NOISE}")
         if node.file.endswith(".scone"):
-            tell(
+            warn_caller(
                 "noise is as large as SCONE's, but not the same: its numbers depend on the compiler of SCONE"
             )
 
@@ -188,7 +188,7 @@ class Reflexes:
         found = [*node.all_of(*FUNCTIONS)]
         node.expect_all_asked(f"a {FEED_FORWARD}")
         if len(found) != 1:
-            raise node.error(f"a {FEED_FORWARD} needs one function: {listed(list(FUNCTIONS))}")
+            raise node.error(f"a {FEED_FORWARD} needs one function: {join_words(list(FUNCTIONS))}")
         kind, function = found[0]
         names = {
             k: n
@@ -255,7 +255,7 @@ class Reflexes:
             names = mask.split()
             for name in names:
                 if name not in STATES:
-                    raise node.error(f"legs have no state '{name}'{or_known(name, STATES)}")
+                    raise node.error(f"legs have no state '{name}'{suggest_or_list(name, STATES)}")
             states = sum(1 << STATES.index(name) for name in set(names))
             prefix = f"S{states:05b}."
             for leg in range(len(SIDES)):
@@ -284,7 +284,7 @@ class Reflexes:
             if full in names:
                 return names.index(full)
         beside = f" or '{own}{SIDES[leg]}'" if self._is_sided else ""
-        raise node.error(f"the model has no '{own}'{beside}{or_known(own, names)}")
+        raise node.error(f"the model has no '{own}'{beside}{suggest_or_list(own, names)}")
 
     def _begin(
         self, node: Node, prefix: str, leg: int, symmetric: bool, kind: Kind

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from osimlite.base.text import listed, or_known
+from osimlite.base.text import join_words, suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.mechanics.kernels.reflexes import LIMITS, TERM
 from osimlite.mechanics.kernels.sensors import SENSED
@@ -59,7 +59,7 @@ class Feedback:
             holder, model = objective, objective.get("ModelOpenSim4") or Node()
         found = holder.one_of(*CONTROLLERS)
         if found is None:
-            raise holder.error(f"a controller is needed: {listed(list(CONTROLLERS))}")
+            raise holder.error(f"a controller is needed: {join_words(list(CONTROLLERS))}")
         self._kind, self._node = found
         self.step, self._legs = control_step(model), legs_of(model)
         known = {name: best for name, (best, _, _) in begun(optimizer, folder).items()}
@@ -105,7 +105,7 @@ class Feedback:
         for name in self._values:
             if name not in parameters.found and name not in self._begun:
                 raise SettingError(
-                    f"the controller has no parameter '{name}'{or_known(name, parameters.found)}"
+                    f"the controller has no parameter '{name}'{suggest_or_list(name, parameters.found)}"
                 )
         return felt, reflexes, parameters
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.text import or_known
+from osimlite.base.text import suggest_or_list
 from osimlite.mechanics.kernels.criteria import (
     CRITERION,
     GAIT,
@@ -264,7 +264,7 @@ class EffortMeasure(Measure):
         kind, walkers = node.text("measure_type"), self.walkers
         if kind not in EFFORTS:
             raise node.error(
-                f"effort of the type '{kind}' is not done here{or_known(kind, EFFORTS)}"
+                f"effort of the type '{kind}' is not done here{suggest_or_list(kind, EFFORTS)}"
             )
         self.by_distance = node.flag("use_cost_of_transport", False)
         self.least_distance = node.number("min_distance", 1.0)
@@ -337,7 +337,7 @@ class DofMeasure(Penalty):
         if name not in names and name + self.side in names:
             name += self.side
         if name not in names:
-            raise node.error(f"the model has no coordinate '{name}'{or_known(name, names)}")
+            raise node.error(f"the model has no coordinate '{name}'{suggest_or_list(name, names)}")
         infos = {info.name: info for info in self.walkers.mechanism.coordinates}
         factor = 180.0 / np.pi if node.flag("in_degrees", infos[name].unit == "rad") else 1.0
         for what, first, scale in (

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import listed, or_known
+from osimlite.base.text import join_words, suggest_or_list
 from osimlite.errors import SettingError, SimulationError
 from osimlite.io.document.reader import read
 from osimlite.io.tables.storage import StoTable, read_sto
@@ -164,16 +164,16 @@ class Scenario:
                 (name for name, _ in objective.parts if name.endswith("Controller")), "none"
             )
             raise objective.error(
-                f"of controllers {listed(list(CONTROLLERS))} are done here, and this has {other}"
+                f"of controllers {join_words(list(CONTROLLERS))} are done here, and this has {other}"
             )
         if measure is None:
-            raise objective.error(f"a measure is needed: {listed(list(MEASURES))}")
+            raise objective.error(f"a measure is needed: {join_words(list(MEASURES))}")
         self.controller, self.measure = controller, measure
         objective.expect_all_asked("a SimulationObjective", tuple(MEASURES))
         method = settings.text("integration_method", "SemiExplicitEuler2")
         if method not in INTEGRATORS:
             raise settings.error(
-                f"there is no integrator '{method}'{or_known(method, INTEGRATORS)}"
+                f"there is no integrator '{method}'{suggest_or_list(method, INTEGRATORS)}"
             )
         self._integrator = INTEGRATORS[method]
 
@@ -227,7 +227,7 @@ class Scenario:
         for name in values:
             if name not in parameters.found and name not in self.begun:
                 raise SettingError(
-                    f"the scenario has no parameter '{name}'{or_known(name, parameters.found)}"
+                    f"the scenario has no parameter '{name}'{suggest_or_list(name, parameters.found)}"
                 )
         return candidates.walk()
 
@@ -318,7 +318,7 @@ class Candidates:
                 )
                 if place is None:
                     raise node.error(
-                        f"the model has no coordinate '{name}'{or_known(name, walkers.coordinates)}"
+                        f"the model has no coordinate '{name}'{suggest_or_list(name, walkers.coordinates)}"
                     )
                 try:
                     walkers.copies.states[:, place] = float(node.value)

@@ -18,7 +18,7 @@ import numpy as np
 
 from osimlite.base.files import read_file
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.base.writing import find_shared_folders
 from osimlite.errors import DocumentError, MissingFileError
 from osimlite.io.document.data import SUFFIXES, parsed_yaml
@@ -175,7 +175,7 @@ class Node:
         """
         for name, node in self.parts:
             if name not in self.asked and name not in CALLED:
-                near = did_you_mean(name, {*self.asked, *known})
+                near = suggest_name(name, {*self.asked, *known})
                 raise node.error(f"'{name}' of {what} is not done here{near}")
 
 
@@ -385,7 +385,7 @@ class _Reader:
             )
         if value.startswith("$"):
             if value not in self.constants:
-                near = did_you_mean(value, self.constants)
+                near = suggest_name(value, self.constants)
                 raise DocumentError(
                     f"there is no constant '{value}'{near}", file=str(self.path), line=self.line()
                 )
@@ -416,7 +416,7 @@ def _resolve_include(name: str, path: Path, base: Path) -> Path:
     found = found_file(name, path.parent, base)
     real = found.resolve()
     if not {found.suffix.lower(), real.suffix.lower()} <= {*INCLUDED_ENDINGS}:
-        endings = listed(INCLUDED_ENDINGS)
+        endings = join_words(INCLUDED_ENDINGS)
         message = f"'{name}' is not included: the name of the file must end in {endings}"
         raise DocumentError(message, file=str(path))
     top = base.resolve()

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.layout import OUTCOME
 from osimlite.mechanics.kernels.pointers import Ints
@@ -185,7 +185,7 @@ class Felt:
         """
         if len(self.legs) != len(SIDES):
             upper, contact = self._legs_named
-            near = did_you_mean(f"{upper}_l", [body.name for body in self.mechanism.bodies])
+            near = suggest_name(f"{upper}_l", [body.name for body in self.mechanism.bodies])
             wanted = f"bodies '{upper}_l' and '{upper}_r', feet, and contact forces '{contact}_l' and '{contact}_r'"
             raise ModelError(f"the model has no legs, which are {wanted}{near}")
 
@@ -236,7 +236,7 @@ class Walkers(Felt):
         others = self.names[len(self.muscles) :]
         if others:
             raise ModelError(
-                f"{listed(others)} are no muscles, and efforts of muscles alone are known"
+                f"{join_words(others)} are no muscles, and efforts of muscles alone are known"
             )
         state, size = self.copies.simulation.state, len(self.coordinates)
         infos = self.mechanism.coordinates

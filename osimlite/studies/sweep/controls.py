@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import did_you_mean, or_known
+from osimlite.base.text import suggest_name, suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.controller_types import PrescribedController
@@ -139,7 +139,7 @@ def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) 
     """
     if interpolation not in INTERPOLATIONS:
         raise SettingError(
-            f"there is no interpolation '{interpolation}'{or_known(interpolation, INTERPOLATIONS)}"
+            f"there is no interpolation '{interpolation}'{suggest_or_list(interpolation, INTERPOLATIONS)}"
         )
     if interpolation != "cubic":
         return
@@ -169,7 +169,7 @@ def controller_of(model: Model, controls: Mapping[str, Any]) -> PrescribedContro
     for name, given in controls.items():
         if name not in actuators:
             raise SettingError(
-                f"the model has no actuator '{name}' to control{did_you_mean(name, actuators)}"
+                f"the model has no actuator '{name}' to control{suggest_name(name, actuators)}"
             )
         if isinstance(given, tuple):
             times, values = (np.asarray(numbers, dtype=float).tolist() for numbers in given)

@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
 from osimlite.simulation.link_motion import Moments, centers_of_mass, stations
 from osimlite.simulation.run_report import probe_labels, probe_rows
@@ -84,7 +84,7 @@ class Expression:
                 return found[0]
             if found["word"]:
                 raise SettingError(
-                    f"the measure '{text}' has no '{found[0]}' to look at{did_you_mean(found[0], known)}"
+                    f"the measure '{text}' has no '{found[0]}' to look at{suggest_name(found[0], known)}"
                 )
             self._quantities.append(known[found[0]])
             self.names.add(found[0])

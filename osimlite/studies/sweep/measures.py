@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.load import module_named, module_of_file
+from osimlite.base.load import import_user_module, run_python_file
 from osimlite.base.records import dataclass, field, replace
-from osimlite.base.text import did_you_mean, or_known
+from osimlite.base.text import suggest_name, suggest_or_list
 from osimlite.errors import ModelError, SettingError
 from osimlite.simulation.batches import Runs, Watch
 from osimlite.studies.sweep import registry
@@ -113,7 +113,7 @@ class Run:
     def history(self, name: str) -> Floats:
         """What a name in an expression stands for, at the times."""
         if name not in self.quantities:
-            raise SettingError(f"a run has no '{name}'{did_you_mean(name, self.quantities)}")
+            raise SettingError(f"a run has no '{name}'{suggest_name(name, self.quantities)}")
         return self.quantities[name](
             self.engine, list(zip(self.times, self.states.tolist(), strict=True))
         )
@@ -149,7 +149,7 @@ def measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> Measur
             raise SettingError(f"there is no measure '{name}': {error.message}") from None
         return Measure(name, partial(_ends, place, locked))
     raise SettingError(
-        f"there is no measure '{name}'{or_known(name, registry.measure_names(), 'module:function')}"
+        f"there is no measure '{name}'{suggest_or_list(name, registry.measure_names(), 'module:function')}"
     )
 
 
@@ -266,10 +266,10 @@ def _state_place(engine: Any, name: str) -> tuple[int | None, float]:
 
 def _function(name: str) -> Callable[[Run], float]:
     place, _, function = name.rpartition(":")
-    module = module_of_file(Path(place)) if place.endswith(".py") else module_named(place)
+    module = run_python_file(Path(place)) if place.endswith(".py") else import_user_module(place)
     result = getattr(module, function, None)
     if not callable(result):
         raise SettingError(
-            f"'{place}' has no function '{function}'{did_you_mean(function, vars(module))}"
+            f"'{place}' has no function '{function}'{suggest_name(function, vars(module))}"
         )
     return result

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.files import folder_to_fill, open_file, read_file, write_atomically
-from osimlite.base.lazy import shown_in_notebooks
+from osimlite.base.files import open_file, prepare_folder, read_file, write_atomically
+from osimlite.base.lazy import make_notebook_repr
 from osimlite.base.pools import Pool
 from osimlite.base.records import dataclass, replace
 from osimlite.base.require import require
-from osimlite.base.text import counted
+from osimlite.base.text import format_count
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.io.document.printer import write
 from osimlite.studies.sweep import registry
@@ -90,7 +90,7 @@ class Optimum(ResultTable):
     model: Path
     history: Path
 
-    _repr_html_ = shown_in_notebooks("optimum")
+    _repr_html_ = make_notebook_repr("optimum")
 
     def _results(self) -> Path:
         return self.history
@@ -167,7 +167,7 @@ def optimize(
         "bounded": is_bounded,
         "start": point.tolist(),
     }
-    with folder_to_fill(folder) as where, pool(plan, workers=workers, cluster=cluster) as workforce:
+    with prepare_folder(folder) as where, pool(plan, workers=workers, cluster=cluster) as workforce:
         evaluations = _Evaluations(
             plan, free, objective.sign, is_bounded, budget, workforce, progress
         )
@@ -186,7 +186,7 @@ def optimize(
                 ended = look(evaluations.ask, search)
             partial.finish()
         except KeyboardInterrupt:
-            raise interrupted(partial, counted(partial.rows, "run")) from None
+            raise interrupted(partial, format_count(partial.rows, "run")) from None
         finally:
             partial.close()
     ended = ended or f"as many runs as were allowed: {evaluations.count}"

@@ -10,9 +10,9 @@ from math import isfinite
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from osimlite.base.quantity import tell_doubt
+from osimlite.base.quantity import warn_of_unit
 from osimlite.base.records import dataclass, replace
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
 from osimlite.io.document.printer import to_text
 from osimlite.io.document.reader import read_text
@@ -210,7 +210,7 @@ def plan(
         rest = {gain.name: _bounds(gain) for gain in gains if gain.name not in held}
         result = variables({**vary, **rest}, model, mechanism, parameters, gains)
     for item in result:
-        tell_doubt(item.doubt)
+        warn_of_unit(item.doubt)
     needs_maker = any(isinstance(item.target, Parameter) for item in result)
     make = source if needs_maker and not isinstance(source, Model) else None
     made = Plan(to_text(model), result, make=make)
@@ -263,7 +263,7 @@ def _stops(mechanism: Mechanism, levels: Mapping[str, float | str], is_below: bo
 def _stop(mechanism: Mechanism, name: str, given: float | str, is_below: bool) -> Stop:
     infos = {key: info for info in mechanism.coordinates for key in (info.name, info.path)}
     if name not in infos:
-        raise SettingError(f"there is no coordinate '{name}'{did_you_mean(name, infos)}")
+        raise SettingError(f"there is no coordinate '{name}'{suggest_name(name, infos)}")
     if infos[name].locked:
         raise SettingError(
             f"the coordinate '{name}' is locked, so that it stops nothing; name one that moves"
@@ -271,5 +271,5 @@ def _stop(mechanism: Mechanism, name: str, given: float | str, is_below: bool) -
     level = in_units_of(mechanism, name, given)
     if not isfinite(level):
         raise SettingError(f"the level of '{name}' that stops a run is a number, not {given}")
-    tell_doubt(suspect_value(infos[name], name, given))
+    warn_of_unit(suspect_value(infos[name], name, given))
     return Stop(name, level, is_below)

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from functools import partial
 
-from osimlite.base.pools import LocalPool, Pool, count_workers, processes
+from osimlite.base.pools import LocalPool, Pool, count_workers, open_process_pool
 from osimlite.studies.sweep.plan import Plan
 from osimlite.studies.sweep.runner import Block, Runner
 from osimlite.studies.sweep.variables import Floats
@@ -34,7 +34,9 @@ def pool(plan: Plan, *, workers: int | None = None, cluster: str | None = None) 
         return
     # What tells of a plan that cannot be run does so here.
     Runner(plan)
-    with processes(partial(run_packed, plan.packed()), workers=workers, cluster=cluster) as made:
+    with open_process_pool(
+        partial(run_packed, plan.packed()), workers=workers, cluster=cluster
+    ) as made:
         yield made
 
 

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from osimlite.base.files import no_such, open_file, put_in_place
+from osimlite.base.files import make_missing_error, open_file, replace_with
 from osimlite.base.require import require
-from osimlite.base.text import counted, listed
+from osimlite.base.text import format_count, join_words
 from osimlite.base.writing import open_to_append
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.simulation.interrupts import defer_sigint
@@ -62,7 +62,7 @@ def settings_of(path: str | Path) -> dict[str, Any]:
     """
     pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
     if not Path(path).exists():
-        raise no_such(path)
+        raise make_missing_error(path)
     try:
         # By the stream: of a name, pyarrow thinks that what is before a colon is a protocol, and
         # that all is UTF-8.
@@ -118,7 +118,7 @@ def refuse_others(path: Path, before: Mapping[str, Any], wanted: Mapping[str, An
     """
     if unlike := differences(before, wanted):
         raise SettingError(
-            f"'{path}' has results of other settings: {listed(unlike)}; name another place with -o, or replace them "
+            f"'{path}' has results of other settings: {join_words(unlike)}; name another place with -o, or replace them "
             "with --force"
         )
 
@@ -250,7 +250,7 @@ class Partial:
 
                 self.read(take)
                 put(1)
-            put_in_place(beside, self.path)
+            replace_with(beside, self.path)
         except OSError as error:
             raise OsimliteError(
                 f"cannot write the file: {error.strerror or error}", file=str(self.path)
@@ -293,7 +293,7 @@ class Partial:
         unlike = differences(before, json.loads(self.schema.metadata[KEY]))
         if unlike or not result.equals(self.schema):
             raise SettingError(
-                f"the interrupted work in '{self.partial}' has other settings: {listed(unlike) or 'its columns'}; "
+                f"the interrupted work in '{self.partial}' has other settings: {join_words(unlike) or 'its columns'}; "
                 "ask for the same as before, or remove that file"
             )
         end = _batches(self.partial, self._count)
@@ -301,7 +301,7 @@ class Partial:
             _log.warning(
                 "'%s' is damaged or cut off after the first %s; the rest is computed again",
                 self.partial,
-                counted(self.rows, "run"),
+                format_count(self.rows, "run"),
             )
             os.truncate(self.partial, end)
 

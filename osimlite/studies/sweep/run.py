@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.lazy import shown_in_notebooks
+from osimlite.base.lazy import make_notebook_repr
 from osimlite.base.pools import Pool
 from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError, SettingError
@@ -71,7 +71,7 @@ class Outcome(ResultTable):
     reasons: Counter[str] = field(default_factory=Counter)
     seconds: float = 0.0
 
-    _repr_html_ = shown_in_notebooks("runs")
+    _repr_html_ = make_notebook_repr("runs")
 
     def _results(self) -> Path:
         return self.path

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from osimlite.base.records import dataclass, field
 from osimlite.base.require import require
-from osimlite.base.text import listed, or_known
+from osimlite.base.text import join_words, suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.studies.sweep.variables import Floats, Variable
 
@@ -92,20 +92,20 @@ def samples(
     with_values = [item.name for item in varied if item.count]
     if sampler is None and count is not None and with_values:
         raise SettingError(
-            f"--samples says how many runs are drawn, the COUNT in the range of {listed(with_values)} how many values "
+            f"--samples says how many runs are drawn, the COUNT in the range of {join_words(with_values)} how many values "
             "a grid has; leave out one of the two, or name the --sampler"
         )
     if sampler is None:
         sampler = "grid" if count is None and all(item.count for item in varied) else "sobol"
     if sampler not in SAMPLERS:
-        raise SettingError(f"there is no sampler '{sampler}'{or_known(sampler, SAMPLERS)}")
+        raise SettingError(f"there is no sampler '{sampler}'{suggest_or_list(sampler, SAMPLERS)}")
     if seed < 0:
         raise SettingError(f"the seed is a whole number from 0 on, not {seed}")
     if sampler == "grid":
         bare = [item.name for item in varied if item.count is None]
         if bare:
             raise SettingError(
-                f"a grid needs the number of values of {listed(bare)}, as in {bare[0]}=LOW:HIGH:COUNT"
+                f"a grid needs the number of values of {join_words(bare)}, as in {bare[0]}=LOW:HIGH:COUNT"
             )
         whole = prod(item.count or 1 for item in varied)
         if count not in (None, whole):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite.base.require import require
-from osimlite.base.text import or_known
+from osimlite.base.text import suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.studies.sweep.sampling import Sobol
 from osimlite.studies.sweep.variables import Floats
@@ -182,7 +182,7 @@ def method_named(name: str) -> Callable[[Ask, Search], str]:
         SettingError: there is none.
     """
     if name not in METHODS:
-        raise SettingError(f"there is no method '{name}'{or_known(name, METHODS)}")
+        raise SettingError(f"there is no method '{name}'{suggest_or_list(name, METHODS)}")
     return METHODS[name]
 
 

@@ -28,9 +28,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite.base.quantity import Quantity, quantity
+from osimlite.base.quantity import Quantity, parse_quantity
 from osimlite.base.records import dataclass, replace
-from osimlite.base.text import did_you_mean
+from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.actuators import Actuator
@@ -279,7 +279,7 @@ def _unknown(
         f"{key}/control" for item in model.components(Actuator) for key in (item.name, item.path)
     ]
     known += spellings(model) if "/" in name else []
-    near = did_you_mean(name, known)
+    near = suggest_name(name, known)
     return SettingError(
         f"there is no coordinate, parameter, control or number '{name}' to vary{near}"
     )
@@ -346,7 +346,7 @@ def _variable(name: str, target: Target, unit: str, given: Range) -> Variable:
 
 def _refuse_mixed(name: str, ends: Sequence[object], unit: str) -> None:
     """Stop at ``20deg:40`` of what is in rad; zero is the same in every unit."""
-    read = [quantity(str(part)) for part in ends]
+    read = [parse_quantity(str(part)) for part in ends]
     with_unit = [each.unit for each in read if each is not None and each.unit is not None]
     bare = [
         each.number
@@ -375,7 +375,7 @@ def _number(name: str, part: object, unit: str) -> float:
     if isinstance(part, int | float):
         given: Quantity | None = Quantity(float(part), None)
     else:
-        given = quantity(str(part))
+        given = parse_quantity(str(part))
     if given is None or not math.isfinite(given.number):
         raise SettingError(f"'{part}' is no number for '{name}'; give one such as 0.5 or 30deg")
     if given.unit is None:

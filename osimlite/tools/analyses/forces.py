@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.base.text import counted, did_you_mean, listed
+from osimlite.base.text import format_count, join_words, suggest_name
 from osimlite.io.tables.old_storage import UNITS
 from osimlite.io.tables.storage import read_sto
 from osimlite.mechanics.multibody.schema_frames import Placements
@@ -74,7 +74,7 @@ def _find_joints(analysis: JointReaction, model: Model, tables: Tables) -> list[
     for name in names:
         if name not in known:
             raise tables.job.error(
-                f"there is no joint '{name}' for '{analysis.name}'{did_you_mean(name, known)}"
+                f"there is no joint '{name}' for '{analysis.name}'{suggest_name(name, known)}"
             )
     return [known[name] for name in names]
 
@@ -87,7 +87,7 @@ def _expand_words(
     if len(words) == 1:
         return words * len(joints)
     if len(words) != len(joints):
-        count = counted(len(joints), "joint")
+        count = format_count(len(joints), "joint")
         raise tables.job.error(f"{what} has {len(words)} words for {count}; give one, or as many")
     return words
 
@@ -128,7 +128,7 @@ def _override_forces(
     if lacking:
         tables.outcome.tell(
             analysis.name,
-            f"'{path}' has no column for {listed(lacking)}: the forces are those of the states, as in OpenSim",
+            f"'{path}' has no column for {join_words(lacking)}: the forces are those of the states, as in OpenSim",
         )
         return motion, None
     model.controller_set.objects.clear()

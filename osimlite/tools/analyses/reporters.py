@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from osimlite.base.text import did_you_mean, listed
+from osimlite.base.text import join_words, suggest_name
 from osimlite.io.tables.old_storage import DEGREES, UNITS
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.base import Component
@@ -56,7 +56,7 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: Tables) -> N
             left_out.append(asked)
             continue
         if parts["output"] not in outputs and reader is None:
-            near = did_you_mean(parts["output"], outputs)
+            near = suggest_name(parts["output"], outputs)
             raise tables.job.error(
                 f"'{path}' has no output '{parts['output']}' for '{analysis.name}'{near}"
             )
@@ -67,10 +67,10 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: Tables) -> N
         columns[kind].append(parts["alias"] or f"{path}|{parts['output']}")
         rows[kind].append(reader(motion, component, path))
     if left_out:
-        kinds = listed([*OUTPUT_FILES])
+        kinds = join_words([*OUTPUT_FILES])
         tables.outcome.tell(
             analysis.name,
-            f"{listed(left_out)}: left out, as only {kinds} are reported, as in OpenSim",
+            f"{join_words(left_out)}: left out, as only {kinds} are reported, as in OpenSim",
         )
     for kind, name in OUTPUT_FILES.items():
         if columns[kind]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import listed
+from osimlite.base.text import join_words
 from osimlite.errors import OsimliteError
 from osimlite.io.document.source import Source
 from osimlite.lint.config import Config, checked_words
@@ -323,4 +323,4 @@ def _without_setup(folder: Folder, claimed: set[Path]) -> Iterator[Measure]:
             yield "errors of markers", partial(error_numbers, folder, file)
     lacking = [tag for tag in SETUPS if tag not in has]
     if lacking:
-        yield "all else", partial(_missing, Missing(f"there is no setup of {listed(lacking)}"))
+        yield "all else", partial(_missing, Missing(f"there is no setup of {join_words(lacking)}"))

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from osimlite.base.files import no_such
+from osimlite.base.files import make_missing_error
 from osimlite.base.records import replace
 from osimlite.errors import OsimliteError
 from osimlite.io.document.kept import top_at
@@ -66,7 +66,7 @@ class Folder:
         setups: dict[str, Path] = {}
         for path in map(Path, paths):
             if not path.exists():
-                raise no_such(path, may_be_folder=True)
+                raise make_missing_error(path, may_be_folder=True)
             for file in sorted((path if path.is_dir() else path.parent).rglob("*")):
                 if file.suffix.lower() in ENDINGS and file.is_file():
                     known = self._named.setdefault(file.name, [])

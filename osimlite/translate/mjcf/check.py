@@ -17,7 +17,7 @@ from numpy.polynomial.polynomial import polyder, polyval
 
 from osimlite.base.records import dataclass
 from osimlite.base.require import require
-from osimlite.base.text import json_lines
+from osimlite.base.text import format_json
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
@@ -66,7 +66,7 @@ class Check:
 
     def to_json(self) -> str:
         """All numbers as JSON text."""
-        return json_lines(_plain(asdict(self)))
+        return format_json(_plain(asdict(self)))
 
 
 def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7) -> Check:

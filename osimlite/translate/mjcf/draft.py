@@ -11,7 +11,7 @@ import numpy as np
 from lxml.etree import Element, SubElement, _Element
 
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import unused
+from osimlite.base.text import make_unique_name
 from osimlite.errors import ModelError, SimulationError, UnsupportedError
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.mechanism import (
@@ -222,7 +222,7 @@ class Draft:
         whole = xml_name(dotted(path))
         name = xml_name(own or whole)
         if name in taken:
-            name = whole if whole not in taken else unused(whole, taken, first=2)
+            name = whole if whole not in taken else make_unique_name(whole, taken, first=2)
         taken.add(name)
         if path in self.tree.by_path:
             self.fidelity.named(path, kind, own, name)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from osimlite.base.require import absent
+from osimlite.base.require import find_missing_packages
 
-pytestmark = pytest.mark.skipif(bool(absent("numpy")), reason="numpy is not installed")
+pytestmark = pytest.mark.skipif(
+    bool(find_missing_packages("numpy")), reason="numpy is not installed"
+)
 
 
 def of_paths(diagnostics):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.base.load import module_name
+from osimlite.base.load import make_module_name
 from osimlite.mechanics.laws import muscle_curves
 from osimlite.mechanics.laws.bezier import LAST, curve_integral, curve_value
 
@@ -23,7 +23,7 @@ def curves(fixtures):
         gzip.decompress((fixtures / "muscles" / "curves.json.gz").read_bytes())
     ):
         if result["curve"].endswith("Curve"):
-            name = module_name(result["curve"].removesuffix("Curve"))
+            name = make_module_name(result["curve"].removesuffix("Curve"))
             make = MORE.get(name) or getattr(muscle_curves, name)
             yield (
                 result,

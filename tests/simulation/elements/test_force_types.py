@@ -9,7 +9,7 @@ import re
 import pytest
 
 import osimlite
-from osimlite.base.load import module_name
+from osimlite.base.load import make_module_name
 from osimlite.schema.states import states_of
 from osimlite.simulation.elements.force_type import ForceType
 from osimlite.simulation.elements.registry import FORCE_TYPES
@@ -93,4 +93,4 @@ def test_a_law_takes_what_the_kernel_gives():
     ],
 )
 def test_names_of_modules(name, module):
-    assert module_name(name) == module
+    assert make_module_name(name) == module

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.base.require import absent
+from osimlite.base.require import find_missing_packages
 from osimlite.derivatives import tangents
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation.engines import linking
@@ -39,7 +39,7 @@ def run_by(source):
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("source", ["compiler", "numba"])
 def test_a_motion_is_the_same_to_the_last_bit_by_every_source(source):
-    if source == "numba" and absent("numba"):
+    if source == "numba" and find_missing_packages("numba"):
         pytest.skip("needs numba (extra 'jit')")
     python, library, other = run_by("python"), run_by(""), run_by(source)
     assert python[0].startswith("Python") and other[0].startswith(

@@ -162,7 +162,7 @@ def test_workers_and_coordinator_are_killed_and_nothing_is_lost(
 
 
 def test_a_cluster_that_is_not_there_is_told(walker, tmp_path, monkeypatch):
-    monkeypatch.setattr("osimlite.base.pools.PATIENCE", 1)
+    monkeypatch.setattr("osimlite.base.pools.CLUSTER_TIMEOUT_S", 1)
     made = plan(walker, {"RHip_rz": (0.3, 0.7)})
     chosen = samples(made.variables, "random", 10)
     with pytest.raises(
@@ -175,7 +175,7 @@ def test_a_cluster_that_is_not_there_is_told(walker, tmp_path, monkeypatch):
     ):
         with pytest.raises(SettingError, match=words):
             sweep(made, chosen, tmp_path / "r.parquet", cluster=address)
-    with pytest.raises(OsimliteError, match="leave out --workers"):
+    with pytest.raises(OsimliteError, match="remove --workers"):
         sweep(made, chosen, tmp_path / "r.parquet", cluster="tcp://127.0.0.1:1", workers=2)
     assert not list(tmp_path.iterdir())
 
@@ -220,7 +220,7 @@ def test_workers_that_cannot_do_the_task_are_told(cluster, walker, tmp_path, mon
     monkeypatch.setattr("osimlite.__version__", "0.0.1")
     made = plan(walker, {"RHip_rz": (0.3, 0.7)}, to=0.1)
     with pytest.raises(
-        OsimliteError, match=r"a worker has osimlite .*, and the sweep was begun by 0\.0\.1"
+        OsimliteError, match=r"a worker has osimlite .*, but the sweep was started by 0\.0\.1"
     ):
         sweep(made, chosen, tmp_path / "r.parquet", cluster=cluster.address)
     assert not list(tmp_path.glob("*.parquet*"))
@@ -247,10 +247,10 @@ def test_a_scheduler_that_goes_is_told_and_nothing_is_lost(
         # be short.
         with distributed.Client(lost.address, set_as_default=False) as client:
             client.wait_for_workers(1, timeout=120)
-        monkeypatch.setattr("osimlite.base.pools.PATIENCE", 5)
+        monkeypatch.setattr("osimlite.base.pools.CLUSTER_TIMEOUT_S", 5)
         # The scheduler is asked for its workers after every task, also right after it was killed.
         monkeypatch.setattr("osimlite.base.pools.WORKER_COUNT_AGE_S", 0.0)
-        with pytest.raises(OsimliteError, match="has gone; go on with --resume"):
+        with pytest.raises(OsimliteError, match="does not answer any more; continue with --resume"):
             sweep(made, chosen, tmp_path / "r.parquet", cluster=lost.address, progress=end)
     finally:
         lost.close()

@@ -7,7 +7,7 @@ from typing import cast
 
 from lxml import etree
 
-from osimlite.base.text import unused
+from osimlite.base.text import make_unique_name
 from osimlite.io.document.upgrade.draft import (
     Draft,
     Element,
@@ -169,7 +169,7 @@ def _add_frame(
     source = next((part for part in place if part is not None), socket)
     frames = draft.get_list(owner, "frames", source=source)
     taken = {frame.get("name") for frame in frames}
-    name = unused(f"{body}_offset", taken, 0)
+    name = make_unique_name(f"{body}_offset", taken, 0)
     frame = draft.add(frames, "PhysicalOffsetFrame", source=source, name=name)
     draft.add(frame, "socket_parent", make_body_path(body), source=socket)
     for tag, part in (("translation", location), ("orientation", orientation)):
@@ -316,7 +316,7 @@ def _list_coordinate_paths(draft: Draft) -> dict[str, str]:
         for joint in list_members(joint_set)
     ):
         name = joint.get("name") or joint.tag.lower()
-        free = unused(name, taken, 0)
+        free = make_unique_name(name, taken, 0)
         taken.add(free)
         for coordinate in joint.iter("Coordinate"):
             paths.setdefault(

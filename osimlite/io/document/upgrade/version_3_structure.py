@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.base.text import unused
+from osimlite.base.text import make_unique_name
 from osimlite.io.document.lexical import ABSENT, Unclean, converter
 from osimlite.io.document.upgrade.draft import (
     Draft,
@@ -64,7 +64,7 @@ def remove_white_space(draft: Draft) -> None:
                 () if parent is None else (other for other in parent if other is not component)
             )
             taken = {sibling.get("name") for sibling in siblings}
-            free = unused(new, taken, 0)
+            free = make_unique_name(new, taken, 0)
             component.set("name", free)
             renamed.setdefault(" ".join(name.split()), free)
             draft.record_change(component)

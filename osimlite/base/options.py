@@ -1,0 +1,100 @@
+"""Declarations of options, shared by the library, the command line and the manual."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from osimlite.base.records import field
+
+
+class OptionSpec(NamedTuple):
+    """Option of a command.
+
+    Attributes:
+        name: keyword of the library; on the command line with - for _, unless `spelled` is given.
+        type: type of the value.
+        help: one sentence.
+        default: value if the option is absent.
+        unit: placeholder of the value in the help, in capitals, as SECONDS.
+        shown: default in words, where `default` does not say it.
+        group: heading of the help under which the option is listed.
+        spelled: spellings on the command line.
+    """
+
+    name: str
+    type: Any
+    help: str
+    default: Any = None
+    unit: str = ""
+    shown: str = ""
+    group: str = ""
+    spelled: tuple[str, ...] = ()
+
+
+class OptionDescription(NamedTuple):
+    """Description of an attribute of an options record.
+
+    Attributes:
+        help: one sentence for the command line; an option without it exists in the library only.
+        more: text for the library, after `help` or instead of it.
+        unit: placeholder of the value in the help.
+        shown: default in words.
+        type: type of the value on the command line, where the library accepts more.
+    """
+
+    help: str
+    more: str
+    unit: str
+    shown: str
+    type: Any
+
+
+def define_option(
+    default: Any,
+    help: str = "",
+    *,
+    more: str = "",
+    unit: str = "",
+    shown: str = "",
+    type: Any = None,
+) -> Any:
+    """Return the field of an options record; for the arguments see :class:`OptionDescription`."""
+    return field(default=default, option=OptionDescription(help, more, unit, shown, type))
+
+
+def list_options(options: Any) -> Iterator[OptionSpec]:
+    """Yield the options of a record that the command line offers."""
+    for name, each in options.__record_fields__.items():
+        description: OptionDescription = each.option
+        if description.help:
+            kind = description.type or eval(
+                options.__annotations__[name], vars(sys.modules[options.__module__])
+            )
+            spelled = (f"--{name.replace('_', '-')}",) if kind is bool else ()
+            yield OptionSpec(
+                name,
+                kind,
+                description.help,
+                each.default,
+                description.unit,
+                description.shown,
+                "",
+                spelled,
+            )
+
+
+def describe_options(options: Any) -> str:
+    """Return the lines under *Attributes* in the docstring of an options record."""
+    from textwrap import fill
+
+    lines = [
+        fill(
+            f"{name}: {each.option.help} {each.option.more}".replace("  ", " ").strip(),
+            112,
+            subsequent_indent="    ",
+        )
+        for name, each in options.__record_fields__.items()
+    ]
+    return "\n".join(" " * 8 + line.replace("\n", "\n" + " " * 8) for line in lines)
