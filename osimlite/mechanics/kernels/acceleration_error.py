@@ -1,4 +1,9 @@
-"""The error of Simbody's angular acceleration of a CustomJoint, as `SimbodyAccelerationError` has it."""
+"""Error of Simbody's angular acceleration of a CustomJoint, as the motion of an operation.
+
+Simbody computes the acceleration of a CustomJoint with an incorrect derivative of its rotation
+axes. To reproduce OpenSim's motions, an operation of the type
+:class:`osimlite.mechanics.multibody.motions.SimbodyAccelerationError` adds the difference.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +13,18 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy
 from osimlite.mechanics.kernels.points import operation_ints, operation_work
 from osimlite.mechanics.laws.vectors import ZERO, along, cross, minus, times, vector
 
-SIGN, COORDINATES, TURNS = 0, 1, 3
-"""Of its integers: -1 if it is passed backwards, else 1; the degrees of freedom of the first two
-coordinates of the joint, and the operations that are the three turns, -1 for what does not move.
-"""
+SIGN = 0
+"""Index among the operation's integers of 1, or -1 if the joint is traversed from child to parent."""
+COORDINATES = 1
+"""Offset of the degrees of freedom of the joint's first two coordinates, -1 for a constant one."""
+TURNS = 3
+"""Offset of the operations that are the joint's three rotations, -1 for one that does not move."""
 
 
 def place_drift(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Nothing moves."""
+    """Pass the frame in SCRATCH on unchanged, since a drift does not move its link."""
     kept, frame = operation_work(model, data, operation), at(data, WORK.SCRATCH)
     copy(12, frame, kept)
     return OUTCOME.OK
@@ -26,7 +33,11 @@ def place_drift(
 def move_drift(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Velocity and own acceleration in SCRATCH; what turns the joint forwards stays in the operation."""
+    """Write zero velocity and the error of the acceleration to SCRATCH.
+
+    The components of the error along the axes of the joint are stored as amount, rate and curvature of
+    the operation.
+    """
     own = at(model, operation_ints(model, operation)[OPERATION.ARGUMENTS])
     kept, result, u = (
         operation_work(model, data, operation),
@@ -65,7 +76,7 @@ def move_drift(
 
 
 def rate(model: Ints, data: Floats, u: Floats, operation: int) -> float:
-    """Of the amount of an operation."""
+    """Return the rate of the amount of an operation."""
     freedom = operation_ints(model, operation)[OPERATION.DOF]
     return (
         u[freedom] if freedom >= 0 else operation_work(model, data, operation)[OPERATION_WORK.RATE]
@@ -73,7 +84,7 @@ def rate(model: Ints, data: Floats, u: Floats, operation: int) -> float:
 
 
 def share(model: Ints, data: Floats, operation: int, freedom: int) -> float:
-    """Derivative of the amount of an operation by a degree of freedom."""
+    """Return the derivative of the amount of an operation by a degree of freedom."""
     j, total = operation_ints(model, operation), 0.0
     if j[OPERATION.DOF] >= 0:
         return 1.0 if j[OPERATION.DOF] == freedom else 0.0

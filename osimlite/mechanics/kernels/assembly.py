@@ -66,6 +66,7 @@ APART = 1.0
 """Status of a pose near which no pose fulfils the constraints."""
 
 MAX_STEPS = 100
+"""Largest number of steps of a search."""
 EASE = 100.0
 """Factor by which coordinates that do not count move more easily."""
 LONGEST_STEP = 0.5
@@ -73,7 +74,7 @@ LONGEST_STEP = 0.5
 OUTSIDE = 1e-12
 """How far a coordinate may be outside of its range (m or rad)."""
 EXACT = 1e-15
-"""Errors of equations below this are rounding (m or rad)."""
+"""Errors of equations below this are rounding errors (m or rad)."""
 SHORTEST_STEP = 1e-13
 """A step shorter than this part of the largest coordinate, or of 1, ends the search."""
 TINY_STEP = 1e-6
@@ -115,47 +116,47 @@ def assembly_work_size(count: int, size: int) -> int:
 
 def assemble_poses(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, p: Ints, c: Floats, w: Floats, frames: Floats,
-    found: Floats, count: int,
+    solutions: Floats, count: int,
 ) -> int:  # fmt: skip
     """Assemble poses, each independently of the others.
 
     Args:
-        model: the mechanism, all of whose coordinates are degrees of freedom.
+        model: integers of a model, all of whose coordinates are degrees of freedom.
         reals: its numbers.
-        data: its work.
-        y: room for a state.
-        f: room for its rates.
-        p: the integers of the assembly.
-        c: its numbers.
-        w: its work, see `assembly_work_size`.
-        frames: of each pose the time (s) and the values of all degrees of freedom (n,).
-        found: of each pose the values that fulfil the constraints (n,), and ASSEMBLED or APART.
-        count: of the poses.
+        data: workspace of an evaluation.
+        y: workspace of a state.
+        f: workspace of its rates.
+        p: integers of the assembly.
+        c: numbers of the assembly.
+        w: workspace, see `assembly_work_size`.
+        frames: per pose the time (s) and the values of all degrees of freedom (n,).
+        solutions: filled per pose with the values that fulfil the constraints (n,), and ASSEMBLED or APART.
+        count: number of poses.
     """
     a, size = Assembly(model, reals, data, y, f, p, c, w), model[MODEL.DOFS]
     for k in range(2 * size):
         y[k] = f[k] = 0.0
     for number in range(count):
-        frame, to = at(frames, (1 + size) * number), at(found, (1 + size) * number)
+        frame, solution = at(frames, (1 + size) * number), at(solutions, (1 + size) * number)
         data[WORK.TIME] = frame[0]
-        to[size] = ASSEMBLED if assemble_pose(a, at(frame, 1), to) else APART
+        solution[size] = ASSEMBLED if assemble_pose(a, at(frame, 1), solution) else APART
     return OUTCOME.OK
 
 
-def assemble_pose(a: Assembly, wanted: Floats, q: Floats) -> bool:
+def assemble_pose(a: Assembly, target: Floats, q: Floats) -> bool:
     """Fill q with the nearest pose in which clamped coordinates are in their ranges; return whether there is one."""
-    size, held, ranges = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD), at(a.c, RANGES)
-    clamped, given = at(held, CLAMPED * size), a.w
+    size, status, ranges = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD), at(a.c, RANGES)
+    clamped, fixed = at(status, CLAMPED * size), a.w
     for k in range(size):
-        given[k] = wanted[k]
-        if held[k] == HELD_AT_END:
-            held[k] = FREED
+        fixed[k] = target[k]
+        if status[k] == HELD_AT_END:
+            status[k] = FREED
     while True:
-        if not find_nearest(a, wanted, q):
+        if not find_nearest(a, target, q):
             return False
         worst, most = -1, OUTSIDE
         for k in range(size):
-            if clamped[k] > 0 and held[k] == FREED:
+            if clamped[k] > 0 and status[k] == FREED:
                 outside = max(ranges[2 * k] - q[k], q[k] - ranges[2 * k + 1])
                 if outside > most:
                     worst, most = k, outside
@@ -163,11 +164,11 @@ def assemble_pose(a: Assembly, wanted: Floats, q: Floats) -> bool:
             return True
         # Fix the coordinate that leaves its range furthest at the end of it; then the others may
         # fit.
-        held[worst] = HELD_AT_END
-        given[worst] = min(max(q[worst], ranges[2 * worst]), ranges[2 * worst + 1])
+        status[worst] = HELD_AT_END
+        fixed[worst] = min(max(q[worst], ranges[2 * worst]), ranges[2 * worst + 1])
 
 
-def find_nearest(a: Assembly, wanted: Floats, q: Floats) -> bool:
+def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
     """Fill q with the nearest pose, whatever the ranges; return whether there is one."""
     size, tolerance = a.model[MODEL.DOFS], a.c[TOLERANCE]
     copy(size, a.w, q)
@@ -184,14 +185,14 @@ def find_nearest(a: Assembly, wanted: Floats, q: Floats) -> bool:
         return True
     before, has_curvature, step = inf, False, at(a.w, size)
     for _ in range(MAX_STEPS):
-        value = measure_change(a, wanted, q)
+        value = measure_change(a, target, q)
         if value < tolerance * tolerance:
             # Nothing that counts has moved.
             return True
-        length = find_step(a, wanted, q, has_curvature)
+        length = find_step(a, target, q, has_curvature)
         if not has_curvature and length > FAST * before:
             has_curvature = True
-            length = find_step(a, wanted, q, has_curvature)
+            length = find_step(a, target, q, has_curvature)
         furthest = 1.0
         for k in range(size):
             furthest = max(furthest, 1.0 + abs(q[k]))
@@ -203,7 +204,7 @@ def find_nearest(a: Assembly, wanted: Floats, q: Floats) -> bool:
                 trial[k] = q[k] + part * step[k]
             if not restore_pose(a, trial, False):
                 return False
-            if is_tiny or measure_change(a, wanted, trial) < value:
+            if is_tiny or measure_change(a, target, trial) < value:
                 break
             part *= 0.5
             if part < 1e-3:
@@ -221,27 +222,27 @@ def find_nearest(a: Assembly, wanted: Floats, q: Floats) -> bool:
 
 def list_freed(a: Assembly) -> int:
     """List the degrees of freedom that may change; return their count."""
-    size, held, count = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD), 0
-    free = at(held, FREE * size)
+    size, status, count = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD), 0
+    free = at(status, FREE * size)
     for k in range(size):
-        if held[k] == FREED:
+        if status[k] == FREED:
             free[count] = k
             count += 1
     return count
 
 
-def measure_change(a: Assembly, wanted: Floats, q: Floats) -> float:
+def measure_change(a: Assembly, target: Floats, q: Floats) -> float:
     """Return half the sum of the squared changes that count."""
     size, total = a.model[MODEL.DOFS], 0.0
     counted = at(a.p, ASSEMBLY_HEAD + COUNTED * size)
     for k in range(size):
         if counted[k] > 0:
-            total += (q[k] - wanted[k]) * (q[k] - wanted[k])
+            total += (q[k] - target[k]) * (q[k] - target[k])
     return 0.5 * total
 
 
 def evaluate_equations(a: Assembly, q: Floats) -> float:
-    """Find errors and rows of the equations of a pose; return the largest error, infinite if one is no number."""
+    """Evaluate errors and rows of the equations of a pose; return the largest error, infinite if undefined."""
     model, size = a.model, a.model[MODEL.DOFS]
     copy(size, q, a.y)
     if a.p[MOVES_LINKS] > 0:
@@ -264,23 +265,23 @@ def count_equations(a: Assembly) -> int:
 
 
 def rows_of(a: Assembly) -> Floats:
-    """Return where the derivatives of the errors by the coordinates (m, n) are."""
+    """Return the derivatives of the errors by the coordinates (m, n)."""
     return at(a.w, 7 * a.model[MODEL.DOFS] + 3 * count_equations(a))
 
 
 def factor_of(a: Assembly) -> Floats:
-    """Return where the factor of the equations of the free coordinates is."""
+    """Return the factor of the equations of the free coordinates."""
     return at(rows_of(a), count_equations(a) * a.model[MODEL.DOFS])
 
 
 def follow_couplers(a: Assembly, q: Floats) -> None:
-    """Let coordinates that depend on others and do not count start where the others want them."""
-    size, held = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD)
-    counted, couplers = at(held, COUNTED * size), at(held, COUPLER_AT * size)
+    """Move dependent coordinates that do not count to the values that their couplers give."""
+    size, status = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD)
+    counted, couplers = at(status, COUNTED * size), at(status, COUPLER_AT * size)
     start = a.model[MODEL.CONSTRAINED]
     for k in range(a.p[COUPLERS]):
         dependent = couplers[2 * k]
-        if held[dependent] == FREED and counted[dependent] == 0:
+        if status[dependent] == FREED and counted[dependent] == 0:
             evaluate_equations(a, q)
             # The error of a coupler is its function less the coordinate.
             q[dependent] += a.data[a.model[start + CONSTRAINED.WORK_ERRORS] + couplers[2 * k + 1]]
@@ -289,14 +290,14 @@ def follow_couplers(a: Assembly, q: Floats) -> None:
 def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
     """Factorise the equations of the free coordinates, each with a left side of unit length; return their rank."""
     size, count = a.model[MODEL.DOFS], count_equations(a)
-    held, rows, factor = at(a.p, ASSEMBLY_HEAD), rows_of(a), factor_of(a)
-    counted, places = at(held, COUNTED * size), at(held, FREE * size)
+    status, rows, factor = at(a.p, ASSEMBLY_HEAD), rows_of(a), factor_of(a)
+    counted, free_list = at(status, COUNTED * size), at(status, FREE * size)
     lengths, longest = at(a.w, 7 * size + count), 1.0
     for i in range(count):
         total = 0.0
         for k in range(free):
-            entry = rows[size * i + places[k]]
-            if is_eased and counted[places[k]] == 0:
+            entry = rows[size * i + free_list[k]]
+            if is_eased and counted[free_list[k]] == 0:
                 entry *= EASE
             factor[free * i + k] = entry
             total += entry * entry
@@ -313,9 +314,9 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
 def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
     """Move q to where the equations hold, by Newton's method with the shortest steps; return whether they do."""
     size, count, tolerance = a.model[MODEL.DOFS], count_equations(a), a.c[TOLERANCE]
-    held, errors, factor = at(a.p, ASSEMBLY_HEAD), at(a.w, 7 * size), factor_of(a)
-    counted, places = at(held, COUNTED * size), at(held, FREE * size)
-    step, trial, room = at(a.w, 2 * size), at(a.w, 3 * size), at(factor, factor_room(count, size))
+    status, errors, factor = at(a.p, ASSEMBLY_HEAD), at(a.w, 7 * size), factor_of(a)
+    counted, free_list = at(status, COUNTED * size), at(status, FREE * size)
+    step, trial, work = at(a.w, 2 * size), at(a.w, 3 * size), at(factor, factor_room(count, size))
     lengths, values = at(errors, count), at(errors, 2 * count)
     free, largest = list_freed(a), evaluate_equations(a, q)
     for _ in range(MAX_STEPS):
@@ -324,16 +325,16 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
         rank = factorise_rows(a, free, not is_assembled)
         for i in range(count):
             values[i] = -errors[i] / lengths[i]
-        minimum_norm(count, free, factor, rank, values, room, step)
+        minimum_norm(count, free, factor, rank, values, work, step)
         furthest = LONGEST_STEP
         for k in range(free):
-            if not is_assembled and counted[places[k]] == 0:
+            if not is_assembled and counted[free_list[k]] == 0:
                 step[k] *= EASE
             furthest = max(furthest, abs(step[k]))
         # Far from a solution the linearization is poor: take short steps, even where errors grow.
         copy(size, q, trial)
         for k in range(free):
-            trial[places[k]] += LONGEST_STEP / furthest * step[k]
+            trial[free_list[k]] += LONGEST_STEP / furthest * step[k]
         new = evaluate_equations(a, trial)
         if largest <= tolerance and not new < 0.5 * largest:
             break
@@ -342,19 +343,21 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
     return largest <= tolerance
 
 
-def find_step(a: Assembly, wanted: Floats, q: Floats, has_curvature: bool) -> float:
+def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> float:
     """Find Newton's step in the null space of the linearized equations.
 
-    Args: a: the assembly; its work vector gets the step of every degree of freedom (rad or m).
-        wanted: desired values of the coordinates (n,). q: present values (n,). has_curvature:
-        whether the Hessian contains the equations times their multipliers, besides the cost.
+    Args:
+        a: assembly; its work vector is filled with the step of every degree of freedom (rad or m).
+        target: desired values of the coordinates (n,).
+        q: present values (n,).
+        has_curvature: whether the Hessian contains the equations times their multipliers, besides the cost.
 
     Returns:
         The largest change of a coordinate (rad or m).
     """
     size, count = a.model[MODEL.DOFS], count_equations(a)
-    held, factor, step = at(a.p, ASSEMBLY_HEAD), factor_of(a), at(a.w, size)
-    counted, places = at(held, COUNTED * size), at(held, FREE * size)
+    status, factor, step = at(a.p, ASSEMBLY_HEAD), factor_of(a), at(a.w, size)
+    counted, free_list = at(status, COUNTED * size), at(status, FREE * size)
     gradient, along = (
         at(a.w, 5 * size),
         at(factor, factor_room(count, size) + count * size + count * count),
@@ -365,13 +368,13 @@ def find_step(a: Assembly, wanted: Floats, q: Floats, has_curvature: bool) -> fl
     left = free - rank
     curvature, spare = at(along, size * size), at(along, 2 * size * size)
     for k in range(free):
-        gradient[k] = q[places[k]] - wanted[places[k]] if counted[places[k]] > 0 else 0.0
+        gradient[k] = q[free_list[k]] - target[free_list[k]] if counted[free_list[k]] > 0 else 0.0
     write_null_space(free, factor, rank, along)
     for k in range(left):
         for m in range(left):
             total = 0.0
             for j in range(free):
-                if counted[places[j]] > 0:
+                if counted[free_list[j]] > 0:
                     total += along[free * k + j] * along[free * m + j]
             curvature[left * k + m] = total
     if has_curvature:
@@ -397,7 +400,7 @@ def find_step(a: Assembly, wanted: Floats, q: Floats, has_curvature: bool) -> fl
         total = 0.0
         for k in range(left):
             total += along[free * k + j] * lengths[k]
-        step[places[j]] = total
+        step[free_list[j]] = total
         largest = max(largest, abs(total))
     return largest
 
@@ -413,13 +416,13 @@ def add_curvature(
         at(a.w, 7 * size + count),
         at(a.w, 7 * size + 2 * count),
     )
-    places, trial = at(a.p, ASSEMBLY_HEAD + FREE * size), at(a.w, 3 * size)
+    free_list, trial = at(a.p, ASSEMBLY_HEAD + FREE * size), at(a.w, 3 * size)
     unit = at(factor, factor_room(count, size))
-    normal, bent = at(unit, count * size), at(along, 2 * size * size)
+    normal, row_change = at(unit, count * size), at(along, 2 * size * size)
     for i in range(count):
         multipliers[i] = 0.0
         for k in range(free):
-            unit[free * i + k] = rows[size * i + places[k]] / lengths[i]
+            unit[free * i + k] = rows[size * i + free_list[k]] / lengths[i]
             multipliers[i] -= unit[free * i + k] * gradient[k]
     for i in range(count):
         for j in range(count):
@@ -434,42 +437,42 @@ def add_curvature(
         multipliers[i] /= lengths[i]
     for k in range(left):
         for j in range(free):
-            bent[j] = 0.0
+            row_change[j] = 0.0
         for side in range(2):
             change = DIFFERENCE if side == 0 else -DIFFERENCE
             copy(size, q, trial)
             for j in range(free):
-                trial[places[j]] += change * along[free * k + j]
+                trial[free_list[j]] += change * along[free * k + j]
             evaluate_equations(a, trial)
             for j in range(free):
                 for i in range(count):
-                    bent[j] += multipliers[i] * rows[size * i + places[j]] / (2.0 * change)
+                    row_change[j] += multipliers[i] * rows[size * i + free_list[j]] / (2.0 * change)
         for m in range(left):
             total = 0.0
             for j in range(free):
-                total += along[free * m + j] * bent[j]
+                total += along[free * m + j] * row_change[j]
             # Half of it on either side of the diagonal, so that rounding does not make it lopsided.
             curvature[left * k + m] += 0.5 * total
             curvature[left * m + k] += 0.5 * total
 
 
-def step_downhill(count: int, curvature: Floats, vectors: Floats, room: Floats, x: Floats) -> None:
-    """Solve for a step where the curvature is not positive: downhill where it is negative, none where it is flat.
+def step_downhill(count: int, curvature: Floats, vectors: Floats, work: Floats, x: Floats) -> None:
+    """Solve for a step where the Hessian is indefinite: downhill for negative, zero for no curvature.
 
     Args:
-        count: of the unknowns.
-        curvature: symmetric (count, count); destroyed.
-        vectors: room for as many numbers.
-        room: for count numbers.
-        x: the slopes downwards, then the step.
+        count: number of unknowns.
+        curvature: symmetric matrix (count, count); destroyed.
+        vectors: workspace (count, count).
+        work: workspace (count,).
+        x: negative gradient, then the step.
     """
     diagonalize(count, curvature, vectors)
     for k in range(count):
         total, value = 0.0, abs(curvature[count * k + k])
         for j in range(count):
             total += vectors[count * k + j] * x[j]
-        room[k] = 0.0 if value < FLAT else total / value
+        work[k] = 0.0 if value < FLAT else total / value
     for j in range(count):
         x[j] = 0.0
         for k in range(count):
-            x[j] += vectors[count * k + j] * room[k]
+            x[j] += vectors[count * k + j] * work[k]

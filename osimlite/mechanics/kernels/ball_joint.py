@@ -1,4 +1,11 @@
-"""The motion of a ball or ellipsoid joint, whose speeds are not the rates of its angles."""
+"""Motion of ball and ellipsoid joints, whose generalized speeds are angular velocities.
+
+With the body-fixed X-Y-Z angles q and the angular velocity u in the parent, the rates are
+qdot = N(q) u, as in :class:`osimlite.mechanics.multibody.motions.SphericalMotion`. The end of the
+motion lies on an ellipsoid with the half axes r at r * n, the elementwise product of r and the
+third axis n of the rotation (A. Seth et al., Minimal formulation of joint motion for
+biomechanisms, Nonlinear Dynamics 62, 2010); r = 0 for a ball joint.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +47,7 @@ from osimlite.mechanics.laws.vectors import (
 def place_ball(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Pass the frame in SCRATCH on by the motion."""
+    """Advance the frame in SCRATCH by the rotation and translation of a ball or ellipsoid joint."""
     j = operation_ints(model, operation)
     kept, frame, radii = (
         operation_work(model, data, operation),
@@ -70,7 +77,13 @@ def place_ball(
 def move_ball(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Columns of the three speeds, rates of the angles; velocity and own acceleration in SCRATCH."""
+    """Write the columns of the three speeds and the rates of the angles.
+
+    Velocity and acceleration while udot = 0 of the motion itself go to SCRATCH.
+
+    Returns:
+        `OUTCOME.SINGULAR_RATES` where the second angle is a right angle, else `OUTCOME.OK`.
+    """
     j = operation_ints(model, operation)
     kept, result, radii = (
         operation_work(model, data, operation),
@@ -101,7 +114,7 @@ def move_ball(
 
 
 def angle_row(y: Floats, angles: Ints, part: int) -> Vector:
-    """What the speeds of a ball do to one of its angles: a row of N, as `SphericalMotion` has it."""
+    """Return the row of N that gives the rate of one angle from the three speeds."""
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     if part == 1:
@@ -110,9 +123,16 @@ def angle_row(y: Floats, angles: Ints, part: int) -> Vector:
 
 
 def angle_drift(y: Floats, f: Floats, angles: Ints, row: Vector) -> float:
-    """Acceleration of an angle without udot, for its row; f has the rates r.
+    """Return the acceleration of an angle while udot = 0.
 
-    The speeds are B r with the axes of the angles as columns, which turn.
+    The speeds are u = B r, where r are the rates and the columns of B the axes of the angles, so that
+    qddot = N (udot - Bdot r).
+
+    Args:
+        y: state.
+        f: rates of the coordinates.
+        angles: degrees of freedom of the three angles.
+        row: row of N of the angle.
     """
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
@@ -123,12 +143,12 @@ def angle_drift(y: Floats, f: Floats, angles: Ints, row: Vector) -> float:
 
 
 def last_axis(y: Floats, angles: Ints) -> Vector:
-    """The last axis of a ball, in its frame."""
+    """Return the third axis n of the rotation of a ball, in its parent frame."""
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     return s2, -s1 * c2, c1 * c2
 
 
 def left_behind(far: Vector, turn: Vector, n: Vector) -> Vector:
-    """What a turn moves the far end r * n by, which is r * (e x n), brought to the start: less e x (r * n)."""
+    """Return the velocity of the end r * n less that of the rotating frame: r * (e x n) - e x (r * n)."""
     return minus(elementwise(far, cross(turn, n)), cross(turn, elementwise(far, n)))

@@ -1,7 +1,7 @@
-"""Many curves of Bezier sections asked at once, as :mod:`osimlite.mechanics.laws.bezier` asks one, to the last bit.
+"""Evaluation of many Bezier curves at once, bit-identical to :mod:`osimlite.mechanics.laws.bezier`.
 
-What is asked has a lane each, whose numbers lie side by side: the steps of the search are the same
-for all lanes, and a processor takes as many at a time as it can.
+Each request has a lane, and the numbers of all lanes are stored side by side: the search takes the
+same steps in all lanes, so that compilers use vector instructions.
 """
 
 from __future__ import annotations
@@ -27,17 +27,35 @@ from osimlite.mechanics.laws.bezier import (
 )
 
 LANES = 64
-"""So many can be asked at once."""
+"""Largest number of requests at once."""
 COEFFICIENTS = STARTS - X
-VALUE, INSIDE, GOES_ON, REST, U, OF_X, ROWS = 0, 1, 2, 3, 4, 5, 5 + COEFFICIENTS
-"""Rows of the room, each of LANES numbers: the answer; 0 where the argument is outside of the
-curve, and the answer there at once; whether the search has to go on, how far the argument is from
-the start of its section, the place on that, and its coefficients.
-"""
+"""Number of coefficients of a section."""
+VALUE = 0
+"""Row of the workspace of the results."""
+INSIDE = 1
+"""Row of 0.0 for an argument beyond the curve, whose result is known at once, else 1.0."""
+GOES_ON = 2
+"""Row of 1.0 while the search continues, else 0.0."""
+REST = 3
+"""Row of the distances of the arguments from the start of their sections."""
+U = 4
+"""Row of the parameters u."""
+OF_X = 5
+"""First row of the coefficients of the sections."""
+ROWS = 5 + COEFFICIENTS
+"""Number of rows, each of LANES numbers."""
 
 
 def ask(x: Floats, room: Floats, number: int, place: int, z: float) -> None:
-    """Ask for the curve at a place among the numbers of the model."""
+    """Request the value of a curve.
+
+    Args:
+        x: numbers of the model.
+        room: workspace of the requests.
+        number: number of the request.
+        place: offset of the curve in `x`.
+        z: argument.
+    """
     c: Any = at(x, place)
     lane = at(room, number)
     end = FIRST if not z >= c[FIRST] else LAST
@@ -56,7 +74,17 @@ def ask(x: Floats, room: Floats, number: int, place: int, z: float) -> None:
 def ask_sum(
     x: Floats, room: Floats, number: int, place: int, of_y: float, of_x: float, total: float
 ) -> None:
-    """Ask where a sum of a curve and its argument is a total, see :func:`osimlite.mechanics.laws.bezier.value_of_sum`."""
+    """Request the value of a curve where ``of_y * y + of_x * x`` has a total, see `bezier.value_of_sum`.
+
+    Args:
+        x: numbers of the model.
+        room: workspace of the requests.
+        number: number of the request.
+        place: offset of the curve in `x`.
+        of_y: factor of the curve.
+        of_x: factor of its argument.
+        total: value of the sum.
+    """
     c: Any = at(x, place)
     lane = at(room, number)
     end = end_of_sum(c, of_y, of_x, total)
@@ -76,19 +104,25 @@ def ask_sum(
 
 
 def missed_of(room: Any, number: int) -> float:
-    """How far a search has ended from where it was to."""
+    """Return the residual of a search."""
     return missed(
         room, LANES * OF_X + number, LANES, room[LANES * U + number], room[LANES * REST + number]
     )
 
 
 def value_of(room: Floats, number: int) -> float:
-    """The value of what was asked."""
+    """Return the result of a request."""
     return room[LANES * VALUE + number]
 
 
 def answer(room: Any, asked: int, rounds: int) -> None:
-    """Answer all that was asked; as a rule a search takes so many rounds, which all go together."""
+    """Compute all requests.
+
+    Args:
+        room: workspace of the requests.
+        asked: number of requests.
+        rounds: number of search steps that all lanes take together; it is usually enough.
+    """
     for lane in range(asked):
         room[LANES * GOES_ON + lane] = 1.0
     for _ in range(rounds):
@@ -105,7 +139,7 @@ def answer(room: Any, asked: int, rounds: int) -> None:
 
 
 def step(room: Any, lane: int) -> None:
-    """A round of a search that goes on."""
+    """Take a search step in one lane."""
     before, is_going = room[LANES * U + lane], room[LANES * GOES_ON + lane] > 0.0
     u, goes_on = nearer_place(room, LANES * OF_X + lane, LANES, before, room[LANES * REST + lane])
     room[LANES * U + lane] = u if is_going else before
@@ -113,7 +147,7 @@ def step(room: Any, lane: int) -> None:
 
 
 def tell(room: Any, lane: int) -> None:
-    """What a search has come to."""
+    """Store the result of a search."""
     value, _ = value_at(room, LANES * OF_X + lane, LANES, room[LANES * U + lane])
     is_inside = room[LANES * INSIDE + lane] > 0.0
     room[LANES * VALUE + lane] = value if is_inside else room[LANES * VALUE + lane]

@@ -1,13 +1,13 @@
 """Cables: paths over obstacles, as in Simbody's CableSpan with the algorithm of Scholz et al.
 
-Between two points of a cable all geodesics are corrected at once: each has four numbers, by which
-its start is moved along it and across it, and turned, and by which it gets longer. They are those
-that would take away what is not smooth where geodesics and lines meet, if that changed linearly,
-while lengths change little. This ends at 1e-5 rad. Obstacles are left, and met, on the way.
+All geodesics between two points of a cable are corrected together. Each has four unknowns: its
+start moves along and across it, and rotates, and it becomes longer. A linearization gives the
+corrections that remove the kinks where geodesics and lines meet, while lengths change little. The
+search ends at 1e-5 rad. Obstacles are lifted off and touched on the way.
 
-Simbody starts each search from the path that it found last. Here all start from the path of the
-default pose, as in OpenSim right after initSystem: what is found depends on the pose alone. So in a
-motion directions differ from OpenSim's by what both may be wrong by, 1e-5 rad.
+Simbody starts each search from the previous path. Here all start from the path of the default pose,
+as in OpenSim right after initSystem, so that the result depends on the pose alone. During a motion
+directions therefore differ from OpenSim's by the tolerance of both, 1e-5 rad.
 
 Source: A. Scholz, M. Sherman, I. Stavness, S. Delp, A. Kecskemethy, A fast multi-obstacle muscle
 wrapping method using natural geodesic variations, Multibody System Dynamics 36, 2016.
@@ -60,55 +60,87 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-COUNT, SOLVER, ELEMENTS = ITEM.OWN + 1, ITEM.OWN + 2, ITEM.OWN + 3
-"""Integers of a cable: how many elements it has, where in its record room for the search is, and the elements."""
+COUNT = ITEM.OWN + 1
+"""Index in the integers of a cable of the number of its elements."""
+SOLVER = ITEM.OWN + 2
+"""Index of the offset in the record of the workspace of the search."""
+ELEMENTS = ITEM.OWN + 3
+"""Offset of the elements."""
 ELEMENT_INTS = 4
-IS_OBSTACLE, LINK, AT, KEPT = 0, 1, 2, 3
-"""Integers of an element of a cable: whether it is an obstacle or a point; its link; where its
-numbers and its part of the record are.
-"""
+"""Number of integers of an element."""
+IS_OBSTACLE = 0
+"""Index in an element of 1 for an obstacle, 0 for a point."""
+LINK = 1
+"""Index of its link."""
+AT = 2
+"""Index of the offset of its numbers."""
+KEPT = 3
+"""Index of the offset of its part of the record."""
 FIRST = 3
-"""Where the parts of the record begin."""
+"""Offset in the record of the parts of the elements."""
 
-PLACE, PULLED = 0, 3
-"""Numbers of a point: the station that the cable runs through, and the one that it pulls at."""
-BEFORE, AFTER = 3, 6
-"""Its part of the record, after the place in ground: directions of the cable before and after it."""
+PLACE = 0
+"""Offset in the numbers of a point of the station that the cable passes (m)."""
+PULLED = 3
+"""Offset of the station at which the cable pulls (m)."""
+BEFORE = 3
+"""Offset in the record of a point of the direction before it; its position in ground comes first."""
+AFTER = 6
+"""Offset of the direction after it."""
 POINT_WORK = 9
+"""Length of the record of a point."""
 
-STATE, TRACKED, GEODESIC = 0, 1, 4
-"""How a cable is on an obstacle: whether it touches; the point of a line that was nearest to the
-surface, or that of a guess; the geodesic.
-"""
+STATE = 0
+"""Index in the record of an obstacle of its state, such as TOUCHES."""
+TRACKED = 1
+"""Offset of the point of a line that was nearest to the surface, or of a guess."""
+GEODESIC = 4
+"""Offset of the geodesic."""
 TOUCH_NUMBERS = GEODESIC + GEODESIC_NUMBERS
-POSE, BEGIN, SURFACE = 0, 12, 12 + TOUCH_NUMBERS
-"""Numbers of an obstacle: its rotation in the link by rows and its place; how the cable is on it
-before the search; the surface.
-"""
-IN_GROUND, GROUND_START, GROUND_END = (
-    TOUCH_NUMBERS,
-    TOUCH_NUMBERS + 12,
-    TOUCH_NUMBERS + 12 + END_NUMBERS,
-)
-"""Its part of the record, after how the cable is on it: its pose in ground, and the ends of the geodesic in ground."""
+"""Length of state, point and geodesic."""
+POSE = 0
+"""Offset in the numbers of an obstacle of its rotation in the link by rows, then its origin."""
+BEGIN = 12
+"""Offset of state, point and geodesic at the start of the search."""
+SURFACE = 12 + TOUCH_NUMBERS
+"""Offset of the numbers of its surface."""
+IN_GROUND = TOUCH_NUMBERS
+"""Offset in the record of an obstacle of its pose in ground."""
+GROUND_START = TOUCH_NUMBERS + 12
+"""Offset of the first end of the geodesic in ground."""
+GROUND_END = TOUCH_NUMBERS + 12 + END_NUMBERS
+"""Offset of the last end of the geodesic in ground."""
 OBSTACLE_WORK = GROUND_END + END_NUMBERS
-TOUCHES, GUESSED, LIFTED = 0.0, 1.0, 2.0
+"""Length of the record of an obstacle."""
+TOUCHES = 0.0
+"""State of an obstacle that the cable touches."""
+GUESSED = 1.0
+"""State of an obstacle that the cable touches near a guess."""
+LIFTED = 2.0
+"""State of an obstacle that the cable does not touch."""
 
-UNKNOWNS, EQUATIONS = 4, 5
-"""Unknowns of each obstacle in the search for a cable (its geodesic has four variations), and its equations."""
-SMOOTH, LARGEST, ROUNDS = 1e-5, radians(10.0), 50
-"""The search ends at this angle, turns an end by no more than this, and has so many rounds."""
+UNKNOWNS = 4
+"""Number of unknowns of an obstacle: the natural variations of its geodesic."""
+EQUATIONS = 5
+"""Number of equations of an obstacle: two per end, and one for the length."""
+SMOOTH = 1e-5
+"""Largest kink (rad) at which the search ends."""
+LARGEST = radians(10.0)
+"""Largest rotation of an end in one correction (rad)."""
+ROUNDS = 50
+"""Largest number of corrections."""
 SIGNIFICANT = 2.0**-45.5
+"""Threshold of independence per equation, Simbody's significant part of a double."""
 
 
 def solver_room(obstacles: int) -> int:
-    """How many numbers a search takes for so many obstacles between two points."""
+    """Return the length of the workspace of a search with `obstacles` obstacles between two points."""
     count, size = EQUATIONS * obstacles, UNKNOWNS * obstacles
     return GEODESIC_ROOM + 4 * (obstacles + 1) + factor_room(count, size) + 2 * count + size
 
 
 def cable_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Length and speed of a cable; NaN if it is none, since a point is inside an obstacle."""
+    """Compute length and speed of a cable; they are NaN where a point is inside an obstacle."""
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     result = at(data, i[ITEM.RECORD])
     elements = at(i, ELEMENTS)
@@ -123,105 +155,130 @@ def cable_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     return OUTCOME.OK
 
 
-def place_element(model: Ints, data: Floats, element: Ints, p: Floats, found: Floats) -> None:
-    """Where an element is in ground; where an obstacle is touched at first."""
-    own, kept, link = at(p, element[AT]), at(found, element[KEPT]), element[LINK]
+def place_element(model: Ints, data: Floats, element: Ints, p: Floats, record: Floats) -> None:
+    """Compute the position of a point, or the pose and the initial contact of an obstacle."""
+    numbers, part, link = at(p, element[AT]), at(record, element[KEPT]), element[LINK]
     if element[IS_OBSTACLE] == 0:
-        put(kept, 0, station(model, data, link, vector(own, PLACE)))
+        put(part, 0, station(model, data, link, vector(numbers, PLACE)))
         return
-    place_frame(model, data, link, own, vector(own, 9), at(kept, IN_GROUND))
+    place_frame(model, data, link, numbers, vector(numbers, 9), at(part, IN_GROUND))
     for k in range(TOUCH_NUMBERS):
-        kept[k] = own[BEGIN + k]
+        part[k] = numbers[BEGIN + k]
 
 
 def to_ground(pose: Floats, point: Vector) -> Vector:
-    """A point of a surface in ground."""
+    """Return a point of a surface in ground."""
     return plus(vector(pose, 9), turned(pose, point))
 
 
-def span(elements: Ints, p: Floats, found: Floats, first: int, last: int, room: Floats) -> float:
-    """Find the cable between two points; returns its length."""
-    lines = at(room, GEODESIC_ROOM)
+def span(elements: Ints, p: Floats, record: Floats, first: int, last: int, work: Floats) -> float:
+    """Find the cable between two points.
+
+    Args:
+        elements: integers of the elements.
+        p: numbers of the cable.
+        record: record of the cable.
+        first: number of the first point.
+        last: number of the last point.
+        work: workspace of the search.
+
+    Returns:
+        The length (m), NaN if there is no such cable.
+    """
+    lines = at(work, GEODESIC_ROOM)
     count = 0
-    for turn in range(ROUNDS + 1):
+    for round_number in range(ROUNDS + 1):
         for k in range(first + 1, last):
-            if not touch(elements, p, found, first, k, last, room):
+            if not touch(elements, p, record, first, k, last, work):
                 return nan
-        count = draw_lines(elements, found, first, last, lines)
+        count = draw_lines(elements, record, first, last, lines)
         values = at(lines, 4 * (count + 1))
-        rough = roughness(elements, found, first, last, lines, values)
+        rough = roughness(elements, record, first, last, lines, values)
         if isnan(rough):
             return nan
-        if rough <= SMOOTH or turn == ROUNDS:
+        if rough <= SMOOTH or round_number == ROUNDS:
             break
-        if not correct(elements, p, found, first, last, count, rough, room):
+        if not correct(elements, p, record, first, last, count, rough, work):
             return nan
-    put(at(found, elements[ELEMENT_INTS * first + KEPT]), AFTER, vector(lines, 0))
-    put(at(found, elements[ELEMENT_INTS * last + KEPT]), BEFORE, vector(lines, 4 * count))
+    put(at(record, elements[ELEMENT_INTS * first + KEPT]), AFTER, vector(lines, 0))
+    put(at(record, elements[ELEMENT_INTS * last + KEPT]), BEFORE, vector(lines, 4 * count))
     length = 0.0
     for k in range(count + 1):
         length += lines[4 * k + 3]
     for k in range(first + 1, last):
-        kept = at(found, elements[ELEMENT_INTS * k + KEPT])
-        if kept[STATE] == TOUCHES:
-            length += kept[GEODESIC + ARC]
+        part = at(record, elements[ELEMENT_INTS * k + KEPT])
+        if part[STATE] == TOUCHES:
+            length += part[GEODESIC + ARC]
     return length
 
 
 def touch(
-    elements: Ints, p: Floats, found: Floats, first: int, number: int, last: int, room: Floats
+    elements: Ints, p: Floats, record: Floats, first: int, number: int, last: int, work: Floats
 ) -> bool:
-    """Tell whether the cable touches an obstacle now, and where; whether no neighbour is inside it."""
+    """Update whether the cable touches an obstacle.
+
+    Args:
+        elements: integers of the elements.
+        p: numbers of the cable.
+        record: record of the cable.
+        first: number of the point before.
+        number: number of the obstacle.
+        last: number of the point after.
+        work: workspace of the search.
+
+    Returns:
+        False if a neighbouring point is inside the obstacle or there is no geodesic.
+    """
     element = at(elements, ELEMENT_INTS * number)
-    own, kept = at(p, element[AT]), at(found, element[KEPT])
-    geodesic, pose, surface = at(kept, GEODESIC), at(kept, IN_GROUND), at(own, SURFACE)
-    if kept[STATE] != TOUCHES or not geodesic[ARC] > 0.0:
-        before = neighbour(elements, found, pose, number, -1, first)
-        after = neighbour(elements, found, pose, number, 1, last)
+    numbers, part = at(p, element[AT]), at(record, element[KEPT])
+    geodesic, pose, surface = at(part, GEODESIC), at(part, IN_GROUND), at(numbers, SURFACE)
+    if part[STATE] != TOUCHES or not geodesic[ARC] > 0.0:
+        before = neighbour(elements, record, pose, number, -1, first)
+        after = neighbour(elements, record, pose, number, 1, last)
         if value(surface, before) > 0.0 or value(surface, after) > 0.0:
             return False
-        way = minus(after, before)
-        if kept[STATE] == GUESSED:
-            kept[STATE] = TOUCHES
-            if not shoot(surface, vector(kept, TRACKED), way, 0.0, geodesic, room):
+        chord = minus(after, before)
+        if part[STATE] == GUESSED:
+            part[STATE] = TOUCHES
+            if not shoot(surface, vector(part, TRACKED), chord, 0.0, geodesic, work):
                 return False
-        elif kept[STATE] == TOUCHES:
+        elif part[STATE] == TOUCHES:
             point, normal = vector(geodesic, START + POINT), vector(geodesic, START + NORMAL)
             if dot(minus(before, point), normal) > 0.0 and dot(minus(after, point), normal) > 0.0:
-                kept[STATE] = LIFTED
-                put(kept, TRACKED, point)
+                part[STATE] = LIFTED
+                put(part, TRACKED, point)
         else:
-            below, point = nearest_on_line(surface, before, after, vector(kept, TRACKED))
-            put(kept, TRACKED, point)
+            below, point = nearest_on_line(surface, before, after, vector(part, TRACKED))
+            put(part, TRACKED, point)
             if below:
-                kept[STATE] = TOUCHES
-                if not shoot(surface, point, way, 0.0, geodesic, room):
+                part[STATE] = TOUCHES
+                if not shoot(surface, point, chord, 0.0, geodesic, work):
                     return False
-    if kept[STATE] == TOUCHES:
-        end_to_ground(pose, at(geodesic, START), at(kept, GROUND_START))
-        end_to_ground(pose, at(geodesic, END), at(kept, GROUND_END))
+    if part[STATE] == TOUCHES:
+        end_to_ground(pose, at(geodesic, START), at(part, GROUND_START))
+        end_to_ground(pose, at(geodesic, END), at(part, GROUND_END))
     return True
 
 
 def neighbour(
-    elements: Ints, found: Floats, pose: Floats, number: int, step: int, limit: int
+    elements: Ints, record: Floats, pose: Floats, number: int, step: int, limit: int
 ) -> Vector:
-    """The next end of the cable before (-1) or after (1) an obstacle, as this sees it."""
+    """Return the next end of the cable before (-1) or after (1) an obstacle, in the obstacle's frame."""
     k = number + step
-    while k != limit and found[elements[ELEMENT_INTS * k + KEPT] + STATE] == LIFTED:
+    while k != limit and record[elements[ELEMENT_INTS * k + KEPT] + STATE] == LIFTED:
         k += step
-    kept = at(found, elements[ELEMENT_INTS * k + KEPT])
+    part = at(record, elements[ELEMENT_INTS * k + KEPT])
     if k == limit:
-        point = vector(kept, 0)
+        point = vector(part, 0)
     else:
         point = to_ground(
-            at(kept, IN_GROUND), vector(kept, GEODESIC + (END if step < 0 else START) + POINT)
+            at(part, IN_GROUND), vector(part, GEODESIC + (END if step < 0 else START) + POINT)
         )
     return turned_back(pose, minus(point, vector(pose, 9)))
 
 
 def end_to_ground(pose: Floats, end: Floats, ground: Floats) -> None:
-    """An end of a geodesic in ground."""
+    """Transform an end of a geodesic to ground."""
     put(ground, POINT, to_ground(pose, vector(end, POINT)))
     for place in (ALONG, NORMAL, ACROSS):
         put(ground, place, turned(pose, vector(end, place)))
@@ -229,34 +286,38 @@ def end_to_ground(pose: Floats, end: Floats, ground: Floats) -> None:
         ground[place] = end[place]
 
 
-def draw_lines(elements: Ints, found: Floats, first: int, last: int, lines: Floats) -> int:
-    """Direction and length of each straight part; returns how many obstacles are touched."""
+def draw_lines(elements: Ints, record: Floats, first: int, last: int, lines: Floats) -> int:
+    """Compute direction and length of each straight part; return the number of touched obstacles."""
     count = 0
-    start = vector(found, elements[ELEMENT_INTS * first + KEPT])
+    start = vector(record, elements[ELEMENT_INTS * first + KEPT])
     for k in range(first + 1, last + 1):
-        kept = at(found, elements[ELEMENT_INTS * k + KEPT])
-        if k == last or kept[STATE] == TOUCHES:
-            way = minus(vector(kept, 0 if k == last else GROUND_START + POINT), start)
-            put(lines, 4 * count, unit(way))
-            lines[4 * count + 3] = norm(way)
+        part = at(record, elements[ELEMENT_INTS * k + KEPT])
+        if k == last or part[STATE] == TOUCHES:
+            chord = minus(vector(part, 0 if k == last else GROUND_START + POINT), start)
+            put(lines, 4 * count, unit(chord))
+            lines[4 * count + 3] = norm(chord)
             if k < last:
-                start = vector(kept, GROUND_END + POINT)
+                start = vector(part, GROUND_END + POINT)
                 count += 1
     return count
 
 
 def roughness(
-    elements: Ints, found: Floats, first: int, last: int, lines: Floats, values: Floats
+    elements: Ints, record: Floats, first: int, last: int, lines: Floats, values: Floats
 ) -> float:
-    """Fill in how far the lines are from the tangent of each end, towards the normal and sideways; returns the most."""
+    """Compute the kinks at both ends of each geodesic, along the normal and the binormal.
+
+    Returns:
+        The largest kink, NaN if one is not a number.
+    """
     most, number = 0.0, 0
     for k in range(first + 1, last):
-        kept = at(found, elements[ELEMENT_INTS * k + KEPT])
-        if kept[STATE] == TOUCHES:
+        part = at(record, elements[ELEMENT_INTS * k + KEPT])
+        if part[STATE] == TOUCHES:
             for end in (GROUND_START, GROUND_END):
                 line = vector(lines, 4 * (number // 4 + (0 if end == GROUND_START else 1)))
                 for axis in (NORMAL, ACROSS):
-                    error = dot(line, vector(kept, end + axis))
+                    error = dot(line, vector(part, end + axis))
                     if isnan(error):
                         return nan
                     values[number] = error
@@ -268,16 +329,27 @@ def roughness(
 def correct(
     elements: Ints,
     p: Floats,
-    found: Floats,
+    record: Floats,
     first: int,
     last: int,
     count: int,
     rough: float,
-    room: Floats,
+    work: Floats,
 ) -> bool:
-    """Correct all geodesics once; whether there are such."""
+    """Correct all geodesics once; return whether all of them exist.
+
+    Args:
+        elements: integers of the elements.
+        p: numbers of the cable.
+        record: record of the cable.
+        first: number of the point before.
+        last: number of the point after.
+        count: number of touched obstacles.
+        rough: largest kink.
+        work: workspace of the search, with lines and kinks.
+    """
     size, equations = UNKNOWNS * count, EQUATIONS * count
-    lines = at(room, GEODESIC_ROOM)
+    lines = at(work, GEODESIC_ROOM)
     values = at(lines, 4 * (count + 1))
     corrections = at(values, 2 * equations)
     a = at(corrections, size)
@@ -285,22 +357,22 @@ def correct(
         a[k] = 0.0
     number, before = 0, first
     for k in range(first + 1, last):
-        kept = at(found, elements[ELEMENT_INTS * k + KEPT])
-        if kept[STATE] == TOUCHES:
+        part = at(record, elements[ELEMENT_INTS * k + KEPT])
+        if part[STATE] == TOUCHES:
             line, next_line, row = (
                 at(lines, 4 * number),
                 at(lines, 4 * number + 4),
                 at(a, 4 * number * size),
             )
-            set_rows(kept, GROUND_START, line, at(row, 4 * number), size)
-            set_rows(kept, GROUND_END, next_line, at(row, 2 * size + 4 * number), size)
+            set_rows(part, GROUND_START, line, at(row, 4 * number), size)
+            set_rows(part, GROUND_END, next_line, at(row, 2 * size + 4 * number), size)
             if number > 0:
-                other = at(found, elements[ELEMENT_INTS * before + KEPT])
+                other = at(record, elements[ELEMENT_INTS * before + KEPT])
                 set_far_rows(
-                    kept, GROUND_START, line, other, GROUND_END, at(row, 4 * number - 4), size
+                    part, GROUND_START, line, other, GROUND_END, at(row, 4 * number - 4), size
                 )
                 back = at(a, (4 * number - 2) * size + 4 * number)
-                set_far_rows(other, GROUND_END, line, kept, GROUND_START, back, size)
+                set_far_rows(other, GROUND_END, line, part, GROUND_START, back, size)
             # Lengths are to change little as long as the path is rough.
             a[(4 * count + number) * size + 4 * number + 3] = rough
             values[4 * count + number] = 0.0
@@ -311,58 +383,70 @@ def correct(
         corrections[k] = -corrections[k]
     step, number = 1.0, 0
     for k in range(first + 1, last):
-        kept = at(found, elements[ELEMENT_INTS * k + KEPT])
-        if kept[STATE] == TOUCHES:
-            most = largest_turn(kept, at(corrections, 4 * number))
+        part = at(record, elements[ELEMENT_INTS * k + KEPT])
+        if part[STATE] == TOUCHES:
+            most = largest_turn(part, at(corrections, 4 * number))
             if most > LARGEST:
                 step = min(step, LARGEST / most)
             number += 1
     number = 0
     for k in range(first + 1, last):
         element = at(elements, ELEMENT_INTS * k)
-        kept = at(found, element[KEPT])
-        if kept[STATE] == TOUCHES:
+        part = at(record, element[KEPT])
+        if part[STATE] == TOUCHES:
             surface = at(p, element[AT] + SURFACE)
             if not shoot_again(
-                surface, at(kept, GEODESIC), at(corrections, 4 * number), step, room
+                surface, at(part, GEODESIC), at(corrections, 4 * number), step, work
             ):
                 return False
             number += 1
     return True
 
 
-def set_rows(kept: Floats, end: int, line: Floats, rows: Floats, size: int) -> None:
-    """The derivatives of both errors at an end of a geodesic by its own four numbers."""
+def set_rows(part: Floats, end: int, line: Floats, rows: Floats, size: int) -> None:
+    """Fill the derivatives of both kinks at an end of a geodesic by its own variations."""
     e = vector(line, 0)
     for k in range(2):
-        a = vector(kept, end + (NORMAL if k == 0 else ACROSS))
+        a = vector(part, end + (NORMAL if k == 0 else ACROSS))
         shift = times((1.0 if end == GROUND_START else -1.0) / line[3], along(a, -dot(e, a), e))
-        vary(kept, end, shift, cross(a, e), at(rows, k * size))
+        vary(part, end, shift, cross(a, e), at(rows, k * size))
 
 
 def set_far_rows(
-    kept: Floats, end: int, line: Floats, other: Floats, far: int, rows: Floats, size: int
+    part: Floats, end: int, line: Floats, other: Floats, far: int, rows: Floats, size: int
 ) -> None:
-    """The derivatives of both errors at an end of a geodesic by the numbers of that at the far end of the line."""
+    """Fill the derivatives of both kinks at an end by the variations of the geodesic across the line."""
     e = vector(line, 0)
     for k in range(2):
-        a = vector(kept, end + (NORMAL if k == 0 else ACROSS))
+        a = vector(part, end + (NORMAL if k == 0 else ACROSS))
         shift = times((-1.0 if end == GROUND_START else 1.0) / line[3], along(a, -dot(e, a), e))
         vary(other, far, shift, (0.0, 0.0, 0.0), at(rows, k * size))
 
 
-def fields(kept: Floats, end: int) -> tuple[float, float, float, float]:
-    """A, R and their derivatives at an end of a geodesic."""
+def fields(part: Floats, end: int) -> tuple[float, float, float, float]:
+    """Return A, R and their derivatives at an end of a geodesic.
+
+    Returns:
+        A, R, A', R'.
+    """
     if end == GROUND_START:
         return 1.0, 0.0, 0.0, 1.0
-    g = at(kept, GEODESIC)
+    g = at(part, GEODESIC)
     return g[A], g[R], g[A_RATE], g[R_RATE]
 
 
-def vary(kept: Floats, end: int, shift: Vector, turn: Vector, row: Floats) -> None:
-    """The derivatives by the four numbers of a geodesic, of what changes as its end shifts and turns."""
-    a, r, a_rate, r_rate = fields(kept, end)
-    frame = at(kept, end)
+def vary(part: Floats, end: int, shift: Vector, turn: Vector, row: Floats) -> None:
+    """Fill the derivatives by the four variations of a geodesic of a function of its end.
+
+    Args:
+        part: record of the obstacle.
+        end: GROUND_START or GROUND_END.
+        shift: derivative of the function by the position of the end.
+        turn: derivative of the function by the rotation of its frame.
+        row: filled (4,).
+    """
+    a, r, a_rate, r_rate = fields(part, end)
+    frame = at(part, end)
     t, n, b = vector(frame, ALONG), vector(frame, NORMAL), vector(frame, ACROSS)
     tt, nt, bt = dot(t, turn), dot(n, turn), dot(b, turn)
     forwards = dot(t, shift) + frame[TORSION] * tt + frame[ALONG_BENDS] * bt
@@ -373,12 +457,15 @@ def vary(kept: Floats, end: int, shift: Vector, turn: Vector, row: Floats) -> No
     row[3] = forwards if end == GROUND_END else 0.0
 
 
-def largest_turn(kept: Floats, corrections: Floats) -> float:
-    """By how much corrections turn the ends of a geodesic, as Simbody has it: only those that are positive count."""
+def largest_turn(part: Floats, corrections: Floats) -> float:
+    """Return the largest component of the rotation of the ends by corrections.
+
+    As in Simbody, only positive products count.
+    """
     most = 0.0
     for end in (GROUND_START, GROUND_END):
-        a, r, a_rate, r_rate = fields(kept, end)
-        frame = at(kept, end)
+        a, r, a_rate, r_rate = fields(part, end)
+        frame = at(part, end)
         t, n, b = vector(frame, ALONG), vector(frame, NORMAL), vector(frame, ACROSS)
         forwards = along(times(frame[TORSION], t), frame[ALONG_BENDS], b)
         sideways = along(times(-frame[ACROSS_BENDS], t), -frame[TORSION], b)
@@ -391,15 +478,23 @@ def largest_turn(kept: Floats, corrections: Floats) -> float:
 
 
 def largest(a: Vector) -> float:
-    """The largest component, by amount."""
+    """Return the largest absolute value of a component."""
     x, y, z = a
     return max(abs(x), abs(y), abs(z))
 
 
 def shoot_again(
-    surface: Floats, geodesic: Floats, corrections: Floats, step: float, room: Floats
+    surface: Floats, geodesic: Floats, corrections: Floats, step: float, work: Floats
 ) -> bool:
-    """Correct a geodesic by a part of its corrections; whether there is such."""
+    """Apply a part of the corrections to a geodesic; return whether it exists.
+
+    Args:
+        surface: numbers of the surface.
+        geodesic: geodesic; changed.
+        corrections: corrections of its four variations.
+        step: the part.
+        work: workspace of an integration.
+    """
     forwards, sideways, turn = step * corrections[0], step * corrections[1], step * corrections[2]
     length = geodesic[ARC] + step * corrections[3]
     if length < 0.0:
@@ -410,31 +505,34 @@ def shoot_again(
     point = along(along(vector(start, POINT), forwards, t), sideways, b)
     tilt = start[ALONG_BENDS] * forwards - start[TORSION] * sideways
     turning = along(times(tilt, b), -turn, n)
-    return shoot(surface, point, plus(t, cross(turning, t)), length, geodesic, room)
+    return shoot(surface, point, plus(t, cross(turning, t)), length, geodesic, work)
 
 
-def speed(model: Ints, data: Floats, count: int, elements: Ints, found: Floats) -> float:
-    """Lengthening speed, that of the straight parts; their ends on obstacles move with these."""
+def speed(model: Ints, data: Floats, count: int, elements: Ints, record: Floats) -> float:
+    """Return the lengthening speed of the straight parts (m/s); their ends on obstacles move with these."""
     total = 0.0
-    here = vector(found, elements[KEPT])
+    here = vector(record, elements[KEPT])
     moves = velocity(model, data, elements[LINK], here)
     for k in range(1, count):
         element = at(elements, ELEMENT_INTS * k)
-        kept = at(found, element[KEPT])
-        if element[IS_OBSTACLE] == 0 or kept[STATE] == TOUCHES:
+        part = at(record, element[KEPT])
+        if element[IS_OBSTACLE] == 0 or part[STATE] == TOUCHES:
             place = 0 if element[IS_OBSTACLE] == 0 else GROUND_START + POINT
-            ahead = vector(kept, place)
+            ahead = vector(part, place)
             ahead_moves = velocity(model, data, element[LINK], ahead)
             total += dot(unit(minus(ahead, here)), minus(ahead_moves, moves))
             here, moves = ahead, ahead_moves
             if element[IS_OBSTACLE] != 0:
-                here = vector(kept, GROUND_END + POINT)
+                here = vector(part, GROUND_END + POINT)
                 moves = velocity(model, data, element[LINK], here)
     return total
 
 
 def pull_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Pull at the points of a cable and at both ends of each geodesic; a cable does not push."""
+    """Apply the tension at the points of a cable and at both ends of each geodesic.
+
+    A cable does not push: a negative tension has no effect.
+    """
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     result, elements = at(data, i[ITEM.RECORD]), at(i, ELEMENTS)
     tension, last = result[TENSION], i[COUNT] - 1
@@ -442,15 +540,15 @@ def pull_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         return OUTCOME.OK
     for k in range(last + 1):
         element = at(elements, ELEMENT_INTS * k)
-        own, kept, link = at(p, element[AT]), at(result, element[KEPT]), element[LINK]
+        numbers, part, link = at(p, element[AT]), at(result, element[KEPT]), element[LINK]
         if element[IS_OBSTACLE] == 0:
-            place = station(model, data, link, vector(own, PULLED))
+            place = station(model, data, link, vector(numbers, PULLED))
             if k > 0:
-                apply_force(model, data, link, place, times(-tension, vector(kept, BEFORE)))
+                apply_force(model, data, link, place, times(-tension, vector(part, BEFORE)))
             if k < last:
-                apply_force(model, data, link, place, times(tension, vector(kept, AFTER)))
-        elif kept[STATE] == TOUCHES:
-            start, end = at(kept, GROUND_START), at(kept, GROUND_END)
+                apply_force(model, data, link, place, times(tension, vector(part, AFTER)))
+        elif part[STATE] == TOUCHES:
+            start, end = at(part, GROUND_START), at(part, GROUND_END)
             apply_force(
                 model, data, link, vector(start, POINT), times(-tension, vector(start, ALONG))
             )

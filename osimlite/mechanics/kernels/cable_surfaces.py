@@ -1,9 +1,9 @@
 """Surfaces that a cable runs over, and geodesics on them, as in Simbody's CableSpan.
 
-A surface is where a function of the place is 0, which is positive inside. A geodesic on a sphere or
-a cylinder is known; on other surfaces it is integrated, in Simbody's very steps, since these tell
-to which digits the path is found. By how much its end moves sideways as its start is shifted
-sideways by 1, or turned, are A and R of its Jacobi fields.
+A surface is the zero set of a function that is positive inside. Geodesics on spheres and cylinders
+are known; on other surfaces they are integrated with Simbody's steps, which determine the digits to
+which the path is found. The Jacobi fields A and R are the lateral displacements of the end per unit
+of lateral displacement, and of rotation, of the start.
 
 Source: A. Scholz, M. Sherman, I. Stavness, S. Delp, A. Kecskemethy, A fast multi-obstacle muscle
 wrapping method using natural geodesic variations, Multibody System Dynamics 36, 2016.
@@ -29,45 +29,99 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-SPHERE, CYLINDER, ELLIPSOID, TORUS = 0.0, 1.0, 2.0, 3.0
-KIND, RADIUS, SQUARE, WEIGHTS, TUBE = 0, 1, 2, 3, 2
-"""Numbers of a surface: what it is; its radius, or that of the ring of a torus; then the radius of
-the tube of a torus, or a square and weights: the surface is where the square is the weighted sum of
-the squares of the coordinates.
-"""
+SPHERE = 0.0
+"""Kind of surface: a sphere."""
+CYLINDER = 1.0
+"""Kind of surface: a cylinder about z."""
+ELLIPSOID = 2.0
+"""Kind of surface: an ellipsoid."""
+TORUS = 3.0
+"""Kind of surface: a torus about z."""
+KIND = 0
+"""Index in the numbers of a surface of its kind."""
+RADIUS = 1
+"""Index of its radius, or of the radius of the ring of a torus (m)."""
+SQUARE = 2
+"""Index of the square s of a quadric: the surface is where s equals the weighted sum of squares."""
+WEIGHTS = 3
+"""Offset of the weights of the squared coordinates."""
+TUBE = 2
+"""Index of the radius of the tube of a torus (m)."""
 SURFACE_NUMBERS = 6
+"""Length of the numbers of a surface."""
 
-POINT, ALONG, NORMAL, ACROSS, ALONG_BENDS, ACROSS_BENDS, TORSION = 0, 3, 6, 9, 12, 13, 14
-"""Numbers of an end of a geodesic: where it is; its direction along the geodesic, out of the
-surface, and across both; the curvatures along and across, and the torsion.
-"""
+POINT = 0
+"""Offset in an end of a geodesic of its position (m)."""
+ALONG = 3
+"""Offset of the unit tangent of the geodesic."""
+NORMAL = 6
+"""Offset of the outward unit normal of the surface."""
+ACROSS = 9
+"""Offset of the unit binormal."""
+ALONG_BENDS = 12
+"""Index of the normal curvature along the geodesic (1/m)."""
+ACROSS_BENDS = 13
+"""Index of the normal curvature across it (1/m)."""
+TORSION = 14
+"""Index of the geodesic torsion (1/m)."""
 END_NUMBERS = 15
+"""Length of an end of a geodesic."""
 
-START, END, A, R, A_RATE, R_RATE, ARC, STEP = 0, 15, 30, 31, 32, 33, 34, 35
-"""Numbers of a geodesic: its ends; the Jacobi fields at the end, and their derivatives; its length,
-m; the step of the integration to begin with, m; 0 to integrate by extrapolation, as exactly as may
-be.
-"""
+START = 0
+"""Offset in a geodesic of its first end."""
+END = 15
+"""Offset of its last end."""
+A = 30
+"""Index of the Jacobi field of lateral displacement at the last end."""
+R = 31
+"""Index of the Jacobi field of rotation at the last end (m)."""
+A_RATE = 32
+"""Index of the derivative of A by the arc length (1/m)."""
+R_RATE = 33
+"""Index of the derivative of R by the arc length."""
+ARC = 34
+"""Index of the length of the geodesic (m)."""
+STEP = 35
+"""Index of the first step of the integration (m); 0 to integrate by extrapolation to rounding."""
 GEODESIC_NUMBERS = 36
+"""Length of a geodesic."""
 
 SIZE = 10
 """Length of the state that is integrated along a geodesic: position, R, A, and their derivatives."""
 COLUMNS = 7
+"""Largest number of columns of an extrapolation."""
 GEODESIC_ROOM = (3 + COLUMNS) * SIZE
-"""Of room for an integration: columns of the extrapolation, or what a step of Merson's takes."""
-ACCURACY, CONSTRAINT, SMALLEST = 1e-10, 1e-9, 2.0**-45.5
-"""Of a step, of what the surface demands, and the smallest step, m."""
-EXACT, ROUNDED = 1e-12, 1e-15
-"""By this the last column of an extrapolation may move the end, m; it is better than that by far.
-So near to 0 the function of the surface is then; moment arms need that.
-"""
-MOST_STEPS, MOST_CORRECTIONS = 10_000, 10
-LEAST, MOST, SAFETY, STRETCH, LESS, MORE = 0.1, 5.0, 0.9, 0.1, 0.9, 1.2
-"""How step sizes change, as in Simbody's GeodesicIntegrator."""
+"""Length of the workspace of an integration: the extrapolation, or a step of Merson's method."""
+ACCURACY = 1e-10
+"""Accuracy of a step of Merson's method."""
+CONSTRAINT = 1e-9
+"""Largest value of the function of the surface after a step."""
+SMALLEST = 2.0**-45.5
+"""Smallest step (m)."""
+EXACT = 1e-12
+"""Change of the end by the last column of an extrapolation (m); the error is far smaller."""
+ROUNDED = 1e-15
+"""Largest value of the function of the surface after an extrapolation, which moment arms need."""
+MOST_STEPS = 10_000
+"""Largest number of steps along a geodesic."""
+MOST_CORRECTIONS = 10
+"""Largest number of Newton steps back to the surface."""
+LEAST = 0.1
+"""Smallest factor of a change of the step, as in Simbody's GeodesicIntegrator; so are the next five."""
+MOST = 5.0
+"""Largest factor of a change of the step."""
+SAFETY = 0.9
+"""Ratio of the chosen step to the one that would just meet the accuracy."""
+STRETCH = 0.1
+"""Part of a step by which the last step may be stretched."""
+LESS = 0.9
+"""Largest factor of a step after a rejection."""
+MORE = 1.2
+"""Smallest factor with which a step is made longer."""
 
 
 def value(p: Floats, a: Vector) -> float:
-    """The function whose zeros are the surface."""
+    """Return the function of a surface, which is zero on the surface and positive inside."""
     x, y, z = a
     result = p[SQUARE] - dot(elementwise(vector(p, WEIGHTS), a), a)
     if p[KIND] == TORUS:
@@ -77,7 +131,7 @@ def value(p: Floats, a: Vector) -> float:
 
 
 def gradient(p: Floats, a: Vector) -> Vector:
-    """Its gradient."""
+    """Return the gradient of the function of a surface."""
     if p[KIND] == TORUS:
         x, y, z = a
         scale, distance = -2.0 / (p[TUBE] * p[TUBE]), sqrt(x * x + y * y)
@@ -87,7 +141,11 @@ def gradient(p: Floats, a: Vector) -> Vector:
 
 
 def hessian(p: Floats, a: Vector) -> tuple[float, float, float, float]:
-    """Its second derivatives xx, yy, zz, xy; the others are 0."""
+    """Return the second derivatives xx, yy, zz, xy of the function of a surface; xz and yz vanish.
+
+    Returns:
+        Four entries.
+    """
     if p[KIND] == TORUS:
         x, y, _ = a
         scale, square = -2.0 / (p[TUBE] * p[TUBE]), x * x + y * y
@@ -103,17 +161,26 @@ def hessian(p: Floats, a: Vector) -> tuple[float, float, float, float]:
 
 
 def hessian_times(p: Floats, a: Vector, b: Vector) -> Vector:
-    """The second derivatives times a vector."""
+    """Multiply a vector by the second derivatives of the function of a surface."""
     xx, yy, zz, xy = hessian(p, a)
     x, y, z = b
     return xx * x + xy * y, xy * x + yy * y, zz * z
 
 
 def nearest_on_line(p: Floats, a: Vector, b: Vector, start: Vector) -> tuple[bool, Vector]:
-    """Whether a line between two points goes below the surface, and where; else its point nearest to the surface.
+    """Find a point of a line segment below the surface, or its point nearest to the surface.
 
-    As Simbody finds it from the point nearest to a start; it is the start if the search did not
-    come to an end.
+    It follows Simbody's search from the point nearest to `start`, which is the result if the search
+    does not converge.
+
+    Args:
+        p: numbers of the surface.
+        a: first end of the segment.
+        b: second end.
+        start: start of the search.
+
+    Returns:
+        Whether the segment passes below the surface, and the point.
     """
     way = minus(b, a)
     square = dot(way, way)
@@ -134,9 +201,18 @@ def nearest_on_line(p: Floats, a: Vector, b: Vector, start: Vector) -> tuple[boo
 
 
 def shoot(
-    p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, room: Floats
+    p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, work: Floats
 ) -> bool:
-    """Find a geodesic from near a point in about a direction; whether there is one."""
+    """Compute a geodesic from near a point in about a direction; return whether it exists.
+
+    Args:
+        p: numbers of the surface.
+        point: start; projected onto the surface.
+        direction: direction; projected onto the tangent plane.
+        length: length of the geodesic (m).
+        geodesic: filled.
+        work: workspace of GEODESIC_ROOM numbers.
+    """
     geodesic[ARC] = length
     if p[KIND] == SPHERE:
         radius = p[RADIUS]
@@ -161,12 +237,12 @@ def shoot(
         geodesic[A], geodesic[A_RATE], geodesic[R], geodesic[R_RATE] = 1.0, 0.0, length, 1.0
         return True
     if geodesic[STEP] == 0.0:
-        return extrapolate(p, point, direction, length, geodesic, room)
-    return integrate(p, point, direction, length, geodesic, room)
+        return extrapolate(p, point, direction, length, geodesic, work)
+    return integrate(p, point, direction, length, geodesic, work)
 
 
 def set_end(p: Floats, point: Vector, direction: Vector, end: Floats) -> None:
-    """Note an end of a geodesic."""
+    """Store an end of a geodesic: position, frame, curvatures and torsion."""
     g = gradient(p, point)
     normal = times(-1.0, unit(g))
     across = unit(cross(direction, normal))
@@ -182,10 +258,13 @@ def set_end(p: Floats, point: Vector, direction: Vector, end: Floats) -> None:
 
 
 def integrate(
-    p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, room: Floats
+    p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, work: Floats
 ) -> bool:
-    """Integrate a geodesic by the method of Merson, with steps as Simbody's GeodesicIntegrator takes them."""
-    y, rates, trial = room, at(room, SIZE), at(room, 2 * SIZE)
+    """Integrate a geodesic by Merson's method, with the steps of Simbody's GeodesicIntegrator.
+
+    The arguments and the result are those of `shoot_geodesic`.
+    """
+    y, rates, trial = work, at(work, SIZE), at(work, 2 * SIZE)
     put(y, 0, point)
     put(y, 5, unit(direction))
     y[3], y[4], y[8], y[9] = 0.0, 1.0, 1.0, 0.0
@@ -200,7 +279,7 @@ def integrate(
             next_t = length
         while True:
             h = next_t - t
-            error = merson(p, h, room)
+            error = merson(p, h, work)
             if error <= ACCURACY and project(p, trial, 0.1 * CONSTRAINT):
                 break
             if not h > SMALLEST:
@@ -232,10 +311,13 @@ def integrate(
 
 
 def extrapolate(
-    p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, room: Floats
+    p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, work: Floats
 ) -> bool:
-    """Integrate a geodesic by the method of Gragg, Bulirsch and Stoer, in steps as long as that may take."""
-    y = room
+    """Integrate a geodesic by the method of Gragg, Bulirsch and Stoer, in steps as long as possible.
+
+    The arguments and the result are those of `shoot_geodesic`.
+    """
+    y = work
     put(y, 0, point)
     put(y, 5, unit(direction))
     y[3], y[4], y[8], y[9] = 0.0, 1.0, 1.0, 0.0
@@ -245,7 +327,7 @@ def extrapolate(
     left = step = length
     while left > 0.0:
         step = min(step, left)
-        while not leap(p, step, room):
+        while not leap(p, step, work):
             step *= 0.5
             if not step > SMALLEST:
                 return False
@@ -257,9 +339,9 @@ def extrapolate(
     return True
 
 
-def leap(p: Floats, step: float, room: Floats) -> bool:
-    """A step by midpoint rules of 2, 4, 6 ... parts, extrapolated; whether it is as exact as may be."""
-    y, f, old, columns = room, at(room, SIZE), at(room, 2 * SIZE), at(room, 3 * SIZE)
+def leap(p: Floats, step: float, work: Floats) -> bool:
+    """Take a step by midpoint rules of 2, 4, 6 ... parts, extrapolated; return whether it is exact."""
+    y, f, old, columns = work, at(work, SIZE), at(work, 2 * SIZE), at(work, 3 * SIZE)
     for column in range(COLUMNS):
         new, parts = at(columns, column * SIZE), 2 * column + 2
         h = step / parts
@@ -292,10 +374,10 @@ def leap(p: Floats, step: float, room: Floats) -> bool:
 
 
 def slope(p: Floats, y: Floats, f: Floats) -> None:
-    """The derivative of the state of a geodesic.
+    """Compute the derivative of the state of a geodesic by the arc length.
 
-    Its acceleration is normal to the surface, and the Jacobi fields change with the Gaussian
-    curvature.
+    The acceleration is normal to the surface, and the Jacobi fields satisfy A'' = -K A and R'' = -K R
+    with the Gaussian curvature K.
     """
     point, velocity = vector(y, 0), vector(y, 5)
     g = gradient(p, point)
@@ -312,7 +394,7 @@ def slope(p: Floats, y: Floats, f: Floats) -> None:
 
 
 def project(p: Floats, y: Floats, exactness: float) -> bool:
-    """Bring the state of a geodesic back to the surface; whether that came to an end."""
+    """Project the state of a geodesic onto the surface; return whether that converged."""
     point = vector(y, 0)
     error = value(p, point)
     for _ in range(MOST_CORRECTIONS):
@@ -328,10 +410,10 @@ def project(p: Floats, y: Floats, exactness: float) -> bool:
     return abs(error) <= CONSTRAINT
 
 
-def merson(p: Floats, h: float, room: Floats) -> float:
-    """A step: fills the state at its end, and returns its error."""
-    y, f0, y1, rough = room, at(room, SIZE), at(room, 2 * SIZE), at(room, 3 * SIZE)
-    f1, f2, f3, f4 = at(room, 4 * SIZE), at(room, 5 * SIZE), at(room, 6 * SIZE), at(room, 7 * SIZE)
+def merson(p: Floats, h: float, work: Floats) -> float:
+    """Take a step of Merson's method; fill the state at its end, and return its error."""
+    y, f0, y1, rough = work, at(work, SIZE), at(work, 2 * SIZE), at(work, 3 * SIZE)
+    f1, f2, f3, f4 = at(work, 4 * SIZE), at(work, 5 * SIZE), at(work, 6 * SIZE), at(work, 7 * SIZE)
     for k in range(SIZE):
         y1[k] = y[k] + h / 3.0 * f0[k]
     slope(p, y1, f1)

@@ -1,9 +1,9 @@
-"""Accelerations from the mass matrix and the bias of another program, whose joints have one axis each.
+"""Accelerations from the mass matrix and bias forces of another program with one-axis joints.
 
-The joints follow the coordinates; with the generalized speeds u their rates are J u, and their
-accelerations J udot + b. So the equations of motion of the coordinates are those of the joints,
-projected: the mass matrix is Jᵀ M J, and the bias is Jᵀ of the forces that the joints need at
-accelerations b. An entry of J that may differ from zero is a share.
+The joints of the other program (Bullet) follow the coordinates: their rates are J u, and their
+accelerations J udot + b. The equations of motion of the coordinates are those of the joints,
+projected: the mass matrix is Jᵀ M J, and the bias is Jᵀ times the joint forces at the
+accelerations b. A share is an entry of J that may differ from zero.
 """
 
 from __future__ import annotations
@@ -31,7 +31,19 @@ from osimlite.mechanics.laws.vectors import ZERO, cross, dot, put, replaced, tim
 def chain_dynamics(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int
 ) -> int:
-    """Mass matrix, and the bias taken off the generalized forces; f has the rates and these before."""
+    """Compute the mass matrix and subtract the bias from the generalized forces.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: filled with the mass matrix.
+        y: state.
+        f: rates of the coordinates, then the generalized forces, from which the bias is subtracted.
+        unused: any number.
+
+    Returns:
+        `OUTCOME.OK`, or the outcome of the kernel that asks the other program.
+    """
     h, right = at(model, model[MODEL.CHAIN]), at(f, model[MODEL.DOFS])
     move_joints(model, reals, data, y, f)
     status = call(h[CHAIN.SUPPLY], model, reals, data, y, f, 0)
@@ -72,15 +84,17 @@ def chain_dynamics(
 def take_off(
     model: Ints, data: Floats, moment: float, freedom: int, acceleration: Floats, right: Floats
 ) -> None:
-    """Take an inertia off that is the same about every axis, so that no speed alone makes it resist.
+    """Subtract an isotropic moment of inertia of a link from the equations of motion.
+
+    Its torque is proportional to the angular acceleration, whatever the velocity.
 
     Args:
-        model: the mechanism.
-        data: what is known of it.
-        moment: the inertia.
-        freedom: the last one on the way from ground to the link that has it.
-        acceleration: of the link without udot.
-        right: the generalized forces.
+        model: integers of the model.
+        data: results of its evaluation.
+        moment: moment of inertia about every axis (kg m²).
+        freedom: last degree of freedom on the path from ground to the link.
+        acceleration: angular acceleration of the link while udot = 0 (rad/s²).
+        right: generalized forces (n,); changed.
     """
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     while freedom >= 0:
@@ -102,7 +116,15 @@ def take_off(
 
 
 def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
-    """Values, rates, and accelerations without udot of all joints, and the shares; f has the rates of coordinates."""
+    """Compute values, rates and accelerations while udot = 0 of all joints, and the shares.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: filled at `CHAIN.WORK_JOINTS` and `CHAIN.WORK_SHARES`.
+        y: state.
+        f: rates of the coordinates.
+    """
     h = at(model, model[MODEL.CHAIN])
     count = h[CHAIN.JOINTS]
     for number in range(count):
@@ -156,7 +178,7 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
 
 
 def move_angle(angles: Ints, y: Floats, f: Floats, part: int, row: Floats) -> float:
-    """Acceleration of one angle of a ball without udot; fills its row."""
+    """Fill the row of N of one angle of a ball; return its acceleration while udot = 0 (rad/s²)."""
     put(row, 0, angle_row(y, angles, part))
     return angle_drift(y, f, angles, vector(row, 0))
 
@@ -164,7 +186,19 @@ def move_angle(angles: Ints, y: Floats, f: Floats, part: int, row: Floats) -> fl
 def move_end(
     angles: Ints, y: Floats, u: Floats, part: int, radius: float, row: Floats
 ) -> tuple[float, float, float]:
-    """Value, rate and acceleration without udot of a component of r n, n the last axis of a ball; fills its row."""
+    """Compute the motion of one component of r n, where n is the third axis of a ball.
+
+    Args:
+        angles: degrees of freedom of the ball.
+        y: state.
+        u: generalized speeds.
+        part: component, 0, 1 or 2.
+        radius: half axis r of the ellipsoid (m).
+        row: filled with the derivatives by the three speeds.
+
+    Returns:
+        Value (m), rate (m/s) and acceleration while udot = 0 (m/s²).
+    """
     n, spin = last_axis(y, angles), (u[angles[0]], u[angles[1]], u[angles[2]])
     # n moves by u x n, and that by u x (u x n).
     put(row, 0, times(radius, cross(n, replaced(ZERO, part, 1.0))))

@@ -1,9 +1,8 @@
-"""The points of an ellipsoid that are closest to given ones.
+"""Points of an ellipsoid that are closest to given points.
 
-Source: J. C. Hart, Distance to an ellipsoid, in P. Heckbert (ed.), Graphics Gems IV, 1994, as
-    OpenSim 4.6 has it in
-WrapEllipsoid: Newton's method stops where the polynomial is small, so the points are those of its
-    very steps.
+Source: J. C. Hart, Distance to an ellipsoid, in P. Heckbert (ed.), Graphics Gems IV, 1994, as in
+OpenSim 4.6's WrapEllipsoid. Newton's method stops where the polynomial is small, so that the points
+depend on its steps, which are reproduced here.
 """
 
 from __future__ import annotations
@@ -15,21 +14,32 @@ from osimlite.mechanics.laws.dual_numbers import settled
 from osimlite.mechanics.laws.vectors import Vector, along, component, minus, norm, plus, unit
 
 FLAT = 2e-13
-"""Distance from a plane of symmetry up to which OpenSim takes a point for one of the plane."""
-SMALL, STEPS = 1e-9, 64
-"""Newton's method ends where the polynomial is less than this, or after so many steps."""
+"""Distance from a plane of symmetry (m) up to which OpenSim counts a point as in the plane."""
+SMALL = 1e-9
+"""Absolute value of the polynomial at which Newton's method ends."""
+STEPS = 64
+"""Largest number of Newton steps."""
 SAMPLES = 300
-"""The blades of a fan stand at all multiples of so small a part of the chord, but the last one before its end."""
+"""Number of intervals of the chord; the fan has a blade at each inner point but the last."""
 LANES = 16
-"""So many blades are found side by side: compilers make instructions for several numbers of such loops."""
-PART, X, Y, Z, MULTIPLIER = 0, LANES, 2 * LANES, 3 * LANES, 4 * LANES
-"""What is kept of each: its place on the chord; (a a u u, b b v v, c c w w), then its direction; t."""
+"""Number of blades that are computed together, so that compilers use vector instructions."""
+PART = 0
+"""Offset in the workspace of the positions of the blades on the chord."""
+X = LANES
+"""Offset of a a u u, then of the x component of the direction."""
+Y = 2 * LANES
+"""Offset of b b v v, then of the y component of the direction."""
+Z = 3 * LANES
+"""Offset of c c w w, then of the z component of the direction."""
+MULTIPLIER = 4 * LANES
+"""Offset of the multipliers t."""
 
 
 def closest_point(radii: Vector, point: Vector) -> Vector:
-    """The closest point; of a point in a plane of symmetry that of the ellipse there, as OpenSim's formula needs.
+    """Return the closest point of an ellipsoid.
 
-    In two such planes it is that of the one across the longer axis.
+    For a point in a plane of symmetry it is that of the ellipse there, as OpenSim's formula needs; for
+    one in two such planes that of the plane across the longer axis.
     """
     axis = -1
     for k in range(3):
@@ -57,11 +67,18 @@ def closest_point(radii: Vector, point: Vector) -> Vector:
 def polynomial(
     P: float, Q: float, R: float, aauu: float, bbvv: float, ccww: float
 ) -> tuple[float, float]:
-    """What is zero if (a a u / P, b b v / Q, c c w / R) is the point closest to (u, v, w), and its derivative by t.
+    """Evaluate the polynomial whose root t gives the closest point (a a u / P, b b v / Q, c c w / R).
 
     Args:
-        P: t + a a; Q and R likewise.
-        aauu: a a u u, where a is a radius; bbvv and ccww likewise.
+        P: t + a a, where a is the first half axis.
+        Q: t + b b.
+        R: t + c c.
+        aauu: a a u u, where u is the first coordinate of the point.
+        bbvv: b b v v.
+        ccww: c c w w.
+
+    Returns:
+        Value and derivative by t.
     """
     PQ, PR, QR = P * Q, P * R, Q * R
     PQR, u, v, w = P * QR, aauu * QR, bbvv * PR, ccww * PQ
@@ -70,7 +87,7 @@ def polynomial(
 
 
 def closest_in_plane(radii: Vector, point: Vector, axis: int) -> Vector:
-    """The closest point of the ellipse in the plane of symmetry across an axis; what the point has along it stays."""
+    """Return the closest point of the ellipse in the plane of symmetry across an axis."""
     a, b, c = radii
     u, v, w = point
     if axis == 0:
@@ -83,7 +100,11 @@ def closest_in_plane(radii: Vector, point: Vector, axis: int) -> Vector:
 
 
 def closest_on_ellipse(a: float, b: float, u: float, v: float) -> tuple[float, float]:
-    """The point of an ellipse that is closest to (u, v)."""
+    """Return the point of an ellipse that is closest to (u, v).
+
+    Returns:
+        Its two coordinates.
+    """
     aa, bb = a * a, b * b
     if abs(u) <= FLAT and abs(v) <= FLAT:
         return (-a if u < 0.0 else a, v) if a < b else (u, -b if v < 0.0 else b)
@@ -110,14 +131,14 @@ def closest_on_ellipse(a: float, b: float, u: float, v: float) -> tuple[float, f
     return aa * u / (t + aa), bb * v / (t + bb)
 
 
-def fan(radii: Vector, start: Vector, chord: Vector, room: Floats) -> Vector:
-    """The mean direction of the shortest ways out of an ellipsoid, from points of a chord.
+def fan(radii: Vector, start: Vector, chord: Vector, work: Floats) -> Vector:
+    """Return the mean direction of the shortest ways out of an ellipsoid, from points of a chord.
 
     Args:
-        radii: of the ellipsoid.
-        start: where the chord begins.
-        chord: the way from there to its other end.
-        room: for 5 * LANES numbers.
+        radii: half axes.
+        start: start of the chord.
+        chord: vector from there to its end.
+        work: workspace of 5 * LANES numbers.
     """
     a, b, c = radii
     sx, sy, sz = start
@@ -130,35 +151,35 @@ def fan(radii: Vector, start: Vector, chord: Vector, room: Floats) -> Vector:
             u, v, w = sx + part * dx, sy + part * dy, sz + part * dz
             aauu, bbvv, ccww = aa * (u * u), bb * (v * v), cc * (w * w)
             value, slope = polynomial(aa, bb, cc, aauu, bbvv, ccww)
-            room[PART + k], room[MULTIPLIER + k] = (
+            work[PART + k], work[MULTIPLIER + k] = (
                 part,
                 -value / slope if abs(value) >= SMALL else 0.0,
             )
-            room[X + k], room[Y + k], room[Z + k] = aauu, bbvv, ccww
+            work[X + k], work[Y + k], work[Z + k] = aauu, bbvv, ccww
         for _ in range(STEPS):
             going = 0
             for k in range(LANES):
-                t = room[MULTIPLIER + k]
+                t = work[MULTIPLIER + k]
                 value, slope = polynomial(
-                    t + aa, t + bb, t + cc, room[X + k], room[Y + k], room[Z + k]
+                    t + aa, t + bb, t + cc, work[X + k], work[Y + k], work[Z + k]
                 )
                 if abs(value) >= SMALL:
                     t -= value / slope
                     going += 1
-                room[MULTIPLIER + k] = t
+                work[MULTIPLIER + k] = t
             if going == 0:
                 break
         for k in range(LANES):
-            part, t = room[PART + k], room[MULTIPLIER + k]
+            part, t = work[PART + k], work[MULTIPLIER + k]
             u, v, w = sx + part * dx, sy + part * dy, sz + part * dz
             P, Q, R = t + aa, t + bb, t + cc
             x, y, z = -t * u * (Q * R), -t * v * (P * R), -t * w * (P * Q)
             size = sqrt(x * x + y * y + z * z)
             inverse = 1.0 / size if size > 0.0 else 0.0
-            room[X + k], room[Y + k], room[Z + k] = inverse * x, inverse * y, inverse * z
+            work[X + k], work[Y + k], work[Z + k] = inverse * x, inverse * y, inverse * z
         for k in range(min(LANES, SAMPLES - 1 - first)):
-            point = along(start, room[PART + k], chord)
-            blade = room[X + k], room[Y + k], room[Z + k]
+            point = along(start, work[PART + k], chord)
+            blade = work[X + k], work[Y + k], work[Z + k]
             u, v, w = point
             if min(abs(u), abs(v), abs(w)) <= FLAT:
                 blade = unit(minus(closest_point(radii, point), point))

@@ -1,15 +1,17 @@
-"""The linear equations of implicit integrators, of which only those of the speeds are solved together.
+"""Linear equations of implicit integrators, condensed to the size of the speeds.
 
-An implicit method solves (1 - c J) d = r over and over, J being the derivative of the rates of a
-state (q, u, z) by it. Here J is what muscles, springs and stops make of it: each pushes along one
-displacement, with a force and with rates of its states that depend on that displacement, its speed
-and these states only. So its states are eliminated by themselves, as internal variables of a
-material are in finite elements, and so are the coordinates, whose rates count as the speeds. What
-is left is of the size of the speeds: the mass matrix, and of each force a stiffness along its
-generalized force of 1 N. The equations of constraints count as heavy masses along them. Contacts of
-half spaces and spheres are three such forces, along the normal and across it; friction grows with
-the depth. All else (gravity, Coriolis forces, how levers change) is left out of J: iterations
-converge without it, and W-methods keep their order.
+An implicit method repeatedly solves (1 - c J) d = r, where J is the derivative of the rates of a
+state (q, u, z) by the state. Here J contains the contributions of muscles, springs and stops. Each
+acts along one displacement, with a force and with rates of its states that depend on this
+displacement, its speed and these states only. Its states are therefore eliminated locally, by
+static condensation as of internal variables in finite elements, and so are the coordinates, whose
+rates count as the speeds.
+
+The condensed matrix has the size of the speeds: the mass matrix, and for each force a rank-one
+stiffness along its generalized force per newton. Constraint equations count as heavy masses along
+them. A contact of half spaces and spheres is three such forces, along the normal and across it;
+friction grows with the depth. Other derivatives (Coriolis forces, changing moment arms of muscles)
+are omitted from J: iterations converge without them, and W-methods keep their order.
 """
 
 from __future__ import annotations
@@ -64,41 +66,51 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 MOST_STATES = 3
-"""A force has at most so many states that are condensed."""
+"""Largest number of states of a force that are condensed."""
 WIDTH = 2 + MOST_STATES
-"""Length of a row of derivatives: by displacement, speed and states. The rows are of the force and of the rates."""
+"""Length of a row of derivatives: by displacement, by speed, and by states.
+
+The first row is that of the force; the others are those of the rates of the states.
+"""
 INVERSE = (1 + MOST_STATES) * WIDTH
+"""Offset in the record of a force of the inverse of 1 - c J of its states, after the derivatives."""
 GAINS = INVERSE + MOST_STATES * MOST_STATES
-PULLS, RIGHT = GAINS + MOST_STATES, GAINS + 2 * MOST_STATES
-FIRST, END, RESPONSE_WORK = (
-    GAINS + 3 * MOST_STATES,
-    GAINS + 3 * MOST_STATES + 1,
-    GAINS + 3 * MOST_STATES + 2,
-)
-"""What is known of a force besides the generalized force of 1 N: the derivatives; the inverse of 1
-- c J of the states; what a speed does to them, and they to the force; their right sides; the first
-degree of freedom that it moves, and the one after the last.
-"""
-SYSTEM, STIFFNESS, DAMPING, LEVERS, RIGHT_AT = range(1, 6)
-"""Matrices (n, n) in the room, behind that of the masses: that to be solved; how generalized forces
-change with coordinates and with speeds while states stay; how with coordinates while states follow.
-A right side is behind them.
-"""
+"""Offset of the change of the states per unit of speed."""
+PULLS = GAINS + MOST_STATES
+"""Offset of the change of the force per unit of the states' right sides."""
+RIGHT = GAINS + 2 * MOST_STATES
+"""Offset of the right sides of the states."""
+FIRST = GAINS + 3 * MOST_STATES
+"""Index of the first degree of freedom that the force acts on."""
+END = GAINS + 3 * MOST_STATES + 1
+"""Index of the end of these degrees of freedom."""
+RESPONSE_WORK = GAINS + 3 * MOST_STATES + 2
+"""Length of the record of a force, without the generalized force per newton (n,) before it."""
+SYSTEM = 1
+"""Number in the workspace of the condensed matrix (n, n); number 0 is the mass matrix."""
+STIFFNESS = 2
+"""Number of the derivatives of generalized forces by coordinates, at constant states."""
+DAMPING = 3
+"""Number of the derivatives of generalized forces by speeds, at constant states."""
+LEVERS = 4
+"""Number of the derivatives of generalized forces by coordinates, with condensed states."""
+RIGHT_AT = 5
+"""Number of matrices, after which a right side (n,) follows."""
 
 LOAD = 12
-"""How many numbers the loads of a link are."""
+"""Length of the load of a link: force (3,), and sum of products of positions and forces (3, 3)."""
 CENTER = 7
-"""Place of the centre of surface 2 among the numbers of a contact."""
+"""Offset among the numbers of a contact of the centre of surface 2."""
 SLIGHT = 1e-12
-"""What counts as rounding among generalized forces of 1 N."""
+"""Entries of a generalized force per newton below this are rounding errors."""
 
 
 HEAVY = 1e6
-"""Weight of constraints: what a unit of an equation weighs, in terms of the largest mass."""
+"""Mass that represents a constraint equation, relative to the largest diagonal entry of M."""
 
 
 def condensation_room(size: int, responses: int) -> int:
-    """How many numbers the equations of so many speeds and forces need."""
+    """Return the length of the workspace for `size` speeds and `responses` forces."""
     return RIGHT_AT * size * size + size + responses * (size + RESPONSE_WORK)
 
 
@@ -108,12 +120,22 @@ def linearise(
     data: Floats,
     y: Floats,
     f: Floats,
-    room: Floats,
+    work: Floats,
     is_evaluated: float,
 ) -> int:
-    """Fill the room with masses, generalized forces and derivatives at a state; f is room for its rates.
+    """Fill the workspace with masses, generalized forces per newton, and derivatives at a state.
 
-    If `is_evaluated` is not 0, the last evaluation was that of this state.
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        y: state.
+        f: workspace for its rates.
+        work: filled, see `condensation_room`.
+        is_evaluated: not 0 if the last evaluation was at this state.
+
+    Returns:
+        `OUTCOME.OK`, or the outcome of a kernel that failed.
     """
     size, status = model[MODEL.DOFS], OUTCOME.OK
     right = at(f, size)
@@ -125,15 +147,15 @@ def linearise(
         bind(model, reals, data, y, f)
     spatial_inertias_and_bias(model, reals, data)
     composite_rigid_body(model, data, right)
-    masses(model, data, room)
-    stiffness, damping = at(room, STIFFNESS * size * size), at(room, DAMPING * size * size)
+    masses(model, data, work)
+    stiffness, damping = at(work, STIFFNESS * size * size), at(work, DAMPING * size * size)
     for k in range(size * size):
         stiffness[k] = damping[k] = 0.0
     turn_levers(model, reals, data, stiffness)
     for number in range(model[MODEL.RESPONSES]):
-        response, known = (
+        response, record = (
             at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
-            known_of(model, room, number),
+            known_of(model, work, number),
         )
         clear_wrenches(model, data)
         for k in range(size):
@@ -143,38 +165,38 @@ def linearise(
             return status
         changes = response[RESPONSE.STATES] > 0
         for k in range(INVERSE):
-            known[size + k] = data[WORK.SCRATCH + k]
+            record[size + k] = data[WORK.SCRATCH + k]
             changes = changes or data[WORK.SCRATCH + k] != 0.0
         first, end = size, 0
         if changes:
             generalized_forces(model, data, right)
         for k in range(size):
-            known[k] = right[k]
+            record[k] = right[k]
             if abs(right[k]) > SLIGHT:
                 first, end = min(first, k), k + 1
-        known[size + FIRST], known[size + END] = first, end
+        record[size + FIRST], record[size + END] = first, end
         if changes:
             sense, by_displacement, by_speed = (
                 response[RESPONSE.SENSE],
-                known[size],
-                known[size + 1],
+                record[size],
+                record[size + 1],
             )
-            add_product(size, 1.0, known, first, end, f, 0, size, stiffness)
+            add_product(size, 1.0, record, first, end, f, 0, size, stiffness)
             add_product(
-                size, sense * by_displacement, known, first, end, known, first, end, stiffness
+                size, sense * by_displacement, record, first, end, record, first, end, stiffness
             )
-            add_product(size, sense * by_speed, known, first, end, known, first, end, damping)
+            add_product(size, sense * by_speed, record, first, end, record, first, end, damping)
     return OUTCOME.OK
 
 
-def known_of(model: Ints, room: Floats, number: int) -> Floats:
-    """The part of the room of a force: its generalized force of 1 N, and what RESPONSE_WORK tells."""
+def known_of(model: Ints, work: Floats, number: int) -> Floats:
+    """Return the record of a force in the workspace: its generalized force per newton, then RESPONSE_WORK."""
     size = model[MODEL.DOFS]
-    return at(room, RIGHT_AT * size * size + size + number * (size + RESPONSE_WORK))
+    return at(work, RIGHT_AT * size * size + size + number * (size + RESPONSE_WORK))
 
 
 def masses(model: Ints, data: Floats, mass: Floats) -> None:
-    """The mass matrix (n, n), heavy across the constraints."""
+    """Fill the mass matrix (n, n), with heavy masses along the constraint equations."""
     size, freedoms, largest = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), 0.0
     for k in range(size * size):
         mass[k] = 0.0
@@ -196,11 +218,12 @@ def masses(model: Ints, data: Floats, mass: Floats) -> None:
 
 
 def turn_levers(model: Ints, reals: Floats, data: Floats, levers: Floats) -> None:
-    """Add how generalized forces of weights and of contacts change as coordinates move their points, to (n, n).
+    """Add the geometric stiffness of weights and contacts to a matrix (n, n).
 
-    They are what is left of the inertias, which have served: of each link the force on it and on
-    all that it carries, and the sum of products of places (from the origin of the spatial vectors)
-    with forces, by rows.
+    It is the change of their generalized forces as coordinates move the points of application. The
+    inertias of the links, which are no longer needed, are replaced by loads: the force on a link and
+    its subtree, and the sum of products of positions (from the origin of the spatial vectors) and
+    forces, by rows.
     """
     size = model[MODEL.DOFS]
     for link in range(model[MODEL.LINKS]):
@@ -253,9 +276,18 @@ def turn_levers(model: Ints, reals: Floats, data: Floats, levers: Floats) -> Non
 
 
 def add_load(
-    model: Ints, data: Floats, link: int, point: Vector, force: Vector, off: Vector
+    model: Ints, data: Floats, link: int, point: Vector, force: Vector, offset: Vector
 ) -> None:
-    """Add a force on a link at a point, which moves as does that of the link that is so far off."""
+    """Add a force on a link to its load.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        link: number of the link; ground is ignored.
+        point: position of the force in ground (m).
+        force: force (N).
+        offset: offset from `point` to the material point that the force moves with (m).
+    """
     if link >= 0:
         here = link_work(model, data, link)
         load, arm = at(here, LINK_WORK.INERTIA), minus(point, vector(here, LINK_WORK.ORIGIN))
@@ -264,7 +296,7 @@ def add_load(
             put(
                 load,
                 3 + 3 * k,
-                plus(vector(load, 3 + 3 * k), plus(times(arm[k], force), times(force[k], off))),
+                plus(vector(load, 3 + 3 * k), plus(times(arm[k], force), times(force[k], offset))),
             )
 
 
@@ -279,7 +311,19 @@ def add_product(
     last: int,
     matrix: Floats,
 ) -> None:
-    """Add a multiple of the product of two rows, each from an entry up to another."""
+    """Add a multiple of the outer product of two vectors to a matrix.
+
+    Args:
+        size: size of the matrix.
+        factor: the multiple.
+        a: first vector.
+        first: start of its nonzero entries.
+        end: end of its nonzero entries.
+        b: second vector.
+        start: start of its nonzero entries.
+        last: end of its nonzero entries.
+        matrix: matrix (size, size); changed.
+    """
     for i in range(first, end):
         if a[i] != 0.0:
             scaled, target = factor * a[i], at(matrix, size * i)
@@ -287,30 +331,30 @@ def add_product(
                 target[k] += scaled * b[k]
 
 
-def condense(model: Ints, c: float, room: Floats) -> bool:
-    """Eliminate all but the speeds from 1 - c J; whether that can be solved."""
+def condense(model: Ints, c: float, work: Floats) -> bool:
+    """Eliminate all but the speeds from 1 - c J and factorise the rest; return whether it is regular."""
     size = model[MODEL.DOFS]
-    system, levers = at(room, SYSTEM * size * size), at(room, LEVERS * size * size)
-    stiffness, damping = at(room, STIFFNESS * size * size), at(room, DAMPING * size * size)
+    system, levers = at(work, SYSTEM * size * size), at(work, LEVERS * size * size)
+    stiffness, damping = at(work, STIFFNESS * size * size), at(work, DAMPING * size * size)
     for k in range(size * size):
-        system[k] = room[k] - c * (damping[k] + c * stiffness[k])
+        system[k] = work[k] - c * (damping[k] + c * stiffness[k])
         levers[k] = stiffness[k]
     for number in range(model[MODEL.RESPONSES]):
-        response, known = (
+        response, record = (
             at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
-            known_of(model, room, number),
+            known_of(model, work, number),
         )
-        count, a = response[RESPONSE.STATES], at(known, size)
-        places = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
+        count, a = response[RESPONSE.STATES], at(record, size)
+        states = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
         if count == 0:
             continue
         inverse, gains, pulls, driven = at(a, INVERSE), at(a, GAINS), at(a, PULLS), at(a, RIGHT)
         for i in range(count):
             rates = at(a, WIDTH * (1 + i))
-            there = places[i] >= 0
-            driven[i] = c * (c * rates[0] + rates[1]) if there else 0.0
+            has_state = states[i] >= 0
+            driven[i] = c * (c * rates[0] + rates[1]) if has_state else 0.0
             for k in range(count):
-                own = c * rates[2 + k] if there and places[k] >= 0 else 0.0
+                own = c * rates[2 + k] if has_state and states[k] >= 0 else 0.0
                 inverse[count * i + k] = (1.0 if i == k else 0.0) - own
         invert(count, inverse)
         by_speed = by_displacement = 0.0
@@ -318,20 +362,24 @@ def condense(model: Ints, c: float, room: Floats) -> bool:
             gains[i] = pulls[i] = 0.0
             for k in range(count):
                 gains[i] += inverse[count * i + k] * driven[k]
-                if places[k] >= 0:
+                if states[k] >= 0:
                     pulls[i] += inverse[count * k + i] * a[2 + k]
         for i in range(count):
-            if places[i] >= 0:
+            if states[i] >= 0:
                 by_speed += a[2 + i] * gains[i]
                 by_displacement += c * pulls[i] * a[WIDTH * (1 + i)]
         first, end, sense = int(a[FIRST]), int(a[END]), response[RESPONSE.SENSE]
-        add_product(size, -c * sense * by_speed, known, first, end, known, first, end, system)
-        add_product(size, sense * by_displacement, known, first, end, known, first, end, levers)
-    return eliminate(size, system, room)
+        add_product(size, -c * sense * by_speed, record, first, end, record, first, end, system)
+        add_product(size, sense * by_displacement, record, first, end, record, first, end, levers)
+    return eliminate(size, system, work)
 
 
 def eliminate(size: int, a: Floats, masses: Floats) -> bool:
-    """Factorise a matrix (size, size) in its place; whether each pivot is more than a part of the mass there."""
+    """Factorise a matrix (size, size) in place by Gaussian elimination without pivoting.
+
+    Returns:
+        Whether each pivot is more than `SMALLEST_PIVOT` times the mass there.
+    """
     for k in range(size):
         row = at(a, size * k)
         if not row[k] > SMALLEST_PIVOT * masses[size * k + k]:
@@ -348,7 +396,7 @@ def eliminate(size: int, a: Floats, masses: Floats) -> bool:
 
 
 def substitute(size: int, a: Floats, x: Floats) -> None:
-    """Solve with the factors of `eliminate` in place."""
+    """Solve a linear system in place with the factors of `factorise_matrix`."""
     for i in range(size):
         x[i] -= product(0, i, at(a, size * i), x)
     for i in range(size - 1, -1, -1):
@@ -371,55 +419,55 @@ def invert(size: int, a: Floats) -> None:
                     a[size * j + k] -= factor * a[size * i + k]
 
 
-def correct(model: Ints, c: float, room: Floats, d: Floats) -> None:
-    """Solve (1 - c J) d = r in place, after `condense` with the same c."""
+def correct(model: Ints, c: float, work: Floats, d: Floats) -> None:
+    """Solve (1 - c J) d = r in place, after `condense_system` with the same c."""
     size = model[MODEL.DOFS]
     du, system, right = (
         at(d, size),
-        at(room, SYSTEM * size * size),
-        at(room, RIGHT_AT * size * size),
+        at(work, SYSTEM * size * size),
+        at(work, RIGHT_AT * size * size),
     )
-    levers = at(room, LEVERS * size * size)
+    levers = at(work, LEVERS * size * size)
     for i in range(size):
         right[i] = 0.0
         for k in range(size):
-            right[i] += room[size * i + k] * du[k] + c * levers[size * i + k] * d[k]
+            right[i] += work[size * i + k] * du[k] + c * levers[size * i + k] * d[k]
     for number in range(model[MODEL.RESPONSES]):
-        response, known = (
+        response, record = (
             at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
-            known_of(model, room, number),
+            known_of(model, work, number),
         )
-        places, a, force = (
+        states, a, force = (
             at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE]),
-            at(known, size),
+            at(record, size),
             0.0,
         )
         for k in range(response[RESPONSE.STATES]):
-            if places[k] >= 0:
-                force += c * a[PULLS + k] * d[places[k]]
+            if states[k] >= 0:
+                force += c * a[PULLS + k] * d[states[k]]
         if force != 0.0:
             for k in range(int(a[FIRST]), int(a[END])):
-                right[k] += force * known[k]
+                right[k] += force * record[k]
     substitute(size, system, right)
     for number in range(model[MODEL.RESPONSES]):
-        response, known = (
+        response, record = (
             at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
-            known_of(model, room, number),
+            known_of(model, work, number),
         )
-        count, a = response[RESPONSE.STATES], at(known, size)
-        places = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
+        count, a = response[RESPONSE.STATES], at(record, size)
+        states = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
         if count == 0:
             continue
         first, end = int(a[FIRST]), int(a[END])
-        displacement = response[RESPONSE.SENSE] * product(first, end, known, d)
-        speed = response[RESPONSE.SENSE] * product(first, end, known, right)
+        displacement = response[RESPONSE.SENSE] * product(first, end, record, d)
+        speed = response[RESPONSE.SENSE] * product(first, end, record, right)
         for i in range(count):
             a[RIGHT + i] = (
-                d[places[i]] + c * a[WIDTH * (1 + i)] * displacement if places[i] >= 0 else 0.0
+                d[states[i]] + c * a[WIDTH * (1 + i)] * displacement if states[i] >= 0 else 0.0
             )
         for i in range(count):
-            if places[i] >= 0:
-                d[places[i]] = a[GAINS + i] * speed + product(
+            if states[i] >= 0:
+                d[states[i]] = a[GAINS + i] * speed + product(
                     0, count, at(a, INVERSE + count * i), at(a, RIGHT)
                 )
     for k in range(size):
@@ -428,7 +476,7 @@ def correct(model: Ints, c: float, room: Floats, d: Floats) -> None:
 
 
 def product(first: int, end: int, a: Floats, b: Floats) -> float:
-    """Of two vectors, from an entry up to another."""
+    """Return the scalar product of the entries `first` to `end` of two vectors."""
     total = 0.0
     for k in range(first, end):
         total += a[k] * b[k]

@@ -1,4 +1,9 @@
-"""Where the end of a rod is that bends evenly; see :class:`osimlite.mechanics.multibody.arc.ArcPoint`."""
+"""End position of a rod that bends with constant curvature, as the amount of an operation.
+
+See :class:`osimlite.mechanics.multibody.arc.ArcPoint`. The rod of length L bends by the total
+angle θ, with cos θ = cos a cos b for its two angles a and b. The end lies at
+L (sin θ) / θ along the rod, and L (1 - cos θ) / θ across it.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +13,22 @@ from osimlite.mechanics.kernels.layout import MODEL, OPERATION, OPERATION_WORK, 
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import operation_ints, operation_work
 
-COMPONENT, LENGTH, NEUTRAL, TERMS, SERIES = 2, 3, 4, 6, 7
-"""Of the table: the component, the length, the two angles where the arguments are zero, the number
-of terms of each series by the square of the angle, and the terms of (sin θ) / θ and (1 - cos θ) /
-θ².
-"""
+COMPONENT = 2
+"""Index in the table of the component of the end position."""
+LENGTH = 3
+"""Index in the table of the length of the rod (m)."""
+NEUTRAL = 4
+"""Offset in the table of the two angles where the arguments are zero (rad)."""
+TERMS = 6
+"""Index in the table of the number of terms of each series."""
+SERIES = 7
+"""Offset of the series by θ² of (sin θ) / θ and then of (1 - cos θ) / θ²."""
 
 
 def amount_by_arc(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Amount of an operation by the bending of a rod in two angles, with its derivatives."""
+    """Compute an amount, its gradient, rate and curvature from the bending of a rod in two angles."""
     j, kept = (
         operation_ints(model, operation),
         operation_work(model, data, operation),
@@ -40,7 +50,16 @@ def amount_by_arc(
 
 
 def arc_at(table: Floats, a: float, b: float) -> tuple[float, float, float, float, float, float]:
-    """Value, derivatives, and second derivatives by a, a; a, b; b, b of a component of the end, at its two angles."""
+    """Return a component of the end position, and its derivatives by the two angles.
+
+    Args:
+        table: table of the function.
+        a: first angle (rad).
+        b: second angle (rad).
+
+    Returns:
+        Value, first derivatives by a and b, second derivatives by a a, a b and b b.
+    """
     sa, ca, sb, cb = sin(a), cos(a), sin(b), cos(b)
     # The cosine of the whole angle, with its derivatives by the two.
     c, ga, gb, haa, hab, hbb = ca * cb, -sa * cb, -ca * sb, -ca * cb, sa * sb, -ca * cb
@@ -67,14 +86,22 @@ def arc_at(table: Floats, a: float, b: float) -> tuple[float, float, float, floa
 
 
 def along_the_arc(table: Floats, cosine: float) -> tuple[float, float, float]:
-    """Value and two derivatives by cos θ of (sin θ) / θ."""
+    """Return (sin θ) / θ and its first and second derivative by cos θ.
+
+    Returns:
+        Value, first and second derivative.
+    """
     square = angle_squared(cosine)
     h, h1, h2 = series(at(table, SERIES), int(table[TERMS]), square)
     return by_cosine(h, h1, h2, h, h1)
 
 
 def across_the_arc(table: Floats, cosine: float) -> tuple[float, float, float]:
-    """Value and two derivatives by cos θ of (1 - cos θ) / (θ sin θ)."""
+    """Return (1 - cos θ) / (θ sin θ) and its first and second derivative by cos θ.
+
+    Returns:
+        Value, first and second derivative.
+    """
     square, count = angle_squared(cosine), int(table[TERMS])
     h, h1, h2 = series(at(table, SERIES), count, square)
     m, m1, m2 = series(at(table, SERIES + count), count, square)
@@ -84,13 +111,22 @@ def across_the_arc(table: Floats, cosine: float) -> tuple[float, float, float]:
 
 
 def angle_squared(cosine: float) -> float:
-    """The square of an angle by its cosine."""
+    """Return the square of an angle from its cosine."""
     angle = acos(max(-1.0, min(1.0, cosine)))
     return angle * angle
 
 
 def series(terms: Floats, count: int, square: float) -> tuple[float, float, float]:
-    """Value and two derivatives of a polynomial."""
+    """Evaluate a polynomial by Horner's rule.
+
+    Args:
+        terms: coefficients by rising powers.
+        count: their number.
+        square: argument θ².
+
+    Returns:
+        Value, first and second derivative.
+    """
     value = slope = bend = 0.0
     for k in range(count - 1, -1, -1):
         bend = bend * square + slope
@@ -102,6 +138,17 @@ def series(terms: Floats, count: int, square: float) -> tuple[float, float, floa
 def by_cosine(
     value: float, first: float, second: float, h: float, h1: float
 ) -> tuple[float, float, float]:
-    """From derivatives by θ² to derivatives by cos θ, whose rate is -sin θ / (2 θ)."""
+    """Convert derivatives by θ² to derivatives by c = cos θ, using d(θ²)/dc = -2 θ / sin θ = -2 / h.
+
+    Args:
+        value: value of the function.
+        first: first derivative by θ².
+        second: second derivative by θ².
+        h: (sin θ) / θ.
+        h1: derivative of h by θ².
+
+    Returns:
+        Value, first and second derivative by cos θ.
+    """
     rate, rate1 = -2.0 / h, 2.0 * h1 / (h * h)
     return value, rate * first, rate * (rate1 * first + rate * second)

@@ -1,8 +1,8 @@
 """Accelerations under constraints: M udot + Gᵀ λ = f and G udot = b.
 
-Where M alone is well conditioned, udot is eliminated: the tree's own factor of M gives what each
-equation's force does. Otherwise the motion is solved for along the directions that the equations
-leave free. Equations that contradict each other are fulfilled as well as can be.
+Where M is well conditioned, udot is eliminated: the sparse factor of M gives the response to the
+force of each equation. Otherwise the motion is computed in the null space of G. Contradictory
+equations are fulfilled in the least-squares sense.
 """
 
 from __future__ import annotations
@@ -24,18 +24,31 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.laws.dual_numbers import is_nothing
 
 SAFE_MASS = 1e-10
-"""What each speed must move, as part of its inertia, for the mass matrix to be divided by."""
+"""Smallest pivot of M relative to its diagonal with which M is inverted."""
 SLIGHT = 2.0**-19.5
-"""Times the root of their number: equations whose forces move this part of what the strongest one's
-do are left out, as in Simbody: its complete orthogonal factorization of G M⁻¹ Gᵀ has the square of
-it as tolerance.
+"""Threshold of independence per square root of the number of equations.
+
+Equations with a smaller response than this part of the largest one are dropped, as in Simbody,
+whose complete orthogonal factorization of G M⁻¹ Gᵀ has the square of this as tolerance.
 """
 
 
 def constrained_dynamics(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int
 ) -> int:
-    """Solve for the accelerations: the second half of f has the generalized forces before."""
+    """Solve for the accelerations under constraints.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results with the mass matrix.
+        y: state.
+        f: rates of the coordinates, then the generalized forces, which the accelerations replace.
+        unused: any number.
+
+    Returns:
+        `OUTCOME.OK`, or SINGULAR_MASS.
+    """
     h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
     right = at(f, size)
     bind(model, reals, data, y, f)
@@ -55,7 +68,15 @@ def constrained_dynamics(
 
 
 def bind(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
-    """Fill in all equations; f has the rates of the coordinates."""
+    """Evaluate all constraint equations: G, errors, and the required values of G u and G udot.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation up to velocities; the equations are filled.
+        y: state.
+        f: rates of the coordinates.
+    """
     h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
     rows, rates = at(data, h[CONSTRAINED.WORK_ROWS]), at(data, h[CONSTRAINED.WORK_RATES])
     for k in range(h[CONSTRAINED.EQUATIONS] * size):
@@ -68,10 +89,19 @@ def bind(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None
 
 
 def by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats) -> bool:
-    """From the accelerations without constraints to those with them, if M is well conditioned; room for 2 (n + m).
+    """Correct unconstrained accelerations by constraint forces, if M is well conditioned.
 
-    With M = Uᵀ D U the equations of what U and D make of udot have as their shortest solution the
-    multipliers' push.
+    With M = Uᵀ D U, the equations G U⁻¹ D^(-1/2) x = b - G udot have the shortest solution x, and
+    U⁻¹ D^(-1/2) x is the response to the multipliers.
+
+    Args:
+        model: integers of the model.
+        data: results with the factor of M and the equations.
+        right: unconstrained accelerations (n,); corrected.
+        room: workspace of 2 (n + m) numbers.
+
+    Returns:
+        Whether M is well conditioned; if not, nothing is changed.
     """
     h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
     count, freedoms, pivots = (
@@ -122,7 +152,7 @@ def by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats) -> bo
 
 
 def toward_ground(model: Ints, data: Floats, right: Floats) -> None:
-    """Solve with Uᵀ of the factor that `solve` left, in place."""
+    """Solve Uᵀ x = b in place with the factor that `solve_accelerations` left."""
     freedoms = at(model, model[MODEL.DOF_AT])
     for k in range(model[MODEL.DOFS] - 1, -1, -1):
         j, load = at(freedoms, DOF.SIZE * k), right[k]
@@ -135,7 +165,7 @@ def toward_ground(model: Ints, data: Floats, right: Floats) -> None:
 
 
 def away_from_ground(model: Ints, data: Floats, right: Floats) -> None:
-    """Solve with U of the factor that `solve` left, in place."""
+    """Solve U x = b in place with the factor that `solve_accelerations` left."""
     freedoms = at(model, model[MODEL.DOF_AT])
     for k in range(model[MODEL.DOFS]):
         j, total = at(freedoms, DOF.SIZE * k), right[k]
@@ -149,7 +179,19 @@ def away_from_ground(model: Ints, data: Floats, right: Floats) -> None:
 def by_directions(
     model: Ints, data: Floats, matrix: Floats, forces: Floats, right: Floats, room: Floats
 ) -> int:
-    """The accelerations by the null space of the equations; room for 2 n (n + 1) numbers, or 2 m more than that."""
+    """Compute the accelerations in the null space of the constraint equations.
+
+    Args:
+        model: integers of the model.
+        data: results with the equations.
+        matrix: entries of the mass matrix.
+        forces: generalized forces (n,); changed.
+        right: filled with the accelerations (n,).
+        room: workspace of 2 n (n + 1) + 2 m numbers.
+
+    Returns:
+        `OUTCOME.OK`, or SINGULAR_MASS if the reduced mass matrix is not positive definite.
+    """
     h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
     count, rows, drifts, equations = (
         h[CONSTRAINED.EQUATIONS],
@@ -207,17 +249,17 @@ def by_directions(
     return OUTCOME.OK
 
 
-def times_mass(model: Ints, matrix: Floats, u: Floats, found: Floats) -> None:
-    """The mass matrix, of which the rows stand one after the other, times a vector."""
-    size, freedoms, place = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), 0
+def times_mass(model: Ints, matrix: Floats, u: Floats, product: Floats) -> None:
+    """Multiply a vector by the mass matrix, whose sparse rows are stored one after the other."""
+    size, freedoms, start = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), 0
     for k in range(size):
-        found[k] = 0.0
+        product[k] = 0.0
     for k in range(size):
         j = at(freedoms, DOF.SIZE * k)
-        found[k] += matrix[place] * u[k]
+        product[k] += matrix[start] * u[k]
         i = j[DOF.ABOVE]
         for m in range(1, j[DOF.DEPTH] + 1):
-            found[k] += matrix[place + m] * u[i]
-            found[i] += matrix[place + m] * u[k]
+            product[k] += matrix[start + m] * u[i]
+            product[i] += matrix[start + m] * u[k]
             i = freedoms[DOF.SIZE * i + DOF.ABOVE]
-        place += j[DOF.DEPTH] + 1
+        start += j[DOF.DEPTH] + 1

@@ -1,9 +1,9 @@
-"""Constraints as equations: rows of the matrix G, errors of the positions, and what G u and G udot are to be.
+"""Constraint equations: rows of G, errors of positions, and the required values of G u and G udot.
 
-Each law here fills in the equations of one constraint, after the velocities of the links are known.
-Those between bodies are made of two kinds of vectors: an axis fixed in a link, and an arm from a
-point of one link to one of another. What a unit of a vector's rate takes of the speeds is what a
-force along it would do to their coordinates.
+Each law fills in the equations of one constraint after the velocities of the links are known.
+Equations between bodies consist of two types of vectors: an axis that is fixed in a link, and an
+arm from a point of one link to a point of another. The derivative of a vector's component by the
+speeds equals the generalized force of a unit force along it (principle of virtual work).
 """
 
 from __future__ import annotations
@@ -45,26 +45,30 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-AXIS, ARM, MEETING = 0, 1, 2
-"""Kinds of vectors; that of a meeting is an arm whose rate is how fast its end leaves the point of
-its first link that is there.
-"""
-PRODUCT, DISTANCE, SLIP = 0, 1, 2
-"""Kinds of equations between bodies: the product of two vectors has a certain value; the second has
-a certain length; the end of the second is a roller whose point at its start moves along with that,
-as far as the first tells.
-"""
-VECTOR_INTS, EQUATION_INTS, EQUATION_NUMBERS = 3, 7, 13
-"""Of a vector its kind and two links (an axis has the first); of an equation its kind and two
-vectors; and for each vector six numbers, of an axis or two points in their links, and the wanted
-value.
-"""
+AXIS = 0
+"""Type of vector: an axis that is fixed in a link."""
+ARM = 1
+"""Type of vector: from a point of one link to a point of another."""
+MEETING = 2
+"""Type of vector: an arm whose rate is that of its end relative to the coincident point of link 1."""
+PRODUCT = 0
+"""Type of equation: the scalar product of two vectors has a given value."""
+DISTANCE = 1
+"""Type of equation: the second vector has a given length."""
+SLIP = 2
+"""Type of equation: a roller at the end of vector 2 does not slip along vector 1 on its start."""
+VECTOR_INTS = 3
+"""Number of integers of a vector: type and two links, of which an axis uses the first."""
+EQUATION_INTS = 7
+"""Number of integers of an equation: its type and two vectors."""
+EQUATION_NUMBERS = 13
+"""Number of reals of an equation: six per vector (axis, or two points), and the given value."""
 
 
 def prescribe(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int
 ) -> int:
-    """A coordinate follows a function of time, whose table is all its numbers."""
+    """Fill in the equation of a coordinate that follows a function of time."""
     i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
     row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
     value, slope, curvature = value_at(at(reals, i[CONSTRAINT.NUMBERS]), data[WORK.TIME])
@@ -78,11 +82,12 @@ def prescribe(
 
 
 def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int) -> int:
-    """A coordinate is a function of others.
+    """Fill in the equation of a coordinate that is a function of others.
 
-    Its integers are the dependent coordinate, the place of room for the gradient, the count of the
-    others, their degrees of freedom, and each coordinate again in full; its numbers the values of
-    coordinates at rest, the dependent one first, and the table of the function.
+    The integers of the constraint are the dependent coordinate, the offset of workspace for the
+    gradient, the number of the other coordinates, their degrees of freedom, and each of these again as
+    a `COORDINATE`. Its numbers are the values of constant coordinates, the dependent one first, and the
+    table of the function.
     """
     i, h, p = (
         at(model, constraint),
@@ -114,7 +119,19 @@ def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, const
 def add_coordinate(
     model: Ints, y: Floats, f: Floats, coordinate: Ints, factor: float, row: Floats
 ) -> float:
-    """Add a multiple of the rate of a coordinate to a row; returns that of what it changes by while no speed does."""
+    """Add a multiple of the rate of a coordinate to a row.
+
+    Args:
+        model: integers of the model.
+        y: state.
+        f: rates of the coordinates.
+        coordinate: integers of the coordinate, see `COORDINATE`.
+        factor: the multiple.
+        row: row of G (n,); changed.
+
+    Returns:
+        The multiple of the acceleration of the coordinate while udot = 0.
+    """
     freedom, ball = coordinate[COORDINATE.DOF], coordinate[COORDINATE.BALL]
     if freedom < 0:
         return 0.0
@@ -133,7 +150,7 @@ def add_coordinate(
 def bind_bodies(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int
 ) -> int:
-    """Some equations between bodies; its integers and numbers are theirs."""
+    """Fill in the equations of a constraint between bodies, which its integers and numbers list."""
     i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
     first, size = i[CONSTRAINT.FIRST_EQUATION], model[MODEL.DOFS]
     for row in range(first, i[CONSTRAINT.END_EQUATION]):
@@ -181,7 +198,18 @@ def bind_bodies(
 def follow(
     model: Ints, reals: Floats, data: Floats, kind: Ints, p: Floats
 ) -> tuple[Vector, Vector, Vector]:
-    """A vector, its rate, and its second derivative while no speed changes."""
+    """Compute a vector, its rate, and its second derivative while udot = 0.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        kind: integers of the vector.
+        p: numbers of the vector.
+
+    Returns:
+        Vector, rate and second derivative, along the axes of ground.
+    """
     one, two = kind[1], kind[2]
     if kind[0] == AXIS:
         axis, turning = (
@@ -214,7 +242,16 @@ def follow(
 
 
 def lean(model: Ints, data: Floats, kind: Ints, p: Floats, on: Vector, row: Floats) -> None:
-    """Add to a row what the speeds do to a vector along a direction."""
+    """Add to a row the derivative by the speeds of a vector's rate along a direction.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        kind: integers of the vector.
+        p: numbers of the vector.
+        on: direction, along the axes of ground.
+        row: row of G (n,); changed.
+    """
     one, two = kind[1], kind[2]
     if kind[0] == AXIS:
         add_wrench(
@@ -231,7 +268,7 @@ def lean(model: Ints, data: Floats, kind: Ints, p: Floats, on: Vector, row: Floa
 def add_force(
     model: Ints, data: Floats, link: int, point: Vector, force: Vector, row: Floats
 ) -> None:
-    """Add what a force at a point of ground on a link does to the coordinates."""
+    """Add to a row the generalized forces of a force on a link at a point of ground."""
     if link >= 0:
         arm = minus(point, vector(link_work(model, data, link), LINK_WORK.ORIGIN))
         add_wrench(model, data, link, cross(arm, force), force, row)
@@ -240,7 +277,7 @@ def add_force(
 def add_wrench(
     model: Ints, data: Floats, link: int, torque: Vector, force: Vector, row: Floats
 ) -> None:
-    """Add what a wrench about the origin of the spatial vectors does to the coordinates."""
+    """Add to a row the generalized forces of a wrench on a link about the origin of its spatial vectors."""
     # Welded bodies may be links of their own.
     while (
         link >= 0 and link_ints(model, link)[LINK.FIRST_DOF] == link_ints(model, link)[LINK.END_DOF]

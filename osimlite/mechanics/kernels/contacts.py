@@ -1,7 +1,7 @@
-"""Hunt-Crossley contact of half spaces, spheres and ellipsoids.
+"""Hunt-Crossley contact of half spaces and spheres, its derivatives, and positions of surfaces.
 
-The numbers of a pair are the centre and the normal of surface 1 in its link, its radius, centre and
-radius of surface 2, and k, a, c, us, ud, uv, vt of the law.
+The numbers of a pair are centre (3,) and normal (3,) of surface 1 in its link, its radius, centre
+(3,) and radius of surface 2, and k, a, c, us, ud, uv, vt of the law.
 """
 
 from __future__ import annotations
@@ -55,15 +55,15 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 RADIUS = 10
-"""Place of the radius of surface 2 among them."""
+"""Index among the numbers of a pair of the radius of surface 2."""
 SMOOTH = 9
-"""How many numbers the law of smooth contact has."""
+"""Number of parameters of the law of smooth contact."""
 
 
 def touch_half_space(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """A sphere on a half space."""
+    """Apply the contact force of a sphere on a half space."""
     d, radius, n, point = on_half_space(model, reals, data, item)
     if d > 0.0:
         press(model, reals, data, item, d, radius, n, point)
@@ -71,7 +71,7 @@ def touch_half_space(
 
 
 def touch_spheres(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Two spheres."""
+    """Apply the contact force of two spheres."""
     d, radius, n, point = on_sphere(model, reals, data, item)
     if d > 0.0:
         press(model, reals, data, item, d, radius, n, point)
@@ -81,7 +81,11 @@ def touch_spheres(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
 def on_half_space(
     model: Ints, reals: Floats, data: Floats, item: int
 ) -> tuple[float, float, Vector, Vector]:
-    """Depth, effective radius, normal and point of a sphere on a half space."""
+    """Compute the contact geometry of a sphere on a half space.
+
+    Returns:
+        Depth (m), effective radius (m), normal, and point of application (m).
+    """
     i = at(model, item)
     one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
     o, n = station(model, data, one, vector(p, 0)), direction(model, data, one, vector(p, 3))
@@ -92,7 +96,11 @@ def on_half_space(
 def on_sphere(
     model: Ints, reals: Floats, data: Floats, item: int
 ) -> tuple[float, float, Vector, Vector]:
-    """Depth, effective radius, normal and point of two spheres."""
+    """Compute the contact geometry of two spheres.
+
+    Returns:
+        Depth (m), effective radius (m), normal, and point of application (m).
+    """
     i = at(model, item)
     p = at(reals, i[ITEM.NUMBERS])
     one, two = (
@@ -105,11 +113,11 @@ def on_sphere(
 def contact_response(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Apply 1 N along the normal of a contact or across it, and leave in SCRATCH how its force there changes.
+    """Apply 1 N along the normal of a contact or across it, and write the derivatives of the force to SCRATCH.
 
-    The integers of the item are how far before it that of the contact is, 0 along the normal, 1 and
-    2 across it, and whether surface 1 is a half space. Friction grows with the force along the
-    normal, and that as the depth to 1.5.
+    The integers of the item are the distance back to the contact's item, the axis (0 along the normal,
+    1 and 2 across it), and whether surface 1 is a half space. Friction is proportional to the normal
+    force, and that to the depth to the power of 1.5.
     """
     i, change = at(model, item), at(data, WORK.SCRATCH)
     pair, axis = item - i[ITEM.OWN], i[ITEM.OWN + 1]
@@ -138,10 +146,10 @@ def contact_response(
 def smooth_contact_response(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """The same of a smooth contact of a sphere with a half space.
+    """Apply 1 N at a smooth contact of a sphere with a half space, and write the derivatives to SCRATCH.
 
-    The integers of the item are how far behind it that of the contact is, and the direction. The
-    numbers of that are those of the law, and of the sphere on the plane
+    The integers of the item are the distance ahead to the contact's item, and the axis. The numbers of
+    the contact are those of the law, then those of the sphere on the plane
     (:mod:`osimlite.simulation.elements.geometries.sphere_on_plane`).
     """
     i, change = at(model, item), at(data, WORK.SCRATCH)
@@ -197,13 +205,23 @@ def respond(
     changes: Vector,
     growth: float,
 ) -> None:
-    """Push two links apart, and leave in SCRATCH how the force of their contact changes.
+    """Push two links apart by 1 N, and write the derivatives of their contact force to SCRATCH.
 
-    Args: one, two: the links. axis: 0 along the normal, 1 and 2 across it. point: where they touch.
-        center: of the second, with which the point moves but for a part `sinks` of what that moves
-        along the normal. n: the normal, from one to two. v: velocity of one relative to two.
-        changes: derivatives along the normal by depth and approach, and force across it over the
-        slip. growth: by what part the force grows with the depth.
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        y: state.
+        f: row of derivatives by coordinates (n,); changed.
+        one: link of surface 1.
+        two: link of surface 2.
+        axis: 0 along the normal, 1 and 2 across it.
+        point: point of application (m).
+        center: centre of surface 2 (m); the point moves with it, but for a part of the normal motion.
+        n: normal from surface 1 to surface 2.
+        v: velocity of surface 1 relative to surface 2 (m/s).
+        sinks: this part of the normal motion.
+        changes: derivatives of the normal force by depth and approach, and friction over slip.
+        growth: relative derivative of the force by the depth (1/m).
     """
     change, (pressed, damped, dragged) = at(data, WORK.SCRATCH), changes
     way, by_depth = n, 0.0
@@ -261,9 +279,22 @@ def turns(
     by_place: Vector,
     by_motion: Vector,
 ) -> None:
-    """Add to a row how coordinates change products with the place of a point of a link and with its velocity there.
+    """Add to a row the derivatives by coordinates of products with position and velocity at a point.
 
-    The point moves as another of the link, a center, but for a part of what that moves along n.
+    The point moves with another point of the link, but for a part of its motion along n.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        y: state.
+        row: derivatives by coordinates (n,); changed.
+        link: number of the link; ground is ignored.
+        point: point of application in ground (m).
+        center: material point that it moves with (m).
+        n: normal.
+        sinks: normal times the part of the motion along n that the point does not take part in.
+        by_place: factor of the position.
+        by_motion: factor of the velocity.
     """
     if link < 0:
         return
@@ -302,7 +333,18 @@ def press(
     n: Vector,
     point: Vector,
 ) -> None:
-    """The force of a contact of a depth at a point, on both surfaces and in the record."""
+    """Apply the force of a contact to both surfaces and write it to the record.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        item: offset of the contact's item.
+        d: depth (m).
+        radius: effective radius (m).
+        n: normal from surface 1 to surface 2.
+        point: point of application (m).
+    """
     i = at(model, item)
     one, two, p, result = (
         i[ITEM.OWN],
@@ -326,25 +368,32 @@ def contact_places(
     each: int,
     rows: Ints,
     states: Floats,
-    room: Floats,
-    places: Floats,
+    rates: Floats,
+    positions: Floats,
     count: int,
 ) -> int:
-    """Centres of the surfaces of all contacts at many states.
+    """Compute positions and normals of the surfaces of all contacts at several states.
 
-    Args: model: the mechanism. vectors: its numbers, one row or several. data: room for an
-        evaluation. each: length of a row of numbers. rows: which of them each state goes with (k,).
-        states: (k, y). room: for a derivative (y,). places: filled with the centre of surface 1,
-        its normal, and the centre of surface 2, in ground (k, P, 9). count: k.
+    Args:
+        model: integers of the model.
+        vectors: its numbers, in one row or several.
+        data: workspace of an evaluation.
+        each: length of a row of numbers.
+        rows: number of the row of each state (k,).
+        states: states (k, y).
+        rates: workspace of a derivative (y,).
+        positions: filled per state and contact with the centre of surface 1, its normal, and the centre
+            of surface 2, in ground (k, P, 9).
+        count: number k of states.
     """
     pairs, size = model[MODEL.CONTACTS], model[MODEL.STATE_SIZE]
     for k in range(count):
         x = at(vectors, each * rows[k])
-        call(model[MODEL.LAWS], model, x, data, at(states, size * k), room, STAGE.POSITION)
+        call(model[MODEL.LAWS], model, x, data, at(states, size * k), rates, STAGE.POSITION)
         for pair in range(pairs):
             i, to = (
                 at(model, model[model[MODEL.CONTACT_AT] + pair]),
-                at(places, 9 * (pairs * k + pair)),
+                at(positions, 9 * (pairs * k + pair)),
             )
             a, one, two = at(x, i[ITEM.NUMBERS]), i[ITEM.OWN], i[ITEM.OWN + 1]
             put(to, 0, station(model, data, one, vector(a, 0)))

@@ -1,9 +1,8 @@
-"""What a walk is judged by: SCONE's measures, noted after each control step.
+"""Criteria that score a walk: SCONE's measures, updated after each control step.
 
-The integers are the count of the criteria, and of each `CRITERION`. Its numbers are the times
-between which it counts (s), and those of its kind; its room begins as `NOTED` says, that of a gait
-as `GAIT_NOTED`, behind which there are the
-steps: the time (s) of each, and how far it led (m).
+The integers are the number of criteria, and per criterion a `CRITERION`. The numbers of a criterion
+are the times between which it is active (s), and those of its kind. Its workspace begins as `NOTED`
+says, that of a gait as `GAIT_NOTED`; there the steps follow, each with its time (s) and length (m).
 """
 
 from __future__ import annotations
@@ -14,29 +13,59 @@ from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.sensors import SENSED, SENSES, foot
 
-GAIT, JUMP, NUMBER, LARGEST_LOAD, WHOLE_LOAD, POWERS, TENSIONS, WANG = range(8)
-"""Kinds: steps; a jump; how far a number of a row, the load of a leg or that of both are beyond a
-range; what muscles take.
-"""
+GAIT = 0
+"""Kind of criterion: steps of a gait."""
+JUMP = 1
+"""Kind of criterion: a jump."""
+NUMBER = 2
+"""Kind of criterion: excess of a number of the sensor row beyond a range."""
+LARGEST_LOAD = 3
+"""Kind of criterion: excess of the larger load of two legs beyond a range."""
+WHOLE_LOAD = 4
+"""Kind of criterion: excess of the total load of two legs beyond a range."""
+POWERS = 5
+"""Kind of criterion: sum of powers of activations; the kinds from here on are efforts."""
+TENSIONS = 6
+"""Kind of criterion: 1 plus the sum of tensions (N)."""
+WANG = 7
+"""Kind of criterion: metabolic power of Wang et al. (W)."""
 QUARTER = 0.5 * pi
-PREPARES, TAKES_OFF, FLIES, COMES_DOWN = range(4)
-"""What a jumper does."""
+"""A right angle (rad)."""
+PREPARES = 0
+"""Phase of a jump before the mass centre rises."""
+TAKES_OFF = 1
+"""Phase of a jump on the ground, after the start of the rise."""
+FLIES = 2
+"""Phase of a jump without ground contact."""
+COMES_DOWN = 3
+"""Phase of a jump after its peak."""
 AT_REST = 1.51
 """Power of a body at rest, W/kg (J. M. Wang et al., ACM Trans. Graph. 31, 2012)."""
 
 
 class CRITERION(metaclass=Record):
-    """Its kind, a place in a row or a power, where its numbers and its room are."""
+    """Integers of a criterion.
+
+    Attributes:
+        KIND: kind, such as GAIT.
+        PLACE: index in the sensor row, or a power.
+        NUMBERS, ROOM: offsets of its numbers and its workspace.
+    """
 
     KIND, PLACE, NUMBERS, ROOM, SIZE = range(5)
 
 
 class CRITERION_NUMBERS(metaclass=Record):
-    """Of all; of a range what follows: a factor of the number, least and largest, penalties of what
-    is beyond and of its square; of a gait: least height of the mass centre over that at the start,
-    load of a foot that touches, shortest time of a step; of a jump: least height likewise, time to
-    prepare (s), whether it ends at the peak; of Wang's
-    effort: part of slow fibers, and of each muscle the mass (kg).
+    """Numbers of a criterion.
+
+    Attributes:
+        START, STOP: times between which it is active (s).
+        FACTOR, LOW, HIGH: of a range, factor of the number, smallest and largest value.
+        LINEAR, SQUARED: of a range, penalties of the excess and of its square.
+        HEIGHT: of a gait or jump, smallest height of the mass centre relative to that at the start.
+        LOAD, SHORTEST: of a gait, load of a foot in contact, and shortest duration of a step (s).
+        PREPARE, AT_PEAK: of a jump, time to prepare (s), and whether it ends at the peak.
+        SLOW, MASSES: of Wang's effort, part of slow fibers, and the masses of the muscles (kg).
     """
 
     START, STOP, FACTOR, LOW, HIGH, LINEAR, SQUARED = range(7)
@@ -46,40 +75,56 @@ class CRITERION_NUMBERS(metaclass=Record):
 
 
 class NOTED(metaclass=Record):
-    """Whether there is a sample, its time and value; integral over time, time of that, largest and
-    smallest value; how far the mass centre was along x at the start, and is.
+    """Workspace of a criterion that samples a value.
+
+    Attributes:
+        BEGUN, TIME, VALUE: whether there is a sample, its time (s) and its value.
+        TOTAL, SPAN: integral over time, and duration (s).
+        HIGHEST, LOWEST: extremes of the value.
+        START, HERE: position of the mass centre along x at the start, and now (m).
     """
 
     BEGUN, TIME, VALUE, TOTAL, SPAN, HIGHEST, LOWEST, START, HERE, SIZE = range(10)
 
 
 class GAIT_NOTED(metaclass=Record):
-    """How far the walker was at the last step, and is; height of the mass centre at the start;
-    whether it has fallen; count of steps; whether each foot touches, -1 if that is not known.
+    """Workspace of a gait.
+
+    Attributes:
+        BEFORE, HERE: distance of the walker at the last step, and now (m).
+        HEIGHT: height of the mass centre at the start (m).
+        FALLEN, COUNT: whether the walker has fallen, and the number of steps.
+        TOUCHES: per foot whether it is in contact, -1 if unknown.
+        STEPS: offset of the steps.
     """
 
     BEFORE, HERE, HEIGHT, FALLEN, COUNT, TOUCHES, STEPS = 0, 1, 2, 3, 4, 5, 7
 
 
 class JUMP_NOTED(metaclass=Record):
-    """Height of the mass centre at the start, now, at the highest and when the jumper began to take
-    off (m); whether it has sunk or come down, see PREPARES.
+    """Workspace of a jump.
+
+    Attributes:
+        START, HERE, PEAK, PREPARED: height of the mass centre at the start, now, at the highest point,
+            and at the start of take-off (m).
+        ENDED: whether the jumper has sunk or come down.
+        DOES: phase, such as PREPARES.
     """
 
     START, HERE, PEAK, PREPARED, ENDED, DOES = range(6)
 
 
 def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
-    """Begin anew with a row."""
+    """Start all criteria with a sensor row."""
     for number in range(i[0]):
-        own = at(i, 1 + CRITERION.SIZE * number)
-        noted, centre = at(room, own[CRITERION.ROOM]), senses[SENSES.CENTRE]
-        if own[CRITERION.KIND] == GAIT:
+        criterion = at(i, 1 + CRITERION.SIZE * number)
+        noted, centre = at(room, criterion[CRITERION.ROOM]), senses[SENSES.CENTRE]
+        if criterion[CRITERION.KIND] == GAIT:
             noted[GAIT_NOTED.BEFORE] = noted[GAIT_NOTED.HERE] = distance(senses, row)
             noted[GAIT_NOTED.HEIGHT] = row[centre + 1]
             noted[GAIT_NOTED.FALLEN] = noted[GAIT_NOTED.COUNT] = 0.0
             noted[GAIT_NOTED.TOUCHES] = noted[GAIT_NOTED.TOUCHES + 1] = -1.0
-        elif own[CRITERION.KIND] == JUMP:
+        elif criterion[CRITERION.KIND] == JUMP:
             for k in range(JUMP_NOTED.ENDED):
                 noted[k] = row[centre + 1]
             noted[JUMP_NOTED.ENDED], noted[JUMP_NOTED.DOES] = 0.0, PREPARES
@@ -92,45 +137,49 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
 def judged(
     senses: Ints, known: Floats, i: Ints, p: Floats, t: float, row: Floats, u: Floats, room: Floats
 ) -> bool:
-    """Note a row, and tell whether the walker has fallen, or its jump has ended.
+    """Update all criteria; return whether the walker has fallen, or its jump has ended.
 
     Args:
-        senses: plan of the row.
-        known: its numbers.
-        i: the criteria.
-        p: their numbers.
-        t: time, s.
-        row: what is felt.
-        u: the excitations that were held.
-        room: of the criteria.
+        senses: plan of the sensor row.
+        known: numbers of the sensor row.
+        i: integers of the criteria.
+        p: numbers of the criteria.
+        t: time (s).
+        row: sensor row.
+        u: excitations during the control step.
+        room: workspace of the criteria.
     """
     has_fallen = False
     for number in range(i[0]):
-        own = at(i, 1 + CRITERION.SIZE * number)
-        numbers, noted = at(p, own[CRITERION.NUMBERS]), at(room, own[CRITERION.ROOM])
+        criterion = at(i, 1 + CRITERION.SIZE * number)
+        numbers, noted = at(p, criterion[CRITERION.NUMBERS]), at(room, criterion[CRITERION.ROOM])
         if not numbers[CRITERION_NUMBERS.START] <= t < numbers[CRITERION_NUMBERS.STOP]:
             continue
-        if own[CRITERION.KIND] == GAIT:
+        if criterion[CRITERION.KIND] == GAIT:
             note_gait(senses, numbers, t, row, noted)
             has_fallen = has_fallen or noted[GAIT_NOTED.FALLEN] > 0.0
             continue
-        if own[CRITERION.KIND] == JUMP:
+        if criterion[CRITERION.KIND] == JUMP:
             note_jump(senses, numbers, t, row, noted)
             has_fallen = has_fallen or noted[JUMP_NOTED.ENDED] > 0.0
             continue
-        if own[CRITERION.KIND] == WANG:
+        if criterion[CRITERION.KIND] == WANG:
             value = wang(senses, known, numbers, row, u)
-        elif own[CRITERION.KIND] >= POWERS:
-            value = effort(senses, known, own[CRITERION.KIND], own[CRITERION.PLACE], row)
+        elif criterion[CRITERION.KIND] >= POWERS:
+            value = effort(
+                senses, known, criterion[CRITERION.KIND], criterion[CRITERION.PLACE], row
+            )
         else:
-            value = penalty(senses, own[CRITERION.KIND], own[CRITERION.PLACE], numbers, row)
+            value = penalty(
+                senses, criterion[CRITERION.KIND], criterion[CRITERION.PLACE], numbers, row
+            )
         noted[NOTED.HERE] = row[senses[SENSES.CENTRE]]
         add(noted, t, value)
     return has_fallen
 
 
 def add(noted: Floats, t: float, value: float) -> None:
-    """A sample: integrals are over lines between samples."""
+    """Add a sample of a value to its integral by the trapezoidal rule, and to its extremes."""
     if noted[NOTED.BEGUN] > 0.0:
         dt = t - noted[NOTED.TIME]
         noted[NOTED.TOTAL] += 0.5 * dt * (noted[NOTED.VALUE] + value)
@@ -143,7 +192,10 @@ def add(noted: Floats, t: float, value: float) -> None:
 
 
 def distance(senses: Ints, row: Floats) -> float:
-    """How far a walker is, m: the mean of the two that are furthest behind, of its feet and its mass centre."""
+    """Return the distance of a walker along x (m).
+
+    It is the mean of the two smallest positions of both feet and the mass centre.
+    """
     centre, one, two = row[senses[SENSES.CENTRE]], foot(senses, row, 0), foot(senses, row, 1)
     if centre >= one and centre >= two:
         return 0.5 * (one + two)
@@ -151,7 +203,7 @@ def distance(senses: Ints, row: Floats) -> float:
 
 
 def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
-    """Whether the mass centre has sunk, and a step if a foot has touched the ground."""
+    """Update a gait: detect a fall by the height of the mass centre, and a step by a foot that lands."""
     noted[GAIT_NOTED.HERE] = distance(senses, row)
     if (
         row[senses[SENSES.CENTRE] + 1]
@@ -177,8 +229,10 @@ def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
 
 
 def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
-    """Follow the height of the mass centre, and what the jumper does: it takes off once it rises
-    after its time to prepare, and comes down when it sinks, or is on the ground after a flight.
+    """Update a jump: follow the height of the mass centre and the phase.
+
+    The jumper takes off once it rises after its time to prepare, and comes down when it sinks, or when
+    it is on the ground after a flight.
     """
     height, rise, does = (
         row[senses[SENSES.CENTRE] + 1],
@@ -202,7 +256,7 @@ def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
 
 
 def penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Floats) -> float:
-    """Of a number beyond a range."""
+    """Return the penalty of a number beyond its range."""
     one, two = row[place], 0.0
     if kind != NUMBER:
         one, two = row[senses[SENSES.LOADS]], row[senses[SENSES.LOADS] + 1]
@@ -217,7 +271,7 @@ def penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Floats) -
 
 
 def effort(senses: Ints, known: Floats, kind: int, power: int, row: Floats) -> float:
-    """The sum of the activations to a power, or 1 more than that of the tensions (N)."""
+    """Return the sum of the activations to a power, or 1 plus the sum of the tensions (N)."""
     count, total = senses[SENSES.MUSCLES], 1.0 if kind == TENSIONS else 0.0
     strengths = at(known, SENSED.HEAD + count)
     for k in range(count):
@@ -232,7 +286,17 @@ def effort(senses: Ints, known: Floats, kind: int, power: int, row: Floats) -> f
 
 
 def wang(senses: Ints, known: Floats, numbers: Floats, row: Floats, excitations: Floats) -> float:
-    """Power, W (J. M. Wang et al., ACM Trans. Graph. 31, 2012, after F. C. Anderson's thesis of 1999)."""
+    """Return the metabolic power of all muscles (W).
+
+    Source: J. M. Wang et al., ACM Trans. Graph. 31, 2012, after F. C. Anderson's thesis of 1999.
+
+    Args:
+        senses: plan of the sensor row.
+        known: numbers of the sensor row.
+        numbers: numbers of the criterion.
+        row: sensor row.
+        excitations: excitations of the muscles.
+    """
     count, slow, total = senses[SENSES.MUSCLES], numbers[CRITERION_NUMBERS.SLOW], 0.0
     optimal, strengths = at(known, SENSED.HEAD), at(known, SENSED.HEAD + count)
     for k in range(count):

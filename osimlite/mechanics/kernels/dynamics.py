@@ -1,10 +1,10 @@
-"""Accelerations of a tree of links under gravity and whatever pushes.
+"""Forward and inverse dynamics of a tree of links.
 
-The composite-rigid-body algorithm gives the mass matrix, and a factorisation that keeps its zeros
-solves for the accelerations (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 6.2
-and 6.5). Of the row of a degree of freedom only the entries of those on its way to ground are
-there, its own first. The cost grows with the number of degrees of freedom times the square of how
-many of them carry one another.
+The composite-rigid-body algorithm gives the mass matrix M, and a factorization M = Lᵀ D L that
+preserves the branch-induced sparsity solves M udot = f for the accelerations (R. Featherstone,
+Rigid Body Dynamics Algorithms, 2008, chapters 6.2 and 6.5). The row of a degree of freedom stores
+only the entries of the degrees of freedom on its path to ground, its own first. The cost grows with
+the number of degrees of freedom times the square of the depth of the tree.
 """
 
 from __future__ import annotations
@@ -43,16 +43,22 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 SMALLEST_PIVOT = 1e-13
-"""Part of the inertia about a degree of freedom that must remain once the joints further out are
-free; with less it moves no mass.
-"""
+"""Smallest pivot relative to the diagonal entry; with less a degree of freedom moves no mass."""
 
 
 def evaluate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, stage: int) -> int:
-    """The derivative f of the state y = (q, u, z): positions, speeds, auxiliary states. All else stays in `data`.
+    """Compute the derivative f of the state y = (q, u, z): coordinates, speeds, auxiliary states.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: filled with all intermediate results.
+        y: state.
+        f: filled with the derivative.
+        stage: how far the evaluation goes, see `STAGE`.
 
     Returns:
-        OK or what went wrong; with SINGULAR_MASS, f[0] is the degree of freedom that moves no mass.
+        `OUTCOME.OK` or what went wrong; with SINGULAR_MASS, f[0] is the degree of freedom without mass.
     """
     place(model, reals, data, y, f)
     if stage == STAGE.POSITION:
@@ -99,18 +105,18 @@ def evaluate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, sta
 
 
 def inverse(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int) -> int:
-    """The generalized forces that are missing for accelerations, constraints left aside.
+    """Compute the generalized forces that are missing for given accelerations, without constraints.
 
     Args:
-        model: the mechanism.
+        model: integers of the model.
         reals: its numbers.
-        data: room.
-        y: the state.
-        f: udot behind the place of the rates; the forces (N, N m) take its place.
+        data: workspace of an evaluation.
+        y: state.
+        f: udot after the rates; replaced by the generalized forces (N, N m).
         unused: any number.
 
     Returns:
-        OK or what went wrong, as of `evaluate`.
+        `OUTCOME.OK` or what went wrong, as of `evaluate`.
     """
     place(model, reals, data, y, f)
     status = move(model, reals, data, y, f)
@@ -127,10 +133,12 @@ def inverse(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unus
 
 
 def equilibrate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, stage: int) -> int:
-    """Bring what can be into equilibrium: changes auxiliary states in y, also after one has failed.
+    """Bring all items that have an equilibrium into it, by changing their auxiliary states in y.
 
-    Returns: OK, or what went wrong; with UNSOLVED, f[0] is the number of the first that has no
-        equilibrium.
+    The remaining items are equilibrated even if one fails.
+
+    Returns:
+        `OUTCOME.OK` or what went wrong; with UNSOLVED, f[0] is the number of the first item that failed.
     """
     status = call(model[MODEL.LAWS], model, reals, data, y, f, stage)
     if status != OUTCOME.OK:
@@ -143,14 +151,23 @@ def equilibrate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
 
 
 def spun(moments: Floats, a: Vector) -> Vector:
-    """A symmetric matrix times a vector."""
+    """Multiply a vector by the symmetric matrix with the entries xx, yy, zz, xy, xz, yz."""
     x, y, z = a
     xx, yy, zz, xy, xz, yz = moments[0], moments[1], moments[2], moments[3], moments[4], moments[5]
     return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
 
 
 def momentum(i: Floats, spin: Vector, velocity: Vector) -> tuple[Vector, Vector]:
-    """Inertia times a spatial vector."""
+    """Multiply a spatial velocity by a spatial inertia.
+
+    Args:
+        i: mass, first moment (3,), xx, yy, zz, xy, xz, yz about the origin.
+        spin: angular velocity.
+        velocity: linear velocity at the origin.
+
+    Returns:
+        Angular and linear momentum.
+    """
     first = vector(i, 1)
     return (
         plus(spun(at(i, 4), spin), cross(first, velocity)),
@@ -159,7 +176,7 @@ def momentum(i: Floats, spin: Vector, velocity: Vector) -> tuple[Vector, Vector]
 
 
 def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
-    """Inertias of the links, and the wrenches that are missing for their accelerations without udot."""
+    """Compute spatial inertias of the links, and minus the wrenches that they need while udot = 0."""
     for link in range(model[MODEL.LINKS]):
         b, here = at(reals, INERTIA_AT + INERTIA.SIZE * link), link_work(model, data, link)
         r, i, m = at(here, LINK_WORK.ROTATION), at(here, LINK_WORK.INERTIA), b[INERTIA.MASS]
@@ -191,7 +208,7 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
 
 
 def accelerate(model: Ints, data: Floats, udot: Floats) -> None:
-    """Add what udot gives to the accelerations of the links, outwards from ground."""
+    """Add the contribution of udot to the accelerations of the links, outwards from ground."""
     columns = at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS]):
         j, here = link_ints(model, link), link_work(model, data, link)
@@ -213,7 +230,7 @@ def accelerate(model: Ints, data: Floats, udot: Floats) -> None:
 
 
 def clear_wrenches(model: Ints, data: Floats) -> None:
-    """No wrench on any link."""
+    """Set the wrenches on all links to zero."""
     for link in range(model[MODEL.LINKS]):
         load = at(link_work(model, data, link), LINK_WORK.WRENCH)
         for k in range(6):
@@ -221,10 +238,10 @@ def clear_wrenches(model: Ints, data: Floats) -> None:
 
 
 def apply_forces(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
-    """Add what all items push to the wrenches, or to the generalized forces behind the rates in f.
+    """Add the loads of all items to the wrenches, or to the generalized forces after the rates in f.
 
     Returns:
-        OK, or what the kernel of an item says; then f[0] is the number of the item.
+        `OUTCOME.OK`, or the outcome of the kernel of an item; then f[0] is the number of the item.
     """
     for number in range(model[MODEL.DOFS], model[MODEL.STATE_SIZE]):
         f[number] = 0.0
@@ -248,7 +265,7 @@ def apply_forces(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats)
 
 
 def generalized_forces(model: Ints, data: Floats, right: Floats) -> None:
-    """The generalized forces of the wrenches, inwards from the leaves."""
+    """Add the generalized forces of the wrenches, inwards from the leaves; sums up the wrenches."""
     columns = at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
         j, load = (
@@ -266,7 +283,7 @@ def generalized_forces(model: Ints, data: Floats, right: Floats) -> None:
 
 
 def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
-    """Mass matrix, and the generalized forces, inwards from the leaves."""
+    """Compute the mass matrix, and add the generalized forces of the wrenches, inwards from the leaves."""
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
         j, here = link_ints(model, link), link_work(model, data, link)
@@ -276,12 +293,12 @@ def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
             turn, shift = vector(c, 0), vector(c, 3)
             right[freedom] += dot(turn, vector(load, 0)) + dot(shift, vector(load, 3))
             angular, linear = momentum(i, turn, shift)
-            row, k, place = at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
+            row, k, column = at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
             while k >= 0:
                 c = at(columns, 6 * k)
-                row[place] = dot(vector(c, 0), angular) + dot(vector(c, 3), linear)
+                row[column] = dot(vector(c, 0), angular) + dot(vector(c, 3), linear)
                 k = freedoms[DOF.SIZE * k + DOF.ABOVE]
-                place += 1
+                column += 1
         if j[LINK.PARENT] >= 0:
             above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.INERTIA)
             # The wrench stands behind the inertia.
@@ -290,7 +307,16 @@ def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
 
 
 def solve(model: Ints, data: Floats, right: Floats) -> int:
-    """Solve for the accelerations in place; returns the degree of freedom that moves no mass, or -1."""
+    """Factorise the mass matrix and solve for the accelerations in place.
+
+    Args:
+        model: integers of the model.
+        data: results with the mass matrix, which is replaced by its factor.
+        right: generalized forces (n,), replaced by the accelerations.
+
+    Returns:
+        -1, or the degree of freedom that moves no mass.
+    """
     size, freedoms, pivots = (
         model[MODEL.DOFS],
         at(model, model[MODEL.DOF_AT]),

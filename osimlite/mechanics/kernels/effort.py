@@ -1,15 +1,19 @@
-"""How actuators share what is needed with the least effort, frame by frame.
+"""Static optimization: distribute generalized forces over actuators, frame by frame.
 
-Of all x with A x = b and bounds on each, the one with the least sum of |x|ᵖ, p > 1. For p = 2 it is
-a function of one multiplier λ for each equation: x is Aᵀλ within its bounds. The λ at which the
-equations hold are found by Newton's method on the concave dual function, whose second derivative is
-that of the entries that are at no bound: an active set that changes as a whole (L. Qi, J. Sun,
-Math. Programming 58, 1993). Each frame begins with the multipliers of the one before. Other p are
-reached by Newton's method, each step of which is such a problem with weights.
+For each frame the kernel minimizes the sum of |x_j|^p, p > 1, over the controls x of the
+actuators, subject to A x = b (the generalized forces) and bounds on each x_j.
 
-The dual function is made strictly concave by a little of |λ - λ'|², where λ' is what was found
-before (R. T. Rockafellar, Math. Oper. Research 1, 1976). So equations that repeat each other do no
-harm, and where there is no solution, what is missing of b tends to the shortest that is possible.
+For p = 2 the problem is solved in its dual form. With one multiplier λ_k per equation, the
+minimizer is x = Aᵀ λ clamped to the bounds, and the equations determine λ. Newton's method on the
+concave dual function finds λ; its second derivative involves only the unknowns that are not at a
+bound, so that the active set changes as a whole (L. Qi, J. Sun, A nonsmooth version of Newton's
+method, Math. Programming 58, 1993). Each frame starts from the multipliers of the previous one.
+Other exponents p are reached by Newton steps, each of which is a weighted problem with p = 2.
+
+A proximal term SLIGHT |λ - λ'|² makes the dual function strictly concave, where λ' is the previous
+solution (R. T. Rockafellar, Augmented Lagrangians and applications of the proximal point
+algorithm, Math. Oper. Research 1, 1976). Redundant equations are therefore harmless, and if the
+problem is infeasible, the residual b - A x converges to the shortest possible one.
 """
 
 from __future__ import annotations
@@ -20,64 +24,93 @@ from osimlite.mechanics.kernels.layout import OUTCOME
 from osimlite.mechanics.kernels.linear_algebra import cholesky, substitute
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 
-FRAMES, EQUATIONS, UNKNOWNS, ENTRIES = 0, 1, 2, 3
-"""Places of the counts; from ENTRIES on room for the places of the entries of a column that are not
-0, after their count (n, 1 + m).
-"""
-POWER, BOUNDS = 0, 1
-"""Places of the exponent, and of the bounds: all lower ones, then all upper ones (2, n)."""
-TIGHTEST, CLOSEST, CLOSE = 1e-15, 1e-13, 1e-10
-"""What may be missing of an equation, as part of its terms: nothing is looked for below the first,
-a search ends at the second, and with the third there is a solution.
-"""
-ROUNDING, LEAST = 1e-12, 1e-14
-"""What part of the largest entry of a column is none, and of that of all: a force within the body moves no pelvis."""
-SLIGHT, SLOWEST = 1e-9, 0.9
-"""How much of |λ - λ'|² is added, as part of the second derivative; what must be left at most of
-what was missing at the λ' before, to go on.
-"""
-CENTRES, ROUNDS, HALVINGS, NEWTON_STEPS, PATIENCE = 30, 100, 60, 200, 20
-"""Most λ' of a problem, steps from each, tries along a step, steps to another exponent than 2, steps in vain."""
-SMALLEST, SOFTEST, LEAST_GAIN = 1e-6, 1e-8, 1e-15
-"""Of such a step: the |x| below which |x|ᵖ is bent as there if p < 2, the least bend as part of the
-largest if p > 2, and the part of the effort that a step must save to be worth it.
-"""
+FRAMES = 0
+"""Index in `sizes` of the number of frames."""
+EQUATIONS = 1
+"""Index in `sizes` of the number m of equations."""
+UNKNOWNS = 2
+"""Index in `sizes` of the number n of unknowns."""
+ENTRIES = 3
+"""Offset in `sizes` of the sparsity of A (n, 1 + m): per column the count and rows of nonzeros."""
+POWER = 0
+"""Index in `numbers` of the exponent p."""
+BOUNDS = 1
+"""Offset in `numbers` of the bounds (2, n): all lower ones, then all upper ones."""
+TIGHTEST = 1e-15
+"""Relative residual of the regularized equations below which an iteration cannot improve it."""
+CLOSEST = 1e-13
+"""Relative residual of the equations at which the search ends."""
+CLOSE = 1e-10
+"""Largest relative residual of the equations with which a frame counts as solved."""
+ROUNDING = 1e-12
+"""Entries below this part of the largest of their column are rounding errors and count as zero."""
+LEAST = 1e-14
+"""Entries below this part of the largest of A count as zero: internal forces move no pelvis."""
+SLIGHT = 1e-9
+"""Weight of the proximal term |λ - λ'|², relative to the mean second derivative of the dual."""
+SLOWEST = 0.9
+"""A further proximal step must reduce the residual to this part of the previous one, or less."""
+CENTRES = 30
+"""Largest number of proximal steps, each of which starts from a new λ'."""
+ROUNDS = 100
+"""Largest number of Newton steps per proximal step."""
+HALVINGS = 60
+"""Largest number of trial lengths in a line search."""
+NEWTON_STEPS = 200
+"""Largest number of Newton steps towards the minimizer for an exponent other than 2."""
+PATIENCE = 20
+"""Number of Newton steps without progress after which a proximal step ends."""
+SMALLEST = 1e-6
+"""For p < 2: relative |x| below which the curvature of |x|^p is taken at this value, as it diverges."""
+SOFTEST = 1e-8
+"""For p > 2: smallest curvature relative to the largest one, as it vanishes at x = 0."""
+LEAST_GAIN = 1e-15
+"""Relative decrease of the sum below which the Newton steps for p other than 2 end."""
 
 
 def effort_room(equations: int, unknowns: int) -> int:
-    """How many numbers the kernel works with."""
+    """Return the length of the workspace for `equations` equations and `unknowns` unknowns."""
     return equations * (equations + 8) + 5 * unknowns
 
 
-def least_effort(sizes: Ints, numbers: Floats, given: Floats, found: Floats, room: Floats) -> int:
-    """Share out, frame by frame.
+def least_effort(
+    sizes: Ints, numbers: Floats, problems: Floats, solutions: Floats, work: Floats
+) -> int:
+    """Distribute generalized forces over actuators with the least effort, frame by frame.
 
-    Args: sizes: counts of frames, equations m and unknowns n, and room. numbers: exponent and
-        bounds. given: of each frame the columns of A (n, m) and b (m,); changed. found: of each
-        frame x (n,), what is missing of b (m,), and 1 if there is a solution, else 0. room: for
-        what `effort_room` says.
+    Args:
+        sizes: numbers of frames, equations m and unknowns n, then the sparsity of A; see FRAMES.
+        numbers: exponent and bounds, see POWER.
+        problems: per frame the columns of A (n, m) and the right side b (m,); scaled in place.
+        solutions: filled per frame with x (n,), the residual b - A x (m,) and 1.0 if solved, else 0.0.
+        work: workspace of `effort_size` numbers.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
-    scales, carried, push, own = room, at(room, m), at(room, 2 * m), at(room, 3 * m)
-    middles, softness = own, at(own, n)
+    scales, previous, multipliers, inner_work = work, at(work, m), at(work, 2 * m), at(work, 3 * m)
+    targets, compliances = inner_work, at(inner_work, n)
     for k in range(m):
-        carried[k] = 0.0
+        previous[k] = 0.0
     for frame in range(sizes[FRAMES]):
-        columns, x = at(given, (n + 1) * m * frame), at(found, (n + m + 1) * frame)
+        columns, x = at(problems, (n + 1) * m * frame), at(solutions, (n + m + 1) * frame)
         scale(sizes, columns, scales)
         for j in range(n):
-            middles[j], softness[j] = 0.0, 1.0
+            targets[j], compliances[j] = 0.0, 1.0
         for k in range(m):
-            push[k] = carried[k] / scales[k]
-        is_solved = share(sizes, numbers, columns, x, at(x, n), push, own) <= CLOSE
+            multipliers[k] = previous[k] / scales[k]
+        is_solved = share(sizes, numbers, columns, x, at(x, n), multipliers, inner_work) <= CLOSE
         if not is_solved and frame > 0:
             for k in range(m):
-                push[k] = 0.0
-            is_solved = share(sizes, numbers, columns, x, at(x, n), push, own) <= CLOSE
+                multipliers[k] = 0.0
+            is_solved = (
+                share(sizes, numbers, columns, x, at(x, n), multipliers, inner_work) <= CLOSE
+            )
         for k in range(m):
-            carried[k] = push[k] * scales[k] if is_solved else 0.0
+            previous[k] = multipliers[k] * scales[k] if is_solved else 0.0
         if is_solved and numbers[POWER] != 2.0:
-            newton(sizes, numbers, columns, x, push, own)
+            newton(sizes, numbers, columns, x, multipliers, inner_work)
         for k in range(m):
             x[n + k] /= scales[k]
         x[n + m] = 1.0 if is_solved else 0.0
@@ -85,9 +118,15 @@ def least_effort(sizes: Ints, numbers: Floats, given: Floats, found: Floats, roo
 
 
 def scale(sizes: Ints, columns: Floats, scales: Floats) -> None:
-    """Make every equation as strong as the others, and note which entries there are."""
+    """Scale each equation to unit length, drop negligible entries, and list the nonzeros of A.
+
+    Args:
+        sizes: sizes of the problem; its sparsity is filled.
+        columns: columns of A (n, m), followed by b (m,); scaled in place.
+        scales: filled with the factor of each equation (m,).
+    """
     m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
-    wanted = at(columns, m * n)
+    rhs = at(columns, m * n)
     most = 0.0
     for j in range(m * n):
         most = max(most, abs(columns[j]))
@@ -103,7 +142,7 @@ def scale(sizes: Ints, columns: Floats, scales: Floats) -> None:
         for j in range(n):
             square += columns[m * j + k] * columns[m * j + k]
         scales[k] = 1.0 / sqrt(square) if square > 0.0 else 1.0
-        wanted[k] *= scales[k]
+        rhs[k] *= scales[k]
     for j in range(n):
         column, entries, count = at(columns, m * j), at(sizes, ENTRIES + (1 + m) * j), 0
         for k in range(m):
@@ -115,12 +154,21 @@ def scale(sizes: Ints, columns: Floats, scales: Floats) -> None:
 
 
 def newton(
-    sizes: Ints, numbers: Floats, columns: Floats, x: Floats, push: Floats, room: Floats
+    sizes: Ints, numbers: Floats, columns: Floats, x: Floats, multipliers: Floats, work: Floats
 ) -> None:
-    """From a solution to the one with the least sum of |x|ᵖ; x is followed by room for what is missing."""
+    """Minimize the sum of |x|^p for p other than 2 by Newton steps, starting from a solution for p = 2.
+
+    Args:
+        sizes: sizes of the problem.
+        numbers: exponent and bounds.
+        columns: scaled columns of A, followed by b.
+        x: feasible start, then the minimizer (n,), followed by its residual (m,).
+        multipliers: workspace for the multipliers (m,).
+        work: workspace, which begins with targets and compliances, see `solve_weighted_least_squares`.
+    """
     m, n, power = sizes[EQUATIONS], sizes[UNKNOWNS], numbers[POWER]
-    middles, softness, tried = room, at(room, n), at(room, 4 * n + m * (m + 5))
-    terms = at(room, 4 * n + 3 * m)
+    targets, compliances, tried = work, at(work, n), at(work, 4 * n + m * (m + 5))
+    terms = at(work, 4 * n + 3 * m)
     for _ in range(NEWTON_STEPS):
         # The largest x is the unit: its powers are neither too large nor too small for floats.
         unit, stiffest = 0.0, 0.0
@@ -132,39 +180,41 @@ def newton(
             size = abs(x[j]) / unit
             size = max(size, SMALLEST) if power < 2.0 else size
             # Below 2 Newton's steps go too far; what bounds |x|ᵖ from above by a square is steeper.
-            softness[j] = max(power - 1.0, 1.0) * size ** (power - 2.0)
-            stiffest = max(stiffest, softness[j])
+            compliances[j] = max(power - 1.0, 1.0) * size ** (power - 2.0)
+            stiffest = max(stiffest, compliances[j])
         for j in range(n):
-            stiffness = max(softness[j], SOFTEST * stiffest)
+            stiffness = max(compliances[j], SOFTEST * stiffest)
             slope = unit * (abs(x[j]) / unit) ** (power - 1.0)
-            middles[j] = x[j] - (slope if x[j] > 0.0 else -slope) / stiffness
-            softness[j] = stiffest / stiffness
+            targets[j] = x[j] - (slope if x[j] > 0.0 else -slope) / stiffness
+            compliances[j] = stiffest / stiffness
         for k in range(m):
-            push[k] = 0.0
-        error = share(sizes, numbers, columns, tried, at(x, n), push, room)
-        if error > CLOSEST and not mended(sizes, numbers, columns, tried, at(x, n), push, room):
+            multipliers[k] = 0.0
+        error = share(sizes, numbers, columns, tried, at(x, n), multipliers, work)
+        if error > CLOSEST and not mended(
+            sizes, numbers, columns, tried, at(x, n), multipliers, work
+        ):
             break
-        before, part = effort(n, power, unit, x, tried, 0.0), 1.0
-        after = effort(n, power, unit, x, tried, part)
+        before, step_length = effort(n, power, unit, x, tried, 0.0), 1.0
+        after = effort(n, power, unit, x, tried, step_length)
         for _ in range(HALVINGS):
             if after < before:
                 break
-            part *= 0.5
-            after = effort(n, power, unit, x, tried, part)
+            step_length *= 0.5
+            after = effort(n, power, unit, x, tried, step_length)
         if not after < before:
             break
         for j in range(n):
-            x[j] += part * (tried[j] - x[j])
+            x[j] += step_length * (tried[j] - x[j])
         if before - after <= LEAST_GAIN * before:
             break
     missing_of(sizes, columns, x, at(x, n), terms)
 
 
-def effort(n: int, power: float, unit: float, x: Floats, to: Floats, part: float) -> float:
-    """The sum of |x|ᵖ on the way to another x, for a unit of x."""
+def effort(n: int, power: float, unit: float, x: Floats, end: Floats, step_length: float) -> float:
+    """Return the sum of (|x| / unit)^p at the fraction `step_length` of the way from x to `end`."""
     total = 0.0
     for j in range(n):
-        total += (abs(x[j] + part * (to[j] - x[j])) / unit) ** power
+        total += (abs(x[j] + step_length * (end[j] - x[j])) / unit) ** power
     return total
 
 
@@ -173,29 +223,36 @@ def share(
     numbers: Floats,
     columns: Floats,
     x: Floats,
-    missing: Floats,
-    push: Floats,
-    room: Floats,
+    residual: Floats,
+    multipliers: Floats,
+    work: Floats,
 ) -> float:
-    """Find the x with the least sum of (x - middle)² / softness, from multipliers on.
+    """Minimize the sum of (x_j - target_j)² / compliance_j subject to A x = b and the bounds.
 
-    The room begins with the middles and the softness.
+    Args:
+        sizes: sizes of the problem.
+        numbers: exponent and bounds.
+        columns: scaled columns of A, followed by b.
+        x: filled with the minimizer (n,).
+        residual: filled with b - A x (m,).
+        multipliers: start of the search (m,), then the multipliers of the equations.
+        work: workspace that begins with the targets (n,) and the compliances (n,).
 
     Returns:
-        The largest part of the terms of an equation that is missing.
+        The largest residual of an equation relative to the size of its terms.
     """
     m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
-    wanted = at(columns, m * n)
-    y, change, centre = at(room, 2 * n), at(room, 3 * n), at(room, 4 * n)
+    rhs = at(columns, m * n)
+    y, change, centre = at(work, 2 * n), at(work, 3 * n), at(work, 4 * n)
     slope, step = at(centre, m), at(centre, 2 * m)
     terms, slight, matrix = at(centre, 3 * m), at(centre, 4 * m), at(centre, 5 * m)
     error_before = error = 0.0
     for number in range(CENTRES):
         for k in range(m):
-            centre[k] = push[k]
-        pulled(sizes, columns, push, y)
-        error = answers(sizes, numbers, columns, room, x, missing, terms)
-        second(sizes, numbers, columns, room, matrix)
+            centre[k] = multipliers[k]
+        pulled(sizes, columns, multipliers, y)
+        error = answers(sizes, numbers, columns, work, x, residual, terms)
+        second(sizes, numbers, columns, work, matrix)
         trace = 0.0
         for k in range(m):
             trace += matrix[m * k + k]
@@ -210,23 +267,23 @@ def share(
                 break
             largest = 0.0
             for k in range(m):
-                slope[k] = missing[k] - slight[k] * (push[k] - centre[k])
+                slope[k] = residual[k] - slight[k] * (multipliers[k] - centre[k])
                 step[k] = slope[k]
                 largest = max(largest, abs(slope[k]) / terms[k])
             if largest <= TIGHTEST:
                 break
-            second(sizes, numbers, columns, room, matrix)
+            second(sizes, numbers, columns, work, matrix)
             for k in range(m):
                 matrix[m * k + k] += slight[k]
             if not cholesky(m, matrix, 0.0):
                 break
             substitute(m, matrix, step)
             pulled(sizes, columns, step, change)
-            part = way(sizes, numbers, wanted, step, push, room)
+            step_length = way(sizes, numbers, rhs, step, multipliers, work)
             for k in range(m):
-                push[k] += part * step[k]
-            pulled(sizes, columns, push, y)
-            error = answers(sizes, numbers, columns, room, x, missing, terms)
+                multipliers[k] += step_length * step[k]
+            pulled(sizes, columns, multipliers, y)
+            error = answers(sizes, numbers, columns, work, x, residual, terms)
         if error <= CLOSEST or (number > 1 and not error < SLOWEST * error_before):
             break
         error_before = error
@@ -238,20 +295,23 @@ def mended(
     numbers: Floats,
     columns: Floats,
     x: Floats,
-    missing: Floats,
-    push: Floats,
-    room: Floats,
+    residual: Floats,
+    multipliers: Floats,
+    work: Floats,
 ) -> bool:
-    """Change x as little as the equations take, which great softness has left to rounding; whether they hold then."""
+    """Move x to the nearest point that fulfils the equations; return whether it does.
+
+    Large compliances leave a residual of rounding errors, which equal compliances remove.
+    """
     for j in range(sizes[UNKNOWNS]):
-        room[j], room[sizes[UNKNOWNS] + j] = x[j], 1.0
+        work[j], work[sizes[UNKNOWNS] + j] = x[j], 1.0
     for k in range(sizes[EQUATIONS]):
-        push[k] = 0.0
-    return share(sizes, numbers, columns, x, missing, push, room) <= CLOSE
+        multipliers[k] = 0.0
+    return share(sizes, numbers, columns, x, residual, multipliers, work) <= CLOSE
 
 
 def pulled(sizes: Ints, columns: Floats, multipliers: Floats, y: Floats) -> None:
-    """y = Aᵀλ."""
+    """Compute y = Aᵀ λ."""
     m = sizes[EQUATIONS]
     for j in range(sizes[UNKNOWNS]):
         column, entries, total = at(columns, m * j), at(sizes, ENTRIES + (1 + m) * j), 0.0
@@ -260,9 +320,9 @@ def pulled(sizes: Ints, columns: Floats, multipliers: Floats, y: Floats) -> None
         y[j] = total
 
 
-def answer(numbers: Floats, n: int, j: int, room: Floats, y: float) -> float:
-    """The x of an unknown for what the multipliers pull it with."""
-    x = room[j] + room[n + j] * y
+def answer(numbers: Floats, n: int, j: int, work: Floats, y: float) -> float:
+    """Return the unknown `j` that minimizes the Lagrangian: target + compliance y, clamped to its bounds."""
+    x = work[j] + work[n + j] * y
     return min(max(x, numbers[BOUNDS + j]), numbers[BOUNDS + n + j])
 
 
@@ -270,81 +330,109 @@ def answers(
     sizes: Ints,
     numbers: Floats,
     columns: Floats,
-    room: Floats,
+    work: Floats,
     x: Floats,
-    missing: Floats,
+    residual: Floats,
     terms: Floats,
 ) -> float:
-    """Fill in x for what the multipliers pull; returns as `missing_of`."""
+    """Compute x from y = Aᵀ λ; fill residual and term sizes, and return as `compute_residual`."""
     n = sizes[UNKNOWNS]
     for j in range(n):
-        x[j] = answer(numbers, n, j, room, room[2 * n + j])
-    return missing_of(sizes, columns, x, missing, terms)
+        x[j] = answer(numbers, n, j, work, work[2 * n + j])
+    return missing_of(sizes, columns, x, residual, terms)
 
 
-def missing_of(sizes: Ints, columns: Floats, x: Floats, missing: Floats, terms: Floats) -> float:
-    """What is missing of b, and how large the terms of the equations are; returns the largest part that is missing."""
+def missing_of(sizes: Ints, columns: Floats, x: Floats, residual: Floats, terms: Floats) -> float:
+    """Compute the residual b - A x and the size of the terms of each equation.
+
+    Args:
+        sizes: sizes of the problem.
+        columns: scaled columns of A, followed by b.
+        x: unknowns (n,).
+        residual: filled with b - A x (m,).
+        terms: filled with |b_k| + Σ_j |A_kj x_j| (m,), or 1 for an equation without terms.
+
+    Returns:
+        The largest ratio of residual to terms.
+    """
     m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
-    wanted, worst = at(columns, m * n), 0.0
+    rhs, largest = at(columns, m * n), 0.0
     for k in range(m):
-        missing[k], terms[k] = wanted[k], abs(wanted[k])
+        residual[k], terms[k] = rhs[k], abs(rhs[k])
     for j in range(n):
         column, entries = at(columns, m * j), at(sizes, ENTRIES + (1 + m) * j)
         for e in range(1, entries[0] + 1):
             k = entries[e]
             term = column[k] * x[j]
-            missing[k] -= term
+            residual[k] -= term
             terms[k] += abs(term)
     for k in range(m):
         # An equation without a term holds.
         terms[k] = terms[k] if terms[k] > 0.0 else 1.0
-        worst = max(worst, abs(missing[k]) / terms[k])
-    return worst
+        largest = max(largest, abs(residual[k]) / terms[k])
+    return largest
 
 
-def second(sizes: Ints, numbers: Floats, columns: Floats, room: Floats, matrix: Floats) -> None:
-    """The second derivative of the dual function without what is added, but for its sign; the lower triangle (m, m)."""
+def second(sizes: Ints, numbers: Floats, columns: Floats, work: Floats, matrix: Floats) -> None:
+    """Fill the lower triangle of Σ_j compliance_j a_j a_jᵀ over the unknowns j within their bounds (m, m).
+
+    This is the second derivative of the dual function without the proximal term, with opposite sign.
+    """
     m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
     for k in range(m * m):
         matrix[k] = 0.0
     for j in range(n):
-        x = room[j] + room[n + j] * room[2 * n + j]
+        x = work[j] + work[n + j] * work[2 * n + j]
         if not numbers[BOUNDS + j] < x < numbers[BOUNDS + n + j]:
             continue
         column, entries = at(columns, m * j), at(sizes, ENTRIES + (1 + m) * j)
         for e in range(1, entries[0] + 1):
             k = entries[e]
-            row, factor = at(matrix, m * k), room[n + j] * column[k]
+            row, factor = at(matrix, m * k), work[n + j] * column[k]
             for g in range(1, e + 1):
                 row[entries[g]] += factor * column[entries[g]]
 
 
 def way(
-    sizes: Ints, numbers: Floats, wanted: Floats, step: Floats, push: Floats, room: Floats
+    sizes: Ints, numbers: Floats, rhs: Floats, step: Floats, multipliers: Floats, work: Floats
 ) -> float:
-    """The part of a step to take: all of it, or where the dual function rises half as much as at its start at most."""
-    m, n, low, high, part, start = sizes[EQUATIONS], sizes[UNKNOWNS], 0.0, 1.0, 0.0, 0.0
+    """Return the step length in (0, 1] along `step`.
+
+    Bisect until the slope of the dual function along the step is at most 0.1 of its initial value; the
+    full step is accepted if the function still rises at its end.
+
+    Args:
+        sizes: sizes of the problem.
+        numbers: exponent and bounds.
+        rhs: right side b (m,).
+        step: Newton step of the multipliers (m,).
+        multipliers: multipliers at the start of the step (m,).
+        work: workspace of `solve_weighted_least_squares`, with y = Aᵀ λ and its change along the step.
+    """
+    m, n, low, high, step_length, start = sizes[EQUATIONS], sizes[UNKNOWNS], 0.0, 1.0, 0.0, 0.0
     y, change, centre, slight = (
-        at(room, 2 * n),
-        at(room, 3 * n),
-        at(room, 4 * n),
-        at(room, 4 * n + 4 * m),
+        at(work, 2 * n),
+        at(work, 3 * n),
+        at(work, 4 * n),
+        at(work, 4 * n + 4 * m),
     )
     for _ in range(HALVINGS):
         rise = 0.0
         for k in range(m):
-            rise += step[k] * (wanted[k] - slight[k] * (push[k] + part * step[k] - centre[k]))
+            rise += step[k] * (
+                rhs[k] - slight[k] * (multipliers[k] + step_length * step[k] - centre[k])
+            )
         for j in range(n):
             if change[j] != 0.0:
-                rise -= change[j] * answer(numbers, n, j, room, y[j] + part * change[j])
-        if part == 0.0:
-            start, part = rise, 1.0
-        elif abs(rise) <= 0.1 * abs(start) or (part == 1.0 and rise > 0.0):
+                rise -= change[j] * answer(numbers, n, j, work, y[j] + step_length * change[j])
+        if step_length == 0.0:
+            start, step_length = rise, 1.0
+        elif abs(rise) <= 0.1 * abs(start) or (step_length == 1.0 and rise > 0.0):
             break
         else:
             if rise > 0.0:
-                low = part
+                low = step_length
             else:
-                high = part
-            part = 0.5 * (low + high)
-    return part
+                high = step_length
+            step_length = 0.5 * (low + high)
+    return step_length

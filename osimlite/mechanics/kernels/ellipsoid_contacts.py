@@ -1,4 +1,4 @@
-"""Contact of ellipsoids, and Simbody's defect in contact of several surfaces."""
+"""Contact of ellipsoids, and a defect of Simbody in contact of several surfaces."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from osimlite.mechanics.laws.vectors import dot, minus, put, vector
 def touch_ellipsoid(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """An ellipsoid on a half space; after the numbers of a pair stand the directions of its axes and half axes."""
+    """Apply the contact force of an ellipsoid on a half space.
+
+    The axes and half axes of the ellipsoid follow the numbers of a pair.
+    """
     i = at(model, item)
     one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
     o, n = station(model, data, one, vector(p, 0)), direction(model, data, one, vector(p, 3))
@@ -32,7 +35,10 @@ def touch_ellipsoid(
 def touch_ellipsoids(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Two ellipsoids, of which one may be a sphere; axes and half axes of both stand after the numbers of a pair."""
+    """Apply the contact force of two ellipsoids, of which one may be a sphere.
+
+    The axes and half axes of both follow the numbers of a pair.
+    """
     i = at(model, item)
     one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
     a, b = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 7))
@@ -49,7 +55,11 @@ def touch_ellipsoids(
 
 
 def axes(model: Ints, data: Floats, link: int, p: Floats) -> Axes:
-    """The axes of an ellipsoid in ground."""
+    """Return the axes of an ellipsoid in ground.
+
+    Returns:
+        Three unit vectors.
+    """
     one, two = (
         direction(model, data, link, vector(p, 0)),
         direction(model, data, link, vector(p, 3)),
@@ -58,12 +68,12 @@ def axes(model: Ints, data: Floats, link: int, p: Floats) -> Axes:
 
 
 def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """All pairs of one force in Simbody's order, until one separates too fast to push.
+    """Compute the pairs of one force in Simbody's order, until one separates too fast to push.
 
-    The integers are the numbers of surfaces and pairs, the link of each surface, and the surfaces
-    of each pair; the numbers the centre and radius of each surface. Simbody sweeps along the axis
-    of ground on which the centres lie farthest apart (largest sum of distances from their mean),
-    from the surface that begins first.
+    Simbody returns at such a pair and ignores the remaining ones. The integers are the numbers of
+    surfaces and pairs, the link of each surface, and the surfaces of each pair; the numbers are centre
+    and radius of each surface. Simbody sweeps along the axis of ground with the largest sum of
+    distances of the centres from their mean, from the surface that begins first.
     """
     i = at(model, item)
     count, pairs, links, p, room = (
@@ -116,7 +126,7 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
 
 
 def near(a: Floats, b: Floats, one: float, two: float) -> bool:
-    """Whether the bounding spheres of two surfaces are not apart; two half spaces never are a pair."""
+    """Return whether the bounding spheres of two surfaces overlap; two half spaces are never a pair."""
     if one == inf and two == inf:
         return False
     way = minus(vector(a, 0), vector(b, 0))
@@ -124,7 +134,7 @@ def near(a: Floats, b: Floats, one: float, two: float) -> bool:
 
 
 def pair_of(surfaces: Ints, pairs: int, one: int, two: int) -> int:
-    """Number of the pair of two surfaces, -1 if they are none."""
+    """Return the number of the pair of two surfaces, or -1."""
     for pair in range(pairs):
         a, b = surfaces[2 * pair], surfaces[2 * pair + 1]
         if (a == one and b == two) or (a == two and b == one):
@@ -133,7 +143,7 @@ def pair_of(surfaces: Ints, pairs: int, one: int, two: int) -> int:
 
 
 def separates(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, part: int) -> bool:
-    """Compute one contact; whether it touches and does not push."""
+    """Compute one contact; return whether it touches without a force."""
     call(model[part + ITEM.LAW], model, reals, data, y, f, part)
     result = at(data, model[part + ITEM.RECORD])
     return bool(

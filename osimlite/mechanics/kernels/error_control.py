@@ -1,4 +1,10 @@
-"""How large the error of a step is, and where constraints hold: what all integrators judge a step by."""
+"""Record of an integration method, and control of the size of its steps by Simbody's rules.
+
+A method is a law that tries one step, from a state y0, which is followed by its derivative, to y1.
+It is called with the offset of its record in `data` as its last argument, and writes the errors of
+the step at ERRORS. Its module states how many numbers and states it needs there (HEAD, STATES), and
+whether it needs derivatives of the forces too (IS_IMPLICIT), which follow in the record.
+"""
 
 from __future__ import annotations
 
@@ -7,55 +13,66 @@ from math import inf, isfinite, sqrt
 from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, OUTCOME, WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, call
 
-LAST_TIME, ACCEPTED, COUNTED_Q, COUNTED_U, SHORTEST, LONGEST = 0, 1, 2, 3, 4, 5
-"""What does not change: time that may be reached at most (s); what the error of a step may be, and
-what the sums of the squared errors of values and of speeds are divided by, see `error_norm`; bounds
-of Merson's steps (s), of which the shortest is taken whatever its error.
-"""
-REACHED, NEXT_STEP = 6, 7
-"""Time (s) at the start of the step, and at its end if it was taken; step to try, and to try next."""
-EVALUATED, HAS_DERIVATIVE = 8, 9
-"""How many evaluations it took; whether the derivative at the end was put behind y1."""
+LAST_TIME = 0
+"""Index in the record of the latest time that a step may reach (s)."""
+ACCEPTED = 1
+"""Index of the accuracy: the largest accepted error norm of a step."""
+COUNTED_Q = 2
+"""Index of the divisor of the sum of squared errors of the coordinates, see `error_norm`."""
+COUNTED_U = 3
+"""Index of the divisor of the sum of squared errors of the speeds, see `error_norm`."""
+SHORTEST = 4
+"""Index of the shortest step (s), which is accepted whatever its error."""
+LONGEST = 5
+"""Index of the longest step (s)."""
+REACHED = 6
+"""Index of the time at the start of the step (s); if the step is accepted, the time at its end."""
+NEXT_STEP = 7
+"""Index of the step to try (s), then of the next step to try."""
+EVALUATED = 8
+"""Index of the number of evaluations that the step took."""
+HAS_DERIVATIVE = 9
+"""Index of 1.0 if the method wrote the derivative at the end after y1, else 0.0."""
 IS_EVALUATED = 10
-"""Whether the last evaluation was that of the start of the step."""
+"""Index of 1.0 if the last evaluation was at the start of the step, else 0.0."""
 MEMORY = 11
-"""From here on a method keeps what it likes from step to step; it begins anew where the first of that is 0."""
+"""Offset of the numbers that a method keeps between steps; it restarts where the first of them is 0."""
 
 ERRORS = 4
-"""Place of the errors, in states after WORK_STATE."""
+"""Offset of the errors of a step after WORK_STATE, in states."""
 
 
 PATIENCE = 10_000
-"""Steps that may be tried before a motion that gets nowhere is given up."""
+"""Number of tried steps after which a motion that makes no progress is abandoned."""
 
 
 def shortest_step(t: float, tried: float) -> float:
-    """The shortest step to take at a time t (s) after so many that were tried.
+    """Return the shortest step at a time t (s) after `tried` tried steps.
 
-    As in Simbody, the first steps from 0 may be of any length. OpenSim goes on with such steps for
-    ever; here they end.
+    As in Simbody, the first steps from t = 0 may have any length. OpenSim continues with such steps
+    forever; here they end after PATIENCE steps.
     """
     return max(2.0**-52 * abs(t), 1e-300) if tried < PATIENCE else 4.0 * 2.0**-52 * max(1.0, abs(t))
 
 
 def weight(value: float) -> float:
-    """What the error of a speed or an auxiliary state counts that has this value at the start of the step."""
+    """Return the weight of the error of a speed or auxiliary state with a value at the start of the step."""
     return 1.0 / abs(value) if abs(value) > 1.0 else 1.0
 
 
 def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: float) -> float:
-    """Step to try after one of size h, as Simbody chooses it; less than h if and only if error > accuracy.
+    """Return the step to try after a step of size h, as Simbody chooses it; it is less than h if error > accuracy.
 
-    The estimated error goes with a power of h, so 0.9 h (accuracy / error)^(1/order) should just
-    do. That is taken if it is at least a fifth more or, after a failure, a tenth less; never more
-    than five times or less than a tenth of h.
+    The estimated error is proportional to a power of h, so that 0.9 h (accuracy / error)^(1/order)
+    should just meet the accuracy. That is used if it is at least a fifth longer or, after a failure, a
+    tenth shorter; the factor is limited to the range 0.1 to 5.
 
     Args:
-        h: step just tried, s.
+        h: step just tried (s).
         error: norm of its estimated error; infinite or not a number after a failed evaluation.
-        accuracy: what the error may be.
-        cut: whether the step was cut short by a limit, so that it is no ground for a larger one.
-        order: of the error.
+        accuracy: accepted error norm.
+        cut: whether the step was shortened by a limit, so that it cannot justify a longer one.
+        order: order of the error.
     """
     if not isfinite(error):
         return 0.1 * h
@@ -67,13 +84,20 @@ def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: fl
 
 
 def step_end(h: Floats) -> float:
-    """Where a step leads to. One that all but reaches the limit goes there."""
+    """Return the time at which a step ends (s); a step that almost reaches the limit is extended to it."""
     t0, limit, step = h[REACHED], h[LAST_TIME], h[NEXT_STEP]
     return limit if limit <= t0 + 1.001 * step else t0 + step
 
 
 def judge(h: Floats, t1: float, error: float, order: float) -> None:
-    """Take or leave a step to t1 by its error of an order, and choose the next one."""
+    """Accept or reject a step by its error, and choose the next one.
+
+    Args:
+        h: record of the method.
+        t1: time at the end of the step (s).
+        error: norm of its error.
+        order: order of the error.
+    """
     limit, step, accuracy = h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED]
     # A step cut much shorter tells nothing about the next.
     cut = limit < h[REACHED] + 0.95 * step
@@ -91,12 +115,24 @@ def projected(
     data: Floats,
     t: float,
     y: Floats,
-    off: Floats,
+    state_errors: Floats,
     has_errors: int,
     tolerance: float,
     limit: float,
 ) -> bool:
-    """Move a state to where the constraints hold, and tell whether they do; see `projection.project`."""
+    """Project a state onto the constraints by the law of the model; return whether they hold.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        t: time (s).
+        y: state; changed.
+        state_errors: estimated errors of the state, see `projection.project_state`.
+        has_errors: 0 if no errors are known.
+        tolerance: accepted errors of the constraints.
+        limit: largest errors to start from.
+    """
     data[WORK.TIME], data[WORK.SCRATCH], data[WORK.SCRATCH + 1] = t, tolerance, limit
     return (
         call(
@@ -105,7 +141,7 @@ def projected(
             reals,
             data,
             y,
-            off,
+            state_errors,
             has_errors,
         )
         == OUTCOME.OK
@@ -123,7 +159,19 @@ def step_error(
     h: Floats,
     is_strict: int,
 ) -> float:
-    """The norm of the errors of a step, once its end was moved to where the constraints hold; see `error_norm`."""
+    """Project the end of a step onto the constraints and return the norm of its errors.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        t1: time at the end of the step (s).
+        y0: state at the start.
+        y1: state at the end; projected.
+        errors: estimated errors of y1; their component normal to the constraints is removed.
+        h: record of the method.
+        is_strict: whether the largest error of an auxiliary state counts, see `error_norm`.
+    """
     error = error_norm(model, y0, errors, h, is_strict)
     # As in Simbody: what half a step would not mend, neither does the projection.
     if model[MODEL.CONSTRAINED] == 0 or not error <= 16.0 * h[ACCEPTED]:
@@ -139,17 +187,18 @@ def step_error(
 
 
 def error_norm(model: Ints, y0: Floats, errors: Floats, h: Floats, is_strict: int) -> float:
-    """Largest of three root mean squares: errors of q as they are, of u and z relative to y0 where |y0| > 1.
+    """Return Simbody's norm of the errors of a step.
 
-    That is Simbody's norm. A fiber among those of many muscles can err much in it. An explicit
-    method brings such a one back, since it has to take short steps; implicit ones may not, and are
-    strict: of z, the largest error counts.
+    It is the largest of three root mean squares: of the errors of q; of those of u and of z, relative
+    to y0 where |y0| > 1. One fiber among those of many muscles may err much in this norm. An explicit
+    method corrects it, since it has to take short steps; implicit ones may not. For these the norm is
+    strict: the largest error of z counts.
 
     Args:
-        model: the mechanism.
+        model: integers of the model.
         y0: state at the start of the step.
-        errors: of its end.
-        h: place of the method.
+        errors: errors of the state at its end.
+        h: record of the method.
         is_strict: whether the largest error of z counts.
     """
     n, size = model[MODEL.DOFS], model[MODEL.STATE_SIZE]

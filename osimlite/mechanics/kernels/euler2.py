@@ -1,8 +1,8 @@
-"""Two half steps of semi-explicit Euler, as Simbody's SemiExplicitEuler2Integrator takes its steps.
+"""Semi-explicit Euler with step doubling, as Simbody's SemiExplicitEuler2Integrator takes its steps.
 
-Speeds and auxiliary states go on by their rates, and then values by the rates that the new speeds
-give them where they were. What two half steps differ from one whole is the error; the end of the
-half steps is kept as it is.
+Speeds and auxiliary states advance by their rates at the start; then coordinates advance by the
+rates that the new speeds give at the old coordinates. The error is the difference of two half steps
+from one full step; the result is that of the half steps.
 """
 
 from __future__ import annotations
@@ -25,13 +25,27 @@ from osimlite.mechanics.kernels.layout import LINK, MODEL, MOTION, OPERATION, OU
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import link_ints, operation_ints
 
-HEAD, STATES, IS_IMPLICIT = MEMORY + 1, 3, False
+HEAD = MEMORY + 1
+"""Length of the head of the method's record, see `error_control`."""
+STATES = 3
+"""Number of states of workspace after it."""
+IS_IMPLICIT = False
+"""Whether the method needs derivatives of the forces."""
 ORDER = 2.0
-"""Of the error."""
+"""Order of the error."""
 
 
 def euler2(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
-    """Try one step from y0, behind which its derivative stands, to y1."""
+    """Try one step from y0, which is followed by its derivative, to y1.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        y0: state at the start, then its derivative.
+        y1: filled with the state at the end.
+        place: offset of the method's record in data.
+    """
     h = at(data, place)
     size = model[MODEL.STATE_SIZE]
     errors, whole = at(data, model[MODEL.WORK_STATE] + ERRORS * size), at(h, HEAD)
@@ -61,7 +75,22 @@ def halved(
     whole: Floats,
     middle: Floats,
 ) -> int:
-    """Compute the end `whole` of one step, and y1 of two half ones; `middle` has room for two states."""
+    """Compute the end of one full step and of two half steps.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        t0: time at the start (s).
+        t1: time at the end (s).
+        y0: state at the start, then its derivative.
+        y1: filled with the end of the two half steps.
+        whole: filled with the end of the full step.
+        middle: workspace of two states.
+
+    Returns:
+        `OUTCOME.OK`, or the outcome of an evaluation that failed.
+    """
     size = model[MODEL.STATE_SIZE]
     f, half = at(middle, size), 0.5 * (t1 - t0)
     f0 = at(y0, size)
@@ -87,7 +116,22 @@ def advanced(
     new: Floats,
     rates: Floats,
 ) -> int:
-    """The state `new` after a step h from y with the derivative f, at whose end it is t; `rates` is room."""
+    """Compute the state after a step of semi-explicit Euler.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        t: time at the end of the step (s).
+        h: step (s).
+        y: state at the start.
+        f: its derivative.
+        new: filled with the state at the end.
+        rates: workspace of a state.
+
+    Returns:
+        `OUTCOME.OK`, or the outcome of an evaluation that failed.
+    """
     n, size = model[MODEL.DOFS], model[MODEL.STATE_SIZE]
     for k in range(n, size):
         new[k] = y[k] + h * f[k]
@@ -108,7 +152,7 @@ def advanced(
 
 
 def has_balls(model: Ints) -> bool:
-    """Whether rates of some values are not their speeds."""
+    """Return whether the rates of some coordinates differ from their speeds."""
     for link in range(model[MODEL.LINKS]):
         i = link_ints(model, link)
         for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):

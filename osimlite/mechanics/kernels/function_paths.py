@@ -1,7 +1,7 @@
-"""Paths of which length, speed and moment arms are functions of coordinates, and the laws of such functions.
+"""Paths whose length, speed and moment arms are functions of coordinates, and these functions.
 
 A function is an item. Its arguments are coordinates, or coordinates and their speeds; its record
-begins with the value, which the derivatives by the arguments follow.
+begins with its value, followed by the derivatives by the arguments.
 """
 
 from __future__ import annotations
@@ -12,25 +12,36 @@ from osimlite.mechanics.kernels.paths import LENGTH, SPEED, TENSION
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.programs import compute
 
-COUNT, LENGTH_BACK, SPEED_BACK, COORDINATES = ITEM.OWN + 1, ITEM.OWN + 2, ITEM.OWN + 3, ITEM.OWN + 4
-"""Integers of a path: how many coordinates it depends on; how far before it the items of length and
-speed stand, 0 if the speed follows from the moment arms; the degrees of freedom of the coordinates
-(-1 for a locked one), and after them how far before it the items of the moment arms stand, 0 for
-one that is the derivative of the length times -1.
+COUNT = ITEM.OWN + 1
+"""Index in the integers of a path of the number of its coordinates."""
+LENGTH_BACK = ITEM.OWN + 2
+"""Index of the distance back to the item of the length function."""
+SPEED_BACK = ITEM.OWN + 3
+"""Index of the distance back to the item of the speed function, 0 if moment arms give the speed."""
+COORDINATES = ITEM.OWN + 4
+"""Offset of the degrees of freedom of the coordinates, -1 for a locked one.
+
+They are followed by the distances back to the items of the moment arms, 0 for a moment arm that is
+the negative derivative of the length.
 """
 ARMS = 3
-"""The rest of its record: the moment arms."""
+"""Offset in the record of a path of its moment arms (m)."""
 
-SIZE, ORDER, ARGUMENTS = ITEM.OWN, ITEM.OWN + 1, ITEM.OWN + 2
-"""Integers of a function: how many arguments it has; the order of a polynomial, or how many
-programs a formula has; the places of the arguments in a state (-1 for what does not change). Its
-numbers begin with the arguments that do not.
+SIZE = ITEM.OWN
+"""Index in the integers of a function of the number of its arguments."""
+ORDER = ITEM.OWN + 1
+"""Index of the order of a polynomial, or of the number of programs of a formula."""
+ARGUMENTS = ITEM.OWN + 2
+"""Offset of the indices of the arguments in a state, -1 for a constant one.
+
+The numbers of a function begin with the values of constant arguments.
 """
 DERIVATIVES = 1
+"""Offset in the record of a function of its derivatives by the arguments."""
 
 
 def function_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Length and speed of a FunctionBasedPath, and its moment arms."""
+    """Compute length, speed and moment arms of a FunctionBasedPath."""
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     count, coordinates = i[COUNT], at(i, COORDINATES)
     length = called(model, reals, data, y, f, item - i[LENGTH_BACK])
@@ -52,7 +63,7 @@ def function_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
 
 
 def called(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> Floats:
-    """The record of a function after it was computed."""
+    """Evaluate the function of an item and return its record."""
     call(model[item + ITEM.LAW], model, reals, data, y, f, item)
     return at(data, model[item + ITEM.RECORD])
 
@@ -60,7 +71,7 @@ def called(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item:
 def pull_coordinates(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Apply the tension of a path by its moment arms."""
+    """Apply the tension of a path to its coordinates by its moment arms."""
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     for k in range(i[COUNT]):
         freedom = i[COORDINATES + k]
@@ -72,7 +83,7 @@ def pull_coordinates(
 def function_of_one(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Of a function of one argument, by its table."""
+    """Evaluate a function of one argument and its derivative by its table."""
     i, p, result = (
         at(model, item),
         at(reals, model[item + ITEM.NUMBERS]),
@@ -84,11 +95,11 @@ def function_of_one(
 
 
 def polynomial(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Of a MultivariatePolynomialFunction.
+    """Evaluate a MultivariatePolynomialFunction and its gradient.
 
-    The terms are sorted by the power of the first argument, then of the next. In the record stand,
-    after the derivatives, the powers of each argument, which powers the term has, and its factors
-    up to each argument.
+    The terms are sorted by the power of the first argument, then of the next. The record holds, after
+    the derivatives, the powers of each argument, the exponents of the current term, and its partial
+    products up to each argument.
     """
     i, p, result = (
         at(model, item),
@@ -136,11 +147,10 @@ def polynomial(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
 
 
 def formula(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Value and derivatives of an ExpressionBasedFunction.
+    """Evaluate an ExpressionBasedFunction and its requested derivatives.
 
-    After its arguments stand the programs of the value and of the derivatives, if these are asked
-    for: the count of steps, the place of the constants, and the steps. The registers are in the
-    record.
+    The integers after the arguments are the programs of the value and of the derivatives: the number of
+    steps, the offset of the constants, and the steps. The registers are in the record.
     """
     i, p, result = (
         at(model, item),

@@ -1,4 +1,7 @@
-"""Functions of coordinates from a table of numbers: kind, a factor for the whole function, and what the kind needs."""
+"""Functions of coordinates and of time, each in a table of numbers; and controls, which are sums of them.
+
+A table begins with the kind of the function and a factor for all of it; the rest depends on the kind.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +11,36 @@ from osimlite.mechanics.kernels.layout import ITEM, MODEL, OPERATION, OPERATION_
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import operation_ints, operation_work
 
-PIECES, SINE, STEP, PIECES_OF_OPENSIM, MONOMIALS, MONOMIALS_OF_OPENSIM, ARC = 0, 1, 2, 3, 4, 5, 6
-"""Kinds: polynomials between knots, a sine, a smooth step; from MONOMIALS on those of several
-arguments, a sum of products of their powers, and the end of a bent rod. Those of OpenSim have what
-OpenSim 4.6 takes for the second derivatives of a MultivariatePolynomialFunction, which is the
-gradient in every column.
+PIECES = 0
+"""Kind: polynomials between knots."""
+SINE = 1
+"""Kind: a sin(w t + phi) + offset."""
+STEP = 2
+"""Kind: a quintic step between two values."""
+PIECES_OF_OPENSIM = 3
+"""Kind: polynomials between knots, with OpenSim 4.6's second derivative."""
+MONOMIALS = 4
+"""Kind: sum of products of powers; the kinds from here on have several arguments."""
+MONOMIALS_OF_OPENSIM = 5
+"""Kind: sum of products of powers, with OpenSim 4.6's second derivatives.
+
+OpenSim 4.6 uses the gradient in every column in place of the second derivatives of a
+MultivariatePolynomialFunction.
 """
+ARC = 6
+"""Kind: end of a bent rod, see :mod:`osimlite.mechanics.kernels.constant_curvature`."""
 
 
 def value_at(table: Floats, z: float) -> tuple[float, float, float]:
-    """Value, slope and second derivative of a function of one number."""
+    """Evaluate a function of one argument.
+
+    Args:
+        table: table of the function.
+        z: argument.
+
+    Returns:
+        Value, first and second derivative.
+    """
     kind, factor = int(table[0]), table[1]
     value = slope = curvature = 0.0
     if kind == SINE:
@@ -39,7 +62,16 @@ def value_at(table: Floats, z: float) -> tuple[float, float, float]:
 
 
 def pieces_at(table: Floats, z: float, kind: int) -> tuple[float, float, float]:
-    """Likewise of polynomials between knots."""
+    """Evaluate a function that consists of polynomials between knots.
+
+    Args:
+        table: table of the function.
+        z: argument.
+        kind: PIECES or PIECES_OF_OPENSIM.
+
+    Returns:
+        Value, first and second derivative.
+    """
     value = slope = curvature = 0.0
     knots, width = int(table[2]), int(table[3])
     low, high = 0, knots
@@ -60,7 +92,7 @@ def pieces_at(table: Floats, z: float, kind: int) -> tuple[float, float, float]:
 def amount_by_one(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Amount of an operation by a function of one coordinate, with its derivatives."""
+    """Compute the amount of an operation, its gradient, rate and curvature by a function of one coordinate."""
     j, a = (
         operation_ints(model, operation),
         operation_work(model, data, operation),
@@ -82,7 +114,7 @@ def amount_by_one(
 def amount_by_several(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Amount of an operation by a polynomial of several coordinates, with its derivatives."""
+    """Compute the amount of an operation, its gradient, rate and curvature by a polynomial of several coordinates."""
     j, a = (
         operation_ints(model, operation),
         operation_work(model, data, operation),
@@ -102,15 +134,18 @@ def amount_by_several(
 def several_at(
     size: int, arguments: Ints, constants: Floats, y: Floats, rates: Floats, gradient: Floats
 ) -> tuple[float, float, float]:
-    """Value, rate and second derivative of a polynomial of several coordinates; fills its gradient.
+    """Evaluate a polynomial of several coordinates and fill its gradient.
 
     Args:
-        size: count of the arguments.
-        arguments: degrees of freedom, -1 for a number that does not change.
-        constants: such numbers, and the table of the polynomial after them.
+        size: number of arguments.
+        arguments: degrees of freedom of the arguments, -1 for a constant one.
+        constants: values of constant arguments (size,), then the table of the polynomial.
         y: values of the degrees of freedom.
-        rates: of these values.
-        gradient: by the arguments (size,).
+        rates: rates of the degrees of freedom.
+        gradient: filled with the derivatives by the arguments (size,).
+
+    Returns:
+        Value, rate, and the second derivative by time at constant rates.
     """
     table = at(constants, size)
     factor, count = table[1], int(table[2])
@@ -152,7 +187,7 @@ def several_at(
 def product(
     size: int, arguments: Ints, constants: Floats, y: Floats, powers: Floats, one: int, two: int
 ) -> float:
-    """Product of powers of all arguments; the powers of arguments `one` and `two` (-1 for none) are one less."""
+    """Return the product of powers of all arguments, with those of `one` and `two` (-1 for none) reduced by one."""
     total = 1.0
     for index in range(size):
         power = int(powers[index]) - (1 if index == one else 0) - (1 if index == two else 0)
@@ -161,10 +196,10 @@ def product(
 
 
 def set_controls(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Each control is the sum of some functions of time.
+    """Compute each control as the sum of some functions of time.
 
-    Of the record, from OWN on, the integers are the count of the controls, for each of them how
-    many functions there are up to it, and the places of the functions' tables among the numbers.
+    The integers of the record from OWN on are the number of controls, per control the cumulative number
+    of its functions, and the offsets of the functions' tables among the numbers.
     """
     i = at(model, item)
     count, numbers, values = i[ITEM.OWN], at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])
@@ -181,7 +216,7 @@ def set_controls(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
 
 
 def with_reflex(data: Floats, place: int, gain: float, rate: float) -> float:
-    """The control at a place, to which its gain (s/m) adds while the muscle lengthens at a rate (m/s)."""
+    """Add a stretch reflex to a control: gain (s/m) times the lengthening speed (m/s) of the muscle."""
     total: float = data[place] + gain * max(rate, 0.0)
     data[place] = total
     return total

@@ -1,4 +1,4 @@
-"""Where paths along geodesics and cables run: each geodesic is shot anew, piece after piece."""
+"""Polylines of cables and of paths along geodesics, for drawing."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ from osimlite.mechanics.laws.vectors import Vector, dot, put, turned_back, vecto
 def trace_geodesics(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Write all corners of a path that was measured into f, in ground; returns how many there are."""
+    """Write all corners of a path whose length was computed to f, in ground; return their number."""
     i, p, result = (
         at(model, item),
         at(reals, model[item + ITEM.NUMBERS]),
@@ -91,7 +91,7 @@ def trace_geodesics(
 
 
 def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """The same of a cable."""
+    """Write all corners of a cable whose length was computed to f, in ground; return their number."""
     i, p, result = (
         at(model, item),
         at(reals, model[item + ITEM.NUMBERS]),
@@ -100,24 +100,24 @@ def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     count = 0
     for k in range(i[CABLE_COUNT]):
         element = at(i, ELEMENTS + ELEMENT_INTS * k)
-        kept = at(result, element[KEPT])
+        part = at(result, element[KEPT])
         if element[IS_OBSTACLE] == 0:
-            put(f, 3 * count, vector(kept, 0))
+            put(f, 3 * count, vector(part, 0))
             count += 1
-        elif kept[STATE] == TOUCHES:
-            geodesic = at(kept, GEODESIC)
+        elif part[STATE] == TOUCHES:
+            geodesic = at(part, GEODESIC)
             point, way = vector(geodesic, START + POINT), vector(geodesic, START + ALONG_GEODESIC)
-            surface, pose, room = (
+            surface, pose, work = (
                 at(p, element[AT] + CABLE_SURFACE),
-                at(kept, IN_GROUND),
+                at(part, IN_GROUND),
                 at(result, i[SOLVER]),
             )
-            put(f, 3 * count, vector(kept, GROUND_START + POINT))
+            put(f, 3 * count, vector(part, GROUND_START + POINT))
             count += 1
             count += trace_geodesic(
-                surface, pose, point, way, geodesic[ARC], geodesic, room, at(f, 3 * count)
+                surface, pose, point, way, geodesic[ARC], geodesic, work, at(f, 3 * count)
             )
-            put(f, 3 * count, vector(kept, GROUND_END + POINT))
+            put(f, 3 * count, vector(part, GROUND_END + POINT))
             count += 1
     return count
 
@@ -129,27 +129,27 @@ def trace_geodesic(
     way: Vector,
     length: float,
     geodesic: Floats,
-    room: Floats,
+    work: Floats,
     f: Floats,
 ) -> int:
-    """Write points of a geodesic between its ends into f, in ground; returns how many.
+    """Write points of a geodesic between its ends to f, in ground; return their number.
 
     Args:
-        surface: that it is on.
-        pose: of the surface in ground.
-        point: where it starts, in the surface.
-        way: in what direction, there.
-        length: how far it goes, m.
-        geodesic: room for one.
-        room: for the integration.
-        f: room for points.
+        surface: numbers of the surface.
+        pose: pose of the surface in ground.
+        point: start in the frame of the surface (m).
+        way: direction at the start.
+        length: length of the geodesic (m).
+        geodesic: workspace of a geodesic.
+        work: workspace of an integration.
+        f: filled with the points.
     """
     geodesic[STEP] = 0.0
-    if not (dot(way, way) > 0.0 and shoot(surface, point, way, length, geodesic, room)):
+    if not (dot(way, way) > 0.0 and shoot(surface, point, way, length, geodesic, work)):
         return 0
     bends = max(abs(geodesic[START + ALONG_BENDS]), abs(geodesic[END + ALONG_BENDS]))
     count = pieces(bends * length)
     for k in range(1, count):
-        shoot(surface, point, way, length * k / count, geodesic, room)
+        shoot(surface, point, way, length * k / count, geodesic, work)
         put(f, 3 * (k - 1), in_ground(pose, vector(geodesic, END + POINT)))
     return count - 1

@@ -1,15 +1,15 @@
-"""Paths that are the shortest around their surfaces, or at least stationary: what `wrapping="geodesic"` asks for.
+"""Shortest (or at least stationary) paths around wrap surfaces, for the option `wrapping="geodesic"`.
 
-Between two neighbouring points each PathWrap whose range holds both bends the path where that
-touches, whatever it does between other points. So its surface stands in the path once for each
-point that a bent piece may begin at. Of the surfaces that a piece goes through, that which turns it
-most is put into it first; then all geodesics of the piece are corrected at once, until it is as
-short as a string; then it may meet, or leave, another surface. Where open surfaces may be passed in
-several directions all are tried, and the shortest of all ways is taken: so lengths do not jump as
-another one becomes the shortest. What is found depends on the pose alone.
+Between two neighbouring points each PathWrap whose range contains both bends the path where it
+touches, independently of other segments. A surface is therefore listed once for each point at which
+a bent segment may begin. Of the surfaces that a segment passes through, the one that turns it most
+is inserted first; then all geodesics of the segment are corrected together until the length is
+stationary; then it may touch, or leave, another surface. Where open surfaces can be passed in
+several directions all are tried and the shortest path is chosen, so that lengths do not jump as
+another one becomes the shortest. The result depends on the pose alone.
 
-A surface inside which a point of the piece lies bends it nowhere, as in OpenSim. A piece for which
-no geodesics are found goes straight on; none such is known but where a point lies on a surface.
+A surface that contains an end of the segment is ignored, as in OpenSim. A segment for which no
+geodesics are found stays straight; the only known cases are points on a surface.
 """
 
 from __future__ import annotations
@@ -78,50 +78,71 @@ from osimlite.mechanics.kernels.points import place_frame
 from osimlite.mechanics.laws.vectors import Vector, cross, minus, norm, put, times, unit, vector
 
 WRAP_INTS = 4
-PLACES, FIRST, LAST, RANGE = 0, 1, 2, 3
-"""Of a wrap, after the nodes: where its numbers are, see `geodesic_starts`; the point that its
-piece begins at, the last one that it may end at, and the first one of its PathWrap's range.
-"""
-CHAIN, BEST, SEARCH, POSES = 0, 1, 2, 3
-"""Integers after the wraps: where in the record the slots are, those of the shortest way so far,
-room for a search, and the poses of the surfaces.
-"""
-HOW, ABOUT, POSE_NUMBERS = 12, 13, 16
+"""Number of integers of a wrap; wraps follow the nodes."""
+PLACES = 0
+"""Index in a wrap of the offset of its numbers, see `geodesic_starts`."""
+FIRST = 1
+"""Index of the point at which its segment begins."""
+LAST = 2
+"""Index of the last point at which its segment may end."""
+RANGE = 3
+"""Index of the first point of the range of its PathWrap."""
+CHAIN = 0
+"""Index after the wraps of the offset in the record of the slots."""
+BEST = 1
+"""Index of the offset of the slots of the shortest path."""
+SEARCH = 2
+"""Index of the offset of the workspace of a search."""
+POSES = 3
+"""Index of the offset of the poses of the surfaces."""
+HOW = 12
+"""Index in a pose of how the surface may bend the segment, NOT or see `start_on_surface`."""
+ABOUT = 13
+"""Offset of the axis about which it turns the segment."""
+POSE_NUMBERS = 16
+"""Length of a pose: rotation by rows, position in ground, HOW and ABOUT."""
 NOT = 0.0
-"""Numbers of the pose of a surface: after its rotation by rows and its place in ground, how it may
-bend the piece at hand, see `start`, and about what axis that turns.
-"""
+"""Value of HOW of a surface that does not bend the segment."""
 
 TOUCH = 1e-10
-"""The angle (rad) by which a piece turns at least around a surface that it is put on."""
+"""Smallest angle by which a segment turns around a surface that is inserted (rad)."""
 WHOLE = 10.0
-"""Added to the angle of surfaces with a side, which come first: no piece turns by so much (rad)."""
+"""Added to the angle of surfaces with an active side, so that they come first (rad)."""
 INSIDE = 1e-14
-"""A point counts as inside a surface if it is so far below it, in units of its function."""
-WAYS, NEARLY = 16, 0.97
-"""So many ways past open surfaces are tried at most; those that are this much longer are left."""
-MEANT, STRING, ALONE = 0, 1, 2
-"""How a piece is bent, if not otherwise: as is meant; around ellipsoids as a string; around one surface alone."""
+"""Value of the function of a surface above which a point counts as inside, relative to SQUARE."""
+WAYS = 16
+"""Largest number of combinations of directions past open surfaces."""
+NEARLY = 0.97
+"""A path is dropped if this part of its length exceeds that of the shortest one."""
+MEANT = 0
+"""Stage of a search in which each surface is passed on its active side."""
+STRING = 1
+"""Stage in which starts on ellipsoids come from a tightened string."""
+ALONE = 2
+"""Stage in which the segment is bent around one surface only."""
 TURNS = 16
-"""So often surfaces may come and go, at most."""
+"""Largest number of changes of the list of surfaces in a search."""
 
 
-def slots_and_room(most: int, wraps: int, room: int) -> tuple[list[int], int]:
-    """The integers after the wraps, and how long the record gets, if that of a path without wraps has a length.
+def slots_and_room(most: int, wraps: int, work: int) -> tuple[list[int], int]:
+    """Return the integers after the wraps, and the length of the record.
 
     Args:
-        most: so many surfaces may bend one piece.
+        most: largest number of surfaces that bend one segment.
         wraps: number of wraps.
-        room: length of the record without slots.
+        work: length of the record without slots.
+
+    Returns:
+        The integers CHAIN, BEST, SEARCH and POSES, and the length of the record.
     """
-    best = room + SLOT * (most + 2)
+    best = work + SLOT * (most + 2)
     search = best + SLOT * (most + 2)
     poses = search + search_room(most)
-    return [room, best, search, poses], poses + POSE_NUMBERS * wraps
+    return [work, best, search, poses], poses + POSE_NUMBERS * wraps
 
 
 def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Length and speed of a path with wraps."""
+    """Compute length and speed of a path with wraps."""
     place_points(model, reals, data, y, item)
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     result, points, size = at(data, i[ITEM.RECORD]), i[POINTS], i[POINTS] + 2 * i[WRAPS]
@@ -150,7 +171,7 @@ def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
 
 
 def place_surfaces(model: Ints, data: Floats, i: Ints, p: Floats) -> None:
-    """Where the surfaces are in ground."""
+    """Compute the poses of the surfaces in ground."""
     size = i[POINTS] + 2 * i[WRAPS]
     poses = at(data, i[ITEM.RECORD] + i[NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS] + POSES])
     for number in range(i[WRAPS]):
@@ -163,15 +184,23 @@ def place_surfaces(model: Ints, data: Floats, i: Ints, p: Floats) -> None:
         pose[HOW] = NOT
 
 
-def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
-    """Bend the piece between two points around its surfaces; returns around how many, which then are in the slots.
+def bend(i: Ints, p: Floats, record: Floats, one: int, two: int) -> int:
+    """Bend the segment between two points around its surfaces, in the shortest of all combinations.
 
-    Of the ways around surfaces that may be passed either way the shortest is taken.
+    Args:
+        i: integers of the path.
+        p: numbers of the path.
+        record: record of the path.
+        one: first point.
+        two: second point.
+
+    Returns:
+        The number of surfaces, which are in the slots of the shortest path.
     """
     size, near = i[POINTS] + 2 * i[WRAPS], 0
-    wraps, work = at(i, NODES_AT + NODE_INTS * size), at(found, ORDER + size)
+    wraps, work = at(i, NODES_AT + NODE_INTS * size), at(record, ORDER + size)
     slots = at(wraps, WRAP_INTS * i[WRAPS])
-    chain, best, poses = at(found, slots[CHAIN]), at(found, slots[BEST]), at(found, slots[POSES])
+    chain, best, poses = at(record, slots[CHAIN]), at(record, slots[BEST]), at(record, slots[POSES])
     for number in range(i[WRAPS]):
         if wraps[WRAP_INTS * number + FIRST] == one and poses[POSE_NUMBERS * number + HOW] != NOT:
             near += 1
@@ -179,7 +208,7 @@ def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
     most, least, way, stage = 0, inf, 0, MEANT
     while way < WAYS and near > 0:
         put(chain, SLOT, vector(work, NODE_WORK * two + PLACE))
-        count, step = settle(i, p, found, one, two, near, way, stage, least)
+        count, step = settle(i, p, record, one, two, near, way, stage, least)
         length = chain_length(chain, count) if count >= 0 else inf
         if length < least:
             most, least = count, length
@@ -194,7 +223,7 @@ def bend(i: Ints, p: Floats, found: Floats, one: int, two: int) -> int:
 
 
 def chain_length(chain: Floats, count: int) -> float:
-    """Length of a piece that is bent around so many surfaces."""
+    """Return the length of a segment that is bent around `count` surfaces (m)."""
     length = norm(minus(start_after(chain, 0, count), end_before(chain, 1)))
     for k in range(1, count + 1):
         line = minus(start_after(chain, k, count), end_before(chain, k + 1))
@@ -205,7 +234,7 @@ def chain_length(chain: Floats, count: int) -> float:
 def settle(
     i: Ints,
     p: Floats,
-    found: Floats,
+    record: Floats,
     one: int,
     two: int,
     near: int,
@@ -213,16 +242,31 @@ def settle(
     stage: int,
     least: float,
 ) -> tuple[int, int]:
-    """Put into the slots what the piece between two points bends around.
+    """Fill the slots with the surfaces that bend the segment between two points.
 
-    Returns: How many surfaces these are, -1 if there is no such way that is shorter; by how much
-        the number of the way differs from that of the next one which has another side of a surface
-        that was met.
+    Args:
+        i: integers of the path.
+        p: numbers of the path.
+        record: record of the path.
+        one: first point.
+        two: second point.
+        near: number of surfaces that may bend the segment.
+        way: number of the combination of directions.
+        stage: MEANT, STRING or ALONE.
+        least: length of the shortest path so far (m).
+
+    Returns:
+        The number of surfaces, -1 if there is no such path that is shorter; and the increment to the
+        number of the next combination with another direction past a surface that was touched.
     """
     size, count, step = i[POINTS] + 2 * i[WRAPS], 0, WAYS
-    work, wraps = at(found, ORDER + size), at(i, NODES_AT + NODE_INTS * size)
+    work, wraps = at(record, ORDER + size), at(i, NODES_AT + NODE_INTS * size)
     slots = at(wraps, WRAP_INTS * i[WRAPS])
-    chain, room, poses = at(found, slots[CHAIN]), at(found, slots[SEARCH]), at(found, slots[POSES])
+    chain, room, poses = (
+        at(record, slots[CHAIN]),
+        at(record, slots[SEARCH]),
+        at(record, slots[POSES]),
+    )
     for number in range(i[WRAPS]):
         put(poses, POSE_NUMBERS * number + ABOUT, (0.0, 0.0, 0.0))
     waits = False
@@ -270,29 +314,34 @@ def settle(
     return -1, step
 
 
-def find_near(i: Ints, p: Floats, found: Floats, slots: Ints, one: int, two: int) -> None:
-    """Note which wraps may bend the piece between two points, from outside of their surfaces, and how."""
+def find_near(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, two: int) -> None:
+    """Mark the wraps that may bend the segment between two points outside of them, and how."""
     size = i[POINTS] + 2 * i[WRAPS]
-    wraps, work = at(i, NODES_AT + NODE_INTS * size), at(found, ORDER + size)
+    wraps, work = at(i, NODES_AT + NODE_INTS * size), at(record, ORDER + size)
     for number in range(i[WRAPS]):
-        own, pose = at(wraps, WRAP_INTS * number), at(found, slots[POSES] + POSE_NUMBERS * number)
-        if own[FIRST] == one:
-            numbers = at(p, own[PLACES])
+        wrap_ints, pose = (
+            at(wraps, WRAP_INTS * number),
+            at(record, slots[POSES] + POSE_NUMBERS * number),
+        )
+        if wrap_ints[FIRST] == one:
+            numbers = at(p, wrap_ints[PLACES])
             surface = at(numbers, SURFACE)
             inside, a, b = INSIDE * surface[SQUARE], seen(pose, work, one), seen(pose, work, two)
             is_near = (
-                two <= own[LAST] and value(surface, a) <= inside and value(surface, b) <= inside
+                two <= wrap_ints[LAST]
+                and value(surface, a) <= inside
+                and value(surface, b) <= inside
             )
             pose[HOW] = AS_MEANT if is_near else NOT
             if (
                 is_near
-                and own[LAST] - own[RANGE] > 1
+                and wrap_ints[LAST] - wrap_ints[RANGE] > 1
                 and (numbers[SIDE] != 0.0 or surface[KIND] == TORUS)
             ):
                 deepest = depth(surface, a, b)
-                for k in range(1, int(found[COUNT])):
-                    before, after = int(found[ORDER + k - 1]), int(found[ORDER + k])
-                    others = own[RANGE] <= before != one and after <= own[LAST]
+                for k in range(1, int(record[COUNT])):
+                    before, after = int(record[ORDER + k - 1]), int(record[ORDER + k])
+                    others = wrap_ints[RANGE] <= before != one and after <= wrap_ints[LAST]
                     if (
                         others
                         and depth(surface, seen(pose, work, before), seen(pose, work, after))
@@ -302,12 +351,12 @@ def find_near(i: Ints, p: Floats, found: Floats, slots: Ints, one: int, two: int
 
 
 def seen(pose: Floats, work: Floats, node: int) -> Vector:
-    """A node of the path in the frame of a surface."""
+    """Return the position of a node in the frame of a surface."""
     return in_surface(pose, vector(work, NODE_WORK * node + PLACE))
 
 
 def place_of(chain: Floats, count: int, number: int) -> int:
-    """The slot of a wrap, 0 if it is in none."""
+    """Return the slot of a wrap, 0 if it has none."""
     for k in range(1, count + 1):
         if chain[SLOT * k + OWNER] == number:
             return k
@@ -315,7 +364,7 @@ def place_of(chain: Floats, count: int, number: int) -> int:
 
 
 def take_out(chain: Floats, count: int, place: int) -> None:
-    """Take what is in a slot out of the chain."""
+    """Remove a slot from the chain."""
     for k in range(SLOT * place, SLOT * (count + 1)):
         chain[k] = chain[k + SLOT]
 
@@ -328,17 +377,30 @@ def meet_most(
     one: int,
     chain: Floats,
     count: int,
-    room: Floats,
+    work: Floats,
 ) -> tuple[int, int, Vector]:
-    """The wrap that turns a line of the chain most, the slot after that line, 0 if there is none, and about what.
+    """Find the wrap that turns a line of the chain most.
 
-    Those with a side come first, since sides are told of the points of the path.
+    Those with an active side come first, since sides refer to the points of the path.
+
+    Args:
+        i: integers of the path.
+        p: numbers of the path.
+        wraps: integers of the wraps.
+        poses: poses of the surfaces.
+        one: first point of the segment.
+        chain: slots.
+        count: number of slots in use.
+        work: workspace of a search.
+
+    Returns:
+        The wrap, the slot after the line (0 if there is none), and the axis of the turn.
     """
     result, place, most, axis = 0, 0, 0.0, (0.0, 0.0, 0.0)
     for number in range(i[WRAPS]):
-        own, pose = at(wraps, WRAP_INTS * number), at(poses, POSE_NUMBERS * number)
-        if own[FIRST] == one and pose[HOW] != NOT and place_of(chain, count, number) == 0:
-            numbers, about = at(p, own[PLACES]), vector(pose, ABOUT)
+        wrap_ints, pose = at(wraps, WRAP_INTS * number), at(poses, POSE_NUMBERS * number)
+        if wrap_ints[FIRST] == one and pose[HOW] != NOT and place_of(chain, count, number) == 0:
+            numbers, about = at(p, wrap_ints[PLACES]), vector(pose, ABOUT)
             surface, before = at(numbers, SURFACE), WHOLE if numbers[SIDE] != 0.0 else 0.0
             inside = INSIDE * surface[SQUARE]
             for k in range(count + 1):
@@ -347,11 +409,11 @@ def meet_most(
                     in_surface(pose, start_after(chain, k, count)),
                 )
                 if value(surface, a) <= inside and value(surface, b) <= inside:
-                    turn, point, way, _ = start(numbers, a, b, pose[HOW], (0.0, 0.0, 0.0), room)
+                    turn, point, way, _ = start(numbers, a, b, pose[HOW], (0.0, 0.0, 0.0), work)
                     # Which line meets it is told by the shorter way; it is met, also if no other
                     # way is found.
                     if turn > TOUCH and norm(about) > 0.0:
-                        other, there, onwards, _ = start(numbers, a, b, pose[HOW], about, room)
+                        other, there, onwards, _ = start(numbers, a, b, pose[HOW], about, work)
                         if other > TOUCH:
                             turn, point, way = other, there, onwards
                     if turn > TOUCH and turn + before > most:
@@ -360,7 +422,7 @@ def meet_most(
 
 
 def insert(p: Floats, pose: Floats, chain: Floats, count: int, place: int, number: int) -> None:
-    """Put a surface into a slot of the chain, before what is there."""
+    """Insert a surface into a slot of the chain."""
     for k in range(SLOT * (count + 3) - 1, SLOT * (place + 1) - 1, -1):
         chain[k] = chain[k - SLOT]
     slot = at(chain, SLOT * place)
@@ -372,19 +434,19 @@ def insert(p: Floats, pose: Floats, chain: Floats, count: int, place: int, numbe
 
 
 def lay(
-    p: Floats, pose: Floats, chain: Floats, count: int, k: int, stage: int, room: Floats
+    p: Floats, pose: Floats, chain: Floats, count: int, k: int, stage: int, work: Floats
 ) -> bool:
-    """Lay the chain around the surface in a slot, as those beside it are; whether it touches that."""
+    """Lay the chain around the surface in a slot, between its neighbours; return whether it touches."""
     first, second = (
         in_surface(pose, end_before(chain, k)),
         in_surface(pose, start_after(chain, k, count)),
     )
     about, slot = vector(pose, ABOUT), at(chain, SLOT * k)
     turn, point, way, arc = start(
-        p, first, second, PULLED if stage == STRING else pose[HOW], about, room
+        p, first, second, PULLED if stage == STRING else pose[HOW], about, work
     )
     if not (
-        turn > TOUCH and shoot(at(slot, OBSTACLE_WORK), point, way, arc, at(slot, GEODESIC), room)
+        turn > TOUCH and shoot(at(slot, OBSTACLE_WORK), point, way, arc, at(slot, GEODESIC), work)
     ):
         return False
     if norm(about) > 0.0:

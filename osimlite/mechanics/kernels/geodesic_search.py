@@ -1,13 +1,13 @@
-"""Newton's method for all geodesics of a piece of a path at once, by their natural variations.
+"""Newton's method for all geodesics of a segment of a path, by their natural variations.
 
-Each geodesic has four unknowns: its start moves along it and across it, and turns, and it gets
-longer. Each of its ends has two equations: the line there has no part along the normal of the
-surface, and none across the geodesic. Unlike those of a cable they are about whole lines, and not
-about their directions, so that they stay nearly linear where a line is short.
+Each geodesic has four unknowns: its start moves along and across it, and rotates, and it becomes
+longer. Each end has two equations: the line there has no component along the normal of the surface,
+and none across the geodesic. Unlike those of a cable, the equations contain the lines and not their
+directions, so that they stay nearly linear where a line is short.
 
-What the ends do across their geodesics changes the length as the equations across tell. So their
-determinant is positive where the length is least, and negative at a saddle; there springs hold the
-ends until it is positive, and the piece slides off towards where it is shorter.
+The determinant of the equations is positive where the length has a minimum, and negative at a
+saddle. There, springs hold the ends until it is positive, and the segment slides off towards a
+shorter path.
 
 Source: A. Scholz, M. Sherman, I. Stavness, S. Delp, A. Kecskemethy, A fast multi-obstacle muscle
 wrapping method using natural geodesic variations, Multibody System Dynamics 36, 2016.
@@ -45,52 +45,62 @@ from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.laws.vectors import Vector, cross, dot, minus, norm, times, vector
 
 OWNER = OBSTACLE_WORK + SURFACE_NUMBERS
+"""Index in a slot of the number of its wrap; before it are an obstacle's record and a surface."""
 SLOT = OWNER + 1
-"""Of a slot: an obstacle of a cable; the surface; whose it is. Of slots in a row the first has the
-place where a piece begins, and the one after those in use the place where it ends.
+"""Length of a slot.
+
+The first slot holds the start of the segment, and the one after those in use holds its end.
 """
 
-SMOOTH, STALLED, NEAR = 1e-12, 1e-8, 1e-3
-"""Angles (rad) at which a search ends, and below which it ends if they get no less; lines that are
-shorter than this (m) count as so long.
-"""
-STIFF, STIFFER = 1.0, 3.0
-"""How stiff springs are at least (N/m) if the string is pulled by 1 N, and how many times stiffer the next ones."""
-ROUNDS, MOST_TURN, LEAST_PART, SHORT = 60, 0.2, 0.1, 1e-6
-"""Of a search: its rounds; by how much (rad) an end of a geodesic may turn in a round; what must be
-left of a geodesic after it, unless that is so short (rad).
-"""
+SMOOTH = 1e-12
+"""Largest kink (rad) at which a search ends."""
+STALLED = 1e-8
+"""Kink (rad) below which a search ends if it does not decrease."""
+NEAR = 1e-3
+"""Smallest length (m) of a line by which its component across is divided."""
+STIFF = 1.0
+"""Smallest stiffness of the springs (N/m) for a tension of 1 N."""
+STIFFER = 3.0
+"""Ratio of successive stiffnesses."""
+ROUNDS = 60
+"""Largest number of rounds of a search."""
+MOST_TURN = 0.2
+"""Largest rotation of an end of a geodesic in a round (rad)."""
+LEAST_PART = 0.1
+"""Smallest part of a geodesic that must remain after a round."""
+SHORT = 1e-6
+"""Angle (rad) of a geodesic below which it may vanish in a round."""
 
 
 def search_room(count: int) -> int:
-    """How many numbers a search takes for so many geodesics."""
+    """Return the length of the workspace of a search with `count` geodesics."""
     size = UNKNOWNS * count
     return GEODESIC_ROOM + 3 * size + factor_room(size, size)
 
 
 def to_ground(slot: Floats) -> None:
-    """Both ends of a geodesic in ground."""
+    """Transform both ends of a geodesic to ground."""
     end_to_ground(at(slot, IN_GROUND), at(slot, GEODESIC + START), at(slot, GROUND_START))
     end_to_ground(at(slot, IN_GROUND), at(slot, GEODESIC + END), at(slot, GROUND_END))
 
 
 def end_before(chain: Floats, k: int) -> Vector:
-    """Where the line to a slot begins."""
+    """Return the start of the line to a slot."""
     return vector(chain, SLOT * (k - 1) + (GROUND_END + POINT if k > 1 else 0))
 
 
 def start_after(chain: Floats, k: int, count: int) -> Vector:
-    """Where the line from a slot ends."""
+    """Return the end of the line from a slot."""
     return vector(chain, SLOT * (k + 1) + (GROUND_START + POINT if k < count else 0))
 
 
-def smooth(chain: Floats, count: int, room: Floats) -> bool:
-    """Correct all geodesics until lines go over into them without a bend; whether that came to an end.
+def smooth(chain: Floats, count: int, work: Floats) -> bool:
+    """Correct all geodesics until the lines meet them without kinks; return whether that converged.
 
-    It does so too where one of them would get shorter than nothing, which then has no length.
+    It also ends where a geodesic would become shorter than zero; this one then has no length.
     """
     size = UNKNOWNS * count
-    values = at(room, GEODESIC_ROOM)
+    values = at(work, GEODESIC_ROOM)
     corrections = at(values, 2 * size)
     a = at(corrections, size)
     before, stiff = inf, 0.0
@@ -117,7 +127,7 @@ def smooth(chain: Floats, count: int, room: Floats) -> bool:
                 at(slot, GEODESIC),
                 at(corrections, UNKNOWNS * k),
                 step,
-                room,
+                work,
             ):
                 return False
             to_ground(slot)
@@ -125,7 +135,10 @@ def smooth(chain: Floats, count: int, room: Floats) -> bool:
 
 
 def part_of(slot: Floats, corrections: Floats) -> float:
-    """The part of its corrections that a geodesic may take; 0 if it gets shorter than nothing, which it then is."""
+    """Return the part of its corrections that a geodesic may take.
+
+    It is 0 if the geodesic would become shorter than zero, and its length is then set to zero.
+    """
     start, arc = at(slot, GROUND_START), slot[GEODESIC + ARC]
     bends = max(abs(start[ALONG_BENDS]), abs(start[ACROSS_BENDS]))
     turn = max(
@@ -142,7 +155,7 @@ def part_of(slot: Floats, corrections: Floats) -> float:
 
 
 def determinant_sign(size: int, a: Floats) -> float:
-    """The sign of the determinant of square equations that were turned into a factor."""
+    """Return the sign of the determinant of square equations that were factorised."""
     diagonal, order, sign = at(a, size * size), at(a, size * size + size), 1.0
     for r in range(size):
         sign = -sign if diagonal[r] < 0.0 else sign
@@ -152,7 +165,18 @@ def determinant_sign(size: int, a: Floats) -> float:
 
 
 def equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: float) -> float:
-    """Fill in the equations: left sides a (4 n, 4 n), right sides; returns by how much an angle misses, at most."""
+    """Fill left sides (4 n, 4 n) and right sides of the equations.
+
+    Args:
+        chain: slots.
+        count: number n of geodesics.
+        values: filled with the right sides.
+        a: filled with the left sides.
+        stiff: stiffness of the springs (N/m).
+
+    Returns:
+        The largest kink (rad).
+    """
     size, most = UNKNOWNS * count, 0.0
     for k in range(size * size):
         a[k] = 0.0

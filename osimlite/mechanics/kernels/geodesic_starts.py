@@ -1,21 +1,21 @@
-"""Where a path begins to bend around a surface, if it does: exact on cylinders and spheres, near enough on others.
+"""Starts of geodesics: where a straight segment of a path begins to bend around a surface.
 
-A straight piece of a path bends around a surface that it would go through. On which side is told by
-the quadrant of the surface, of all sides by where the way is shorter:
+They are exact on cylinders and spheres, and approximate on other surfaces. A segment bends around a
+surface that it would pass through. The quadrant of the surface determines the side; without a
+quadrant the shorter way is chosen:
 
-- a cylinder with a side x or y: the path turns so that it lies on the active side, whatever angle
-  that takes, and also where it misses the cylinder but would pass behind it, whenever OpenSim bends
-  it;
-- a sphere or an ellipsoid with a side: a line through it is bent to where it is least deep in the
-  surface; if that is not on the active side, then to the other end of the same plane, if this is
-  nearer to what a mirror shows;
-- a torus: the path goes through the hole, and never through the plane outside of the ring.
+- A cylinder with a side x or y: the path turns so that it lies on the active side, by any angle,
+  also where it misses the cylinder but would pass behind it, whenever OpenSim bends it.
+- A sphere or an ellipsoid with a side: a line through it is bent to where it is least deep in the
+  surface; if that is not on the active side, to the opposite end of the same plane, if this is
+  nearer to the mirror image.
+- A torus: the path passes through the hole, and never through the plane outside of the ring.
 
-Of several pieces around one cylinder or torus only that which comes nearest to its axis, or its
-ring, need do so. The others bend where they go through it, the shorter way.
+Of several segments around one cylinder or torus, only the one that comes nearest to its axis or
+ring needs to do so. The others bend where they pass through it, the shorter way.
 
-All points are in the frame of the surface, in m. Neighbours of a piece that are inside count as on
-the surface.
+All points are in the frame of the surface, in m. Neighbours of a segment that are inside count as
+on the surface.
 """
 
 from __future__ import annotations
@@ -54,45 +54,64 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-AXIS, SIDE, HALF_LENGTH, SURFACE = 0, 1, 2, 3
-"""Numbers of what a path wraps around: axis and sign of its side, half its length (of a cylinder), the surface."""
+AXIS = 0
+"""Index in the numbers of a wrap of the axis of its active side."""
+SIDE = 1
+"""Index of the sign of its active side, 0.0 for the complete surface."""
+HALF_LENGTH = 2
+"""Index of half the length of a cylinder (m)."""
+SURFACE = 3
+"""Offset of the numbers of the surface, see `cable_surfaces`."""
 
 Start = tuple[float, Vector, Vector, float]
-"""The angle by which a path turns on a surface, and 0 or less if it does not touch; the point where
-it meets the surface; its direction there; its length on the surface, m.
+"""Start of a geodesic.
+
+It consists of the angle by which the path turns on the surface, 0 or less if it does not touch; the
+point where it meets the surface; its direction there; and its length on the surface (m).
 """
 
-AS_MEANT, ANY_SIDE, PULLED = 1.0, 2.0, 3.0
-"""How a surface may bend a piece: on the side that is meant; on any side where the piece goes
-through it; around an ellipsoid where a string comes to lie.
-"""
+AS_MEANT = 1.0
+"""A surface bends a segment on its active side."""
+ANY_SIDE = 2.0
+"""A surface bends a segment on any side where the segment passes through it."""
+PULLED = 3.0
+"""An ellipsoid bends a segment where a tightened string comes to lie."""
 
 LEAST = 1e-100
-"""Denominators are at least this, so that nothing is divided by zero."""
-SAMPLES, STEPS = 16, 6
-"""The place of a line that is nearest to a ring is found among so many, and made exact in so many steps."""
+"""Smallest denominator, so that nothing is divided by zero."""
+SAMPLES = 16
+"""Number of intervals in the search for the point of a segment nearest to a ring."""
+STEPS = 6
+"""Number of Newton steps that refine this point."""
 NEAR_MIDDLE = 0.3
-"""A line goes through near the middle of a sphere if its squared distance, in radii (see `depth`), is less."""
-WAYS, WORTHWHILE = 16, 1.5
-"""So many directions across a line are tried on an ellipsoid; the next best is worth trying if the
-line is at most so much deeper there.
-"""
+"""Depth (see `squared_depth`) below which a line passes near the middle of a sphere."""
+WAYS = 16
+"""Number of directions across a line that are tried on an ellipsoid."""
+WORTHWHILE = 1.5
+"""Largest ratio of depths with which the second best direction is tried."""
 ASIDE = 0.5
-"""A line is bent in the direction that its axis tells, if the cosine with the one where it is least deep is less."""
-BENT, BEADS, PULLS = 0.7, 16, 8
-"""If the cosine between both ends of a path is less than this, a string is pulled tight over an
-ellipsoid: of so many pieces, so often.
-"""
+"""Cosine with the least deep direction below which the given axis determines the direction."""
+BENT = 0.7
+"""Cosine between both ends of a path below which a string is tightened over an ellipsoid."""
+BEADS = 16
+"""Number of segments of the string."""
+PULLS = 8
+"""Number of sweeps at each resolution of the string."""
 
 
 def start(
-    p: Floats, first: Vector, second: Vector, how: float, about: Vector, room: Floats
+    p: Floats, first: Vector, second: Vector, how: float, about: Vector, work: Floats
 ) -> Start:
-    """Where a straight piece between two points begins to bend around what the numbers tell of.
+    """Find where a straight segment between two points begins to bend around a surface.
 
-    Args: p: the numbers. first: where the piece begins. second: where it ends. how: it may be bent.
-        about: about this axis, as by the right hand, it turns around a surface without a side;
-        zeros if that is open. room: for a string of beads.
+    Args:
+        p: numbers of the wrap.
+        first: start of the segment.
+        second: end of the segment.
+        how: AS_MEANT, ANY_SIDE or PULLED.
+        about: axis about which the segment turns around a surface without a side, by the right-hand
+            rule; zeros for either direction.
+        work: workspace of a string.
     """
     axis, side, surface = int(p[AXIS]), p[SIDE], at(p, SURFACE)
     if surface[KIND] == TORUS:
@@ -103,15 +122,15 @@ def start(
         return around_cylinder(
             surface[RADIUS], p[HALF_LENGTH], first, second, side_out, component(about, 2)
         )
-    return around_ellipsoid(surface, first, second, axis, side, how, about, room)
+    return around_ellipsoid(surface, first, second, axis, side, how, about, work)
 
 
 def ways_past(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
-    """In how many directions a line that goes through an open surface is to be bent, to find the shortest way.
+    """Return the number of directions in which a line through an open surface is bent in turn.
 
-    Around a surface alone there is another one only on an ellipsoid. Among others each is passed on
-    either side, and a sphere, on which any direction may be the best, also across these if the line
-    goes through near its middle.
+    Around a single surface there is a second one only on an ellipsoid. Among others, each is passed on
+    either side; a sphere, on which any direction may be the shortest, also perpendicular to these if
+    the line passes near its middle.
     """
     if not is_alone:
         return 4 if p[KIND] == SPHERE and depth(p, first, second) < NEAR_MIDDLE else 2
@@ -127,8 +146,10 @@ def ways_past(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
 
 
 def depth(p: Floats, first: Vector, second: Vector) -> float:
-    """How near a piece comes to the middle: squared, to the axis of a cylinder or the ring of a
-    torus (m^2), or to the centre of a sphere or an ellipsoid (by radii).
+    """Return how near a segment comes to the middle of a surface, squared.
+
+    It is the distance from the axis of a cylinder or the ring of a torus (m²), or from the centre of a
+    sphere or an ellipsoid in units of the radii.
     """
     if p[KIND] == TORUS:
         return distance_from_ring(nearest_to_ring(p[RADIUS], first, second), p[RADIUS])
@@ -142,9 +163,17 @@ def depth(p: Floats, first: Vector, second: Vector) -> float:
 def around_cylinder(
     radius: float, half_length: float, first: Vector, second: Vector, side_out: Vector, about: float
 ) -> Start:
-    """The start on a cylinder about z: a straight line once the cylinder is rolled out.
+    """Return the start on a cylinder about z, along a straight line on the unrolled cylinder.
 
     As in OpenSim there is none if the path would meet and leave the cylinder beyond its ends.
+
+    Args:
+        radius: radius of the cylinder (m).
+        half_length: half its length (m).
+        first: start of the segment.
+        second: end of the segment.
+        side_out: direction of the active side, zeros for the complete surface.
+        about: sign of the turn about z, 0.0 for either.
     """
     px, py, pz = first
     qx, qy, qz = second
@@ -196,18 +225,18 @@ def around_cylinder(
 
 
 def turns_left(one: float, before: float, two: float, after: float, sweep: float) -> bool:
-    """Whether a path turns to the left around a cylinder, so that it stays on the active side as in OpenSim.
+    """Return whether a path turns to the left around a cylinder, to stay on the active side as in OpenSim.
 
-    It goes by that tangent of the first end which meets the active side, or if both do or none
-    does, by that of the second; if these do not tell either, the shorter way, but the longer one
-    from behind to behind.
+    It follows the tangent of the first end that meets the active side. If both or none do, that of the
+    second end decides; if these do not either, the shorter way, but the longer one from behind to
+    behind.
 
     Args:
-        one: angle of the first end from the middle of the active side.
-        before: angle from there to its tangents.
-        two: angle of the second end.
-        after: angle from there to its tangents.
-        sweep: angle from end to end to the left, from 0 on.
+        one: angle of the first end from the middle of the active side (rad).
+        before: angle from there to its tangents (rad).
+        two: angle of the second end (rad).
+        after: angle from there to its tangents (rad).
+        sweep: angle from end to end to the left, not negative (rad).
     """
     left1, right1 = cos(one + before) >= 0.0, cos(one - before) >= 0.0
     left2, right2 = cos(two - after) >= 0.0, cos(two + after) >= 0.0
@@ -226,12 +255,11 @@ def around_ellipsoid(
     side: float,
     how: float,
     about: Vector,
-    room: Floats,
+    work: Floats,
 ) -> Start:
-    """The start on a sphere or an ellipsoid: on a circle, where all is so scaled that the surface is the unit sphere.
+    """Return the start on a sphere or an ellipsoid, along a circle where the surface is scaled to the unit sphere.
 
-    The circle is in the plane of the ends and the direction in which the line is least deep in the
-    surface.
+    The circle is in the plane of the ends and the direction in which the line is least deep.
     """
     weights = vector(p, WEIGHTS)
     wx, wy, wz = times(1.0 / p[SQUARE], weights)
@@ -263,22 +291,25 @@ def around_ellipsoid(
         mirrored = replaced(out, axis, -component(out, axis))
         out = times(1.0 if dot(mirrored, out) >= 0.0 else -1.0, out)
     out = elementwise(scale, out)
-    result = on_section(radii, one, two, cross(out, way), room)
+    result = on_section(radii, one, two, cross(out, way), work)
     turn, _, sets_out, _ = result
-    is_bent = dot(unit(sets_out), unit(vector(room, 0))) < BENT and (
+    is_bent = dot(unit(sets_out), unit(vector(work, 0))) < BENT and (
         side == 0.0 or dot(out, middle) > 0.0
     )
     if p[KIND] == ELLIPSOID and (is_bent or how == PULLED):
-        result = shortened(p, turn, first, second, room)
+        result = shortened(p, turn, first, second, work)
     return result
 
 
 def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector:
-    """The direction across a line in which it is least below the widest of an ellipsoid, a unit vector.
+    """Return the direction across a line in which it is least deep in an ellipsoid, a unit vector.
 
-    Args: radii: of the ellipsoid. middle: a point of the line. way: along the line. deeper: if
-        positive, return the next direction in which it is less so than in those beside; zeros if
-        there is none, or if the line is so many times deeper there.
+    Args:
+        radii: half axes.
+        middle: point of the line.
+        way: direction of the line.
+        deeper: if positive, return the second best local minimum, or zeros if there is none or the
+            line is more than this many times deeper there.
     """
     x, y, z = way
     axis = 0 if abs(x) <= min(abs(y), abs(z)) else (1 if abs(y) <= abs(z) else 2)
@@ -308,20 +339,20 @@ def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector
 
 
 def below(aa: float, ab: float, bb: float, ma: float, mb: float, k: int) -> float:
-    """How far a line is below the widest of an ellipsoid in a direction across it, by products of scaled directions."""
+    """Return the depth of a line in an ellipsoid in a direction across it, from products of scaled directions."""
     c, s = cos(2.0 * pi / WAYS * k), sin(2.0 * pi / WAYS * k)
     return sqrt(aa * c * c + 2.0 * ab * c * s + bb * s * s) - ma * c - mb * s
 
 
-def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, room: Floats) -> Start:
-    """The start on a section of an ellipsoid, and beads along it.
+def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, work: Floats) -> Start:
+    """Return the start on a plane section of an ellipsoid, and beads along it.
 
     Args:
-        radii: of the ellipsoid.
-        one: an end, so scaled that the surface is the unit sphere.
-        two: the other end, likewise.
-        across: normal to the plane of the section; the path turns to the left about it.
-        room: filled with the direction at the end, and the beads.
+        radii: half axes.
+        one: first end, scaled so that the surface is the unit sphere.
+        two: second end, scaled in the same way.
+        across: normal of the plane of the section; the path turns to the left about it.
+        work: filled with the direction at the end, and the beads.
     """
     normal = unit(across)
     centre = times(dot(normal, one), normal)
@@ -334,13 +365,13 @@ def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, room: Fl
     turn = atan2(dot(across, a2), dot(a1, a2))
     if turn < -1e-6:
         turn += 2.0 * pi
-    put(room, 0, elementwise(radii, cross(normal, a2)))
+    put(work, 0, elementwise(radii, cross(normal, a2)))
     length = 0.0
     for k in range(1, BEADS):
         angle = turn * (k - 0.5) / (BEADS - 1)
         c, s = cos(angle), sin(angle)
         length += norm(elementwise(radii, along(times(c, across), -s, a1)))
-        put(room, 3 * k, elementwise(radii, along(along(centre, c, a1), s, across)))
+        put(work, 3 * k, elementwise(radii, along(along(centre, c, a1), s, across)))
     return (
         turn,
         elementwise(radii, along(centre, 1.0, a1)),
@@ -349,13 +380,13 @@ def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, room: Fl
     )
 
 
-def shortened(p: Floats, turn: float, first: Vector, second: Vector, room: Floats) -> Start:
-    """A start from a string of beads that is pulled tight over an ellipsoid, by few of them at first.
+def shortened(p: Floats, turn: float, first: Vector, second: Vector, work: Floats) -> Start:
+    """Return a start from a string of beads that is tightened over an ellipsoid, at rising resolutions.
 
     A section that turns far may be near no geodesic, or not near the shortest one.
     """
-    put(room, 0, first)
-    put(room, 3 * BEADS, second)
+    put(work, 0, first)
+    put(work, 3 * BEADS, second)
     stride = BEADS // 4
     one, two = BEADS, 0
     while stride > 0:
@@ -363,7 +394,7 @@ def shortened(p: Floats, turn: float, first: Vector, second: Vector, room: Float
             # Those that are new come first.
             for k in range(stride, BEADS, stride if pull > 0 else 2 * stride):
                 bead = times(
-                    0.5, plus(vector(room, 3 * (k - stride)), vector(room, 3 * (k + stride)))
+                    0.5, plus(vector(work, 3 * (k - stride)), vector(work, 3 * (k + stride)))
                 )
                 if value(p, bead) > 0.0:
                     for _ in range(2):
@@ -371,21 +402,24 @@ def shortened(p: Floats, turn: float, first: Vector, second: Vector, room: Float
                         bead = along(bead, 0.5 * value(p, bead) / dot(out, out), out)
                     if stride == 1 and pull == PULLS:
                         one, two = min(one, k), k
-                put(room, 3 * k, bead)
+                put(work, 3 * k, bead)
         stride //= 2
     if two == 0:
         return 0.0, first, second, 0.0
-    begin, end = vector(room, 3 * one - 3), vector(room, 3 * one)
+    begin, end = vector(work, 3 * one - 3), vector(work, 3 * one)
     length = 0.5 * (
-        norm(minus(end, begin)) + norm(minus(vector(room, 3 * two + 3), vector(room, 3 * two)))
+        norm(minus(end, begin)) + norm(minus(vector(work, 3 * two + 3), vector(work, 3 * two)))
     )
     for k in range(one, two):
-        length += norm(minus(vector(room, 3 * k + 3), vector(room, 3 * k)))
+        length += norm(minus(vector(work, 3 * k + 3), vector(work, 3 * k)))
     return turn, times(0.5, plus(begin, end)), minus(end, begin), length
 
 
 def touching(point: Vector, radius: float, normal: Vector, way: float) -> Vector:
-    """Where the line from a point touches a circle about the origin that is gone around in a way; not from inside."""
+    """Return the tangent point of a circle about the origin from a point, in a direction of rotation.
+
+    For a point inside, it is the nearest point of the circle.
+    """
     distance = max(norm(point), LEAST)
     cosine = min(radius / distance, 1.0)
     foot = times(radius * cosine / distance, point)
@@ -395,7 +429,7 @@ def touching(point: Vector, radius: float, normal: Vector, way: float) -> Vector
 def around_torus(
     ring: float, tube: float, first: Vector, second: Vector, axis: int, side: float, how: float
 ) -> Start:
-    """The start on a torus about z: as on a cylinder in the place of the ring that is nearest to the line."""
+    """Return the start on a torus about z, as on a cylinder at the point of the ring nearest to the line."""
     x, y, _ = near = nearest_to_ring(ring, first, second)
     if side != 0.0 and not on_side(near, axis, side):
         return 0.0, first, near, 0.0
@@ -417,7 +451,7 @@ def around_torus(
 
 
 def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
-    """The point of a piece that is nearest to a ring about z."""
+    """Return the point of a segment that is nearest to a ring about z."""
     wx, wy, wz = way = minus(second, first)
     best, least = 0.0, inf
     for k in range(SAMPLES + 1):
@@ -441,19 +475,19 @@ def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
 
 
 def distance_from_ring(point: Vector, ring: float) -> float:
-    """Squared distance from a ring about z."""
+    """Return the squared distance of a point from a ring about z (m²)."""
     x, y, z = point
     across = sqrt(x * x + y * y) - ring
     return across * across + z * z
 
 
 def seen(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
-    """A vector along the axes of the cylinder in the place of the ring: inwards, down, and along the ring."""
+    """Return the components of a vector along the cylinder at the ring: inwards, down, and along the ring."""
     _, _, z = point
     return dot(inwards, point), -z, dot(tangent, point)
 
 
 def back(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
-    """A vector along these axes, in the frame of the torus."""
+    """Return the vector with these components, in the frame of the torus."""
     x, y, z = point
     return along(along((0.0, 0.0, -y), x, inwards), z, tangent)

@@ -1,36 +1,38 @@
-"""What the kernels work on: three vectors.
+"""Layout of the three vectors that all kernels work on: `model`, `reals` and `data`.
 
-A mechanism is a tree of links. A link is one body, or several that never move in one another, and
-has its frame where the last motion of its joint ends. The way from the carrying link to it is a
-list of operations: each is a fixed transform and then one motion, about the z axis or along any
-axis if it has one. The degrees of freedom are numbered in the order of the links, so that what
-carries stands before what is carried. Whatever pushes is an item.
+- `model` (integers): the structure of the mechanism, and the offsets of all else.
+- `reals` (floats): masses, positions, parameters of forces, in SI units. Models of one structure
+  differ in `reals` only.
+- `data` (floats): results of an evaluation, and workspace. Records in it are named ..._WORK.
 
-The integers `model` say what is connected to what, and where everything is in the other two; the
-numbers `reals` hold masses, places, parameters of forces, in SI units; `data` is what an evaluation
-leaves behind. Models of one structure differ in `reals` only. Spatial vectors stack the angular
-part over the linear part; velocities, accelerations, inertias and wrenches of a link are along the
-axes of ground and about an origin that stays in ground: the place of the first link of its tree, so
-that no digits are lost far away from ground's own origin.
+A mechanism is a tree of links. A link is one body, or several that never move relative to each
+other; its frame is where the last motion of its joint ends. The path from the parent to a link is a
+list of operations, each of which is a fixed transform and then one motion, about the z axis or
+along an axis. Degrees of freedom are numbered in the order of the links, so that parents come
+before children. Everything that applies loads, or is computed with them, is an item.
+
+Spatial vectors stack the angular part over the linear part. Velocities, accelerations, inertias and
+wrenches of a link are along the axes of ground and about a point that is fixed in ground: the
+position of the first link of its tree, so that no digits are lost far from the origin of ground.
 """
 
 from __future__ import annotations
 
 from functools import cache
-from itertools import accumulate, count, islice
+from itertools import accumulate, count
 
 
 class Record(type):
-    """The metaclass of records: their attributes are offsets of fields, or numbers that stand for something.
+    """Metaclass of records, whose attributes are offsets of fields or numbers of alternatives.
 
-    Compiled kernels take one as they take a module, so that a field is a constant there.
+    Compiled kernels use such a class like a module, so that a field is a constant there.
     """
 
     def record(cls, **values: int) -> list[int]:
-        """A record of these fields, in the order in which they are declared, up to SIZE or OWN.
+        """Return the integers of a record in the order of its fields, up to SIZE or OWN.
 
         Raises:
-            TypeError: a field is missing, or none has the name.
+            TypeError: a field is missing, or an unknown one is given.
         """
         names = _names(cls)
         if len(values) != len(names) or not values.keys() >= {*names}:
@@ -42,7 +44,7 @@ class Record(type):
 
 @cache
 def _names(record: Record) -> tuple[str, ...]:
-    """The fields of a record by their offsets."""
+    """Return the names of the fields of a record, sorted by their offsets."""
     numbers = {name: number for name, number in vars(record).items() if name.isupper()}
     end = numbers["SIZE" if "SIZE" in numbers else "OWN"]
     offsets = {number: name for name, number in numbers.items() if 0 <= number < end}
@@ -51,47 +53,81 @@ def _names(record: Record) -> tuple[str, ...]:
 
 # Integers: a head with counts and offsets, then records.
 class MODEL(metaclass=Record):
-    """The head of the model: counts, and where all else is."""
+    """Head of the model: counts, and the offsets of all other records."""
 
     _at = count()
-    LINKS, DOFS, ITEMS, CONTACTS = islice(_at, 4)
-    """How many there are: links, degrees of freedom, items (forces and the like), contacts."""
-    LINK_AT, OPERATION_AT, DOF_AT, ITEM_AT = islice(_at, 4)
-    """Offsets of the records in the model; at ITEM_AT are the offsets of the items' records."""
-    SUMMED, SUMMED_AT = islice(_at, 2)
-    """Count and offset of a list of the degrees of freedom whose columns are sums of several."""
+    LINKS = next(_at)
+    """Number of links."""
+    DOFS = next(_at)
+    """Number n of degrees of freedom."""
+    ITEMS = next(_at)
+    """Number of items: forces, probes and the functions that they call."""
+    CONTACTS = next(_at)
+    """Number of pairs of contact surfaces."""
+    LINK_AT = next(_at)
+    """Offset of the records of the links, see `LINK`."""
+    OPERATION_AT = next(_at)
+    """Offset of the records of the operations, see `OPERATION`."""
+    DOF_AT = next(_at)
+    """Offset of the records of the degrees of freedom, see `DOF`."""
+    ITEM_AT = next(_at)
+    """Offset of a list of the offsets of the items' records, see `ITEM`."""
+    SUMMED = next(_at)
+    """Number of degrees of freedom whose columns are sums over several operations."""
+    SUMMED_AT = next(_at)
+    """Offset of the list of these degrees of freedom."""
     FIXED_AT = next(_at)
-    """Offset in reals of the fixed transforms of the operations, by rows and then the translation,
-    and of axes of slides (K, 15), see `FIXED`.
-    """
-    WORK_LINK, WORK_OPERATION, WORK_COLUMN, WORK_PIVOT, WORK_CONTACT, WORK_STATE = islice(_at, 6)
-    """Offsets in the data of what is computed for links, operations, columns, pivots, contacts and states."""
+    """Offset in reals of the fixed transforms of the operations (K, 15), see `FIXED`."""
+    WORK_LINK = next(_at)
+    """Offset in data of the results of the links, see `LINK_WORK`."""
+    WORK_OPERATION = next(_at)
+    """Offset in data of the results of the operations, see `OPERATION_WORK`."""
+    WORK_COLUMN = next(_at)
+    """Offset in data of the columns (n, 6): twist per unit of each speed."""
+    WORK_PIVOT = next(_at)
+    """Offset in data of the diagonal of the mass matrix before its factorization (n,)."""
+    WORK_CONTACT = next(_at)
+    """Offset in data of the results of the contacts, see `CONTACT_WORK`."""
+    WORK_STATE = next(_at)
+    """Offset in data of workspace for states."""
     WORK_SIZE = next(_at)
-    """Length of the data."""
+    """Length of data."""
     CONTACT_AT = next(_at)
-    """Where the offsets of the records of the pairs stand, by contact."""
+    """Offset of a list of the offsets of the contacts' items."""
     CONSTRAINED = next(_at)
     """Offset of the record of all constraints, 0 if there are none."""
     STATE_SIZE = next(_at)
     """Length of a state: values, speeds, and auxiliary states."""
-    CONTROLS, WORK_CONTROL = islice(_at, 2)
-    """Offset of the record of the controls, 0 if there are none; offset in data of the controls."""
-    EQUILIBRIA, EQUILIBRIUM_AT = islice(_at, 2)
-    """Count and offset of what can be brought into equilibrium, see `EQUILIBRIUM`."""
+    CONTROLS = next(_at)
+    """Offset of the record of the controls, 0 if there are none."""
+    WORK_CONTROL = next(_at)
+    """Offset in data of the controls."""
+    EQUILIBRIA = next(_at)
+    """Number of items that can be brought into equilibrium."""
+    EQUILIBRIUM_AT = next(_at)
+    """Offset of their records, see `EQUILIBRIUM`."""
     CHAIN = next(_at)
-    """Offset of the record of the joints of another program that gives the mass matrix and the
-    bias, 0 if there is none.
-    """
-    RESPONSES, RESPONSE_AT = islice(_at, 2)
-    """Count and offset of the forces that push along one displacement, see `RESPONSE`."""
-    RUNS, RUN_AT = islice(_at, 2)
-    """Count and offset of runs of items that follow one another, see `RUN`."""
+    """Offset of the record of another program that gives the mass matrix, 0 if there is none, see `CHAIN`."""
+    RESPONSES = next(_at)
+    """Number of forces along one displacement that implicit integrators differentiate."""
+    RESPONSE_AT = next(_at)
+    """Offset of their records, see `RESPONSE`."""
+    RUNS = next(_at)
+    """Number of runs of consecutive items."""
+    RUN_AT = next(_at)
+    """Offset of their records, see `RUN`."""
     LAWS = next(_at)
-    """From here on the addresses of the laws, by their number."""
+    """Offset of the addresses of the laws, by their numbers in the table."""
 
 
 class LINK(metaclass=Record):
-    """Integers of a link: its parent (-1 is ground), the ranges of its operations and of its degrees of freedom."""
+    """Integers of a link.
+
+    Attributes:
+        PARENT: number of the parent link, -1 for ground.
+        FIRST_OPERATION, END_OPERATION: range of its operations.
+        FIRST_DOF, END_DOF: range of its degrees of freedom.
+    """
 
     PARENT, FIRST_OPERATION, END_OPERATION, FIRST_DOF, END_DOF, SIZE = range(6)
 
@@ -99,178 +135,310 @@ class LINK(metaclass=Record):
 class OPERATION(metaclass=Record):
     """Integers of an operation, one motion of a joint.
 
-    Its motion, the kind of its fixed transform, the degree of freedom that is its amount or -1, the
-    law that gives the amount otherwise or the motion of a ball; offset and number of the arguments
-    in the model (degrees of freedom, -1 for a number that does not change); offset in reals of the
-    radii, or of the values of such arguments and the table of the function after them; offset in
-    data of the gradient.
+    Attributes:
+        MOTION: type of the motion, see `MOTION`.
+        BEFORE: type of the fixed transform before it, see `TRANSFORM`.
+        DOF: degree of freedom that is its amount, or -1.
+        FUNCTION: number of the law that gives the amount or the motion of a ball; or ALONE, TOGETHER.
+        ARGUMENTS, ARGUMENT_COUNT: offset in the model and number of the arguments of that law, which
+            are degrees of freedom or -1 for a constant one.
+        EXTRA: offset in reals of the radii, or of constant arguments and then the function's table.
+        GRADIENT: offset in data of the gradient of the amount.
     """
 
     MOTION, BEFORE, DOF, FUNCTION, ARGUMENTS, ARGUMENT_COUNT, EXTRA, GRADIENT, SIZE = range(9)
-    ALONE, TOGETHER = -1, -2
-    """In place of the law: the column of the degree of freedom comes from this operation only, or from several."""
+    ALONE = -1
+    """FUNCTION if the column of the degree of freedom comes from this operation only."""
+    TOGETHER = -2
+    """FUNCTION if the column of the degree of freedom is a sum over several operations."""
 
 
 class DOF(metaclass=Record):
-    """Of a degree of freedom: the next one on the way to ground or -1, offset in data of its row of
-    the mass matrix, and how many there are on the way.
+    """Integers of a degree of freedom.
+
+    Attributes:
+        ABOVE: next degree of freedom on the path to ground, or -1.
+        ROW: offset in data of its row of the mass matrix.
+        DEPTH: number of degrees of freedom above it.
     """
 
     ABOVE, ROW, DEPTH, SIZE = range(4)
 
 
 class ITEM(metaclass=Record):
-    """Of an item: address of its kernel, offsets in reals and data of what it owns there, number of
-    the first contact of its element, and from OWN on integers of its own. The record of the
-    controls is like one.
+    """Integers of an item, or of the controls.
+
+    Attributes:
+        LAW: address of its kernel.
+        NUMBERS, RECORD: offsets of its parameters in reals and of its results in data.
+        FIRST_CONTACT: number of the first contact of its element.
+        OWN: offset of further integers that depend on the kernel.
     """
 
     LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = range(5)
 
 
 class EQUILIBRIUM(metaclass=Record):
-    """Of what can be brought into equilibrium: the address of the kernel that does it, and the offset of its item."""
+    """Integers of an item that can be brought into equilibrium.
+
+    Attributes:
+        KERNEL: address of the kernel that does it.
+        ITEM: offset of the item.
+    """
 
     KERNEL, ITEM, SIZE = range(3)
 
 
 class RESPONSE(metaclass=Record):
-    """Of a force that pushes along one displacement: the address of the kernel that finds its
-    derivatives, the offset of its item, the offset among the item's integers of the first of those
-    that say where its states are, their count, and -1 if it pulls against the displacement, else 1.
+    """Integers of a force along one displacement.
+
+    Attributes:
+        KERNEL: address of the kernel that computes its derivatives.
+        ITEM: offset of its item.
+        FIRST_STATE, STATES: offset among the item's integers of the indices of its states, and their number.
+        SENSE: -1 if it pulls against the displacement, else 1.
     """
 
     KERNEL, ITEM, FIRST_STATE, STATES, SENSE, SIZE = range(6)
 
 
 class RUN(metaclass=Record):
-    """Of items that are computed one after another: address of the kernel that computes all of them
-    at once, 0 if each is computed by its own; numbers of the first and the end; offset in data of
-    room for curves, see `batched_curves`.
+    """Integers of a run of consecutive items.
+
+    Attributes:
+        LAW: address of the kernel that computes all of them at once, 0 if each has its own.
+        FIRST, END: range of the items.
+        ROOM: offset in data of workspace for curves, see `batched_curves`.
     """
 
     LAW, FIRST, END, ROOM, SIZE = range(5)
 
 
 class CONSTRAINED(metaclass=Record):
-    """Of all constraints."""
+    """Integers of all constraints together."""
 
     _at = count()
-    DYNAMICS, PROJECT, CONSTRAINTS, CONSTRAINT_AT = islice(_at, 4)
-    """The laws that find accelerations and that project states; count of the constraints, and where
-    the offsets of their records stand.
-    """
-    EQUATIONS, POSITIONS, LOCKS, BALLS, BALL_AT, ENTRIES = islice(_at, 6)
-    """Counts of the equations, of those that bind positions, and of coordinates that are just
-    locked; count of the balls, and where the offsets of their arguments stand; count of the numbers
-    of the mass matrix.
-    """
-    WORK_ROWS, WORK_ERRORS, WORK_RATES, WORK_DRIFTS = islice(_at, 4)
-    """Offsets in data of G (m, n), of the errors, and of what G u and G udot are to be."""
-    WORK_KEPT, WORK_FACTOR, WORK_SYSTEM, WORK_TRIAL = islice(_at, 4)
-    """Offsets in data of scratch: for (m, n) numbers, for a factor of them, for solving, for states."""
-    FACTORISE, MINIMUM_NORM = islice(_at, 2)
-    """The laws that factorise equations, and that solve them then."""
+    DYNAMICS = next(_at)
+    """Number of the law that computes accelerations."""
+    PROJECT = next(_at)
+    """Number of the law that projects states onto the constraints."""
+    CONSTRAINTS = next(_at)
+    """Number of constraints."""
+    CONSTRAINT_AT = next(_at)
+    """Offset of a list of the offsets of the constraints' records, see `CONSTRAINT`."""
+    EQUATIONS = next(_at)
+    """Number m of equations."""
+    POSITIONS = next(_at)
+    """Number of equations that constrain positions."""
+    LOCKS = next(_at)
+    """Number of coordinates that are just locked."""
+    BALLS = next(_at)
+    """Number of ball joints."""
+    BALL_AT = next(_at)
+    """Offset of a list of the offsets of the balls' degrees of freedom."""
+    ENTRIES = next(_at)
+    """Number of stored entries of the mass matrix."""
+    WORK_ROWS = next(_at)
+    """Offset in data of the matrix G (m, n)."""
+    WORK_ERRORS = next(_at)
+    """Offset in data of the errors of the equations (m,)."""
+    WORK_RATES = next(_at)
+    """Offset in data of the prescribed values of G u (m,)."""
+    WORK_DRIFTS = next(_at)
+    """Offset in data of the required values of G udot (m,)."""
+    WORK_KEPT = next(_at)
+    """Offset in data of workspace for a copy of rows (m, n)."""
+    WORK_FACTOR = next(_at)
+    """Offset in data of workspace for a factor of (m, n) equations."""
+    WORK_SYSTEM = next(_at)
+    """Offset in data of workspace for linear systems."""
+    WORK_TRIAL = next(_at)
+    """Offset in data of workspace for states."""
+    FACTORISE = next(_at)
+    """Number of the law that factorises equations."""
+    MINIMUM_NORM = next(_at)
+    """Number of the law that solves factorised equations."""
     SIZE = next(_at)
 
 
 class CONSTRAINT(metaclass=Record):
-    """Of a constraint: its law and the offset of its numbers; its equations, of which those up to
-    the second end bind positions, and from OWN on integers of its own.
+    """Integers of a constraint.
+
+    Attributes:
+        LAW, NUMBERS: number of its law, and offset of its parameters in reals.
+        FIRST_EQUATION, END_EQUATION: range of its equations.
+        END_POSITION: end of those that constrain positions.
+        OWN: offset of further integers that depend on the law.
     """
 
     LAW, NUMBERS, FIRST_EQUATION, END_EQUATION, END_POSITION, OWN = range(6)
 
 
 class COORDINATE(metaclass=Record):
-    """Of a coordinate in a constraint: its degree of freedom, the place of the arguments of its
-    ball or -1, and its number among these.
+    """Integers of a coordinate in a constraint.
+
+    Attributes:
+        DOF: its degree of freedom, -1 for a locked one.
+        BALL: offset of the degrees of freedom of its ball, or -1.
+        PART: its number among the angles of the ball.
     """
 
     DOF, BALL, PART, SIZE = range(4)
 
 
 class CHAIN(metaclass=Record):
-    """Of the joints of another program."""
+    """Integers of another program that has joints with one axis each, see :mod:`osimlite.mechanics.kernels.chain`."""
 
     _at = count()
-    DYNAMICS, SUPPLY, JOINTS, JOINT_AT = islice(_at, 4)
-    SHARES, SHARE_AT, PRODUCTS, PRODUCT_AT, EXCESSES, EXCESS_AT = islice(_at, 6)
-    """The law that finds the mass matrix, the address of the kernel that asks the other program;
-    counts and offsets of their records, of pairs of a joint and a degree of freedom that moves it,
-    of products of two such shares, and of links to which the other program gives too much inertia.
+    DYNAMICS = next(_at)
+    """Number of the law that computes the mass matrix."""
+    SUPPLY = next(_at)
+    """Address of the kernel that asks the other program."""
+    JOINTS = next(_at)
+    """Number of joints."""
+    JOINT_AT = next(_at)
+    """Offset of the records of the joints, see `JOINT`."""
+    SHARES = next(_at)
+    """Number of pairs of a joint and a degree of freedom that moves it."""
+    SHARE_AT = next(_at)
+    """Offset of their records, see `SHARE`."""
+    PRODUCTS = next(_at)
+    """Number of products of two shares."""
+    PRODUCT_AT = next(_at)
+    """Offset of their records, see `PRODUCT`."""
+    EXCESSES = next(_at)
+    """Number of links to which the other program gives too much inertia."""
+    EXCESS_AT = next(_at)
+    """Offset of their records, see `EXCESS`."""
+    WORK_JOINTS = next(_at)
+    """Offset in data of values, rates, accelerations while udot = 0, and forces of all joints.
+
+    The mass matrix of the other program follows them.
     """
-    WORK_JOINTS, WORK_SHARES, ENTRY_AT, END_ENTRY = islice(_at, 4)
-    """Offsets in data: of values, rates, accelerations without udot and forces of all joints and
-    then the mass matrix, of the shares, and of the rows of our own mass matrix and their end.
-    """
+    WORK_SHARES = next(_at)
+    """Offset in data of the values of the shares."""
+    ENTRY_AT = next(_at)
+    """Offset in data of the mass matrix of the degrees of freedom."""
+    END_ENTRY = next(_at)
+    """End in data of this mass matrix."""
     SIZE = next(_at)
 
 
 class JOINT(metaclass=Record):
-    """Of a joint: what it is a part of, number of that degree of freedom or operation, which part
-    or the offset in reals of a factor, and its first share.
+    """Integers of a joint of another program.
+
+    Attributes:
+        KIND: what it follows, see `JOINT_KIND`.
+        SOURCE: number of the degree of freedom or operation that it follows.
+        PART: component of that, or offset in reals of a factor.
+        FIRST_SHARE: its first share.
     """
 
     KIND, SOURCE, PART, FIRST_SHARE, SIZE = range(5)
 
 
 class SHARE(metaclass=Record):
-    """What a degree of freedom has in a joint."""
+    """Integers of a share: the derivative of a joint by a degree of freedom.
+
+    Attributes:
+        JOINT: number of the joint.
+        DOF: degree of freedom, or -1 for a constant argument.
+    """
 
     JOINT, DOF, SIZE = range(3)
 
 
 class PRODUCT(metaclass=Record):
-    """Two shares, the entry of the other program's mass matrix that they take, and offset in data
-    of what it adds to.
+    """Integers of a product of two shares.
+
+    Attributes:
+        ONE, TWO: numbers of the shares.
+        ENTRY: entry of the other program's mass matrix that they multiply.
+        PLACE: offset in data of the entry of the mass matrix that the product is added to.
     """
 
     ONE, TWO, ENTRY, PLACE, SIZE = range(5)
 
 
 class EXCESS(metaclass=Record):
-    """A link, the last degree of freedom on the way to it, and offset in reals of what its inertia is too large by."""
+    """Integers of a link whose inertia is too large in the other program.
+
+    Attributes:
+        LINK: number of the link.
+        DOF: last degree of freedom on the path to it.
+        NUMBER: offset in reals of the excess moment of inertia (kg m²).
+    """
 
     LINK, DOF, NUMBER, SIZE = range(4)
 
 
 class JOINT_KIND(metaclass=Record):
-    """A multiple of a degree of freedom, the amount of an operation, an angle of a ball, a
-    component of where its end lies on the ellipsoid, a component of the error of a drift.
+    """What a joint of another program follows.
+
+    Attributes:
+        LINE: a multiple of a degree of freedom.
+        AMOUNT_OF: the amount of an operation.
+        ANGLE: an angle of a ball.
+        ELLIPSOID: a component of the position of an ellipsoid joint.
+        ERROR: a component of the error of a drift.
     """
 
     LINE, AMOUNT_OF, ANGLE, ELLIPSOID, ERROR = range(5)
 
 
 # Numbers.
-GRAVITY_AT, INERTIA_AT = 0, 3
-"""Gravity in ground (3,), and of each link its `INERTIA`."""
+GRAVITY_AT = 0
+"""Offset in reals of gravity in ground (3,), m/s²."""
+INERTIA_AT = 3
+"""Offset in reals of the inertias of the links, see `INERTIA`."""
 
 
 class INERTIA(metaclass=Record):
-    """Mass, mass centre in the link, xx, yy, zz, xy, xz, yz about it."""
+    """Inertia of a link in reals, in its frame.
+
+    Attributes:
+        MASS: mass (kg).
+        CENTER: mass centre (m).
+        MOMENTS: moments xx, yy, zz and products xy, xz, yz of inertia about the mass centre (kg m²).
+    """
 
     MASS, CENTER, MOMENTS, SIZE = accumulate((1, 3, 6), initial=0)
 
 
 class FIXED(metaclass=Record):
-    """Of an operation: rotation by rows and translation of its fixed transform, and the axis of a slide."""
+    """Fixed transform of an operation in reals.
+
+    Attributes:
+        ROTATION: rotation by rows.
+        TRANSLATION: translation (m).
+        AXIS: axis of a slide.
+    """
 
     ROTATION, TRANSLATION, AXIS, SIZE = accumulate((9, 3, 3), initial=0)
 
 
 class WORK(metaclass=Record):
-    """The head of the data: the time (s), and room for what laws hand over."""
+    """Head of data.
+
+    Attributes:
+        TIME: time (s).
+        SCRATCH: workspace by which laws exchange arguments and results.
+    """
 
     TIME, SCRATCH, SIZE = accumulate((1, 31), initial=0)
 
 
 class LINK_WORK(metaclass=Record):
-    """Of a link: rotation in ground by rows, position of its origin, origin of the spatial vectors,
-    velocity, acceleration while the derivatives of all speeds are zero (upwards against gravity);
-    inertia (mass, first moment, xx, yy, zz, xy, xz, yz) and wrench of it, and of all that it
-    carries too after the evaluation.
+    """Results of a link, along the axes of ground.
+
+    Attributes:
+        ROTATION: rotation in ground by rows.
+        POSITION: position of its origin (m).
+        ORIGIN: point of ground that its spatial vectors are taken about (m).
+        VELOCITY: spatial velocity.
+        ACCELERATION: spatial acceleration while udot = 0, relative to free fall.
+        INERTIA: mass, first moment, xx, yy, zz, xy, xz, yz; of its subtree after the evaluation.
+        WRENCH: torque and force; of its subtree after the evaluation.
     """
 
     ROTATION, POSITION, ORIGIN, VELOCITY, ACCELERATION, INERTIA, WRENCH, SIZE = accumulate(
@@ -279,16 +447,25 @@ class LINK_WORK(metaclass=Record):
 
 
 class OPERATION_WORK(metaclass=Record):
-    """Work of an operation: the axis, or the frame by rows whose axes a ball's speeds are about;
-    where that is; amount, rate and second derivative without udot, if a function gives them.
+    """Results of an operation.
+
+    Attributes:
+        AXIS: axis in ground, or the frame by rows whose axes the speeds of a ball are about.
+        POINT: position of the axis or frame in ground (m).
+        AMOUNT, RATE, CURVATURE: amount, its rate and its second derivative while udot = 0, if a
+            function gives them.
     """
 
     AXIS, POINT, AMOUNT, RATE, CURVATURE, SIZE = accumulate((9, 3, 1, 1, 2), initial=0)
 
 
 class CONTACT_WORK(metaclass=Record):
-    """Work of a contact: force on surface 2, its point, depth and radius of the law; force and
-    depth are 0 without contact.
+    """Results of a contact; force and depth are 0 without contact.
+
+    Attributes:
+        FORCE: force on surface 2 (N), then the point where it acts (m).
+        DEPTH: depth (m).
+        RADIUS: effective radius of the law (m).
     """
 
     FORCE, DEPTH, RADIUS, SIZE = accumulate((6, 1, 1), initial=0)
@@ -296,32 +473,54 @@ class CONTACT_WORK(metaclass=Record):
 
 # Kinds.
 class MOTION(metaclass=Record):
-    """Motions: about z, along an axis (those before BALL have one axis), a SphericalMotion, one
-    that is passed from end to start, a SimbodyAccelerationError.
+    """Types of motions; those before BALL have one axis.
+
+    Attributes:
+        TURN: rotation about z.
+        SLIDE: translation along an axis.
+        BALL: spherical or ellipsoidal motion.
+        BALL_BACK: the same, traversed from its end to its start.
+        ACCELERATION_ERROR: error of Simbody's acceleration of a CustomJoint.
     """
 
     TURN, SLIDE, BALL, BALL_BACK, ACCELERATION_ERROR = range(5)
 
 
 class TRANSFORM(metaclass=Record):
-    """Fixed transforms: none, a translation, any."""
+    """Types of fixed transforms.
+
+    Attributes:
+        NOTHING: identity.
+        SHIFT: translation.
+        MOVE: rotation and translation.
+    """
 
     NOTHING, SHIFT, MOVE = range(3)
 
 
 class OUTCOME(metaclass=Record):
-    """What becomes of an evaluation: good, a degree of freedom moves no mass, the rates of a ball
-    are not defined; of a
-    projection: too far from where the constraints hold; of a kernel in Python: it raised an error;
-    of an item: its law has no solution.
+    """Outcomes of kernels.
+
+    Attributes:
+        OK: success.
+        SINGULAR_MASS: a degree of freedom moves no mass.
+        SINGULAR_RATES: the rates of a ball are not defined.
+        FAR: a projection starts too far from the constraints.
+        FAILED: a kernel in Python raised an error.
+        UNSOLVED: the law of an item has no solution.
     """
 
     OK, SINGULAR_MASS, SINGULAR_RATES, FAR, FAILED, UNSOLVED = range(6)
 
 
 class STAGE(metaclass=Record):
-    """How far an evaluation goes: to the accelerations, to the positions of the links, to the
-    forces (those that items apply are then in place of the accelerations), to the velocities.
+    """How far an evaluation goes.
+
+    Attributes:
+        ACCELERATION: to the accelerations.
+        POSITION: to the poses of the links.
+        FORCE: to the forces; f then holds the generalized forces that items apply directly.
+        VELOCITY: to the velocities.
     """
 
     ACCELERATION, POSITION, FORCE, VELOCITY = range(4)

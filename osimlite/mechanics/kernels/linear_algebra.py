@@ -1,9 +1,10 @@
-"""Linear equations that may repeat or contradict each other, and positive definite ones.
+"""Linear algebra of small matrices: rank-deficient equations, Cholesky's method, eigenvalues.
 
-The complete orthogonal decomposition by reflections (G. H. Golub, C. F. Van Loan, Matrix
-Computations, 1996, chapters 5.2 and 5.5): the equations are taken in the order of what they say
-beyond those before them, as long as that is enough, and turned into those of as many unknowns; the
-rest follows from these or contradicts them.
+Equations that may repeat or contradict each other are solved by a complete orthogonal decomposition
+with Householder reflections (G. H. Golub, C. F. Van Loan, Matrix Computations, 1996, chapters 5.2
+and 5.5). Equations are processed in the order of their largest remaining norm until the rank is
+reached, and reduced to a triangle of the size of the rank. Eigenvalues come from the cyclic Jacobi
+method (the same, chapter 8.4).
 """
 
 from __future__ import annotations
@@ -14,23 +15,29 @@ from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 
 REDUNDANT = 1e-9
-"""An equation that differs from what others say by less than this part of itself says nothing new."""
+"""Relative size of the part of an equation beyond the others below which it counts as redundant."""
 ROUNDING = 1e-13
-"""What is shorter than this part of the longest equation, or than this at all, is rounding error: in m and rad."""
+"""Equations shorter than this (m, rad), or than this part of the longest one, are rounding errors."""
 
 # A factor of count equations for size unknowns: the turned equations with the reflections (count,
 # size), their diagonal and order (2, count), and if there are more equations than count, these
 # turned once more (count, count) with diagonal; at the end how many equations count.
 FACTOR_EXTRA = 3
+"""Number of vectors (count,) in a factor: diagonal, order, diagonal of the second reduction.
+
+A factor of `count` equations in `size` unknowns holds the reduced equations with their reflections
+(count, size), these vectors, the second reduction (count, count) for fewer independent equations
+than `count`, and at the end the rank.
+"""
 
 
 def factor_room(count: int, size: int) -> int:
-    """How many numbers a factor has."""
+    """Return the length of a factor of `count` equations in `size` unknowns."""
     return count * size + count * count + FACTOR_EXTRA * count + 1
 
 
 def factored(model: Ints, data: Floats, count: int, a: Floats, smallest: float) -> int:
-    """Turn equations for all speeds into the factor, see `factorise`; returns how many count."""
+    """Factorise equations in all speeds by the law of the model, see `factorise_equations`; return the rank."""
     data[WORK.SCRATCH] = smallest
     return call(
         model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.FACTORISE]],
@@ -44,7 +51,16 @@ def factored(model: Ints, data: Floats, count: int, a: Floats, smallest: float) 
 
 
 def solved(model: Ints, count: int, a: Floats, values: Floats, room: Floats, reals: Floats) -> None:
-    """The shortest x that comes nearest to fulfilling equations that were `factored`, see `minimum_norm`."""
+    """Solve equations that `factorise_by_law` factorised, see `solve_minimum_norm`.
+
+    Args:
+        model: integers of the model.
+        count: number of equations.
+        a: factor.
+        values: right sides (count,).
+        room: workspace (count,).
+        reals: filled with the shortest solution (n,).
+    """
     call(
         model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.MINIMUM_NORM]],
         model,
@@ -59,7 +75,7 @@ def solved(model: Ints, count: int, a: Floats, values: Floats, room: Floats, rea
 def factorise_law(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int
 ) -> int:
-    """`factorise` for others to call by its address: the factor f, what counts in SCRATCH."""
+    """Factorise equations as a law: f holds the equations and gets the factor, SCRATCH the threshold."""
     size = model[MODEL.DOFS]
     rank = factorise(count, size, f, data[WORK.SCRATCH])
     f[factor_room(count, size) - 1] = rank
@@ -69,7 +85,7 @@ def factorise_law(
 def minimum_norm_law(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int
 ) -> int:
-    """`minimum_norm` for others to call by its address: right sides x, room w, factor y, solution f."""
+    """Solve factorised equations as a law: right sides `reals`, workspace `data`, factor y, solution f."""
     size = model[MODEL.DOFS]
     rank = int(y[factor_room(count, size) - 1])
     minimum_norm(count, size, y, rank, reals, data, f)
@@ -77,13 +93,19 @@ def minimum_norm_law(
 
 
 def factorise(count: int, size: int, a: Floats, smallest: float) -> int:
-    """Turn equations, whose left sides (count, size) a factor begins with, into the factor.
+    """Factorise equations in place.
 
-    What an equation says beyond others counts if it is more than `smallest` times what the
-    strongest one says.
+    An equation counts as independent if its part beyond the others is more than `smallest` times the
+    longest equation.
+
+    Args:
+        count: number of equations.
+        size: number of unknowns.
+        a: left sides (count, size), replaced by the factor.
+        smallest: relative threshold of independence.
 
     Returns:
-        How many equations count.
+        The rank, which is the number of independent equations.
     """
     diagonal, order, rank = at(a, count * size), at(a, count * size + count), 0
     for r in range(count):
@@ -129,7 +151,18 @@ def factorise(count: int, size: int, a: Floats, smallest: float) -> int:
 
 
 def reflection(first: int, end: int, stride: int, length: float, v: Floats) -> float:
-    """Make of a vector from an entry on the one whose reflection leaves that entry only; returns what that becomes."""
+    """Compute the Householder vector that maps a vector to a multiple of its entry `first`.
+
+    Args:
+        first: index of the entry.
+        end: end of the vector.
+        stride: distance between its entries.
+        length: norm of the vector from the entry on.
+        v: vector, replaced by the Householder vector of norm sqrt(2).
+
+    Returns:
+        The value of the entry after the reflection.
+    """
     lead = v[stride * first]
     value = -length if lead > 0.0 else length
     if length > 0.0:
@@ -142,7 +175,16 @@ def reflection(first: int, end: int, stride: int, length: float, v: Floats) -> f
 
 
 def reflect(first: int, end: int, stride: int, v: Floats, apart: int, x: Floats) -> None:
-    """Reflect a vector in another; how far the entries of the mirror stand apart, and those of the vector."""
+    """Reflect the vector x by a Householder vector v: x -= (v . x) v.
+
+    Args:
+        first: index of the first entry of both.
+        end: end of both.
+        stride: distance between the entries of v.
+        v: Householder vector of norm sqrt(2).
+        apart: distance between the entries of x.
+        x: vector; changed.
+    """
     total = 0.0
     for k in range(first, end):
         total += v[stride * k] * x[apart * k]
@@ -153,16 +195,16 @@ def reflect(first: int, end: int, stride: int, v: Floats, apart: int, x: Floats)
 def minimum_norm(
     count: int, size: int, a: Floats, rank: int, values: Floats, room: Floats, x: Floats
 ) -> None:
-    """The shortest x (size,) that comes nearest to fulfilling factored equations with right sides (count,).
+    """Compute the shortest least-squares solution of factorised equations.
 
     Args:
-        count: of the equations.
-        size: of the unknowns.
-        a: the factor.
-        rank: how many equations count.
-        values: the right sides.
-        room: for as many numbers.
-        x: filled.
+        count: number of equations.
+        size: number of unknowns.
+        a: factor.
+        rank: number of independent equations.
+        values: right sides (count,).
+        room: workspace (count,).
+        x: filled with the solution (size,).
     """
     diagonal, order = at(a, count * size), at(a, count * size + count)
     for i in range(count):
@@ -188,7 +230,7 @@ def minimum_norm(
 
 
 def apply_q(size: int, a: Floats, rank: int, x: Floats) -> None:
-    """From turned unknowns to the unknowns; those from `rank` on are free."""
+    """Transform rotated unknowns back to the unknowns; those from `rank` on are free."""
     for r in range(rank - 1, -1, -1):
         reflect(r, size, 1, at(a, size * r), 1, x)
 
@@ -198,9 +240,9 @@ def write_null_space(size: int, a: Floats, rank: int, basis: Floats) -> None:
 
     Args:
         size: number of unknowns.
-        a: the equations as `factorise` leaves them.
-        rank: their rank.
-        basis: the vectors of the basis, one after the other.
+        a: factor.
+        rank: number of independent equations.
+        basis: filled with the vectors of the basis, one after the other.
     """
     for k in range(size - rank):
         direction = at(basis, size * k)
@@ -211,7 +253,7 @@ def write_null_space(size: int, a: Floats, rank: int, basis: Floats) -> None:
 
 
 def cholesky(size: int, a: Floats, smallest: float) -> bool:
-    """Factorise a symmetric matrix (size, size), of which the lower triangle counts, in its place.
+    """Factorise a symmetric positive definite matrix (size, size) in place; its lower triangle is used.
 
     Returns:
         Whether each pivot is more than `smallest` times its entry of the matrix.
@@ -232,7 +274,7 @@ def cholesky(size: int, a: Floats, smallest: float) -> bool:
 
 
 def substitute(size: int, a: Floats, x: Floats) -> None:
-    """Solve with the factor of `cholesky` in place."""
+    """Solve a linear system in place with the factor of `cholesky`."""
     for i in range(size):
         total = x[i]
         for k in range(i):
@@ -246,16 +288,18 @@ def substitute(size: int, a: Floats, x: Floats) -> None:
 
 
 MAX_SWEEPS = 60
+"""Largest number of sweeps of Jacobi's method."""
 NEGLIGIBLE = 1e-32
-"""Squares of entries off the diagonal that are together this part of those on it are rounding."""
+"""Ratio of the squared entries off and on the diagonal at which Jacobi's method ends."""
 
 
 def diagonalize(size: int, a: Floats, vectors: Floats) -> None:
-    """Turn a symmetric matrix into a diagonal one by rotations.
+    """Compute eigenvalues and eigenvectors of a symmetric matrix.
 
-    Args: size: of the matrix. a: the matrix (size, size); its eigenvalues are on its diagonal then.
-        vectors: filled with the eigenvectors by rows (size, size), orthonormal, in the order of the
-        eigenvalues.
+    Args:
+        size: size of the matrix.
+        a: matrix (size, size); its diagonal is filled with the eigenvalues.
+        vectors: filled with the orthonormal eigenvectors by rows (size, size), in the same order.
     """
     for i in range(size):
         for j in range(size):
@@ -274,7 +318,7 @@ def diagonalize(size: int, a: Floats, vectors: Floats) -> None:
 
 
 def rotate(size: int, a: Floats, vectors: Floats, i: int, j: int) -> None:
-    """Turn the plane of two unknowns so that the entry of both is 0."""
+    """Rotate the plane of two unknowns so that their common entry vanishes."""
     entry = a[size * i + j]
     if entry == 0.0:
         return

@@ -1,4 +1,4 @@
-"""Runge-Kutta-Merson, as Simbody's RungeKuttaMersonIntegrator takes its steps, rounding for rounding."""
+"""Runge-Kutta-Merson of order 4, as Simbody's RungeKuttaMersonIntegrator takes its steps, bit by bit."""
 
 from __future__ import annotations
 
@@ -17,13 +17,27 @@ from osimlite.mechanics.kernels.error_control import (
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 
-HEAD, STATES, IS_IMPLICIT = MEMORY + 1, 3, False
+HEAD = MEMORY + 1
+"""Length of the head of the method's record, see `error_control`."""
+STATES = 3
+"""Number of states of workspace after it."""
+IS_IMPLICIT = False
+"""Whether the method needs derivatives of the forces."""
 ORDER = 4.0
-"""Of the error."""
+"""Order of the error."""
 
 
 def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
-    """Try one step from y0, behind which its derivative stands, to y1."""
+    """Try one step from y0, which is followed by its derivative, to y1.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        y0: state at the start, then its derivative.
+        y1: filled with the state at the end.
+        place: offset of the method's record in data.
+    """
     h = at(data, place)
     errors, stages = (
         at(data, model[MODEL.WORK_STATE] + ERRORS * model[MODEL.STATE_SIZE]),
@@ -49,7 +63,22 @@ def staged(
     ya: Floats,
     stages: Floats,
 ) -> int:
-    """Compute y1 and, in `ya`, its errors."""
+    """Compute the stages, the state at the end and its errors.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        t0: time at the start (s).
+        t1: time at the end (s).
+        y0: state at the start, then its derivative.
+        y1: filled with the state at the end.
+        ya: filled with the errors of y1.
+        stages: workspace of three states.
+
+    Returns:
+        `OUTCOME.OK`, or the outcome of an evaluation that failed.
+    """
     size, h = model[MODEL.STATE_SIZE], t1 - t0
     f0, fa, fb, fc = at(y0, size), stages, at(stages, size), at(stages, 2 * size)
     for stage in range(4):

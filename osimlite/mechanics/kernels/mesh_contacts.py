@@ -20,19 +20,19 @@ from osimlite.mechanics.laws.elastic_foundation import (
 from osimlite.mechanics.laws.vectors import ZERO, Vector, dot, minus, norm, plus, put, times, vector
 
 SPRINGS = 16
-"""Where the springs stand among the numbers: stiffness and middle in the link of each."""
+"""Offset among the numbers of the springs: stiffness (N/m) and position in the link of each."""
 
 MESH_WORK = 10
-"""The record: force and torque on the mesh, the point that they are about, and energy."""
+"""Length of the record: force and torque on the mesh, the point they act about, and energy."""
 
 
 def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """A mesh (surface 2) on a half space or a sphere.
+    """Apply the contact force of a mesh (surface 2) on a half space or a sphere.
 
-    The integers are the links of both, the place of the pair among those of the force, the number
-    of the springs, and whether surface 1 is a half space; the numbers centre, normal and radius of
-    surface 1 in its link, centre and radius of the ball around the mesh in its link, and c, us, ud,
-    uv, vt of the law.
+    The integers are the links of both surfaces, the number of the pair in its force, the number of
+    springs, and whether surface 1 is a half space. The numbers are centre, normal and radius of surface
+    1 in its link, centre and radius of the bounding sphere of the mesh in its link, and c, us, ud, uv,
+    vt of the law.
     """
     i = at(model, item)
     one, two, count, is_plane = i[ITEM.OWN], i[ITEM.OWN + 1], i[ITEM.OWN + 3], i[ITEM.OWN + 4]
@@ -74,7 +74,17 @@ def load_mesh(
     torque: Vector,
     energy: float,
 ) -> None:
-    """Apply a force at a point, and a torque, to the mesh, and their opposites to surface 1; fill both records."""
+    """Apply a force and a torque to the mesh, and their opposites to surface 1; fill both records.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        item: offset of the mesh's item.
+        about: point where the force acts (m).
+        force: force on the mesh (N).
+        torque: torque on the mesh (N m).
+        energy: potential energy (J).
+    """
     i = at(model, item)
     one, two, result = i[ITEM.OWN], i[ITEM.OWN + 1], at(data, i[ITEM.RECORD])
     contact = at(

@@ -1,4 +1,9 @@
-"""Where the links are and how they move, outwards from ground."""
+"""Forward kinematics: poses and velocities of the links, outwards from ground.
+
+Velocities and accelerations are propagated from each link to its children as in the outward pass
+of the recursive Newton-Euler algorithm (R. Featherstone, Rigid Body Dynamics Algorithms, 2008,
+chapter 5.3), in spatial vectors along the axes of ground.
+"""
 
 from __future__ import annotations
 
@@ -28,11 +33,19 @@ from osimlite.mechanics.laws.rotations import Axes, X, Y, Z, along_axes, sine_co
 from osimlite.mechanics.laws.vectors import ZERO, Vector, along, cross, plus, put, times, vector
 
 BALL_MOVES = 1
-"""How far after the law of a ball (or a drift) that places its link is the one that moves it."""
+"""Offset from the number of the law that places a ball (or drift) to that of the law that moves it."""
 
 
 def place(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
-    """Rotations, positions and origins of all links, axes of all operations."""
+    """Compute rotations, positions and origins of all links, and the axes of all operations.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: filled with the poses.
+        y: state, of which the coordinates are used.
+        f: scratch that laws may use.
+    """
     for link in range(model[MODEL.LINKS]):
         i, here = link_ints(model, link), link_work(model, data, link)
         axes, origin = (X, Y, Z), ZERO
@@ -88,12 +101,12 @@ def place(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> Non
 
 
 def axes_of(rows: Floats) -> Axes:
-    """The axes of a frame, whose rotation is given by rows."""
+    """Return the axes of a frame, the columns of a rotation that is stored by rows."""
     return (rows[0], rows[3], rows[6]), (rows[1], rows[4], rows[7]), (rows[2], rows[5], rows[8])
 
 
 def set_frame(rows: Floats, axes: Axes, origin: Vector) -> None:
-    """Set a rotation by rows, and the position after it."""
+    """Store a rotation by rows, and the position after it."""
     one, two, three = axes
     rows[0], rows[3], rows[6] = one
     rows[1], rows[4], rows[7] = two
@@ -102,7 +115,20 @@ def set_frame(rows: Floats, axes: Axes, origin: Vector) -> None:
 
 
 def move(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
-    """After `place`: velocities, accelerations without udot, columns of the speeds, rates of coordinates, controls."""
+    """Compute velocities, accelerations while udot = 0, columns of the speeds, and controls.
+
+    `place_links` must have been called for the same state.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: filled with velocities, accelerations and columns.
+        y: state.
+        f: its first part is filled with the rates of the coordinates.
+
+    Returns:
+        `OUTCOME.OK`, or the outcome of a law that failed.
+    """
     status, size, controls = OUTCOME.OK, model[MODEL.DOFS], model[MODEL.CONTROLS]
     if controls > 0:
         status = call(model[controls + ITEM.LAW], model, reals, data, y, f, controls)
@@ -190,11 +216,11 @@ def move(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
 
 
 def set_row(row: Floats, turn: Vector, shift: Vector) -> None:
-    """Set a spatial vector."""
+    """Store a spatial vector."""
     put(row, 0, turn)
     put(row, 3, shift)
 
 
 def add_row(row: Floats, factor: float, turn: Vector, shift: Vector) -> None:
-    """Add a multiple to a spatial vector."""
+    """Add a multiple of a spatial vector to a stored one."""
     set_row(row, along(vector(row, 0), factor, turn), along(vector(row, 3), factor, shift))

@@ -1,13 +1,14 @@
-"""Multistep methods of variable order and step: backward differentiation formulas, and Adams-Moulton's.
+"""Multistep methods of variable order and step: numerical differentiation and Adams-Moulton formulas.
 
-Both keep backward differences, with steps that are equal for a while and orders that change: the
-numerical differentiation formulas of orders 1 to 5 (L. F. Shampine, M. W. Reichelt, The MATLAB ODE
-Suite, SIAM J. Sci. Comput. 18, 1997) those of the state, Adams' formulas of orders 2 to 8 those of
-its derivative (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I,
-chapter III.1). These err much less where they are stable; their error is estimated as that of the
-formula of one order less. Both solve c f(y) = psi + d, where d is what y differs from its
-prediction, by Newton's iteration; its linear equations are those of
-:mod:`osimlite.mechanics.kernels.condensation`.
+Both store backward differences at equal steps, whose order and step change now and then. The
+numerical differentiation formulas (NDF, a variant of BDF) of orders 1 to 5 store differences of the
+state (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997). The
+Adams-Moulton formulas of orders 2 to 8 store differences of its derivative (E. Hairer, S. P.
+Norsett, G. Wanner, Solving Ordinary Differential Equations I, chapter III.1). The latter are much
+more accurate where they are stable; their error is estimated by the formula of one order less.
+
+Both solve c f(y) = psi + d by Newton's iteration, where d is the difference of y from its
+prediction. The linear equations are those of :mod:`osimlite.mechanics.kernels.condensation`.
 """
 
 from __future__ import annotations
@@ -31,32 +32,53 @@ from osimlite.mechanics.kernels.error_control import (
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, is_finite
 
-ORDER, STEP, EQUAL, CONDENSED, AGE, REFUSED, MATRICES = range(MEMORY, MEMORY + 7)
-"""Order; step, s; how many steps were equal; c that the linear equations are for, 0 if for none;
-for how many steps their derivatives have served; how many steps were refused in turn; place of
-three matrices (8, 8) that change the step, and of a column.
-"""
+ORDER = MEMORY
+"""Index in the method's record of its order, 0 before the first step."""
+STEP = MEMORY + 1
+"""Index of the step (s)."""
+EQUAL = MEMORY + 2
+"""Index of the number of equal steps since the last change."""
+CONDENSED = MEMORY + 3
+"""Index of the coefficient c of the factorised linear equations, 0 if there are none."""
+AGE = MEMORY + 4
+"""Index of the number of steps for which the derivatives have been used, 0 if there are none."""
+REFUSED = MEMORY + 5
+"""Index of the number of consecutive rejected steps."""
+MATRICES = MEMORY + 6
+"""Offset of three matrices (8, 8) that change the step, and of a column (8,)."""
 WIDTH = 8
+"""Number of coefficients per method, and size of the matrices."""
 HEAD = MATRICES + 3 * WIDTH * WIDTH + WIDTH
+"""Length of the head of the method's record, see `error_control`."""
 
 IS_IMPLICIT = True
-BDF, ADAMS = 0, 1
+"""Whether the method needs derivatives of the forces."""
+BDF = 0
+"""Number of the numerical differentiation formulas."""
+ADAMS = 1
+"""Number of the Adams-Moulton formulas."""
 MOST_ORDER = 5, 7
+"""Highest order index of each method."""
 ROWS = max(MOST_ORDER) + 3
+"""Number of stored differences: y and its differences, or y and the differences of h f."""
 STATES = ROWS + 2
-"""Room for so many states: y and its backward differences, or y and those of h f; d, and psi."""
+"""Number of states of workspace: the differences, d, and psi."""
 
 _ONES = (1.0,) * WIDTH
 _KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0, 0.0, 0.0)
 _SUMS = tuple(sum((1.0 / k for k in range(1, order + 1)), 0.0) for order in range(WIDTH))
 _ADAMS = (1.0, 1 / 2, 5 / 12, 3 / 8, 251 / 720, 95 / 288, 19087 / 60480, 5257 / 17280)
 PREDICTED = (*_ONES, 0.0, *_ADAMS[:-1])
+"""Weight of each difference in the prediction, for both methods."""
 GIVEN = _SUMS + _ONES
+"""Weight of each difference in psi, for both methods."""
 ALPHA = (
     *((1.0 - kappa) * total for kappa, total in zip(_KAPPA, _SUMS, strict=True)),
     *(1.0 / g for g in _ADAMS),
 )
+"""Ratio of the step to the coefficient c, by order, for both methods."""
 DIFFERENCE = _ONES + ALPHA[WIDTH:]
+"""Ratio of the newest difference to d, by order, for both methods."""
 ERROR_CONSTANT = (
     *(
         kappa * total + 1.0 / (k + 1.0)
@@ -64,39 +86,55 @@ ERROR_CONSTANT = (
     ),
     *(1.0, *(before - g for before, g in pairwise(_ADAMS))),
 )
-"""Constants of both methods: by difference its weight in the prediction, and in psi; by order h /
-c, the newest difference by d, and the error by the newest difference.
-"""
+"""Ratio of the error to the newest difference, by order, for both methods."""
 
-ITERATIONS, CONVERGED, SOLVED = 4, 0.05, 1e-3
-"""Newton's steps at most; what the error of an iteration may be, of that of a step; how far off
-equations may be that need no second one.
-"""
+ITERATIONS = 4
+"""Largest number of Newton iterations per step."""
+CONVERGED = 0.05
+"""Accepted error of the iteration relative to the accuracy of the step."""
+SOLVED = 1e-3
+"""Residual relative to the accuracy with which one iteration is enough."""
 RENEWED = 20
-"""After so many steps the derivatives are computed anew."""
-SAFETY, SHRINK, GROW, WORTH = 0.8, 0.2, 8.0, 1.2
-"""Of the step that should just do, which is taken; how much a step changes at most, and at least to be made longer."""
+"""Number of steps after which the derivatives are computed anew."""
+SAFETY = 0.8
+"""Ratio of the chosen step to the one that would just meet the accuracy."""
+SHRINK = 0.2
+"""Smallest factor of a change of the step."""
+GROW = 8.0
+"""Largest factor of a change of the step."""
+WORTH = 1.2
+"""Smallest factor with which a step is made longer."""
 PATIENCE = 3
-"""So many refused steps in turn and the history is dropped: something has changed abruptly."""
+"""Number of consecutive rejections after which the history is dropped, as the motion has a kink."""
 
 
 def bdf(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
-    """Try one step from y0, behind which its derivative stands, to y1, which its derivative is put behind."""
+    """Try one step by a numerical differentiation formula, see `try_multistep`."""
     return multistep(model, reals, data, y0, y1, place, BDF)
 
 
 def adams(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
-    """The same by the other method."""
+    """Try one step by an Adams-Moulton formula, see `try_multistep`."""
     return multistep(model, reals, data, y0, y1, place, ADAMS)
 
 
 def multistep(
     model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int, method: int
 ) -> int:
-    """The same by either: BDF or ADAMS."""
+    """Try one step from y0, which is followed by its derivative, to y1; write its derivative after y1.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        y0: state at the start, then its derivative.
+        y1: filled with the state at the end, then its derivative.
+        place: offset of the method's record in data.
+        method: BDF or ADAMS.
+    """
     size = model[MODEL.STATE_SIZE]
     h = at(data, place)
-    rows, room = at(h, HEAD), at(h, HEAD + STATES * size)
+    rows, work = at(h, HEAD), at(h, HEAD + STATES * size)
     d, psi, errors = (
         at(rows, ROWS * size),
         at(rows, (ROWS + 1) * size),
@@ -117,11 +155,11 @@ def multistep(
         predict(size, method, order, rows, y1, psi)
         if h[AGE] <= 0.0 or h[AGE] > RENEWED:
             data[WORK.TIME] = t1
-            is_new = linearise(model, reals, data, y1, at(y1, size), room, 0.0) == OUTCOME.OK
+            is_new = linearise(model, reals, data, y1, at(y1, size), work, 0.0) == OUTCOME.OK
             h[AGE], h[CONDENSED] = 1.0 if is_new else 0.0, 0.0
-        if h[AGE] > 0.0 and (h[CONDENSED] == c or condense(model, c, room)):
+        if h[AGE] > 0.0 and (h[CONDENSED] == c or condense(model, c, work)):
             h[CONDENSED] = c
-            iterations = newton(model, reals, data, t1, c, y0, y1, d, psi, errors, room, h)
+            iterations = newton(model, reals, data, t1, c, y0, y1, d, psi, errors, work, h)
         if iterations > 0 or is_new or h[AGE] <= 0.0:
             break
         h[AGE] = 0.0
@@ -166,7 +204,7 @@ def multistep(
 
 
 def begin(model: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
-    """Start with order 1, and a step that changes little."""
+    """Start the history with order 1 and a step that changes the state little."""
     size = model[MODEL.STATE_SIZE]
     speed = error_norm(model, y0, at(y0, size), h, 1)
     h[STEP] = min(h[NEXT_STEP], 0.1 * sqrt(h[ACCEPTED]) / max(speed, 1.0))
@@ -179,7 +217,7 @@ def begin(model: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
 
 
 def predict(size: int, method: int, order: int, rows: Floats, y: Floats, psi: Floats) -> None:
-    """The end of a step if the newest difference is zero, and psi."""
+    """Compute psi, and the state at the end of a step whose newest difference is zero."""
     first = WIDTH * method
     for k in range(size):
         y[k], psi[k] = rows[k], 0.0
@@ -199,15 +237,35 @@ def newton(
     y1: Floats,
     d: Floats,
     psi: Floats,
-    step: Floats,
-    room: Floats,
+    change: Floats,
+    work: Floats,
     h: Floats,
 ) -> int:
-    """Solve c f(t, y1) = psi + d, where y1 is the prediction and d what is added to it; how many iterations that took.
+    """Solve c f(t, y1) = psi + d by Newton's iteration, where d = y1 - prediction.
 
-    None if they do not converge.
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        t: time at the end of the step (s).
+        c: coefficient of the formula (s).
+        y0: state at the start, for the error norm.
+        y1: prediction, then the solution and its derivative.
+        d: filled with the difference of the solution from the prediction.
+        psi: sum over older differences.
+        change: workspace of a state.
+        work: condensed linear equations.
+        h: record of the method.
+
+    Returns:
+        The number of iterations, 0 if they do not converge.
     """
-    size, f1, rest, before = model[MODEL.STATE_SIZE], at(y1, model[MODEL.STATE_SIZE]), 0.0, 0.0
+    size, f1, previous_residual, previous_length = (
+        model[MODEL.STATE_SIZE],
+        at(y1, model[MODEL.STATE_SIZE]),
+        0.0,
+        0.0,
+    )
     for k in range(size):
         d[k] = 0.0
     for iteration in range(ITERATIONS):
@@ -218,36 +276,44 @@ def newton(
         ) != OUTCOME.OK or not is_finite(size, f1):
             return 0
         for k in range(size):
-            step[k] = c * f1[k] - psi[k] - d[k]
-        residual = error_norm(model, y0, step, h, 1)
-        correct(model, c, room, step)
-        length = error_norm(model, y0, step, h, 1)
+            change[k] = c * f1[k] - psi[k] - d[k]
+        residual = error_norm(model, y0, change, h, 1)
+        correct(model, c, work, change)
+        length = error_norm(model, y0, change, h, 1)
         for k in range(size):
-            y1[k] += step[k]
-            d[k] += step[k]
+            y1[k] += change[k]
+            d[k] += change[k]
         if residual <= SOLVED * h[ACCEPTED]:
             return iteration + 1
         # Where derivatives have become far too large, all steps are short: only what they leave
         # tells.
         if iteration > 0:
-            if not (residual < rest and length < before):
+            if not (residual < previous_residual and length < previous_length):
                 return 0
-            rate = max(residual / rest, length / before)
+            rate = max(residual / previous_residual, length / previous_length)
             if rate / (1.0 - rate) * length <= CONVERGED * h[ACCEPTED]:
                 return iteration + 1
-        rest, before = residual, length
+        previous_residual, previous_length = residual, length
     return 0
 
 
 def refuse(size: int, method: int, h: Floats, rows: Floats, excess: float) -> None:
-    """Make the step shorter; the excess is infinite if there was no solution."""
+    """Shorten the step after a rejection.
+
+    Args:
+        size: length of a state.
+        method: BDF or ADAMS.
+        h: record of the method.
+        rows: differences.
+        excess: error over accuracy, infinite if there was no solution.
+    """
     h[REFUSED] += 1.0
     h[EQUAL] = 0.0
     if h[REFUSED] > PATIENCE:
         h[NEXT_STEP], h[ORDER] = SHRINK * h[STEP], 0.0
         return
-    wanted = SAFETY * excess ** (-1.0 / (h[ORDER] + 1.0)) if excess < inf else 0.25
-    rescale(size, method, h, rows, min(max(wanted, SHRINK), SAFETY))
+    factor = SAFETY * excess ** (-1.0 / (h[ORDER] + 1.0)) if excess < inf else 0.25
+    rescale(size, method, h, rows, min(max(factor, SHRINK), SAFETY))
     h[NEXT_STEP] = h[STEP]
 
 
@@ -261,7 +327,18 @@ def choose(
     error: float,
     safety: float,
 ) -> None:
-    """Choose order and step for the next steps."""
+    """Choose order and step for the next steps.
+
+    Args:
+        model: integers of the model.
+        method: BDF or ADAMS.
+        h: record of the method.
+        y0: state at the start of the last step.
+        rows: differences.
+        errors: workspace of a state.
+        error: norm of the error of the last step.
+        safety: ratio of the step to the one that would just meet the accuracy.
+    """
     size, order, accuracy = model[MODEL.STATE_SIZE], int(h[ORDER]), h[ACCEPTED]
     best, factor = order, reach(error / accuracy, order)
     for other in (order - 1, order + 1):
@@ -279,12 +356,12 @@ def choose(
 
 
 def reach(excess: float, order: int) -> float:
-    """How many times longer a step would just do, of which the error is so many times what it may be."""
+    """Return the factor of the step with which an error of `excess` times the accuracy would just meet it."""
     return max(excess, 1e-12) ** (-1.0 / (order + 1.0))
 
 
 def rescale(size: int, method: int, h: Floats, rows: Floats, factor: float) -> None:
-    """Change the step: the differences at other distances, on the polynomial through the same values."""
+    """Change the step by a factor: interpolate the differences on the polynomial through the same values."""
     # Adams' are of the derivative times the step, behind the state.
     order, differing = int(h[ORDER]) - method, at(rows, size * method)
     scale = factor if method == ADAMS else 1.0
@@ -311,7 +388,7 @@ def rescale(size: int, method: int, h: Floats, rows: Floats, factor: float) -> N
 
 
 def differences(order: int, factor: float, matrix: Floats) -> None:
-    """What makes of differences those of which the steps are so many times longer."""
+    """Fill the matrix that evaluates differences at steps that are `factor` times as long."""
     for j in range(order + 1):
         total = 1.0
         matrix[j] = total

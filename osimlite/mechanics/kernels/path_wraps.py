@@ -1,13 +1,13 @@
-"""How a path finds its way around its surfaces, in rounds, as in OpenSim.
+"""Wrapping of a path around its surfaces in rounds, as in OpenSim.
 
-A round goes through the PathWraps in their order: the tangent points of each are taken out, and
-each straight piece of the path between the points of its range is bent around its surface. The
-first piece that must wrap does; else the one that gets longer by the least. What a round leaves is
-where the next one starts, until the length stays as it is. Nothing is left for the next evaluation.
+A round processes the PathWraps in order: the tangent points of each are removed, and each straight
+segment of the path within its range is bent around its surface. The first segment that must wrap is
+used; else the one that becomes longer by the least. The next round starts from the result, until
+the length does not change. Nothing is kept for the next evaluation.
 
-OpenSim keeps where a point is in ground from its first use on, though later rounds move the tangent
-points: straight distances and the directions of forces go by the place that is kept, while the
-surfaces, velocities and points of application go by the newest one. So do they here.
+OpenSim caches the position of a tangent point in ground at its first use, although later rounds
+move the tangent points: straight distances and directions of forces use the cached position,
+while surfaces, velocities and points of application use the newest one. So does this module.
 """
 
 from __future__ import annotations
@@ -66,29 +66,35 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 WRAP_INTS = 3
-BACK, FIRST, LAST = 0, 1, 2
-"""Of a wrap, after the nodes: how far before the path's item that of the surface stands, 0 if it is
-not active; the first and the last point between which the path may wrap.
-"""
+"""Number of integers of a wrap; wraps follow the nodes."""
+BACK = 0
+"""Index in a wrap of the distance back to the item of its surface, 0 if it is not active."""
+FIRST = 1
+"""Index of the first point of its range."""
+LAST = 2
+"""Index of the last point of its range."""
 
-ROUNDS, STILL = 8, 0.0005
-"""At most so many rounds; a change of length (m) below which there is no other."""
+ROUNDS = 8
+"""Largest number of rounds."""
+STILL = 0.0005
+"""Change of the length (m) below which no further round follows."""
 
 NOWHERE = -2
-"""What becomes of a wrap if the path runs through no point of its range; OpenSim then leaves the path as it is."""
+"""Result of a wrap whose range contains no active point; OpenSim then leaves the path as it is."""
 
 BEYOND = -3
-"""What becomes of one whose range ends beyond the path; OpenSim then fails."""
+"""Result of a wrap whose range ends beyond the path; OpenSim then fails."""
 
-POSE, BEST = ENDS, ENDS + 12
-"""The record of a surface: after the piece that is tried, its rotation by rows and its origin in
-ground; what its law has found, from FIRST_TANGENT on, for the piece that is bent.
-"""
+POSE = ENDS
+"""Offset in the record of a surface of its pose in ground: rotation by rows, then origin."""
+BEST = ENDS + 12
+"""Offset of the results of its law for the segment that is bent, from FIRST_TANGENT on."""
 SURFACE_WORK = BEST + ROOM - FIRST_TANGENT
+"""Length of the record of a surface."""
 
 
 def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Length and speed of a path with wraps."""
+    """Compute length and speed of a path with wraps."""
     place_points(model, reals, data, y, item)
     place_surfaces(model, reals, data, item)
     wraps, length, exchanged = model[item + WRAPS], inf, False
@@ -117,7 +123,7 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
 
 
 def place_surfaces(model: Ints, reals: Floats, data: Floats, item: int) -> None:
-    """Where the surfaces are; no tangent point is known."""
+    """Compute the poses of the surfaces, and mark all tangent points as unused."""
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     nodes, work = (
         i[POINTS] + 2 * i[WRAPS],
@@ -137,7 +143,7 @@ def place_surfaces(model: Ints, reals: Floats, data: Floats, item: int) -> None:
 
 
 def take_out(model: Ints, data: Floats, item: int, number: int) -> None:
-    """Take the tangent points of a wrap out of the path, if they are in it."""
+    """Remove the tangent points of a wrap from the path, if they are in it."""
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     order, count, first = at(result, ORDER), int(result[COUNT]), i[POINTS] + 2 * number
     kept = 0
@@ -151,26 +157,26 @@ def take_out(model: Ints, data: Floats, item: int, number: int) -> None:
 def wrap(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int, number: int
 ) -> int:
-    """Find the way around one surface; returns what became of the last piece that was tried."""
+    """Bend the path around one surface; return the result for the last segment that was tried."""
     take_out(model, data, item, number)
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     points, count = i[POINTS], int(result[COUNT])
     size = points + 2 * i[WRAPS]
     nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + size)
-    own, tangent = at(nodes, NODE_INTS * size + WRAP_INTS * number), points + 2 * number
-    if own[BACK] == 0:
+    wrap_ints, tangent = at(nodes, NODE_INTS * size + WRAP_INTS * number), points + 2 * number
+    if wrap_ints[BACK] == 0:
         return NONE
-    if own[FIRST] <= own[LAST] and own[LAST] >= points:
+    if wrap_ints[FIRST] <= wrap_ints[LAST] and wrap_ints[LAST] >= points:
         return BEYOND
-    surface = item - own[BACK]
+    surface = item - wrap_ints[BACK]
     e = at(data, model[surface + ITEM.RECORD])
     begin = end = -1
     for k in range(count):
-        if own[FIRST] <= order[k] <= own[LAST] and order[k] < points:
+        if wrap_ints[FIRST] <= order[k] <= wrap_ints[LAST] and order[k] < points:
             begin, end = k if begin < 0 else begin, k
     if begin < 0:
         return NOWHERE
-    says, best, least = NONE, -1, inf
+    code, best, least = NONE, -1, inf
     one, two = at(work, NODE_WORK * tangent), at(work, NODE_WORK * (tangent + 1))
     for k in range(begin, end):
         m, n = at(nodes, NODE_INTS * int(order[k])), at(nodes, NODE_INTS * int(order[k + 1]))
@@ -179,25 +185,25 @@ def wrap(
             continue
         put(e, FIRST_END, in_surface(at(e, POSE), vector(a, PLACE)))
         put(e, SECOND_END, in_surface(at(e, POSE), vector(b, PLACE)))
-        says = call(model[surface + ITEM.LAW], model, reals, data, y, f, surface)
-        if says < WRAPPED:
+        code = call(model[surface + ITEM.LAW], model, reals, data, y, f, surface)
+        if code < WRAPPED:
             continue
         r1 = in_ground(at(e, POSE), vector(e, FIRST_TANGENT))
         r2 = in_ground(at(e, POSE), vector(e, SECOND_TANGENT))
-        longer = -inf
-        if says == WRAPPED:
+        increase = -inf
+        if code == WRAPPED:
             p1, p2 = spot(m, a), spot(n, b)
-            longer = (
+            increase = (
                 norm(minus(p1, r1)) + e[SURFACE_LENGTH] + norm(minus(p2, r2)) - norm(minus(p1, p2))
             )
-        if longer < least:
-            best, least = k, longer
+        if increase < least:
+            best, least = k, increase
             put(one, PLACE, r1)
             put(two, PLACE, r2)
             one[SURFACE], two[SURFACE] = 0.0, e[SURFACE_LENGTH]
             for j in range(ROOM - FIRST_TANGENT):
                 e[BEST + j] = e[FIRST_TANGENT + j]
-        if says == MANDATORY:
+        if code == MANDATORY:
             break
     # A law has no points for a piece of which OpenSim has none.
     if best >= 0 and one[PLACE] == one[PLACE]:
@@ -205,14 +211,14 @@ def wrap(
             order[k + 2] = order[k]
         order[best + 1], order[best + 2] = tangent, tangent + 1
         result[COUNT] = count + 2
-    return says
+    return code
 
 
 def in_surface(pose: Floats, a: Vector) -> Vector:
-    """A point of ground in the frame of a surface."""
+    """Return a point of ground in the frame of a surface."""
     return turned_back(pose, minus(a, vector(pose, 9)))
 
 
 def in_ground(pose: Floats, a: Vector) -> Vector:
-    """A point of a surface in ground."""
+    """Return a point of a surface in ground."""
     return plus(vector(pose, 9), turned(pose, a))

@@ -1,9 +1,9 @@
-"""Paths: what the law of any path leaves in its record, and the laws of those that run from point to point.
+"""Common record of all paths, and the laws of paths through points.
 
-A path is an item that other items call: its law finds length and speed, and the law of the item
-that stands PULL places before it applies the tension that was put into the record. Paths through
-points keep the points in the record, in the order in which the path runs through them, so that
-nothing is computed twice.
+A path is an item that other items call: its law computes length and speed, and the law of the item
+PULL records before it applies the tension that is written to the record. Paths through points keep
+the points in the record, in the order in which the path passes them, so that nothing is computed
+twice.
 """
 
 from __future__ import annotations
@@ -27,58 +27,106 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 PULL = ITEM.OWN
-"""The first integer of the item of any path."""
+"""Index in the integers of a path of the distance back to the item that applies its tension."""
 
-LENGTH, SPEED, TENSION = 0, 1, 2
-"""The record of any path begins with length (m), lengthening speed (m/s) and tension (N)."""
+LENGTH = 0
+"""Index in the record of any path of its length (m)."""
+SPEED = 1
+"""Index in the record of its lengthening speed (m/s)."""
+TENSION = 2
+"""Index in the record of its tension (N)."""
 
-POINTS, WRAPS, NODES_AT = ITEM.OWN + 1, ITEM.OWN + 2, ITEM.OWN + 3
-"""Integers of a path through points: how many points and wraps it has, and the records of its
-nodes: of the points, and then of two tangent points for each wrap.
-"""
+POINTS = ITEM.OWN + 1
+"""Index in the integers of the number of points."""
+WRAPS = ITEM.OWN + 2
+"""Index of the number of wraps."""
+NODES_AT = ITEM.OWN + 3
+"""Offset of the nodes: the points, then two tangent points for each wrap."""
 
 NODE_INTS = 8
-LINK, BODY, KIND, OF, AT, TABLES = 0, 1, 2, 3, 4, 5
-"""Of a node: its link and body (there is no line that pulls between two nodes of one body); the
-degree of freedom of its coordinate (-1 if that is locked), or the number of the surface that a
-tangent point is on; place of its numbers, and of the tables of its three functions.
-"""
+"""Number of integers of a node."""
+LINK = 0
+"""Index in a node of its link."""
+BODY = 1
+"""Index of its body; no force acts between two nodes of one body."""
+KIND = 2
+"""Index of its kind, such as FIXED."""
+OF = 3
+"""Index of its degree of freedom, -1 if that is locked; for a tangent point of its surface."""
+AT = 4
+"""Index of the offset of its numbers."""
+TABLES = 5
+"""Offset of the offsets of the tables of its three functions."""
 
-FIXED, CONDITIONAL, MOVING, CLAMPED, TANGENT = 0, 1, 2, 3, 4
-"""Kinds of nodes; a clamped one is a moving one that stands still outside its range, as its place does."""
+FIXED = 0
+"""Kind of a node that is fixed in its link."""
+CONDITIONAL = 1
+"""Kind of a node that is active within a range of a coordinate."""
+MOVING = 2
+"""Kind of a node whose position is a function of a coordinate."""
+CLAMPED = 3
+"""Kind of a moving node that stands still outside its range, as its position does."""
+TANGENT = 4
+"""Kind of a tangent point on a wrap surface."""
 
-STATION, VALUE, LOW, HIGH, TURN = 0, 3, 4, 5, 6
-"""Numbers of a node: a point of the link (m); value of a locked coordinate, and the range of any;
-rotation in the link of the frame in which the functions give the place, by rows, which then is
-about that point.
-"""
+STATION = 0
+"""Offset in the numbers of a node of its point in the link (m)."""
+VALUE = 3
+"""Index of the value of a locked coordinate."""
+LOW = 4
+"""Index of the smallest value of the coordinate."""
+HIGH = 5
+"""Index of the largest value of the coordinate."""
+TURN = 6
+"""Offset of the rotation in the link of the functions' frame, by rows; its origin is the point."""
 
-COUNT, ORDER = 3, 4
-"""The rest of the record: how many nodes the path runs through, which these are, and what is known of each node."""
+COUNT = 3
+"""Index in the record of a path of the number of active nodes."""
+ORDER = 4
+"""Offset of the numbers of the active nodes in order, then of the results of all nodes."""
 
 NODE_WORK = 12
-PLACE, KEPT, ALONG, GRADIENT, SURFACE, IS_KEPT = 0, 3, 6, 9, 9, 10
-"""Of a node: where it is in ground, and where a tangent point counts as for straight lines, once
-that is known; unit vector to the next node; derivative of the place by the coordinate, in ground;
-length on the surface before it.
-"""
+"""Length of the results of a node."""
+PLACE = 0
+"""Offset in the results of a node of its position in ground (m)."""
+KEPT = 3
+"""Offset of the position of a tangent point for straight lines, once it is used, see `path_wraps`."""
+ALONG = 6
+"""Offset of the unit vector to the next node."""
+GRADIENT = 9
+"""Offset of the derivative of a moving point's position by the coordinate, in ground."""
+SURFACE = 9
+"""Index of the length on the surface before a tangent point (m)."""
+IS_KEPT = 10
+"""Index of 1.0 if a tangent point has a KEPT position, else 0.0."""
 
-COINCIDENT, SIGNIFICANT = 2.0**-52, 2.0 ** (-52.0 * 7.0 / 8.0)
-"""Distances (m) below which two points have no line in OpenSim, for speeds and for forces; these
-then are NaN there, and nothing here.
+COINCIDENT = 2.0**-52
+"""Distance of two points (m) below which OpenSim has no direction for their relative speed.
+
+The speed is NaN in OpenSim; here it is the norm of the relative velocity.
 """
+SIGNIFICANT = 2.0 ** (-52.0 * 7.0 / 8.0)
+"""Distance of two points (m) below which OpenSim has no direction for forces; here they vanish."""
 
 
 def path_length(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, path: int
 ) -> tuple[float, float]:
-    """Length and lengthening speed of the path of an item."""
+    """Compute length (m) and lengthening speed (m/s) of the path of an item.
+
+    Returns:
+        Length and speed.
+    """
     call(model[path + ITEM.LAW], model, reals, data, y, f, path)
     return known_length(model, data, path)
 
 
 def known_length(model: Ints, data: Floats, path: int) -> tuple[float, float]:
-    """The same as they were found last."""
+    """Return length (m) and lengthening speed (m/s) of a path as they were computed last.
+
+    Returns:
+        Length and speed.
+    """
     result = at(data, model[path + ITEM.RECORD])
     return result[LENGTH], result[SPEED]
 
@@ -86,20 +134,20 @@ def known_length(model: Ints, data: Floats, path: int) -> tuple[float, float]:
 def pull_path(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, path: int, tension: float
 ) -> None:
-    """Apply a tension along the path of an item, after its length was found."""
+    """Apply a tension (N) along the path of an item, after its length has been computed."""
     data[model[path + ITEM.RECORD] + TENSION] = tension
     call(model[path - model[path + PULL] + ITEM.LAW], model, reals, data, y, f, path)
 
 
 def straight_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Length and speed of a path without wraps."""
+    """Compute length and speed of a path without wraps."""
     place_points(model, reals, data, y, item)
     measure_points(model, data, y, item)
     return OUTCOME.OK
 
 
 def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int) -> None:
-    """Where the points are, and which of them the path runs through."""
+    """Compute the positions of the points and list the active ones."""
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     result = at(data, i[ITEM.RECORD])
     order, work = at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
@@ -135,7 +183,7 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
 
 
 def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
-    """Length, speed and directions, from the places of the nodes that the path runs through; returns the length."""
+    """Compute length, speed and directions from the positions of the active nodes; return the length."""
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     nodes, order, work = (
         at(i, NODES_AT),
@@ -162,7 +210,7 @@ def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
 
 
 def spot(node: Ints, here: Floats) -> Vector:
-    """Where a node counts as for straight lines: a tangent point where it is when that is first asked for."""
+    """Return the position of a node for straight lines: of a tangent point where it was when first used."""
     if node[KIND] != TANGENT:
         return vector(here, PLACE)
     if here[IS_KEPT] == 0.0:
@@ -172,7 +220,7 @@ def spot(node: Ints, here: Floats) -> Vector:
 
 
 def node_velocity(model: Ints, data: Floats, y: Floats, node: Ints, here: Floats) -> Vector:
-    """Velocity of a node; tangent points move with the body of their surface."""
+    """Return the velocity of a node (m/s); tangent points move with the body of their surface."""
     v = velocity(model, data, node[LINK], vector(here, PLACE))
     if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
         return along(v, y[model[MODEL.DOFS] + node[OF]], vector(here, GRADIENT))
@@ -180,9 +228,9 @@ def node_velocity(model: Ints, data: Floats, y: Floats, node: Ints, here: Floats
 
 
 def pull_points(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Pull at the nodes of a path, along every line between two bodies.
+    """Apply the tension at the nodes of a path, along each line between two bodies.
 
-    A moving point works on its coordinate too.
+    At a moving point the tension also acts on its coordinate.
     """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     nodes, order, work = (
@@ -215,7 +263,21 @@ def pull_each(
     states: Floats,
     forces: Floats,
 ) -> int:
-    """The generalized forces of 1 N along each item, all of which are paths, in a row each, state by state."""
+    """Compute the generalized forces of 1 N along each item, all of which are paths, at several states.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: workspace of an evaluation.
+        y: workspace of a state.
+        f: workspace of its derivative.
+        count: number of states.
+        states: states (count, y).
+        forces: filled with the moment arms (count, items, n).
+
+    Returns:
+        `OUTCOME.OK`, or the outcome of the evaluation that failed.
+    """
     size, items = model[MODEL.DOFS], model[MODEL.ITEMS]
     applied = at(f, size)
     for row in range(count):

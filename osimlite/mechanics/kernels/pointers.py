@@ -1,6 +1,7 @@
-"""Two operations on vectors that machine code has and Python has not, each with what it means in Python.
+"""Vectors of kernels: views, calls of laws by address, and plain operations on states.
 
-:mod:`osimlite.simulation.engines.compiler` puts instructions in the place of these functions.
+`at` and `call` exist in machine code but not in Python; here is what they mean in Python.
+:mod:`osimlite.simulation.engines.compiler` replaces these two by instructions.
 """
 
 from __future__ import annotations
@@ -19,42 +20,44 @@ else:
     Floats = Ints = Any
 
 Law = Callable[[Ints, Floats, Floats, Floats, Floats, int], int]
-"""Takes the three vectors of :mod:`osimlite.mechanics.kernels.layout`, a state, room for its
-derivative, and the number of an operation or the place of an item, which the law is about.
+"""Signature of a law: `model`, `reals`, `data`, a state y, its rates f, and the index of its subject.
+
+:mod:`osimlite.mechanics.kernels.layout` describes the three vectors. The subject is the number of
+an operation, or the offset of an item or a constraint in the model.
 """
 
 Vector = TypeVar("Vector", "Floats", "Ints")
 
 laws: dict[int, Law] = {}
-"""The laws by address, as Python knows them."""
+"""Laws by the integers that stand for their addresses in Python."""
 
 
 def address(law: Law) -> int:
-    """What stands for the address of a law in Python."""
+    """Register a law and return the integer that stands for its address in Python."""
     laws[id(law)] = law
     return id(law)
 
 
 def at(vector: Vector, place: int) -> Vector:
-    """The vector from a place on."""
+    """Return the vector from an offset on, as a view."""
     return vector[place:]
 
 
 def call(
     address: int, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, place: int
 ) -> int:
-    """Call the law at an address."""
+    """Call the law at an address and return its outcome."""
     return laws[address](model, reals, data, y, f, place)
 
 
 def copy(count: int, values: Floats, to: Floats) -> None:
-    """Copy numbers."""
+    """Copy `count` numbers."""
     for k in range(count):
         to[k] = values[k]
 
 
 def is_finite(count: int, values: Floats) -> bool:
-    """Whether all of so many numbers are finite."""
+    """Return whether the first `count` numbers are all finite."""
     total = 0.0
     for k in range(count):
         total += values[k]
@@ -72,7 +75,19 @@ def cubic(
     t: float,
     y: Floats,
 ) -> None:
-    """State y at a time within a step, on the cubic Hermite polynomial through its ends."""
+    """Evaluate the cubic Hermite polynomial through both ends of a step at the time t.
+
+    Args:
+        size: length of a state.
+        t0: time at the start of the step (s).
+        y0: state at the start.
+        f0: its rates.
+        t1: time at the end of the step (s).
+        y1: state at the end.
+        f1: its rates.
+        t: time within the step (s).
+        y: filled with the state at t.
+    """
     h = t1 - t0
     z = (t - t0) / h
     b1 = z * z * (3.0 - 2.0 * z)

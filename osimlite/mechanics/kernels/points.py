@@ -1,4 +1,7 @@
-"""Points of links, and what pushes and turns them; a negative number of a link is ground."""
+"""Records of links and operations, and positions, velocities and forces at points of links.
+
+A negative number of a link stands for ground.
+"""
 
 from __future__ import annotations
 
@@ -16,27 +19,36 @@ from osimlite.mechanics.laws.vectors import ZERO, Vector, cross, minus, plus, pu
 
 
 def link_ints(model: Ints, link: int) -> Ints:
-    """Integers of a link, see `LINK`."""
+    """Return the integers of a link, see `LINK`."""
     return at(model, model[MODEL.LINK_AT] + LINK.SIZE * link)
 
 
 def link_work(model: Ints, data: Floats, link: int) -> Floats:
-    """Work of a link, see `LINK_WORK`."""
+    """Return the results of a link, see `LINK_WORK`."""
     return at(data, model[MODEL.WORK_LINK] + LINK_WORK.SIZE * link)
 
 
 def operation_ints(model: Ints, operation: int) -> Ints:
-    """Integers of an operation, see `OPERATION`."""
+    """Return the integers of an operation, see `OPERATION`."""
     return at(model, model[MODEL.OPERATION_AT] + OPERATION.SIZE * operation)
 
 
 def operation_work(model: Ints, data: Floats, operation: int) -> Floats:
-    """Work of an operation, see `OPERATION_WORK`."""
+    """Return the results of an operation, see `OPERATION_WORK`."""
     return at(data, model[MODEL.WORK_OPERATION] + OPERATION_WORK.SIZE * operation)
 
 
 def screw(j: Ints, a: Floats, origin: Vector) -> tuple[Vector, Vector]:
-    """What a unit of the amount of an operation turns, and shifts at an origin; not of balls."""
+    """Return the motion per unit amount of an operation that is no ball: a twist about `origin`.
+
+    Args:
+        j: integers of the operation.
+        a: results of the operation.
+        origin: point of ground that the linear part is taken at (m).
+
+    Returns:
+        Angular and linear part of the twist.
+    """
     axis = vector(a, OPERATION_WORK.AXIS)
     if j[OPERATION.MOTION] == MOTION.TURN:
         return axis, cross(minus(vector(a, OPERATION_WORK.POINT), origin), axis)
@@ -44,7 +56,7 @@ def screw(j: Ints, a: Floats, origin: Vector) -> tuple[Vector, Vector]:
 
 
 def station(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
-    """Position in ground of a point of a link."""
+    """Return the position in ground of a point that is given in a link (m)."""
     if link < 0:
         return point
     r = link_work(model, data, link)
@@ -57,14 +69,23 @@ def station(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
 
 
 def direction(model: Ints, data: Floats, link: int, along: Vector) -> Vector:
-    """A direction of a link, in ground."""
+    """Return a direction that is given in a link, along the axes of ground."""
     return along if link < 0 else turned(link_work(model, data, link), along)
 
 
 def place_frame(
     model: Ints, data: Floats, link: int, rows: Floats, point: Vector, pose: Floats
 ) -> None:
-    """Where a frame of a link is in ground, whose rotation there is given by rows: its own by rows, then its origin."""
+    """Compute the pose in ground of a frame that is fixed in a link.
+
+    Args:
+        model: integers of the model.
+        data: results of its evaluation.
+        link: number of the link.
+        rows: rotation of the frame in the link, by rows.
+        point: origin of the frame in the link (m).
+        pose: filled with the rotation in ground by rows (9,), then the origin in ground (3,).
+    """
     for k in range(3):
         pose[k], pose[3 + k], pose[6 + k] = direction(
             model, data, link, (rows[k], rows[3 + k], rows[6 + k])
@@ -73,7 +94,7 @@ def place_frame(
 
 
 def velocity(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
-    """Velocity of the point of a link that is at a point of ground."""
+    """Return the velocity (m/s) of the material point of a link at a position in ground."""
     if link < 0:
         return ZERO
     here = link_work(model, data, link)
@@ -83,12 +104,16 @@ def velocity(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
 
 
 def angular_velocity(model: Ints, data: Floats, link: int) -> Vector:
-    """Angular velocity of a link."""
+    """Return the angular velocity of a link along the axes of ground (rad/s)."""
     return ZERO if link < 0 else vector(link_work(model, data, link), LINK_WORK.VELOCITY)
 
 
 def acceleration(model: Ints, reals: Floats, data: Floats, link: int, point: Vector) -> Vector:
-    """Acceleration of the point of a link that is at a point of ground, while the speeds do not change."""
+    """Return the acceleration of a material point of a link while udot = 0 (m/s²).
+
+    The point is at a position in ground. Links carry accelerations relative to free fall, so that
+    gravity is added here.
+    """
     if link < 0:
         return ZERO
     here = link_work(model, data, link)
@@ -105,12 +130,12 @@ def acceleration(model: Ints, reals: Floats, data: Floats, link: int, point: Vec
 
 
 def angular_acceleration_bias(model: Ints, data: Floats, link: int) -> Vector:
-    """Angular acceleration of a link while the speeds do not change."""
+    """Return the angular acceleration of a link while udot = 0 (rad/s²)."""
     return ZERO if link < 0 else vector(link_work(model, data, link), LINK_WORK.ACCELERATION)
 
 
 def apply_force(model: Ints, data: Floats, link: int, point: Vector, force: Vector) -> None:
-    """Apply a force at a point of ground to a link."""
+    """Add a force (N) at a position in ground to the wrench on a link."""
     if link < 0:
         return
     here = link_work(model, data, link)
@@ -120,7 +145,7 @@ def apply_force(model: Ints, data: Floats, link: int, point: Vector, force: Vect
 
 
 def apply_torque(model: Ints, data: Floats, link: int, torque: Vector) -> None:
-    """Apply a torque to a link."""
+    """Add a torque (N m) to the wrench on a link."""
     if link >= 0:
         load = at(link_work(model, data, link), LINK_WORK.WRENCH)
         put(load, 0, plus(vector(load, 0), torque))

@@ -1,4 +1,4 @@
-"""Poses in which couplers and equations hold, and how equations are bent."""
+"""Poses that fulfil couplers, ranges and equations, and the curvature of the equations."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ from osimlite.mechanics.kernels.pose_step import equations_for, list_free
 from osimlite.mechanics.kernels.projection import REDUNDANT
 
 EXACT = 1e-13
-"""What constraints may be off (m or rad)."""
+"""Accepted error of the equations (m or rad)."""
 ASIDE = 1e-5
-"""How far differences of equations go (rad or m)."""
+"""Step of the finite differences of equations (rad or m)."""
 
 
 def settle(m: Fit, y: Floats) -> bool:
-    """Bring a pose into the ranges, to the values that are given, and to where couplers and equations hold."""
+    """Move a pose into the ranges, to prescribed values, and onto couplers and equations; return success."""
     p, c, v, size = m.p, m.c, m.v, m.model[MODEL.DOFS]
     ranges, resolved = at(c, p[RANGES_AT]), at(p, p[RESOLVED_AT])
     for k in range(size):
@@ -56,7 +56,7 @@ def settle(m: Fit, y: Floats) -> bool:
 
 
 def couple_all(m: Fit, y: Floats) -> None:
-    """Put what depends on others where these have it."""
+    """Set all dependent coordinates by their couplers."""
     p, size = m.p, m.model[MODEL.DOFS]
     for number in range(p[COUPLERS]):
         i = at(p, p[p[COUPLER_AT] + number])
@@ -64,7 +64,7 @@ def couple_all(m: Fit, y: Floats) -> None:
 
 
 def restore(m: Fit, y: Floats) -> bool:
-    """Bring a pose to where the equations hold, in the shortest steps of what is free; whether they do then."""
+    """Move a pose onto the equations by minimum-norm Newton steps of the free coordinates; return success."""
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     count, errors, step = equations_of(m), at(v, p[ERRORS]), at(v, p[STEP])
     ranges, before = at(m.c, p[RANGES_AT]), inf
@@ -98,7 +98,7 @@ def restore(m: Fit, y: Floats) -> bool:
 
 
 def forget_bends(m: Fit) -> None:
-    """Take the equations for straight ones."""
+    """Set the equations' part of the Hessian to zero."""
     size = m.model[MODEL.DOFS]
     if equations_of(m) > 0:
         for k in range(size * size):
@@ -106,9 +106,9 @@ def forget_bends(m: Fit) -> None:
 
 
 def bend_equations(m: Fit, y: Floats) -> None:
-    """Find what the equations add to the second derivative: their own, times how hard each pulls at the pose.
+    """Compute the equations' part of the Hessian: their second derivatives times their multipliers.
 
-    The derivatives are known before, and are not afterwards.
+    The derivatives of the cost must be known, and are lost.
     """
     p, v, size, count = m.p, m.v, m.model[MODEL.DOFS], equations_of(m)
     rows, slope, curves = at(v, p[ROWS]), at(v, p[SLOPE]), at(v, p[CURVES])

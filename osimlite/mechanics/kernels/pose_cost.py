@@ -1,13 +1,13 @@
-"""What a pose costs: how far markers, sensors and coordinates are from where they were measured.
+"""Cost of a pose: weighted squared deviations of markers, sensors and coordinates, with derivatives.
 
-The cost is half the weighted sum of squared distances and angles. A marker weighs on its link as a
-point mass and pulls at it as a spring: the gradient is the generalized force of these springs, what
-the deviations' first derivatives make of the second derivative is the mass matrix of these masses,
-found by the composite-rigid-body algorithm, and the rest follows from how the axes of the joints
-turn one another (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 2.10 and 6.2): a
-turn about an axis carries the columns of all that it carries.
+The cost is half the weighted sum of squared distances and angles. A marker is a point mass on its
+link and a spring that pulls at it: the gradient is the generalized force of the springs, and the
+Gauss-Newton part of the Hessian is the mass matrix of the point masses, which the
+composite-rigid-body algorithm computes. The rest of the Hessian follows from how the axes of the
+joints rotate one another (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 2.10 and
+6.2): a rotation about an axis carries the columns of all joints outwards of it.
 
-Second derivatives leave out how functions of several coordinates are bent.
+The Hessian omits the second derivatives of functions of several coordinates.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ from osimlite.mechanics.laws.vectors import (
 
 
 def cost(m: Fit, y: Floats) -> float:
-    """Cost of a pose, with the gradient and the parts of the second derivative by all free coordinates."""
+    """Return the cost of a pose; compute its gradient and both parts of its Hessian by all free coordinates."""
     model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
     look(m, y)
     for k in range(p[BALLS]):
@@ -94,7 +94,7 @@ def cost(m: Fit, y: Floats) -> float:
 
 
 def look(m: Fit, y: Floats) -> None:
-    """Where the links are, what each coordinate moves, and the equations."""
+    """Evaluate a pose: links, columns of the coordinates, and equations."""
     model, p, v, size = m.model, m.p, m.v, m.model[MODEL.DOFS]
     for k in range(size):
         # So that the second derivatives of the functions are those by the coordinates.
@@ -107,7 +107,7 @@ def look(m: Fit, y: Floats) -> None:
 
 
 def turn_by_angles(m: Fit, y: Floats, angles: Ints) -> None:
-    """Make of the columns of the speeds of a ball those of the rates of its angles."""
+    """Convert the columns of the speeds of a ball to those of the rates of its angles."""
     columns = at(m.data, m.model[MODEL.WORK_COLUMN])
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
@@ -123,7 +123,7 @@ def turn_by_angles(m: Fit, y: Floats, angles: Ints) -> None:
 
 
 def markers_pull(m: Fit) -> float:
-    """Put the masses and springs of the markers on the links; what they cost."""
+    """Add the masses and springs of the markers to the links; return their cost."""
     model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
     for k in range(p[MARKERS]):
         weight, link = v[p[WEIGHTS] + k], p[p[MARKER_AT] + k]
@@ -163,7 +163,7 @@ def markers_pull(m: Fit) -> float:
 
 
 def gather(m: Fit, y: Floats) -> None:
-    """Gradient and second derivative by the degrees of freedom, inwards from the leaves."""
+    """Compute gradient and Hessian by the degrees of freedom, inwards from the leaves."""
     model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     slope, stiffness, bend = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND])
@@ -203,7 +203,7 @@ def gather(m: Fit, y: Floats) -> None:
 
 
 def follow_couplers(m: Fit, y: Floats) -> None:
-    """Make of the derivatives, and of the equations, those by the coordinates that depend on no others."""
+    """Convert the derivatives and the equations to those by the independent coordinates."""
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     slope, stiffness, bend, rows = (
         at(v, p[SLOPE]),
@@ -216,7 +216,7 @@ def follow_couplers(m: Fit, y: Floats) -> None:
         rates[k] = 1.0
     for number in range(p[COUPLERS] - 1, -1, -1):
         i = at(p, p[p[COUPLER_AT] + number])
-        own = i[DEPENDENT_OF]
+        dependent = i[DEPENDENT_OF]
         _, bent = coupled(m, i, y, gradient, rates)
         for k in range(i[COUNT_OF]):
             freedom = i[ARGUMENTS_OF + k]
@@ -224,20 +224,20 @@ def follow_couplers(m: Fit, y: Floats) -> None:
                 continue
             gain = gradient[k]
             for j in range(size):
-                stiffness[size * j + freedom] += gain * stiffness[size * j + own]
-                bend[size * j + freedom] += gain * bend[size * j + own]
+                stiffness[size * j + freedom] += gain * stiffness[size * j + dependent]
+                bend[size * j + freedom] += gain * bend[size * j + dependent]
             for j in range(size):
-                stiffness[size * freedom + j] += gain * stiffness[size * own + j]
-                bend[size * freedom + j] += gain * bend[size * own + j]
+                stiffness[size * freedom + j] += gain * stiffness[size * dependent + j]
+                bend[size * freedom + j] += gain * bend[size * dependent + j]
             if i[COUNT_OF] == 1:
-                bend[size * freedom + freedom] += bent * slope[own]
-            slope[freedom] += gain * slope[own]
+                bend[size * freedom + freedom] += bent * slope[dependent]
+            slope[freedom] += gain * slope[dependent]
             for j in range(equations_of(m)):
-                rows[size * j + freedom] += gain * rows[size * j + own]
+                rows[size * j + freedom] += gain * rows[size * j + dependent]
 
 
 def equations_of(m: Fit) -> int:
-    """How many equations bind the positions."""
+    """Return the number of equations that constrain positions."""
     return (
         m.model[m.model[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS]
         if m.model[MODEL.CONSTRAINED] > 0
@@ -246,14 +246,25 @@ def equations_of(m: Fit) -> int:
 
 
 def coupled(m: Fit, i: Ints, y: Floats, gradient: Floats, rates: Floats) -> tuple[float, float]:
-    """Value of a coordinate that depends on others, its second derivative if it depends on one; fills the slopes."""
+    """Evaluate a coordinate that depends on others, and fill the derivatives by these.
+
+    Args:
+        m: the fit.
+        i: integers of the coupler.
+        y: state.
+        gradient: filled with the derivatives by the arguments.
+        rates: rates of the coordinates for the second derivative.
+
+    Returns:
+        The value, and the second derivative if it depends on one coordinate.
+    """
     size, constants = i[COUNT_OF], at(m.c, i[NUMBERS_OF])
     if int(constants[size]) >= MONOMIALS:
         value, _, bent = several_at(size, at(i, ARGUMENTS_OF), constants, y, rates, gradient)
         return value, bent
-    place = 0.0
+    argument = 0.0
     if size > 0:
-        place = y[i[ARGUMENTS_OF]] if i[ARGUMENTS_OF] >= 0 else constants[0]
-    value, slope, bent = value_at(at(constants, size), place)
+        argument = y[i[ARGUMENTS_OF]] if i[ARGUMENTS_OF] >= 0 else constants[0]
+    value, slope, bent = value_at(at(constants, size), argument)
     gradient[0] = slope
     return value, bent

@@ -1,4 +1,4 @@
-"""How the axes of a joint, each carried by those before it, bend the cost of a pose."""
+"""Second derivative of the cost of a pose due to the axes of a joint, each carried by those before it."""
 
 from __future__ import annotations
 
@@ -30,9 +30,15 @@ from osimlite.mechanics.laws.vectors import turned as turned_by
 
 
 def twisted(load: Floats, turned: Floats, turn: Vector, shift: Vector) -> Vector:
-    """The moment of the springs' pulls at arms that are what a motion moves their ends by.
+    """Return the moment of the springs' forces at arms that a motion displaces.
 
-    The sum over the springs of (shift + turn x arm) x pull.
+    It is the sum over the springs of (shift + turn x arm) x force.
+
+    Args:
+        load: sum of moments and forces (6,).
+        turned: sum of forces times arms (3, 3).
+        turn: angular part of the motion.
+        shift: linear part of the motion.
     """
     trace = turned[0] + turned[4] + turned[8]
     x, y, z = turn
@@ -41,7 +47,15 @@ def twisted(load: Floats, turned: Floats, turn: Vector, shift: Vector) -> Vector
 
 
 def bend_joint(m: Fit, y: Floats, link: int, load: Floats, turned: Floats) -> None:
-    """What the axes of one joint make of the second derivative: each is carried by those before it."""
+    """Add to the Hessian the contribution of the axes of one joint.
+
+    Args:
+        m: the fit.
+        y: state.
+        link: link of the joint.
+        load: sum of moments and forces on the subtree of the link.
+        turned: sum of forces times arms on the subtree.
+    """
     p = m.p
     places = at(p, p[AXES_AT])
     for one in range(places[link], places[link + 1]):
@@ -57,7 +71,7 @@ def bend_joint(m: Fit, y: Floats, link: int, load: Floats, turned: Floats) -> No
 
 
 def bend_axis(m: Fit, y: Floats, number: int, pull: float) -> None:
-    """What the function of one axis makes of the second derivative."""
+    """Add to the Hessian the second derivative of the function of one axis."""
     model, size, bend = m.model, m.model[MODEL.DOFS], at(m.v, m.p[BEND])
     axis = axis_of(m, number)
     j = operation_ints(model, axis[0])
@@ -79,12 +93,16 @@ def bend_axis(m: Fit, y: Floats, number: int, pull: float) -> None:
 
 
 def axis_of(m: Fit, number: int) -> Ints:
-    """The operation of an axis, and which part of a ball it is."""
+    """Return the operation of an axis, and its part of a ball."""
     return at(m.p, m.p[AXES_AT] + m.model[MODEL.LINKS] + 1 + 2 * number)
 
 
 def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vector]:
-    """The motion of a unit of one axis of a link."""
+    """Return the twist per unit amount of one axis of a link.
+
+    Returns:
+        Angular and linear part.
+    """
     model, data, axis = m.model, m.data, axis_of(m, number)
     j, a = (
         operation_ints(model, axis[0]),
@@ -111,7 +129,7 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
 
 
 def spread(m: Fit, y: Floats, one: int, two: int, amount: float) -> None:
-    """Add to the second derivative a multiple of what a pair of axes is to all pairs of coordinates."""
+    """Add to the Hessian a multiple of the product of two axes' derivatives by all coordinates."""
     size, bend = m.model[MODEL.DOFS], at(m.v, m.p[BEND])
     for k in range(arguments_of(m, one)):
         first, gain = argument(m, y, one, k)
@@ -124,7 +142,7 @@ def spread(m: Fit, y: Floats, one: int, two: int, amount: float) -> None:
 
 
 def arguments_of(m: Fit, number: int) -> int:
-    """How many coordinates an axis goes by."""
+    """Return the number of coordinates that an axis depends on."""
     model, axis = m.model, axis_of(m, number)
     j = operation_ints(model, axis[0])
     if axis[1] >= SLIDES:
@@ -133,7 +151,11 @@ def arguments_of(m: Fit, number: int) -> int:
 
 
 def argument(m: Fit, y: Floats, number: int, k: int) -> tuple[int, float]:
-    """A coordinate that an axis goes by, and how far it goes by a unit of it."""
+    """Return a coordinate that an axis depends on, and the derivative of its amount by it.
+
+    Returns:
+        Degree of freedom and derivative.
+    """
     model, axis = m.model, axis_of(m, number)
     j = operation_ints(model, axis[0])
     if axis[1] >= SLIDES:

@@ -1,10 +1,10 @@
-"""The pose that fits measurements best, frame by frame.
+"""Inverse kinematics: the pose that fits measurements best, frame by frame.
 
-Newton's method on what the couplers, the equations and the ends of the ranges leave free (J.
-Nocedal, S. Wright, Numerical Optimization, 2006, chapters 10.3, 16.7 and 18.3). Where the second
-derivative is no bowl the part of the residuals is left out, as Gauss and Newton do, and where that
-leads nowhere the step is damped, as Levenberg and Marquardt do. What nothing measures hardly moves:
-of all poses that fit alike the nearest is found.
+Newton's method in the directions that couplers, equations and ends of ranges leave free (J.
+Nocedal, S. Wright, Numerical Optimization, 2006, chapters 10.3, 16.7 and 18.3). Where the Hessian
+is not positive definite, the Gauss-Newton approximation replaces it; where that fails, the step is
+damped by the Levenberg-Marquardt method. Coordinates that no measurement determines hardly move: of
+all poses that fit equally well the nearest is found.
 """
 
 from __future__ import annotations
@@ -57,76 +57,101 @@ from osimlite.mechanics.kernels.pose_step import (
 )
 from osimlite.mechanics.laws.vectors import put
 
-FITTED, UNSEEN, STUCK, APART = 0.0, 1.0, 2.0, 3.0
-"""What becomes of a frame: the best pose; nothing was seen, the pose before; the search has ended
-before the best pose was reached; no pose near the one before keeps the constraints.
-"""
+FITTED = 0.0
+"""Status of a frame with the best pose."""
+UNSEEN = 1.0
+"""Status of a frame without measurements, which has the previous pose."""
+STUCK = 2.0
+"""Status of a frame whose search ended before it converged."""
+APART = 3.0
+"""Status of a frame with no pose near the previous one that fulfils the constraints."""
 FINEST = 1e-9
-"""What coordinates of a pose may be off, as far as can be told from how the steps shrink (rad or m)."""
+"""Accuracy of the coordinates, as estimated from the decrease of the steps (rad or m)."""
 MOST_STEPS = 200
-LIGHTEST, HEAVIEST, FIRST_DAMPING = 1e-10, 1e12, 1e-4
-"""Damping of a step: least, most, and that of the first step that is to be short."""
-VAGUE, ALIKE = 1e-7, 1e-7
-"""Least damping where there are poses that look alike; what part of its stiffness a coordinate must
-keep when all others follow, so that this is not so.
-"""
+"""Largest number of steps of a descent."""
+LIGHTEST = 1e-10
+"""Smallest damping of a step."""
+HEAVIEST = 1e12
+"""Largest damping of a step."""
+FIRST_DAMPING = 1e-4
+"""Damping of the first step that is to be short."""
+VAGUE = 1e-7
+"""Smallest damping where several poses fit alike."""
+ALIKE = 1e-7
+"""Smallest pivot relative to the stiffness with which no poses fit alike."""
 SMALL_STEPS = 1e-2
-"""Damping of the first step where the way down is to be followed closely."""
+"""Damping of the first step of a descent by small steps."""
 PATIENCE = 8
-"""After how many steps the whole second derivative is taken, also where poses look alike or steps are short."""
+"""Number of steps after which the complete Hessian is used in any case."""
 POSES = 2
-"""How many poses are kept to go on from."""
+"""Number of previous poses that are kept for extrapolation."""
 RENEWED = 5
-"""After how many steps the second derivatives of the equations are found anew, which not every pose needs."""
+"""Number of steps after which the curvature of the equations is computed, which few poses need."""
 
 
 def fit_frames(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, p: Ints, c: Floats, v: Floats, frames: Floats,
-    found: Floats, count: int,
+    results: Floats, count: int,
 ) -> int:  # fmt: skip
-    """Fit some frames, one after the other.
+    """Fit poses to several frames, one after the other.
 
-    Args: model: the mechanism. reals: its numbers. data: its work. y: a state, the pose to start
-        from; then the last pose. f: room for another. p: the integers of the fit. c: its numbers.
-        v: its work. frames: of each the places of the markers (m, 3) in ground, the rotations of
-        the sensors (k, 3, 3), the values of the goals, those of what is held. found: of each the
-        values of all degrees of freedom, the places of the markers in the fitted pose (m, 3), the
-        turns of the sensors from where they were measured (k, 3), the cost, the count of the steps,
-        and what became of it. count: of the frames.
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: workspace of an evaluation.
+        y: state with the pose to start from, then the last pose.
+        f: workspace of a derivative.
+        p: integers of the fit.
+        c: numbers of the fit.
+        v: workspace of the fit.
+        frames: per frame the positions of the markers (m, 3) in ground, the rotations of the sensors
+            (k, 3, 3), the values of the goals, and the prescribed values.
+        results: filled per frame with the values of all degrees of freedom, the fitted positions of the
+            markers (m, 3), the rotation vectors of the sensors from their measurements (k, 3), the cost,
+            the number of steps, and the status.
+        count: number of frames.
     """
     m = Fit(model, reals, data, f, p, c, v)
     size, markers, sensors = model[MODEL.DOFS], p[MARKERS], p[SENSORS]
-    width, given = (
+    width, input_size = (
         size + 3 * (markers + sensors) + 3,
         3 * markers + 9 * sensors + p[GOALS] + p[HELD],
     )
     for number in range(count):
-        to = at(found, width * number)
-        copy(given, at(frames, given * number), at(v, p[MEASURED]))
+        result = at(results, width * number)
+        copy(input_size, at(frames, input_size * number), at(v, p[MEASURED]))
         value, steps, status = fit_frame(m, y)
-        copy(size, y, to)
+        copy(size, y, result)
         for k in range(markers):
-            place = station(
+            position = station(
                 model,
                 data,
                 p[p[MARKER_AT] + k],
                 (c[MARKER_NUMBERS * k], c[MARKER_NUMBERS * k + 1], c[MARKER_NUMBERS * k + 2]),
             )
-            put(to, size + 3 * k, place)
+            put(result, size + 3 * k, position)
         for k in range(sensors):
-            put(to, size + 3 * (markers + k), turn_of(m, k))
-        end = at(to, size + 3 * (markers + sensors))
+            put(result, size + 3 * (markers + k), turn_of(m, k))
+        end = at(result, size + 3 * (markers + sensors))
         end[0], end[1], end[2] = value, float(steps), status
     return OUTCOME.OK
 
 
 def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
-    """Bring a pose to the best of a frame: its cost, the count of the steps, what became of it."""
+    """Move a pose to the best fit of a frame.
+
+    Args:
+        m: the fit.
+        y: state; changed.
+
+    Returns:
+        Cost, number of steps, and status.
+    """
     v, p, size = m.v, m.p, m.model[MODEL.DOFS]
     history = at(v, p[HISTORY])
-    kept, last, trial = int(history[0]), at(history, 1), at(v, p[TRIAL])
+    previous_count, last, trial = int(history[0]), at(history, 1), at(v, p[TRIAL])
     seen = weigh(m)
-    if kept > 0:
+    if previous_count > 0:
         copy(size, last, y)
     if not settle(m, y):
         look(m, y)
@@ -136,7 +161,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         return 0.0, 0, UNSEEN
     note_pattern(m, y)
     value, is_vague = inf, v[p[PATTERN] + p[MARKERS] + p[SENSORS] + p[GOALS]] > 0.0
-    if kept > 1 and not is_vague:
+    if previous_count > 1 and not is_vague:
         before = at(last, size)
         for k in range(size):
             trial[k] = y[k] if p[p[RESOLVED_AT] + k] == IDLE else 2.0 * last[k] - before[k]
@@ -149,11 +174,11 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
             copy(size, y, trial)
         value = other if not value < other else cost(m, trial)
     lightest, start = VAGUE if is_vague else LIGHTEST, at(history, 2 + POSES * size)
-    if kept == 0:
+    if previous_count == 0:
         copy(size, trial, last)
     copy(size, trial, start)
     value, steps, status = descend(m, trial, y, value, lightest, lightest)
-    if kept == 0:
+    if previous_count == 0:
         # From far away there are several ways down; small steps find others than large ones, and
         # what begins away from the ends of its range is not held there before it is known where it
         # belongs.
@@ -182,7 +207,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
             if value < upright:
                 value, more, status = come_round(m, start, y, value, status, lightest)
                 steps += more
-    if kept == 0 and unwind(m, y, last, start, value):
+    if previous_count == 0 and unwind(m, y, last, start, value):
         value, more, status = descend(m, start, y, cost(m, start), lightest, lightest)
         steps += more
     free_ends(m)
@@ -191,13 +216,13 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         # A whole turn, from one end of a range to the other, is no movement to go on with.
         before[k] = last[k] + 2.0 * pi * floor((y[k] - last[k]) / (2.0 * pi) + 0.5)
     copy(size, y, last)
-    history[0], history[1 + POSES * size] = min(kept + 1.0, float(POSES)), value
+    history[0], history[1 + POSES * size] = min(previous_count + 1.0, float(POSES)), value
     look(m, y)
     return value, steps, status
 
 
 def note_pattern(m: Fit, y: Floats) -> None:
-    """If other things are seen than in the frame before, find out whether poses look alike, and what moves nothing."""
+    """Find out whether poses fit alike and which coordinates are idle, if other things are measured than before."""
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     count = p[MARKERS] + p[SENSORS] + p[GOALS]
     weights, pattern, is_new = at(v, p[WEIGHTS]), at(v, p[PATTERN]), False
@@ -226,7 +251,20 @@ def note_pattern(m: Fit, y: Floats) -> None:
 def descend_again(
     m: Fit, start: Floats, y: Floats, value: float, status: float, damping: float, lightest: float
 ) -> tuple[float, int, float]:
-    """Look for a better pose than the best so far, whose cost is known, from another start; keep the better one."""
+    """Descend from another start, and keep the better pose.
+
+    Args:
+        m: the fit.
+        start: other start.
+        y: best pose so far; changed.
+        value: its cost.
+        status: its status.
+        damping: damping of the first step.
+        lightest: smallest damping.
+
+    Returns:
+        Cost, number of steps, and status of the better pose.
+    """
     size = m.model[MODEL.DOFS]
     best, trial = at(start, size), at(m.v, m.p[TRIAL])
     copy(size, y, best)
@@ -244,7 +282,19 @@ def descend_again(
 def come_round(
     m: Fit, start: Floats, y: Floats, value: float, status: float, lightest: float
 ) -> tuple[float, int, float]:
-    """Look for a better pose with each angle that is at an end of its range at the other one; keep the best."""
+    """Try each angle at an end of its range at the other end, and keep the best pose.
+
+    Args:
+        m: the fit.
+        start: workspace of a start.
+        y: best pose so far; changed.
+        value: its cost.
+        status: its status.
+        lightest: smallest damping.
+
+    Returns:
+        Cost, number of steps, and status of the best pose.
+    """
     steps = 0
     for number in range(m.model[MODEL.DOFS]):
         if go_round(m, y, start, number):
@@ -254,7 +304,11 @@ def come_round(
 
 
 def weigh(m: Fit) -> bool:
-    """The weights in this frame, of markers and of sensors each as shares of what is seen; whether anything is."""
+    """Compute the weights of this frame, normalized over the measured markers and sensors.
+
+    Returns:
+        Whether anything is measured.
+    """
     p, c, v = m.p, m.c, m.v
     measured, weights = at(v, p[MEASURED]), at(v, p[WEIGHTS])
     markers, sensors = p[MARKERS], p[SENSORS]
@@ -275,7 +329,7 @@ def weigh(m: Fit) -> bool:
 
 
 def share(count: int, weights: Floats) -> bool:
-    """Make shares of some weights; whether there is any."""
+    """Normalize weights to a sum of one; return whether any is positive."""
     total = 0.0
     for k in range(count):
         total += weights[k]
@@ -287,7 +341,19 @@ def share(count: int, weights: Floats) -> bool:
 def descend(
     m: Fit, start: Floats, y: Floats, value: float, damping: float, lightest: float
 ) -> tuple[float, int, float]:
-    """From a pose whose cost and derivatives are known to the best nearby; fills y, and leaves marks where it ends."""
+    """Descend from a pose whose cost and derivatives are known to the best one nearby.
+
+    Args:
+        m: the fit.
+        start: start; changed.
+        y: filled with the pose; marks remain of coordinates at ends of their ranges.
+        value: cost of the start.
+        damping: damping of the first step.
+        lightest: smallest damping.
+
+    Returns:
+        Cost, number of steps, and status.
+    """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     step = at(v, p[STEP])
     before, bends, status = inf, damping == LIGHTEST, STUCK

@@ -1,11 +1,11 @@
-"""What orientation sensors cost: the squares of the angles by which they are turned from where they were measured.
+"""Cost of orientation sensors: squared angles of rotation from the measured orientation.
 
-A sensor is a torsion spring. If phi is the turn from the measured rotation to that of the sensor,
-along its axis in ground and as long as its angle, the half square of the angle changes with the
-rotation of the link by phi, and phi by the inverse of the left Jacobian of the rotations (G.
+A sensor is a torsion spring. Let phi be the rotation vector, in ground, from the measured
+orientation to that of the sensor. The derivative of half the squared angle by the rotation of the
+link is phi, and the derivative of phi is the inverse of the left Jacobian of the rotations (G.
 Chirikjian, Stochastic Models, Information Theory, and Lie Groups, volume 2, 2012, chapter 10.7): 1
-- [phi]/2 + c [phi]², where c is (1 - angle/2 cot(angle/2)) / angle². The even part is the moment of
-inertia of the sensor, the odd part goes where the springs of markers have their pulls times arms.
+- [phi]/2 + c [phi]², where c is (1 - angle/2 cot(angle/2)) / angle². Its symmetric part is added to
+the inertia, its antisymmetric part to the sums of forces times arms.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 SMALL = 1e-3
-"""An angle (rad) from which on c is computed from it; below, 1/12 is as exact."""
+"""Angle (rad) below which c = 1/12 is as accurate as its formula."""
 NEARLY_BACK = -0.99
-"""A cosine below which the axis of a turn follows from the even part of the rotation, for the odd part vanishes."""
+"""Cosine below which the axis of a rotation follows from its symmetric part, as the other vanishes."""
 
 
 def sensors_turn(m: Fit) -> float:
-    """Put the springs of the sensors on the links; what they cost."""
+    """Add the torsion springs of the sensors to the links; return their cost."""
     model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
     for k in range(p[SENSORS]):
         weight, link = v[p[WEIGHTS] + p[MARKERS] + k], p[p[SENSOR_AT] + k]
@@ -84,7 +84,7 @@ def sensors_turn(m: Fit) -> float:
 
 
 def evenness(angle: float) -> float:
-    """What stands before the square of the turn in the inverse Jacobian."""
+    """Return the factor c of the squared rotation in the inverse left Jacobian."""
     if angle < SMALL:
         return 1.0 / 12.0
     sine, cosine = sine_cosine(0.5 * angle)
@@ -92,23 +92,31 @@ def evenness(angle: float) -> float:
 
 
 def turn_of(m: Fit, sensor: int) -> Vector:
-    """The turn (rad, in ground) from the measured rotation of a sensor to the one that it has."""
+    """Return the rotation vector (rad, in ground) from the measured orientation of a sensor to its own."""
     rows = at(m.c, MARKER_NUMBERS * m.p[MARKERS] + SENSOR_NUMBERS * sensor)
-    wanted = at(m.v, m.p[MEASURED] + 3 * m.p[MARKERS] + 9 * sensor)
-    return turn_between(m.model, m.data, m.p[m.p[SENSOR_AT] + sensor], rows, wanted)
+    target = at(m.v, m.p[MEASURED] + 3 * m.p[MARKERS] + 9 * sensor)
+    return turn_between(m.model, m.data, m.p[m.p[SENSOR_AT] + sensor], rows, target)
 
 
-def turn_between(model: Ints, data: Floats, link: int, rows: Floats, wanted: Floats) -> Vector:
-    """The turn (rad, in ground) that takes a wanted rotation to that of a frame of a link; both are given by rows."""
+def turn_between(model: Ints, data: Floats, link: int, rows: Floats, target: Floats) -> Vector:
+    """Return the rotation vector (rad, in ground) from a target orientation to that of a frame of a link.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        link: number of the link.
+        rows: rotation of the frame in the link, by rows.
+        target: target orientation in ground, by rows.
+    """
     twist, diagonal = ZERO, ZERO
     for k in range(3):
         is_axis = direction(model, data, link, (rows[k], rows[3 + k], rows[6 + k]))
-        axis = wanted[k], wanted[3 + k], wanted[6 + k]
+        axis = target[k], target[3 + k], target[6 + k]
         twist = plus(twist, cross(axis, is_axis))
         diagonal = plus(diagonal, elementwise(axis, is_axis))
     cosine, sine = 0.5 * (dot(diagonal, (1.0, 1.0, 1.0)) - 1.0), 0.5 * sqrt(dot(twist, twist))
     if cosine < NEARLY_BACK:
-        return turn_back(model, data, link, rows, wanted, twist, diagonal)
+        return turn_back(model, data, link, rows, target, twist, diagonal)
     if not sine > 1e-12:
         return times(0.5, twist)
     angle = acos(cosine) if cosine < 0.7 else sine_angle(sine)
@@ -120,17 +128,27 @@ def turn_back(
     data: Floats,
     link: int,
     rows: Floats,
-    wanted: Floats,
+    target: Floats,
     twist: Vector,
     diagonal: Vector,
 ) -> Vector:
-    """The same for nearly half a turn: its even part is twice the axis times itself."""
+    """Return the rotation vector for nearly half a turn, from the symmetric part of the rotation.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        link: number of the link.
+        rows: rotation of the frame in the link, by rows.
+        target: target orientation in ground, by rows.
+        twist: twice the antisymmetric part of the rotation.
+        diagonal: diagonal of the rotation.
+    """
     x, y, z = diagonal
     axis = 0 if x >= y and x >= z else (1 if y >= z else 2)
     row = ZERO
     for k in range(3):
         is_axis = direction(model, data, link, (rows[k], rows[3 + k], rows[6 + k]))
-        measured = wanted[k], wanted[3 + k], wanted[6 + k]
+        measured = target[k], target[3 + k], target[6 + k]
         row = along(
             along(row, component(is_axis, axis), measured), component(measured, axis), is_axis
         )
@@ -142,5 +160,5 @@ def turn_back(
 
 
 def sine_angle(sine: float) -> float:
-    """The acute angle of a sine."""
+    """Return the acute angle of a sine (rad)."""
     return 0.5 * pi - acos(min(1.0, sine))

@@ -1,4 +1,4 @@
-"""Where to look for a better pose than the one that the way down has led to."""
+"""Other starts of the search for a better pose than the one that a descent found."""
 
 from __future__ import annotations
 
@@ -20,17 +20,18 @@ from osimlite.mechanics.kernels.pose_record import (
 from osimlite.mechanics.laws.vectors import dot, vector
 
 INWARDS = 0.3
-"""How far from the ends of their ranges coordinates begin when a better pose is looked for (rad or m)."""
+"""Distance of coordinates from the ends of their ranges at another start (rad or m)."""
 ROUND = 0.75 * pi
-"""By how much the first pose is turned in ground, to either side, when a better one is looked for
-(rad): a range may reach to just before half a turn.
+"""Angle by which the first pose is turned in ground, either way (rad).
+
+A range may end just before half a turn.
 """
 SAME = 1e-9
-"""How near to an end of its range what is there may be (rad or m)."""
+"""Distance from an end of a range below which a coordinate counts as at the end (rad or m)."""
 
 
 def move_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> None:
-    """A pose in which no clamped coordinate is near an end of its range."""
+    """Write a start in which no coordinate with a range is near an end of it."""
     ranges = at(m.c, m.p[RANGES_AT])
     for k in range(m.model[MODEL.DOFS]):
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], from_pose[k]
@@ -40,9 +41,19 @@ def move_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> No
 
 
 def turn_round(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: float) -> bool:
-    """A pose in which what a joint to ground carries is turned about the vertical; false if this is no such coordinate.
+    """Write a start in which the subtree of a joint to ground is turned about the vertical.
 
-    Subjects walk to and fro, and the way down from half a turn away may lead elsewhere.
+    Subjects walk in both directions, and a descent from half a turn away may end elsewhere.
+
+    Args:
+        m: the fit.
+        from_pose: pose to start from.
+        start: filled.
+        freedom: degree of freedom of the turn.
+        angle: angle of the turn (rad).
+
+    Returns:
+        Whether the degree of freedom is such a coordinate.
     """
     model, p, ranges = m.model, m.p, at(m.c, m.p[RANGES_AT])
     move_inwards(m, from_pose, start, 2.0 * INWARDS)
@@ -63,7 +74,7 @@ def turn_round(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: fl
 
 
 def joint_to_ground(m: Fit, freedom: int) -> int:
-    """The link whose joint to ground has this degree of freedom, or -1 if it is of another joint."""
+    """Return the link whose joint to ground has a degree of freedom, or -1."""
     model, result = m.model, -1
     for link in range(model[MODEL.LINKS]):
         j = link_ints(model, link)
@@ -73,7 +84,7 @@ def joint_to_ground(m: Fit, freedom: int) -> int:
 
 
 def is_angle(m: Fit, freedom: int) -> bool:
-    """Whether a degree of freedom turns anything in the pose that was looked at last, and may change."""
+    """Return whether a free degree of freedom turns anything in the pose that was evaluated last."""
     turn, mark = (
         vector(at(m.data, m.model[MODEL.WORK_COLUMN]), 6 * freedom),
         m.p[m.p[RESOLVED_AT] + freedom],
@@ -82,17 +93,20 @@ def is_angle(m: Fit, freedom: int) -> bool:
 
 
 def is_at_end(m: Fit, y: Floats, freedom: int) -> bool:
-    """Whether what may change is at one end of its range, and not at the other."""
+    """Return whether a coordinate is at exactly one end of a finite range."""
     ranges = at(m.c, m.p[RANGES_AT])
     low, high = ranges[2 * freedom], ranges[2 * freedom + 1]
     return high - low < inf and (y[freedom] <= low + SAME) != (y[freedom] >= high - SAME)
 
 
 def go_round(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
-    """A pose in which an angle at one end of its range is a whole turn on, or at the other end; false if it is at none.
+    """Write a start in which an angle at an end of its range is a full turn further, or at the other end.
 
-    Who turns on the spot comes round. Other joints than those to ground do only if their ranges
-    leave out little.
+    A subject that turns on the spot makes full turns. Other joints than those to ground do so only if
+    their ranges omit little.
+
+    Returns:
+        Whether the degree of freedom is such an angle.
     """
     ranges = at(m.c, m.p[RANGES_AT])
     low, high = ranges[2 * freedom], ranges[2 * freedom + 1]
@@ -109,11 +123,13 @@ def go_round(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
 
 
 def turn_over(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
-    """A pose in which the two other angles of a joint to ground are half a turn on, while this one is at an end.
+    """Write a start with the two other angles of a joint to ground half a turn further.
 
-    Where the second of three angles is at 90 degrees that is the same pose, and the way on for who
-    turns head over
-    heels: the second angle goes back from there.
+    Where the second of three angles is a right angle this is the same pose, and the continuation of a
+    motion head over heels: the second angle goes back from there.
+
+    Returns:
+        Whether the degree of freedom is at an end of its range and such angles exist.
     """
     link, others = joint_to_ground(m, freedom), 0
     if link < 0 or not is_at_end(m, y, freedom):
@@ -131,7 +147,7 @@ def turn_over(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
 
 
 def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:
-    """A pose in which what is at an end of its range is not; false if there is nothing."""
+    """Write a start in which coordinates at ends of their ranges are inside; return whether there are any."""
     ranges, result = at(m.c, m.p[RANGES_AT]), False
     for k in range(m.model[MODEL.DOFS]):
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], y[k]
@@ -142,7 +158,11 @@ def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:
 
 
 def unwind(m: Fit, y: Floats, first: Floats, start: Floats, value: float) -> bool:
-    """A pose without the whole turns that the way from the first one has led to, if it costs no more."""
+    """Write a pose without the full turns that were made from the first one, if it costs no more.
+
+    Returns:
+        Whether a full turn was removed.
+    """
     size, ranges, trial, result = (
         m.model[MODEL.DOFS],
         at(m.c, m.p[RANGES_AT]),

@@ -1,7 +1,7 @@
-"""One step towards the pose that fits best: where the quadratic model of the cost is least.
+"""One step towards the pose that fits best: the minimum of the quadratic model of the cost.
 
-The model counts for what couplers, equations and the ends of the ranges leave free (J. Nocedal, S.
-Wright, Numerical Optimization, 2006, chapters 16.2 and 16.7).
+The model is minimized over the directions that couplers, equations and ends of ranges leave free
+(J. Nocedal, S. Wright, Numerical Optimization, 2006, chapters 16.2 and 16.7).
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from osimlite.mechanics.kernels.pose_record import (
 from osimlite.mechanics.kernels.projection import REDUNDANT
 
 SMALLEST = 1e-14
-"""What part of its stiffness a coordinate must keep when all others follow, for the model to be a bowl."""
+"""Smallest pivot relative to the stiffness with which the model counts as convex."""
 SOFTEST = 0.01
-"""Damping of a step is relative to the stiffness of a coordinate and this (m²/rad²)."""
+"""Stiffness (m²/rad²) that is added to that of a coordinate where a step is damped."""
 
 
 def list_free(m: Fit) -> int:
-    """List the coordinates that are free, and at no end of their ranges; returns their count."""
+    """List the coordinates that are free and not at an end of their range; return their number."""
     p, count = m.p, 0
     for k in range(m.model[MODEL.DOFS]):
         if p[p[RESOLVED_AT] + k] == VARIABLE:
@@ -51,7 +51,16 @@ def list_free(m: Fit) -> int:
 
 
 def equations_for(m: Fit, free: int, has_step: int) -> tuple[Floats, Floats, Floats]:
-    """The equations for the free coordinates, what they are to give after steps of others, and room behind."""
+    """Return the equations for the free coordinates.
+
+    Args:
+        m: the fit.
+        free: number of free coordinates.
+        has_step: 1 if the steps of coordinates at ends of ranges are subtracted, else 0.
+
+    Returns:
+        Workspace of their factor, which begins with the left sides; right sides; workspace after them.
+    """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     count, rows, errors, step = equations_of(m), at(v, p[ROWS]), at(v, p[ERRORS]), at(v, p[STEP])
     factor = at(v, p[ROOM] + 2 * size)
@@ -68,7 +77,7 @@ def equations_for(m: Fit, free: int, has_step: int) -> tuple[Floats, Floats, Flo
 
 
 def find_ends(m: Fit, y: Floats) -> None:
-    """Which coordinates stay at ends of their ranges: those that are there, and are pulled outwards."""
+    """Mark the coordinates that stay at an end of their range: those that the gradient pulls outwards."""
     p, v = m.p, m.v
     ranges, slope = at(m.c, p[RANGES_AT]), at(v, p[SLOPE])
     for k in range(m.model[MODEL.DOFS]):
@@ -81,7 +90,7 @@ def find_ends(m: Fit, y: Floats) -> None:
 
 
 def free_ends(m: Fit) -> None:
-    """No coordinate stays at an end of its range any more."""
+    """Mark all coordinates at an end of their range as free."""
     p = m.p
     for k in range(m.model[MODEL.DOFS]):
         if p[p[RESOLVED_AT] + k] == AT_END:
@@ -89,7 +98,17 @@ def free_ends(m: Fit) -> None:
 
 
 def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
-    """The step of all coordinates to where the quadratic model is least, in their ranges; false if it is no bowl."""
+    """Compute the step of all coordinates to the minimum of the model within the ranges.
+
+    Args:
+        m: the fit.
+        y: state.
+        damping: damping of the step.
+        bends: whether the model includes the part of the Hessian beyond Gauss-Newton.
+
+    Returns:
+        Whether the model is convex.
+    """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     step, ranges = at(v, p[STEP]), at(m.c, p[RANGES_AT])
     for k in range(size):
@@ -114,7 +133,18 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
 
 
 def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) -> int:
-    """The step of the free coordinates, after those of others; its place in the work, or -1 if the model is no bowl."""
+    """Compute the step of the free coordinates, after that of the coordinates at ends of ranges.
+
+    Args:
+        m: the fit.
+        free: number of free coordinates.
+        damping: damping of the step.
+        bent: factor of the part of the Hessian beyond Gauss-Newton.
+        smallest: smallest pivot relative to the stiffness.
+
+    Returns:
+        The offset of the step in the workspace, or -1 if the model is not convex.
+    """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     stiffness, bend, slope, step = (
         at(v, p[STIFFNESS]),
@@ -123,12 +153,12 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
         at(v, p[STEP]),
     )
     count = equations_of(m)
-    place = p[ROOM] + 2 * size + (count * size + count * count + 3 * count + 1) + 2 * count
-    solution, matrix = at(v, place), at(v, place + size)
+    offset = p[ROOM] + 2 * size + (count * size + count * count + 3 * count + 1) + 2 * count
+    solution, matrix = at(v, offset), at(v, offset + size)
     for k in range(free):
         freedom = p[p[FREE_AT] + k]
         row, more, total = at(stiffness, size * freedom), at(bend, size * freedom), -slope[freedom]
-        bonds = at(v, p[CURVES] + (size * freedom if count > 0 else 0))
+        constraint_row = at(v, p[CURVES] + (size * freedom if count > 0 else 0))
         for j in range(size):
             if p[p[RESOLVED_AT] + j] == AT_END:
                 total -= (row[j] + bent * more[j]) * step[j]
@@ -137,55 +167,65 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
             other = p[p[FREE_AT] + j]
             matrix[free * k + j] = row[other] + bent * more[other]
             if count > 0:
-                matrix[free * k + j] += bent * bonds[other]
+                matrix[free * k + j] += bent * constraint_row[other]
         matrix[free * k + k] += damping * (row[freedom] + SOFTEST)
     if count == 0:
         if not cholesky(free, matrix, smallest):
             return -1
         substitute(free, matrix, solution)
-        return place
-    return solve_along(m, free, place, smallest)
+        return offset
+    return solve_along(m, free, offset, smallest)
 
 
-def solve_along(m: Fit, free: int, place: int, smallest: float) -> int:
-    """The same where equations bind the coordinates: along the directions that they leave free."""
+def solve_along(m: Fit, free: int, offset: int, smallest: float) -> int:
+    """Compute the step of the free coordinates in the null space of the equations.
+
+    Args:
+        m: the fit.
+        free: number of free coordinates.
+        offset: offset of the right side and the matrix in the workspace.
+        smallest: smallest pivot relative to the stiffness.
+
+    Returns:
+        The offset of the step in the workspace, or -1 if the model is not convex.
+    """
     v, size, count = m.v, m.model[MODEL.DOFS], equations_of(m)
-    solution, matrix = at(v, place), at(v, place + size)
+    solution, matrix = at(v, offset), at(v, offset + size)
     across = at(matrix, size * size)
     directions = at(across, size)
     reduced = at(directions, size * size)
-    factor, right, room = equations_for(m, free, 1)
+    factor, right, work = equations_for(m, free, 1)
     rank = factorise(count, free, factor, REDUNDANT * count)
-    minimum_norm(count, free, factor, rank, right, room, across)
+    minimum_norm(count, free, factor, rank, right, work, across)
     left = free - rank
     write_null_space(free, factor, rank, directions)
     for k in range(free):
         for j in range(free):
             solution[k] -= matrix[free * k + j] * across[j]
-    wanted = at(reduced, left * left)
+    rhs = at(reduced, left * left)
     for k in range(left):
         row = at(directions, free * k)
-        wanted[k] = 0.0
+        rhs[k] = 0.0
         for j in range(free):
-            wanted[k] += row[j] * solution[j]
+            rhs[k] += row[j] * solution[j]
     for k in range(left):
         row = at(directions, free * k)
-        made = at(wanted, left)
+        product = at(rhs, left)
         for i in range(free):
-            made[i] = 0.0
+            product[i] = 0.0
             for j in range(free):
-                made[i] += matrix[free * i + j] * row[j]
+                product[i] += matrix[free * i + j] * row[j]
         for other in range(k + 1):
             total, second = 0.0, at(directions, free * other)
             for i in range(free):
-                total += second[i] * made[i]
+                total += second[i] * product[i]
             reduced[left * k + other] = reduced[left * other + k] = total
     if not cholesky(left, reduced, smallest):
         return -1
-    substitute(left, reduced, wanted)
+    substitute(left, reduced, rhs)
     for j in range(free):
         total = across[j]
         for k in range(left):
-            total += directions[free * k + j] * wanted[k]
+            total += directions[free * k + j] * rhs[k]
         solution[j] = total
-    return place
+    return offset

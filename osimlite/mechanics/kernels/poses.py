@@ -1,4 +1,4 @@
-"""Several states one after another, and what is asked for of each: one call for a whole sweep."""
+"""Evaluation of several states in one call, with selected results of each."""
 
 from __future__ import annotations
 
@@ -19,18 +19,28 @@ def look(
     stage: int,
     states: Floats,
     order: Ints,
-    found: Floats,
+    results: Floats,
 ) -> int:
-    """Evaluate states, or accelerate them, up to the first that cannot be: its time is in `data` then, and itself in y.
+    """Evaluate states, or their inverse dynamics, up to the first that fails.
 
-    Args: model: the structure. reals: its numbers. data: room for what is found. y: room for a
-        state. f: room for its derivative. stage: up to which each is evaluated. states: time,
-        state, and accelerations if they are given, one after another. order: how many states, how
-        many accelerations, the address of what is called for each state, how many places are looked
-        at, and these places: of data, and behind it of f. found: what stands at the places, state
-        by state.
+    The time of a state that fails is left in `data`, and the state itself in y.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: workspace of an evaluation.
+        y: workspace of a state.
+        f: workspace of its derivative.
+        stage: stage of each evaluation, see `STAGE`.
+        states: time, state, and accelerations if there are any, one after another.
+        order: numbers of states and of accelerations per state, address of the law, number of results,
+            and their indices, in data and behind it in f.
+        results: filled with the results, state by state.
+
+    Returns:
+        `OUTCOME.OK`, or the outcome of the evaluation that failed.
     """
-    size, room, count, moving, law, looked = (
+    size, room, count, moving, law, selected = (
         model[MODEL.STATE_SIZE],
         model[MODEL.WORK_SIZE],
         order[0],
@@ -39,17 +49,17 @@ def look(
         order[3],
     )
     for number in range(count):
-        given = at(states, (1 + size + moving) * number)
-        data[WORK.TIME] = given[0]
+        input = at(states, (1 + size + moving) * number)
+        data[WORK.TIME] = input[0]
         for k in range(size):
-            y[k] = given[1 + k]
+            y[k] = input[1 + k]
         for k in range(moving):
-            f[model[MODEL.DOFS] + k] = given[1 + size + k]
+            f[model[MODEL.DOFS] + k] = input[1 + size + k]
         status = call(law, model, reals, data, y, f, stage)
         if status != OUTCOME.OK:
             return status
-        row = at(found, looked * number)
-        for k in range(looked):
+        row = at(results, selected * number)
+        for k in range(selected):
             place = order[4 + k]
             row[k] = data[place] if place < room else f[place - room]
     return OUTCOME.OK
@@ -64,17 +74,25 @@ def push_each(
     law: int,
     states: Floats,
     order: Ints,
-    found: Floats,
+    results: Floats,
 ) -> int:
-    """What is missing of accelerations while no actuator pushes, and what each pushes by a control of 1; see `look`.
+    """Compute the generalized forces that are missing without actuators, and those of each actuator.
 
-    Args: model: the structure. reals: its numbers. data: room for what is found. y: room for a
-        state. f: room for its derivative. law: address of `inverse`. states: time, state and
-        accelerations, one after another. order: how many states, how many actuators, and of each
-        its item, the place of its control, the item of its path and the place of what it pulls with
-        by a control of 1; these two are -1 if it has no path. found: generalized forces that are
-        missing (n,), and of each actuator those that it gives (n,) and what it pulls with, state by
-        state.
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: workspace of an evaluation.
+        y: workspace of a state.
+        f: workspace of its derivative.
+        law: address of `inverse_dynamics`.
+        states: time, state and accelerations, one after another.
+        order: numbers of states and of actuators; per actuator its item, the index of its control, the
+            item of its path and the index of its tension per unit control, both -1 without a path.
+        results: filled per state with the missing generalized forces (n,), and per actuator with the
+            generalized forces for a control of 1 (n,) and the tension.
+
+    Returns:
+        `OUTCOME.OK`, or the outcome of the evaluation that failed.
     """
     size, freedoms, count, actuators = (
         model[MODEL.STATE_SIZE],
@@ -84,31 +102,39 @@ def push_each(
     )
     applied = at(f, freedoms)
     for number in range(count):
-        given = at(states, (1 + size + freedoms) * number)
-        row = at(found, (freedoms + actuators * (freedoms + 1)) * number)
-        data[WORK.TIME] = given[0]
+        input = at(states, (1 + size + freedoms) * number)
+        row = at(results, (freedoms + actuators * (freedoms + 1)) * number)
+        data[WORK.TIME] = input[0]
         for k in range(size):
-            y[k] = given[1 + k]
+            y[k] = input[1 + k]
         for k in range(freedoms):
-            applied[k] = given[1 + size + k]
+            applied[k] = input[1 + size + k]
         status = call(law, model, reals, data, y, f, 0)
         if status != OUTCOME.OK:
             return status
         for k in range(freedoms):
             row[k] = applied[k]
         for actuator in range(actuators):
-            own = at(order, 2 + 4 * actuator)
+            actuator_record = at(order, 2 + 4 * actuator)
             to = at(row, freedoms + actuator * (freedoms + 1))
             clear_wrenches(model, data)
             for k in range(freedoms):
                 applied[k] = 0.0
-            if own[2] >= 0:
-                to[freedoms] = data[own[3]]
-                pull_path(model, reals, data, y, f, own[2], data[own[3]])
+            if actuator_record[2] >= 0:
+                to[freedoms] = data[actuator_record[3]]
+                pull_path(model, reals, data, y, f, actuator_record[2], data[actuator_record[3]])
             else:
-                data[own[1]] = 1.0
-                status = call(model[own[0] + ITEM.LAW], model, reals, data, y, f, own[0])
-                data[own[1]], to[freedoms] = 0.0, 1.0
+                data[actuator_record[1]] = 1.0
+                status = call(
+                    model[actuator_record[0] + ITEM.LAW],
+                    model,
+                    reals,
+                    data,
+                    y,
+                    f,
+                    actuator_record[0],
+                )
+                data[actuator_record[1]], to[freedoms] = 0.0, 1.0
                 if status != OUTCOME.OK:
                     return status
             generalized_forces(model, data, applied)
@@ -126,24 +152,29 @@ def watch(
     count: int,
     states: Floats,
     order: Ints,
-    found: Floats,
+    results: Floats,
 ) -> int:
-    """Look at states.
+    """Evaluate some items at several states.
 
-    Args: model: the structure. reals: its numbers. data: room for what is found. y: room for a
-        state. f: room for its derivative. count: how many states. states: one after another. order:
-        how many places in data are looked at, how many are set to 0 before each state, these places
-        one after the other; then for each state the number of the one item that is computed, -1 for
-        all. found: what stands at the places, state by state; NaN in a state that cannot be
-        computed.
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: workspace of an evaluation.
+        y: workspace of a state.
+        f: workspace of its derivative.
+        count: number of states.
+        states: states, one after another.
+        order: number of results, number of entries of data to clear before each state, the indices of
+            both; then per state the number of the item to evaluate, -1 for all.
+        results: filled with the results, state by state; NaN for a state that fails.
 
     Returns:
-        OK, or what the kernel of an item said last that is something else.
+        `OUTCOME.OK`, or the last outcome that differs from it.
     """
-    size, looked, cleared = model[MODEL.STATE_SIZE], order[0], order[1]
-    places, clears = at(order, 2), at(order, 2 + looked)
-    items = at(order, 2 + looked + cleared)
-    said = OUTCOME.OK
+    size, selected, cleared = model[MODEL.STATE_SIZE], order[0], order[1]
+    places, clears = at(order, 2), at(order, 2 + selected)
+    items = at(order, 2 + selected + cleared)
+    outcome = OUTCOME.OK
     for number in range(count):
         for k in range(size):
             y[k] = states[size * number + k]
@@ -157,7 +188,7 @@ def watch(
             if status == OUTCOME.OK:
                 item = model[model[MODEL.ITEM_AT] + k]
                 status = call(model[item + ITEM.LAW], model, reals, data, y, f, item)
-        for k in range(looked):
-            found[looked * number + k] = data[places[k]] if status == OUTCOME.OK else nan
-        said = said if status == OUTCOME.OK else status
-    return said
+        for k in range(selected):
+            results[selected * number + k] = data[places[k]] if status == OUTCOME.OK else nan
+        outcome = outcome if status == OUTCOME.OK else status
+    return outcome

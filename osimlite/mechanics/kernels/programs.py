@@ -1,4 +1,4 @@
-"""Formulas in kernels: a formula is a list of steps, each of which puts one number into a register."""
+"""Interpreter of formulas: a program is a list of steps, each of which fills one register."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from osimlite.mechanics.laws import formulas
 from osimlite.mechanics.laws.formulas import FUNCTIONS, OF_TWO, divide, larger, power, smaller
 
 OF_ONE = tuple(law for name, law in FUNCTIONS.items() if name not in OF_TWO)
+"""Names of the functions of one argument, in the order of their numbers."""
 STEPS = ("number", "+", "-", "*", "negative", "divide", "power", "smaller", "larger", *OF_ONE)
-"""What a step may do, by its number."""
+"""Operations of the steps; a step stores the index of its operation here."""
 
 LINES = [
     line
     for number, law in enumerate(OF_ONE)
     for line in (f"if kind == {number}:", f"    return {law}(a)")
 ]
+"""Text of the branches of `of_one`."""
 of_one = written(
     "of_one",
     __name__,
@@ -25,11 +27,14 @@ of_one = written(
 
 
 def compute(steps: Ints, count: int, constants: Floats, registers: Floats, variables: int) -> float:
-    """The result of a program.
+    """Run a program and return its result.
 
-    Args: steps: what each does, and the registers that it works on (count, 3); for a number its
-        place in the constants. count: of the steps. constants: numbers of the formula. registers:
-        the variables, and after them room for the results. variables: their count.
+    Args:
+        steps: per step its operation and two registers (count, 3); for a number its index in the constants.
+        count: number of steps.
+        constants: numbers of the formula.
+        registers: the variables, then one register for the result of each step.
+        variables: number of variables.
     """
     value = 0.0
     for k in range(count):
@@ -61,6 +66,6 @@ def compute(steps: Ints, count: int, constants: Floats, registers: Floats, varia
 
 
 def of_two(one: float, two: float, steps: Ints, constants: Floats, registers: Floats) -> float:
-    """The result of a program of two variables, whose count of steps stands before them."""
+    """Run a program of two variables that is preceded by its number of steps, and return its result."""
     registers[0], registers[1] = one, two
     return compute(at(steps, 1), steps[0], constants, registers, 2)

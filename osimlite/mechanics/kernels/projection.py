@@ -1,10 +1,10 @@
-"""The nearest state where constraints hold.
+"""Projection of states onto the constraints.
 
-When states are projected, how exactly, and by which measure of nearness, is as in Simbody, so that
-the steps are those of OpenSim: positions and speeds are left alone as long as the root mean square
-of the errors of all constraints, locks included, is below the tolerance, and brought to a tenth of
-it otherwise; a change of a speed above 1 counts relative to it; and what lies across the
-constraints counts as no error of the integration.
+When states are projected, how exactly, and in which norm follows Simbody, so that the steps are
+those of OpenSim: positions and speeds are left alone as long as the root mean square of the errors
+of all constraints, locks included, is below the tolerance, and are brought to a tenth of it
+otherwise. A change of a speed above 1 counts relative to the speed. The component of an
+integration error normal to the constraints is removed from the error.
 """
 
 from __future__ import annotations
@@ -18,26 +18,30 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.laws.rotations import sine_cosine
 
 OVERSHOOT = 0.1
-"""The part of the tolerance that a projection aims at."""
+"""Part of the tolerance that a projection aims at."""
 FINEST = 2.0 ** (-52.0 * 7.0 / 8.0)
 """Errors of constraints below this are rounding: Simbody's significant part of a double (Real), eps^(7/8)."""
 REDUNDANT = 2.0**-26
-"""Times the number of equations: how nearly one must follow from others to be dropped."""
+"""Threshold of independence per equation, see `factorise_equations`."""
 ITERATIONS = 20
-"""Newton's steps of a projection."""
+"""Largest number of Newton steps of a projection."""
 
 
 def project(
-    model: Ints, reals: Floats, data: Floats, y: Floats, off: Floats, has_errors: int
+    model: Ints, reals: Floats, data: Floats, y: Floats, state_errors: Floats, has_errors: int
 ) -> int:
-    """Move a state to where the constraints hold, if it is near; else it stays.
+    """Move a state onto the constraints if it is near them; else leave it as it is.
 
-    Args: model: the mechanism. reals: its numbers. data: what the constraints may be off, and may
-        be off at most in y, are in SCRATCH. y: the state. off: how far off each entry of it may be;
-        of that, what lies across the constraints is taken away. has_errors: 0 if that is not known.
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results; SCRATCH holds the tolerance, and the largest error to start from.
+        y: state; changed.
+        state_errors: estimated error of each entry of the state, whose normal component is removed.
+        has_errors: 0 if no errors are known.
 
     Returns:
-        OK if they hold then.
+        `OUTCOME.OK` if the constraints hold afterwards, else FAR or the outcome of an evaluation.
     """
     size, h = model[MODEL.DOFS], at(model, model[MODEL.CONSTRAINED])
     tolerance, limit = data[WORK.SCRATCH], data[WORK.SCRATCH + 1]
@@ -46,9 +50,13 @@ def project(
         trial[k] = y[k]
     status = bound(model, reals, data, trial)
     if status == OUTCOME.OK:
-        status = project_values(model, reals, data, trial, off, has_errors, tolerance, limit)
+        status = project_values(
+            model, reals, data, trial, state_errors, has_errors, tolerance, limit
+        )
     if status == OUTCOME.OK:
-        status = project_speeds(model, data, trial, at(off, size), has_errors, tolerance, limit)
+        status = project_speeds(
+            model, data, trial, at(state_errors, size), has_errors, tolerance, limit
+        )
     if status == OUTCOME.OK:
         for k in range(2 * size):
             y[k] = trial[k]
@@ -56,7 +64,7 @@ def project(
 
 
 def bound(model: Ints, reals: Floats, data: Floats, y: Floats) -> int:
-    """All equations at a state."""
+    """Evaluate all constraint equations at a state; return the outcome."""
     f = at(data, model[model[MODEL.CONSTRAINED] + CONSTRAINED.WORK_TRIAL] + 2 * model[MODEL.DOFS])
     status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.VELOCITY)
     if status == OUTCOME.OK:
@@ -69,20 +77,34 @@ def project_values(
     reals: Floats,
     data: Floats,
     y: Floats,
-    off: Floats,
+    state_errors: Floats,
     has_errors: int,
     tolerance: float,
     limit: float,
 ) -> int:
-    """Change the values of a state whose equations are known, and the errors with them; the equations follow."""
+    """Project the coordinates of a state whose equations are known, and update the equations.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results with the equations.
+        y: state; its coordinates are changed.
+        state_errors: estimated errors of the coordinates (n,), whose normal component is removed.
+        has_errors: 0 if no errors are known.
+        tolerance: accepted root mean square of the errors.
+        limit: largest root mean square to start from.
+
+    Returns:
+        `OUTCOME.OK` or FAR.
+    """
     size, h = model[MODEL.DOFS], at(model, model[MODEL.CONSTRAINED])
-    count, kept, factor = (
+    count, jacobian, factor = (
         h[CONSTRAINED.POSITIONS],
         at(data, h[CONSTRAINED.WORK_KEPT]),
         at(data, h[CONSTRAINED.WORK_FACTOR]),
     )
     errors = at(data, h[CONSTRAINED.WORK_SYSTEM])
-    room, step, following = (
+    work, step, following = (
         at(errors, count),
         at(errors, 2 * count),
         at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size),
@@ -93,11 +115,11 @@ def project_values(
     if not norm <= limit:
         return OUTCOME.FAR
     for iteration in range(ITERATIONS):
-        rows_by_values(model, data, y, kept)
+        rows_by_values(model, data, y, jacobian)
         for k in range(count * size):
-            factor[k] = kept[k]
+            factor[k] = jacobian[k]
         factored(model, data, count, factor, REDUNDANT * count)
-        solved(model, count, factor, errors, room, step)
+        solved(model, count, factor, errors, work, step)
         for k in range(size):
             following[k], following[size + k] = y[k] - step[k], y[size + k]
         before, norm = norm, inf
@@ -113,9 +135,9 @@ def project_values(
     if not norm <= tolerance:
         return OUTCOME.FAR
     if has_errors > 0:
-        across(model, count, kept, factor, off, errors, room, step)
+        across(model, count, jacobian, factor, state_errors, errors, work, step)
         for k in range(size):
-            off[k] -= step[k]
+            state_errors[k] -= step[k]
     return bound(model, reals, data, y)
 
 
@@ -123,12 +145,25 @@ def project_speeds(
     model: Ints,
     data: Floats,
     y: Floats,
-    off: Floats,
+    state_errors: Floats,
     has_errors: int,
     tolerance: float,
     limit: float,
 ) -> int:
-    """Change the speeds of a state whose equations are known, and their errors with them."""
+    """Project the speeds of a state whose equations are known.
+
+    Args:
+        model: integers of the model.
+        data: results with the equations.
+        y: state; its speeds are changed.
+        state_errors: estimated errors of the speeds (n,), whose normal component is removed.
+        has_errors: 0 if no errors are known.
+        tolerance: accepted root mean square of the errors.
+        limit: largest root mean square to start from.
+
+    Returns:
+        `OUTCOME.OK` or FAR.
+    """
     size, h = model[MODEL.DOFS], at(model, model[MODEL.CONSTRAINED])
     count, rows, factor = (
         h[CONSTRAINED.EQUATIONS],
@@ -140,7 +175,7 @@ def project_speeds(
         at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size),
         at(y, size),
     )
-    room, step = at(errors, count), at(errors, 2 * count)
+    work, step = at(errors, count), at(errors, 2 * count)
     norm = speed_errors(model, data, u, errors)
     if norm <= tolerance:
         return OUTCOME.OK
@@ -154,7 +189,7 @@ def project_speeds(
     factored(model, data, count, factor, REDUNDANT * count)
     # The rows do not depend on the speeds: one step does, a second one mends its rounding.
     for _ in range(2):
-        solved(model, count, factor, errors, room, step)
+        solved(model, count, factor, errors, work, step)
         for k in range(size):
             u[k] -= scales[k] * step[k]
         norm = speed_errors(model, data, u, errors)
@@ -163,9 +198,9 @@ def project_speeds(
     if not norm <= tolerance:
         return OUTCOME.FAR
     if has_errors > 0:
-        across(model, count, rows, factor, off, errors, room, step)
+        across(model, count, rows, factor, state_errors, errors, work, step)
         for k in range(size):
-            off[k] -= scales[k] * step[k]
+            state_errors[k] -= scales[k] * step[k]
     return OUTCOME.OK
 
 
@@ -174,22 +209,33 @@ def across(
     count: int,
     rows: Floats,
     factor: Floats,
-    off: Floats,
+    state_errors: Floats,
     values: Floats,
-    room: Floats,
-    found: Floats,
+    work: Floats,
+    normal: Floats,
 ) -> None:
-    """What of some errors lies across equations, of which the factor is known."""
+    """Compute the component of some errors normal to factorised equations.
+
+    Args:
+        model: integers of the model.
+        count: number of equations.
+        rows: left sides of the equations (count, n).
+        factor: their factor.
+        state_errors: errors (n,).
+        values: workspace (count,).
+        work: workspace (count,).
+        normal: filled with the component (n,).
+    """
     size = model[MODEL.DOFS]
     for i in range(count):
         values[i] = 0.0
         for k in range(size):
-            values[i] += rows[size * i + k] * off[k]
-    solved(model, count, factor, values, room, found)
+            values[i] += rows[size * i + k] * state_errors[k]
+    solved(model, count, factor, values, work, normal)
 
 
 def position_errors(model: Ints, data: Floats, errors: Floats) -> float:
-    """The errors of the positions one after the other, and their root mean square."""
+    """Collect the errors of the positions; return their root mean square."""
     h, count, total = at(model, model[MODEL.CONSTRAINED]), 0, 0.0
     for number in range(h[CONSTRAINED.CONSTRAINTS]):
         constraint = at(model, model[h[CONSTRAINED.CONSTRAINT_AT] + number])
@@ -203,7 +249,7 @@ def position_errors(model: Ints, data: Floats, errors: Floats) -> float:
 
 
 def speed_errors(model: Ints, data: Floats, u: Floats, errors: Floats) -> float:
-    """The errors of the speeds, and their root mean square."""
+    """Compute the errors G u - b of the speeds; return their root mean square."""
     h, size, total = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS], 0.0
     rows, rates = at(data, h[CONSTRAINED.WORK_ROWS]), at(data, h[CONSTRAINED.WORK_RATES])
     for i in range(h[CONSTRAINED.EQUATIONS]):
@@ -216,14 +262,14 @@ def speed_errors(model: Ints, data: Floats, u: Floats, errors: Floats) -> float:
 
 
 def rows_by_values(model: Ints, data: Floats, y: Floats, rows: Floats) -> None:
-    """Derivatives of the errors of the positions by the coordinates."""
+    """Write the derivatives of the position errors by the coordinates (not by the speeds)."""
     h, size, count = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS], 0
     for number in range(h[CONSTRAINED.CONSTRAINTS]):
         constraint = at(model, model[h[CONSTRAINED.CONSTRAINT_AT] + number])
         for i in range(constraint[CONSTRAINT.FIRST_EQUATION], constraint[CONSTRAINT.END_POSITION]):
-            row, given = at(rows, size * count), at(data, h[CONSTRAINED.WORK_ROWS] + size * i)
+            row, speed_row = at(rows, size * count), at(data, h[CONSTRAINED.WORK_ROWS] + size * i)
             for k in range(size):
-                row[k] = given[k]
+                row[k] = speed_row[k]
             count += 1
     for number in range(h[CONSTRAINED.BALLS]):
         a = at(model, model[h[CONSTRAINED.BALL_AT] + number])

@@ -1,4 +1,4 @@
-"""What a run works on and writes down: reports, a log of its steps, events, peaks."""
+"""Records of a run: reports, a log of its steps, events and peak forces."""
 
 from __future__ import annotations
 
@@ -11,33 +11,72 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy, cu
 from osimlite.mechanics.kernels.points import station
 from osimlite.mechanics.laws.vectors import dot, vector
 
-DONE, FAILED, FULL, STOPPED, TOO_MANY = 0, 1, 2, 3, 4
-"""How a run ends: at its limit, at a state beyond which there is no step, with a full log, at an
-event that stops it, after as many tried steps as were allowed.
-"""
+DONE = 0
+"""Ending of a run that reached its last time."""
+FAILED = 1
+"""Ending of a run at a state beyond which there is no step."""
+FULL = 2
+"""Ending of a run whose log is full."""
+STOPPED = 3
+"""Ending of a run at an event that stops it."""
+TOO_MANY = 4
+"""Ending of a run that tried as many steps as were allowed."""
 
 TIME_OF_EVENT = 1e-9
-"""How exactly the time of an event is found on the interpolated motion, s."""
+"""Accuracy of the time of an event on the interpolated motion (s)."""
 
-TAKEN, ATTEMPTED, EVALUATIONS, REPORTED, LOGGED, EVENTS, COUNTED = range(7)
-"""Indices of what a run counts: steps taken and attempted, evaluations, rows reported and logged, events."""
+TAKEN = 0
+"""Index in the counts of the number of accepted steps."""
+ATTEMPTED = 1
+"""Index of the number of tried steps."""
+EVALUATIONS = 2
+"""Index of the number of evaluations."""
+REPORTED = 3
+"""Index of the number of reports."""
+LOGGED = 4
+"""Index of the number of steps in the log."""
+EVENTS = 5
+"""Index of the number of events; those beyond the workspace are only counted."""
+COUNTED = 6
+"""Number of counts."""
 
-COORDINATE, HEIGHT, TOUCH = 0, 1, 2
-"""Kinds of watches: on the value of a coordinate, on how far a point lies along a direction, on a contact."""
+COORDINATE = 0
+"""Type of watch: the value of a coordinate."""
+HEIGHT = 1
+"""Type of watch: the position of a point along a direction."""
+TOUCH = 2
+"""Type of watch: a contact."""
 
 STATES = 6
-"""Room for so many states that a run needs at WORK_STATE, and two numbers for each contact and watch after them."""
+"""Number of states of workspace that a run needs at WORK_STATE.
 
-MOST_TRIES, TIMES, MOST_EVENTS, EVENT, WATCHES, MOST_LOGGED = 0, 1, 2, 3, 4, 5
-"""Places of the sizes: steps that may be tried, how many rows there are and how long the row of an event is."""
-START_HOLDS, METHOD, METHOD_AT = 6, 7, 8
-"""Places of whether the constraints hold at the start, of the address of the method and of its place in `data`."""
+Two numbers for each contact and watch follow.
+"""
+
+MOST_TRIES = 0
+"""Index in the sizes of the largest number of tried steps."""
+TIMES = 1
+"""Index of the number of reports."""
+MOST_EVENTS = 2
+"""Index of the number of rows for events."""
+EVENT = 3
+"""Index of the length of a row of an event: 3, or more if it holds the state."""
+WATCHES = 4
+"""Index of the number of watches."""
+MOST_LOGGED = 5
+"""Index of the number of rows of the log, 0 for no log."""
+START_HOLDS = 6
+"""Index of 1 if the constraints hold at the start, else 0."""
+METHOD = 7
+"""Index of the address of the integration method."""
+METHOD_AT = 8
+"""Index of the offset in `data` of the method's record."""
 
 
 class Motion(NamedTuple):
-    """What a run works on and writes down; any of the records may have no rows.
+    """Inputs and records of a run; any of the records may have no rows.
 
-    A state has y numbers, see STATE_SIZE.
+    A state has y numbers, see `MODEL.STATE_SIZE`.
     """
 
     model: Ints  # the mechanism
@@ -64,7 +103,7 @@ class Motion(NamedTuple):
 
 
 def evaluated(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:
-    """Evaluate at a time."""
+    """Evaluate a state at a time; return the outcome."""
     m.data[WORK.TIME] = t
     return call(m.model[MODEL.LAWS], m.model, m.reals, m.data, y, f, stage)
 
@@ -80,7 +119,19 @@ def inside(
     t: float,
     y: Floats,
 ) -> None:
-    """State y at a time within a step, where the constraints hold if it can be moved there."""
+    """Compute the state at a time within a step, projected onto the constraints where possible.
+
+    Args:
+        m: the run.
+        t0: time at the start of the step (s).
+        y0: state at the start.
+        f0: its rates.
+        t1: time at the end of the step (s).
+        y1: state at the end.
+        f1: its rates.
+        t: time within the step (s).
+        y: filled with the state.
+    """
     cubic(m.model[MODEL.STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
     if m.model[MODEL.CONSTRAINED] > 0:
         projected(
@@ -89,7 +140,7 @@ def inside(
 
 
 def note_peaks(m: Motion, t: float) -> None:
-    """Keep the largest forces."""
+    """Update the largest forces of the contacts, and their times."""
     for pair in range(m.model[MODEL.CONTACTS]):
         c, peak = (
             at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair),
@@ -101,7 +152,7 @@ def note_peaks(m: Motion, t: float) -> None:
 
 
 def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
-    """Write a step into the log."""
+    """Append a step to the log."""
     size, row = m.model[MODEL.STATE_SIZE], m.counts[LOGGED]
     log = at(m.log, (1 + 2 * size) * row)
     log[0] = t
@@ -117,7 +168,13 @@ def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
 
 
 def levels_at(m: Motion, y: Floats, levels: Floats) -> None:
-    """Fill levels: of each contact 1 if it pushes, else -1; of each watch how far it is above its level."""
+    """Compute the levels of contacts and watches, whose changes of sign are events.
+
+    Args:
+        m: the run.
+        y: state that was evaluated.
+        levels: filled; per contact 1 if it transmits a force, else -1; per watch the value above its level.
+    """
     pairs = m.model[MODEL.CONTACTS]
     for pair in range(pairs):
         c = at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
@@ -145,7 +202,22 @@ def note_events(
     before: Floats,
     after: Floats,
 ) -> float:
-    """Write down what began and ended within a step; returns the time at which the run is to stop, or infinity."""
+    """Record what began and ended within a step.
+
+    Args:
+        m: the run.
+        t0: time at the start of the step (s).
+        y0: state at the start.
+        f0: its rates.
+        t1: time at the end of the step (s).
+        y1: state at the end.
+        f1: its rates.
+        before: levels at the start.
+        after: levels at the end, then workspace for levels.
+
+    Returns:
+        The time at which an event stops the run (s), or infinity.
+    """
     counts, events = m.counts, m.events
     size, pairs = m.model[MODEL.STATE_SIZE], m.model[MODEL.CONTACTS]
     stop, first, total, event = inf, counts[EVENTS], pairs + m.sizes[WATCHES], m.sizes[EVENT]
@@ -184,7 +256,15 @@ def note_events(
 
 
 def insert(m: Motion, first: int, t: float, number: int, rises: bool) -> int:
-    """Put an event among those of its step, by time; returns its row, which may lie beyond the room."""
+    """Insert an event among those of its step, sorted by time; return its row, which may not exist.
+
+    Args:
+        m: the run.
+        first: first event of the step.
+        t: time of the event (s).
+        number: number of the contact or watch.
+        rises: whether the level rises.
+    """
     row, events, length = int(m.counts[EVENTS]), m.events, m.sizes[EVENT]
     m.counts[EVENTS] += 1
     if row >= m.sizes[MOST_EVENTS]:

@@ -1,14 +1,14 @@
-"""Reflexes: sums of terms ``gain * (sensor - offset)`` with a delay, each on while a leg is in some states.
+"""Reflex controllers: sums of terms ``gain * (sensor - offset)`` with a delay, gated by states of legs.
 
-The integers are a head, `REFLEXES`; of each term `TERM`; of each gate the sensors of a coordinate
-and of its speed; of each sensor what it feels, `sensors.SOURCE`. The numbers of a candidate are a
-head, `LIMITS`, in which each leg has its own; of each term delay, gain and offset; of each gate
-delay, least and largest value; those of sources. Where legs have states the first two sensors feel
-their loads. Delays are in control steps. A term without a sensor is ``gain * (t - delay)**power``
-from its delay on, with the time t in control steps.
+The integers are a head, `REFLEXES`; per term a `TERM`; per gate the sensors of a coordinate and of
+its speed; per sensor its source, `sensors.SOURCE`. The numbers of a candidate are a head, `LIMITS`,
+with a part for each leg; per term delay, gain and offset; per gate delay, smallest and largest
+value; then those of the sources. Where legs have states, the first two sensors are their loads.
+Delays are in control steps. A term without a sensor is ``gain * (t - delay)**power`` from its delay
+on, where the time t is in control steps.
 
-Noise is drawn anew at each control step, from a seed, the number of the step and that of what is
-noisy alone.
+The noise of a control step depends on the seed, the number of the step and the number of the noisy
+control or sensor only.
 """
 
 from __future__ import annotations
@@ -19,28 +19,50 @@ from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.sensors import SOURCE, ahead, felt
 
-EARLY_STANCE, LATE_STANCE, LIFTOFF, SWING, LANDING = range(5)
-"""States of a leg."""
+EARLY_STANCE = 0
+"""State of a leg that carries load with the foot ahead."""
+LATE_STANCE = 1
+"""State of a leg that carries load with the foot behind."""
+LIFTOFF = 2
+"""State of a leg that is being unloaded."""
+SWING = 3
+"""State of a leg without load."""
+LANDING = 4
+"""State of a leg in swing whose foot is far ahead."""
 UNKNOWN = -1
-FREE, OF_SENSOR, OF_RESULT = 0, 1, 2
-"""What of a term may not be negative: nothing, how far its sensor is above its offset, or what comes of that."""
+"""State of a leg before the first control step."""
+FREE = 0
+"""Kind of a term that may have any sign."""
+OF_SENSOR = 1
+"""Kind of a term with max(sensor - offset, 0)."""
+OF_RESULT = 2
+"""Kind of a term with max(gain * (sensor - offset), 0)."""
 OF_GATE = 2
-"""Integers of a gate."""
+"""Number of integers of a gate."""
 OF_EACH = 3
-"""Numbers of a term, and of a gate."""
+"""Number of numbers of a term, and of a gate."""
 NEAR = 1e-9
-"""A delay of whole control steps is one, whatever it was divided to."""
+"""A delay this near to whole control steps counts as whole, as it was divided by the step."""
 
-OF_CONTROLS, OF_SENSORS = 0, 1
-"""Noise that is apart."""
+OF_CONTROLS = 0
+"""Stream of the random numbers for controls."""
+OF_SENSORS = 1
+"""Stream of the random numbers for sensors."""
 WORD = 0xFFFFFFFF
+"""Mask of 32 bits."""
 
 
 class REFLEXES(metaclass=Record):
-    """Counts of terms and gates, how many control steps and sensors are remembered, whether legs
-    have states, whether these go from stance to swing at once; how many numbers, and how much room,
-    each candidate has; number of the first control step that is recorded, and of rows of the
-    record; whether there is noise.
+    """Head of the integers of reflexes.
+
+    Attributes:
+        TERMS, GATES: numbers of terms and of gates.
+        KEPT, SENSORS: number of control steps that are remembered, and of sensors.
+        HAS_STATES: whether legs have states.
+        SWINGS_FROM_STANCE: whether a leg may go from stance to swing directly.
+        NUMBERS, ROOM: lengths of the numbers and of the memory of a candidate.
+        FIRST, ROWS: number of the first control step that is recorded, and of rows of the record.
+        IS_NOISY: whether there is noise.
     """
 
     (
@@ -60,17 +82,29 @@ class REFLEXES(metaclass=Record):
 
 
 class TERM(metaclass=Record):
-    """Muscle, sensor (-1 for none), what may not be negative (without a sensor the power of time),
-    the leg whose states decide, these as bits, and the number of what may suppress it or -1.
+    """Integers of a term.
+
+    Attributes:
+        TARGET: control that the term is added to.
+        SENSOR: number of its sensor, -1 for none.
+        KIND: FREE, OF_SENSOR or OF_RESULT; without a sensor the power of time.
+        LEG, STATES: leg whose states decide, and these states as bits.
+        GATE: number of the gate that may suppress the term, or -1.
     """
 
     TARGET, SENSOR, KIND, LEG, STATES, GATE, SIZE = range(7)
 
 
 class LIMITS(metaclass=Record):
-    """Delay of the loads; of each leg the loads with which it stands and swings, and how far the
-    foot is ahead in late stance, at liftoff and at landing, m; a seed, and standard deviations of
-    the noise of controls and of sensors: at least, and as part of what is noisy.
+    """Head of the numbers of reflexes.
+
+    Attributes:
+        DELAY: delay of the loads (control steps); before the parts of the legs.
+        STANDS, SWINGS: in the part of a leg the loads over the weight with which it stands and swings.
+        LATE, LEAVES, LANDS: how far the foot is ahead in late stance, at liftoff and at landing (m).
+        SEED: seed of the noise.
+        CONTROL_NOISE, CONTROL_PART: standard deviation of the noise of a control, and per unit of it.
+        SENSOR_NOISE, SENSOR_PART: standard deviation of the noise of a sensor, and per unit of it.
     """
 
     DELAY, STANDS, SWINGS, LATE, LEAVES, LANDS, OF_LEG = 0, 0, 1, 2, 3, 4, 5
@@ -81,21 +115,31 @@ class LIMITS(metaclass=Record):
 def note_senses(
     model: Ints, data: Floats, i: Ints, p: Floats, frames: int, row: Floats, history: Floats
 ) -> None:
-    """Remember what is felt after so many rows."""
+    """Add the current sensors, with noise, to the history.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        i: integers of the reflexes.
+        p: numbers of the reflexes.
+        frames: number of earlier sensor rows.
+        row: sensor row.
+        history: ring buffer of sensors; changed.
+    """
     sensors = i[REFLEXES.SENSORS]
-    kept = at(history, sensors * (frames % i[REFLEXES.KEPT]))
+    newest = at(history, sensors * (frames % i[REFLEXES.KEPT]))
     sources = at(i, REFLEXES.HEAD + TERM.SIZE * i[REFLEXES.TERMS] + OF_GATE * i[REFLEXES.GATES])
     for k in range(sensors):
-        kept[k] = felt(model, data, at(sources, SOURCE.SIZE * k), p, row)
+        newest[k] = felt(model, data, at(sources, SOURCE.SIZE * k), p, row)
     if i[REFLEXES.IS_NOISY] > 0:
         for k in range(sensors):
-            width = p[LIMITS.SENSOR_NOISE] + p[LIMITS.SENSOR_PART] * abs(kept[k])
+            width = p[LIMITS.SENSOR_NOISE] + p[LIMITS.SENSOR_PART] * abs(newest[k])
             if width > 0.0:
-                kept[k] += width * normal(int(p[LIMITS.SEED]), OF_SENSORS, frames, k)
+                newest[k] += width * normal(int(p[LIMITS.SEED]), OF_SENSORS, frames, k)
 
 
 def add_noise(i: Ints, p: Floats, step: int, count: int, controls: Floats) -> None:
-    """Add noise to controls at a control step, as SCONE's NoiseController does."""
+    """Add noise to the controls of a control step, as SCONE's NoiseController does."""
     if i[REFLEXES.IS_NOISY] > 0:
         for k in range(count):
             width = p[LIMITS.CONTROL_NOISE] + p[LIMITS.CONTROL_PART] * controls[k]
@@ -104,7 +148,15 @@ def add_noise(i: Ints, p: Floats, step: int, count: int, controls: Floats) -> No
 
 
 def felt_before(i: Ints, frames: int, history: Floats, sensor: int, delay: float) -> float:
-    """A sensor as it was; before the beginning all was as at the beginning."""
+    """Return a delayed sensor by linear interpolation; before the start it has its first value.
+
+    Args:
+        i: integers of the reflexes.
+        frames: number of sensor rows.
+        history: ring buffer of sensors.
+        sensor: number of the sensor.
+        delay: delay (control steps).
+    """
     back, latest = min(delay, frames - 1.0), frames - 1
     whole = floor(back + NEAR)
     part = min(max(back - whole, 0.0), 1.0)
@@ -118,7 +170,17 @@ def felt_before(i: Ints, frames: int, history: Floats, sensor: int, delay: float
 def go_on(
     senses: Ints, i: Ints, p: Floats, frames: int, row: Floats, history: Floats, legs: Floats
 ) -> None:
-    """The states of two legs after a control step."""
+    """Advance the states of two legs by one control step.
+
+    Args:
+        senses: plan of the sensor row.
+        i: integers of the reflexes.
+        p: numbers of the reflexes.
+        frames: number of sensor rows.
+        row: sensor row.
+        history: ring buffer of sensors.
+        legs: states of the legs (2,); changed.
+    """
     one, two = felt_before(i, frames, history, 0, p[0]), felt_before(i, frames, history, 1, p[0])
     first, second = ahead(senses, row, 0), ahead(senses, row, 1)
     of_one, of_two, is_direct = (
@@ -140,16 +202,16 @@ def after(
     other: float,
     is_direct: bool,
 ) -> int:
-    """The state of a leg that follows.
+    """Return the next state of a leg.
 
     Args:
-        state: that it was in.
-        limits: of the leg.
-        load: on it, over the weight.
-        other_stands: whether the other one stands.
-        here: how far its foot is ahead, m.
-        other: how far that of the other is.
-        is_direct: whether it may go from stance to swing.
+        state: its present state.
+        limits: numbers of the leg, see `LIMITS`.
+        load: load on the leg over the weight.
+        other_stands: whether the other leg stands.
+        here: how far its foot is ahead (m).
+        other: how far the foot of the other leg is ahead (m).
+        is_direct: whether it may go from stance to swing directly.
     """
     stands, swings = load > limits[LIMITS.STANDS], load <= limits[LIMITS.SWINGS]
     late, lands = here < limits[LIMITS.LATE], here > limits[LIMITS.LANDS]
@@ -174,7 +236,16 @@ def after(
 def add_reflexes(
     i: Ints, p: Floats, frames: int, history: Floats, legs: Floats, result: Floats
 ) -> None:
-    """Add what all terms that are on excite muscles by."""
+    """Add all active terms to the controls.
+
+    Args:
+        i: integers of the reflexes.
+        p: numbers of the reflexes.
+        frames: number of sensor rows.
+        history: ring buffer of sensors.
+        legs: states of the legs (2,).
+        result: controls; changed.
+    """
     terms, count = at(i, REFLEXES.HEAD), i[REFLEXES.TERMS]
     gates, numbers = at(terms, TERM.SIZE * count), at(p, LIMITS.HEAD)
     for k in range(count):
@@ -204,24 +275,40 @@ def add_reflexes(
 
 
 def is_closed(i: Ints, gate: Ints, own: Floats, frames: int, history: Floats) -> bool:
-    """Whether a coordinate is beyond a range and moves further."""
+    """Return whether a gate suppresses a term: its coordinate is beyond the range and moves further away."""
     value = felt_before(i, frames, history, gate[0], own[0])
     speed = felt_before(i, frames, history, gate[1], own[0])
     return (value < own[1] and speed < 0.0) or (value > own[2] and speed >= 0.0)
 
 
 def normal(seed: int, what: int, step: int, number: int) -> float:
-    """A number of a normal distribution of mean 0 and deviation 1, by the method of Box and Muller."""
+    """Return a normally distributed number of mean 0 and deviation 1, by the method of Box and Muller.
+
+    Args:
+        seed: seed of 64 bits.
+        what: stream, OF_CONTROLS or OF_SENSORS.
+        step: number of the control step.
+        number: number of the control or sensor.
+    """
     one, two = philox(int(step) & WORD, int(number), what, 0, seed & WORD, (seed >> 32) & WORD)
     return sqrt(-2.0 * log((one + 1.0) / (WORD + 1.0))) * cos(2.0 * pi * two / (WORD + 1.0))
 
 
 def philox(a: int, b: int, c: int, d: int, key: int, other: int) -> tuple[int, int]:
-    """The first two words of Philox4x32-10 (J. K. Salmon et al., Parallel random numbers: as easy as 1, 2, 3, SC 2011).
+    """Return the first two words of Philox4x32-10.
+
+    Source: J. K. Salmon et al., Parallel random numbers: as easy as 1, 2, 3, SC 2011.
 
     Args:
-        a, b, c, d: words of the counter.
-        key, other: of the key.
+        a: first word of the counter.
+        b: second word.
+        c: third word.
+        d: fourth word.
+        key: first word of the key.
+        other: second word of the key.
+
+    Returns:
+        Two words of 32 bits.
     """
     for _ in range(10):
         one, two = 0xD2511F53 * a, 0xCD9E8D57 * c

@@ -1,11 +1,11 @@
-"""A Rosenbrock method of order 3, for stiff motion at loose tolerances: four linear systems a step, and no iteration.
+"""A Rosenbrock W-method of order 3 for stiff motion at loose tolerances.
 
-The first two stages are at the start of the step, so that two evaluations do for a step besides
-that at its end. The method is L-stable and stiffly accurate. The conditions of order 3, and of
-order 2 whatever the derivatives J are, leave a method of this shape one free number, its diagonal
-(E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, chapters IV.6 and IV.7); a
-quarter is near the least with which it is stable. What J of
-:mod:`osimlite.mechanics.kernels.condensation` leaves out costs it little.
+It solves four linear systems per step and iterates nothing. The first two stages are at the start
+of the step, so that a step takes two evaluations besides that at its end. The method is L-stable
+and stiffly accurate. The conditions of order 3, and of order 2 for any approximation of the
+Jacobian J, leave one free parameter, the diagonal (E. Hairer, G. Wanner, Solving Ordinary
+Differential Equations II, chapters IV.6 and IV.7); a quarter is near the smallest stable value. The
+terms that J of :mod:`osimlite.mechanics.kernels.condensation` omits therefore cost little accuracy.
 """
 
 from __future__ import annotations
@@ -29,33 +29,45 @@ from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy, is_finite
 
 IS_NEW = MEMORY
-"""Whether the derivatives are those at the start of the step."""
-HEAD, IS_IMPLICIT = MEMORY + 1, True
+"""Index in the method's record of 1.0 if the derivatives are those at the start of the step."""
+HEAD = MEMORY + 1
+"""Length of the head of the method's record, see `error_control`."""
+IS_IMPLICIT = True
+"""Whether the method needs derivatives of the forces."""
 
 STAGES = 4
+"""Number of stages."""
 STATES = STAGES
-"""The method keeps a derivative for each stage: so many vectors as long as a state."""
+"""Number of states of workspace: one per stage."""
 
 DIAGONAL = 0.25
+"""Diagonal coefficient gamma."""
 ALPHA = (
     (0.0, 0.0, 0.0, 0.0),
     (0.0, 0.0, 0.0, 0.0),
     (1 / 3, 0.0, 0.0, 0.0),
     (43 / 56, 31 / 56, -9 / 28, 0.0),
 )
+"""Coefficients alpha_ij of the arguments of the stages."""
 GAMMA = (
     (DIAGONAL, 0.0, 0.0, 0.0),
     (0.5, DIAGONAL, 0.0, 0.0),
     (-11 / 72, -7 / 72, DIAGONAL, 0.0),
     (-43 / 56, -31 / 56, 15 / 14, DIAGONAL),
 )
+"""Coefficients gamma_ij of the products with J."""
 WEIGHTS = (0.0, 0.0, 0.75, DIAGONAL)
+"""Weights of the stages in the result."""
 EMBEDDED = (43 / 168, 31 / 168, 0.5 - 3 / 28, 1 / 6)
-"""A third of the way to the formula of order 2 where the last stage is evaluated: as large as errors are at the end."""
+"""Weights of the stages in the formula for the error estimate.
+
+It is a third of the way to the formula of order 2 at the argument of the last stage, so that the
+estimate is as large as the errors at the end are.
+"""
 
 
 def _by_gamma(row: tuple[float, ...]) -> tuple[float, ...]:
-    """A row times the inverse of GAMMA."""
+    """Return a row times the inverse of GAMMA."""
     result = [0.0] * STAGES
     for j in range(STAGES - 1, -1, -1):
         rest = sum(result[i] * GAMMA[i][j] for i in range(j + 1, STAGES))
@@ -64,26 +76,46 @@ def _by_gamma(row: tuple[float, ...]) -> tuple[float, ...]:
 
 
 UNIT = tuple(tuple(float(i == j) for j in range(STAGES)) for i in range(STAGES))
+"""Unit matrix."""
 PLACES = tuple(value for row in ALPHA for value in _by_gamma(row))
-CARRIED = tuple(-DIAGONAL * value for row in UNIT for value in _by_gamma(row))
-ENDS = _by_gamma(WEIGHTS)
-MISSES = _by_gamma(tuple(one - other for one, other in zip(WEIGHTS, EMBEDDED, strict=True)))
-TIMES = tuple(sum(row) for row in ALPHA)
-"""The coefficients as the stages need them, in which no product with J occurs (E. Hairer, G.
-Wanner, Solving Ordinary Differential Equations II, chapter IV.7): by rows where a stage is
-evaluated, and what it has of those before it; what end and error have of the stages; times, of
-which 0 is the start, where the derivative is known.
-"""
+"""ALPHA times the inverse of GAMMA, by rows.
 
-SAFETY, SHRINK, GROW, WORTH = 0.9, 0.2, 5.0, 1.1
-"""Of the step that should just do, which is taken; how much a step changes at most, and at least to be made longer."""
+In terms of the transformed stages no product with J occurs (E. Hairer, G. Wanner, Solving Ordinary
+Differential Equations II, chapter IV.7).
+"""
+CARRIED = tuple(-DIAGONAL * value for row in UNIT for value in _by_gamma(row))
+"""Coefficients of the transformed earlier stages on the right side of a stage, by rows."""
+ENDS = _by_gamma(WEIGHTS)
+"""Coefficients of the transformed stages in the result."""
+MISSES = _by_gamma(tuple(one - other for one, other in zip(WEIGHTS, EMBEDDED, strict=True)))
+"""Coefficients of the transformed stages in the error estimate."""
+TIMES = tuple(sum(row) for row in ALPHA)
+"""Times of the stages, as part of the step; at 0 the derivative is known."""
+
+SAFETY = 0.9
+"""Ratio of the chosen step to the one that would just meet the accuracy."""
+SHRINK = 0.2
+"""Smallest factor of a change of the step."""
+GROW = 5.0
+"""Largest factor of a change of the step."""
+WORTH = 1.1
+"""Smallest factor with which a step is made longer."""
 
 
 def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
-    """Try one step from y0, behind which its derivative stands, to y1."""
+    """Try one step from y0, which is followed by its derivative, to y1.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        y0: state at the start, then its derivative.
+        y1: filled with the state at the end.
+        place: offset of the method's record in data.
+    """
     size = model[MODEL.STATE_SIZE]
     h = at(data, place)
-    stages, room = at(h, HEAD), at(h, HEAD + STATES * size)
+    stages, work = at(h, HEAD), at(h, HEAD + STATES * size)
     errors, f1 = at(data, model[MODEL.WORK_STATE] + ERRORS * size), at(y1, size)
     t0, accuracy, step = h[REACHED], h[ACCEPTED], h[NEXT_STEP]
     h[EVALUATED], h[HAS_DERIVATIVE] = 2.0, 0.0
@@ -96,14 +128,14 @@ def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats,
         copy(size, y0, y1)
         h[IS_NEW] = (
             1.0
-            if linearise(model, reals, data, y1, f1, room, h[IS_EVALUATED]) == OUTCOME.OK
+            if linearise(model, reals, data, y1, f1, work, h[IS_EVALUATED]) == OUTCOME.OK
             else 0.0
         )
     h[IS_EVALUATED] = 0.0
     if (
         h[IS_NEW] > 0.0
-        and condense(model, c, room)
-        and staged(model, reals, data, t0, step, c, y0, y1, stages, room)
+        and condense(model, c, work)
+        and staged(model, reals, data, t0, step, c, y0, y1, stages, work)
     ):
         for k in range(size):
             y1[k], errors[k] = y0[k], 0.0
@@ -132,9 +164,25 @@ def staged(
     y0: Floats,
     y: Floats,
     stages: Floats,
-    room: Floats,
+    work: Floats,
 ) -> bool:
-    """Compute the stages; y has room for a state and its derivative."""
+    """Compute the stages of a step.
+
+    Args:
+        model: integers of the model.
+        reals: its numbers.
+        data: results of an evaluation.
+        t0: time at the start (s).
+        step: step (s).
+        c: diagonal coefficient times the step (s).
+        y0: state at the start, then its derivative.
+        y: workspace of a state and its derivative.
+        stages: filled with the transformed stages.
+        work: condensed linear equations.
+
+    Returns:
+        Whether all evaluations succeeded.
+    """
     size, f = model[MODEL.STATE_SIZE], at(y, model[MODEL.STATE_SIZE])
     for i in range(STAGES):
         stage, rates = at(stages, size * i), f if TIMES[i] > 0.0 else at(y0, size)
@@ -152,5 +200,5 @@ def staged(
             stage[k] = c * rates[k]
             for j in range(i):
                 stage[k] += CARRIED[STAGES * i + j] * stages[size * j + k]
-        correct(model, c, room, stage)
+        correct(model, c, work, stage)
     return True

@@ -1,4 +1,4 @@
-"""A whole motion in one call: steps of a method, reports, events.
+"""Complete motions in one call: steps of an integration method, reports and events.
 
 The rules are those of Simbody's AbstractIntegratorRep, rounding for rounding.
 """
@@ -75,10 +75,28 @@ def run_several(
     first: int,
     last: int,
 ) -> int:
-    """The runs `first` to `last` - 1, each on its own rows.
+    """Integrate the runs `first` to `last` - 1, each on its own rows.
 
-    Args: as of `Motion`, one row for each run; a log, `data` and what tells how to run serve them
-    all. `each` is the length of a row of numbers, 0 if one serves them all.
+    Args:
+        model: integers of the model.
+        reals: numbers of the runs, in rows of `each`.
+        data: workspace of an evaluation and of the method, shared.
+        each: length of a row of numbers, 0 if all runs share one.
+        sizes: sizes and settings, see `MOST_TRIES`.
+        clocks: per run time and next step to try (s).
+        counts: per run the counts, see `TAKEN`.
+        states: per run the state; changed.
+        times: times of the reports (s).
+        reports: per run the states at these times.
+        log: log of the steps, shared.
+        forces: forces of contacts at the steps of the log, shared.
+        events: per run the events.
+        peaks: per run the largest forces of contacts.
+        watches: watches, see `Motion`.
+        levels: numbers of the watches.
+        endings: filled with the ending of each run, see `DONE`.
+        first: number of the first run.
+        last: end of the runs.
     """
     for k in range(first, last):
         m = run_of(
@@ -123,7 +141,7 @@ def run_of(
     levels: Floats,
     k: int,
 ) -> Motion:
-    """One of several runs."""
+    """Return one of several runs; the arguments are those of `run_several`, and the number k of the run."""
     size, pairs = model[MODEL.STATE_SIZE], model[MODEL.CONTACTS]
     return Motion(
         model,
@@ -144,15 +162,21 @@ def run_of(
 
 
 def run(m: Motion, y: Floats, is_going: bool) -> int:
-    """Go on from the state y, which is changed, until something ends the run.
+    """Integrate from the state y, which is changed, until a condition ends the run.
 
-    Its derivative is that at the end of the run before if that goes on.
+    Args:
+        m: the run.
+        y: state at the start, then at the end.
+        is_going: whether the derivative at the end of the previous run is that at the start.
+
+    Returns:
+        The ending, see `DONE`.
     """
     model, counts, clock, sizes = m.model, m.counts, m.clock, m.sizes
     size = model[MODEL.STATE_SIZE]
-    room, h = at(m.data, model[MODEL.WORK_STATE]), at(m.data, sizes[METHOD_AT])
-    y0, f0, y1, f1 = room, at(room, size), at(room, 2 * size), at(room, 3 * size)
-    before = at(room, STATES * size)
+    work, h = at(m.data, model[MODEL.WORK_STATE]), at(m.data, sizes[METHOD_AT])
+    y0, f0, y1, f1 = work, at(work, size), at(work, 2 * size), at(work, 3 * size)
+    before = at(work, STATES * size)
     after = at(before, model[MODEL.CONTACTS] + sizes[WATCHES])
     is_kept = model[MODEL.CONSTRAINED] == 0 or sizes[START_HOLDS] > 0
     if not is_kept and not projected(
@@ -216,12 +240,15 @@ def run(m: Motion, y: Floats, is_going: bool) -> int:
         y0, y1 = y1, y0
         f0, f1 = f1, f0
         copy(size, y0, y)
-    copy(size, f0, at(room, size))
+    copy(size, f0, at(work, size))
     return DONE
 
 
 def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
-    """Whether the end of a step has a derivative, which a method may have found where no forces are looked at."""
+    """Evaluate the end of a step unless the method has done so; return whether its derivative is finite.
+
+    A method's derivative is not used where contacts or watches need the results of an evaluation.
+    """
     if (
         m.data[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0
         and m.model[MODEL.CONTACTS] + m.sizes[WATCHES] == 0
@@ -234,7 +261,17 @@ def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
 
 
 def step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:
-    """Find a step whose error is small enough: y1 and the time of its end; t0 - 1 if there is none, t0 if too many."""
+    """Find a step whose error is accepted.
+
+    Args:
+        m: the run.
+        t0: time at the start (s).
+        y0: state at the start, then its derivative.
+        y1: filled with the state at the end.
+
+    Returns:
+        The time at the end of the step (s); t0 - 1 if there is none, t0 after too many tried steps.
+    """
     counts, clock, sizes = m.counts, m.clock, m.sizes
     h = at(m.data, sizes[METHOD_AT])
     smallest = max(shortest_step(t0, counts[ATTEMPTED]), h[SHORTEST])

@@ -1,11 +1,10 @@
-"""What is felt of a walker once its forces are computed: a row of numbers that measures go by, and sources of reflexes.
+"""Sensors of a walker: a row of measurements after each evaluation, and sources of reflexes.
 
-The plan of a row are integers: a head, `SENSES`; of each muscle where w has what `OF_MUSCLES`
-names; of each force that limits a coordinate the number of that and where w has the force; the link
-of each body; of each leg the numbers of the bodies that it hangs on and ends with, and the first
-and the end of the contacts of its foot. The numbers that belong to it are a head, `SENSED`; optimal
-fiber lengths (m), strengths (N); of each control the least and the largest; mass centres in the
-links (m), masses (kg).
+The plan of a row consists of integers: a head, `SENSES`; per muscle the indices in `data` of
+`OF_MUSCLES`; per coordinate limit force the coordinate and the index of the force in `data`; the
+link of each body; per leg its hip-side body (pelvis) and its foot, and the range of the contacts of the foot.
+The numbers of a row are a head, `SENSED`; optimal fiber lengths (m) and strengths (N); smallest and
+largest controls; mass centres in the links (m) and masses (kg).
 """
 
 from __future__ import annotations
@@ -18,18 +17,26 @@ from osimlite.mechanics.kernels.points import angular_velocity, direction, stati
 from osimlite.mechanics.laws.vectors import ZERO, Vector, along, dot, norm, over, plus, put, vector
 
 OF_MUSCLES = "fiber_length", "fiber_velocity", "tension", "activation", "active_fiber_force"
+"""Results of a muscle that a row uses."""
 OF_MUSCLE = 5
-"""How many these are."""
+"""Number of integers of a muscle."""
 OF_LEG = 4
-"""How many integers a leg has."""
+"""Number of integers of a leg."""
 
 
 class SENSES(metaclass=Record):
-    """Counts, of controls and of the numbers too, and where a row has what is felt: lengths of
-    fibers over the optimal ones, velocities (of these lengths per s), forces of tendons over the
-    strengths, activations, active forces of fibers (N); values of coordinates and their speeds,
-    forces that limit them (N, N m); forces of the ground on each leg over the weight; mass centres
-    of bodies and the common one (m), how fast that rises (m/s).
+    """Head of the plan of a sensor row.
+
+    Attributes:
+        MUSCLES, COORDINATES, LEGS, LIMITS, BODIES, CONTROLS, KNOWN: numbers of muscles, coordinates,
+            legs, coordinate limit forces, bodies, controls, and of numbers of the row.
+        LENGTHS, VELOCITIES: offsets of fiber lengths and velocities over the optimal lengths (1, 1/s).
+        FORCES, ACTIVATIONS, ACTIVE: offsets of tendon forces over the strengths, activations, and
+            active fiber forces (N).
+        VALUES, SPEEDS, MOMENTS: offsets of coordinates, speeds, and limit forces (N, N m).
+        LOADS: offset of the ground reaction force of each leg over the weight.
+        PLACES, CENTRE, RISE: offsets of the mass centres of bodies and of all (m), and of the vertical
+            velocity of the latter (m/s).
     """
 
     MUSCLES, COORDINATES, LEGS, LIMITS, BODIES, CONTROLS, KNOWN = range(7)
@@ -38,68 +45,107 @@ class SENSES(metaclass=Record):
 
 
 class SENSED(metaclass=Record):
-    """Weight (N), mass (kg), for how long controls are held (s), 1 if steps begin with the derivative before them."""
+    """Head of the numbers of a sensor row.
+
+    Attributes:
+        WEIGHT, MASS: weight (N) and mass (kg) of the walker.
+        STEP: duration of a control step (s).
+        LAGS: 1 if a step begins with the derivative at the end of the previous one.
+    """
 
     WEIGHT, MASS, STEP, LAGS, HEAD = range(5)
 
 
-IN_ROW, SPINDLE, POSITION, VELOCITY, ANGLE, TURN = range(6)
-"""Kinds of sources: a number of a row; the rate of a muscle's spindles, whose length and velocity
-are two numbers of a row (A. Prochazka, Prog. Brain Res. 123, 1999, p. 135, with a velocity over the
-optimal length as in SCONE). Of a link: where a point is, and how fast, along a direction of ground
-(m, m/s); angles that rotations about y, z and x make one after the other, and the angular velocity
-about an axis of the link (rad, rad/s).
+IN_ROW = 0
+"""Kind of source: a number of the row."""
+SPINDLE = 1
+"""Kind of source: firing rate of muscle spindles, from a length and a velocity of the row.
+
+Source: A. Prochazka, Prog. Brain Res. 123, 1999, p. 135, with a velocity over the optimal fiber
+length as in SCONE.
 """
+POSITION = 2
+"""Kind of source: position of a point of a link along a direction of ground (m)."""
+VELOCITY = 3
+"""Kind of source: velocity of a point of a link along a direction of ground (m/s)."""
+ANGLE = 4
+"""Kind of source: sum of the angles of successive rotations about y, z and x of a link (rad)."""
+TURN = 5
+"""Kind of source: angular velocity about an axis of a link (rad/s)."""
 SPINDLE_GAIN = 65.0 / 200.0
+"""Ratio of the coefficients of velocity and length in Prochazka's formula."""
 
 
 class SOURCE(metaclass=Record):
-    """Kind; place in a row, or link; a second place in a row, or where numbers of a link are: of a
-    point its place in the link and the direction; of angles the axes of a frame in the link, and
-    how each angle counts; of an angular velocity the axis.
+    """Integers of a source.
+
+    Attributes:
+        KIND: kind, such as IN_ROW.
+        PLACE: index in the row, or number of a link.
+        MORE: second index in the row, or offset of the numbers: point and direction; axes of a frame
+            and factors of the angles; or an axis.
     """
 
     KIND, PLACE, MORE, SIZE = range(4)
 
 
 def felt(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats) -> float:
-    """What a source is, after a row is filled; p are the numbers that it has its own among."""
-    kind, place = source[SOURCE.KIND], source[SOURCE.PLACE]
+    """Return the value of a source after the row has been filled.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        source: integers of the source.
+        p: numbers that contain those of the source.
+        row: sensor row.
+    """
+    kind, index = source[SOURCE.KIND], source[SOURCE.PLACE]
     if kind == IN_ROW:
-        return row[place]
+        return row[index]
     if kind == SPINDLE:
         speed = row[source[SOURCE.MORE]]
-        return max(row[place] + SPINDLE_GAIN * (sqrt(speed) if speed > 0.0 else -sqrt(-speed)), 0.0)
-    own = at(p, source[SOURCE.MORE])
+        return max(row[index] + SPINDLE_GAIN * (sqrt(speed) if speed > 0.0 else -sqrt(-speed)), 0.0)
+    numbers = at(p, source[SOURCE.MORE])
     if kind == ANGLE:
-        xx, yx, zx = direction(model, data, place, vector(own, 0))
-        _, yy, _ = direction(model, data, place, vector(own, 3))
-        _, yz, _ = direction(model, data, place, vector(own, 6))
+        xx, yx, zx = direction(model, data, index, vector(numbers, 0))
+        _, yy, _ = direction(model, data, index, vector(numbers, 3))
+        _, yz, _ = direction(model, data, index, vector(numbers, 6))
         return dot(
-            vector(own, 9), (atan2(-yz, yy), atan2(-zx, xx), atan2(yx, sqrt(xx * xx + zx * zx)))
+            vector(numbers, 9), (atan2(-yz, yy), atan2(-zx, xx), atan2(yx, sqrt(xx * xx + zx * zx)))
         )
     if kind == TURN:
         return dot(
-            direction(model, data, place, vector(own, 0)), angular_velocity(model, data, place)
+            direction(model, data, index, vector(numbers, 0)), angular_velocity(model, data, index)
         )
-    point = station(model, data, place, vector(own, 0))
-    return dot(vector(own, 3), point if kind == POSITION else velocity(model, data, place, point))
+    point = station(model, data, index, vector(numbers, 0))
+    return dot(
+        vector(numbers, 3), point if kind == POSITION else velocity(model, data, index, point)
+    )
 
 
 def feel(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, row: Floats) -> None:
-    """Fill a row, after an evaluation of the state y."""
+    """Fill a sensor row after an evaluation of the state y.
+
+    Args:
+        model: integers of the model.
+        data: results of the evaluation.
+        y: state.
+        i: plan of the row.
+        p: numbers of the row.
+        row: filled.
+    """
     muscles, freedoms, bodies = i[SENSES.MUSCLES], i[SENSES.COORDINATES], i[SENSES.BODIES]
-    own, optimal = at(i, SENSES.HEAD), at(p, SENSED.HEAD)
+    muscle_ints, optimal = at(i, SENSES.HEAD), at(p, SENSED.HEAD)
     strengths = at(optimal, muscles)
     for k in range(muscles):
-        places = at(own, OF_MUSCLE * k)
+        places = at(muscle_ints, OF_MUSCLE * k)
         row[i[SENSES.LENGTHS] + k] = data[places[0]] / optimal[k]
         row[i[SENSES.VELOCITIES] + k] = data[places[1]] / optimal[k]
         row[i[SENSES.FORCES] + k] = data[places[2]] / strengths[k]
         row[i[SENSES.ACTIVATIONS] + k] = data[places[3]]
         row[i[SENSES.ACTIVE] + k] = data[places[4]]
     copy(2 * freedoms, y, at(row, i[SENSES.VALUES]))
-    limits, moments = at(own, OF_MUSCLE * muscles), at(row, i[SENSES.MOMENTS])
+    limits, moments = at(muscle_ints, OF_MUSCLE * muscles), at(row, i[SENSES.MOMENTS])
     for k in range(freedoms):
         moments[k] = 0.0
     for k in range(i[SENSES.LIMITS]):
@@ -107,10 +153,10 @@ def feel(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, row: Floats) 
     links, total, rise = at(limits, 2 * i[SENSES.LIMITS]), ZERO, 0.0
     centres = at(strengths, muscles + 2 * i[SENSES.CONTROLS])
     for k in range(bodies):
-        place = station(model, data, links[k], vector(centres, 3 * k))
-        put(row, i[SENSES.PLACES] + 3 * k, place)
-        total = along(total, centres[3 * bodies + k], place)
-        rise += centres[3 * bodies + k] * velocity(model, data, links[k], place)[1]
+        position = station(model, data, links[k], vector(centres, 3 * k))
+        put(row, i[SENSES.PLACES] + 3 * k, position)
+        total = along(total, centres[3 * bodies + k], position)
+        rise += centres[3 * bodies + k] * velocity(model, data, links[k], position)[1]
     put(row, i[SENSES.CENTRE], over(total, p[SENSED.MASS]))
     row[i[SENSES.RISE]] = rise / p[SENSED.MASS]
     for k in range(i[SENSES.LEGS]):
@@ -121,21 +167,21 @@ def feel(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, row: Floats) 
 
 
 def contact_force(model: Ints, data: Floats, pair: int) -> Vector:
-    """Force of a contact, N."""
+    """Return the force of a contact on its surface 2 (N)."""
     return vector(data, model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair + CONTACT_WORK.FORCE)
 
 
 def foot(i: Ints, row: Floats, leg: int) -> float:
-    """How far the foot of a leg is along x, m."""
+    """Return the position of the foot of a leg along x (m)."""
     return row[i[SENSES.PLACES] + 3 * leg_ints(i, leg)[1]]
 
 
 def ahead(i: Ints, row: Floats, leg: int) -> float:
-    """How far the foot of a leg is before what the leg hangs on, m."""
+    """Return how far the foot of a leg is ahead of the pelvis along x (m)."""
     return foot(i, row, leg) - row[i[SENSES.PLACES] + 3 * leg_ints(i, leg)[0]]
 
 
 def leg_ints(i: Ints, leg: int) -> Ints:
-    """The integers of a leg."""
+    """Return the integers of a leg."""
     before = SENSES.HEAD + OF_MUSCLE * i[SENSES.MUSCLES] + 2 * i[SENSES.LIMITS] + i[SENSES.BODIES]
     return at(i, before + OF_LEG * leg)

@@ -1,7 +1,7 @@
-"""Which functions are compiled by themselves and called by their address, by name.
+"""Table of the kernels that are called by their address, and compilation of generated kernels.
 
-Each is compiled when the first model that needs it is made ready, and kept. Those of the engine are
-here; those that are written for kinds of forces and probes are in
+Each kernel of the table is compiled when the first model that needs it is prepared, and cached.
+Kernels that are generated for types of forces and probes are listed by
 :mod:`osimlite.simulation.elements.laws`.
 """
 
@@ -86,11 +86,11 @@ LAW_MODULES = {
 """The module of each of the engine's own."""
 
 LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
-"""Index of a law's address among those that begin at `layout.LAWS`."""
+"""Index of each kernel's address among the addresses from `layout.MODEL.LAWS` on."""
 
 
 def own_function(name: str) -> Callable[..., Any]:
-    """The function of a name."""
+    """Return the kernel of a name in the table."""
     function: Callable[..., Any] = getattr(
         import_module(f"{__package__}.{LAW_MODULES[name]}"), name
     )
@@ -98,19 +98,19 @@ def own_function(name: str) -> Callable[..., Any]:
 
 
 RECORDS = {record.__name__: record for record in (MODEL, ITEM, RUN, WORK, OUTCOME)}
-"""What the code of kernels uses of the layout."""
+"""Records of the layout that generated kernels refer to."""
 GIVEN = 'model: "Ints", reals: "Floats", data: "Floats", y: "Floats", f: "Floats"'
-"""What every kernel is called with, before what it computes."""
+"""Parameters that every kernel begins with, as text."""
 
 
 def written(name: str, module: str, source: str, **scope: Any) -> Callable[..., int]:
-    """A kernel that was written.
+    """Return the function that a text defines.
 
     Args:
-        name: of it.
-        module: that it belongs to.
-        source: its text.
-        scope: what this uses, besides the layout.
+        name: name of the function.
+        module: name of the module that it belongs to.
+        source: text of the function.
+        scope: names that the text uses besides the records of the layout.
     """
     known = {**RECORDS, "at": pointers.at, "__name__": module, **scope}
     file = f"<kernel {name}>"

@@ -1,8 +1,8 @@
-"""Motions whose controls are held for a step, and whole walks in one call.
+"""Motions with controls that are held per control step, and complete walks in one call.
 
-A walk are control steps of reflexes, the motion between, what is felt, and how it is judged. Any
-other run can go by
-reflexes, too: what they know of what was is a room of its own, from which a run goes on.
+A walk alternates control steps (sensors, reflexes, excitations) with integration, and is scored by
+criteria. Any other run can be controlled by reflexes too; the memory of its reflexes is a workspace
+of its own, from which a later run continues.
 """
 
 from __future__ import annotations
@@ -34,18 +34,31 @@ from osimlite.mechanics.kernels.reflexes import (
 from osimlite.mechanics.kernels.runs import run, run_of
 from osimlite.mechanics.kernels.sensors import SENSED, SENSES, feel
 
-FEEL, BEGIN, START = -1, -2, -3
-"""Orders besides a number of control steps: to feel what is; then to begin reflexes and excite
-muscles by them, or to begin criteria.
-"""
-STEPS, FRAMES, GOING, FORCES, COUNTS = range(5)
-"""What is counted of a walk: control steps, rows that were felt, 1 while it goes on, evaluations of the forces."""
+FEEL = -1
+"""Order to fill the sensor rows only, in place of a number of control steps."""
+BEGIN = -2
+"""Order to fill the sensor rows, and to start reflexes and excitations."""
+START = -3
+"""Order to fill the sensor rows, and to start the criteria."""
+STEPS = 0
+"""Index in the progress of the number of control steps."""
+FRAMES = 1
+"""Index of the number of sensor rows."""
+GOING = 2
+"""Index of 1 while the walk continues, then 0."""
+FORCES = 3
+"""Index of the number of evaluations."""
+COUNTS = 4
+"""Length of the progress."""
 LEGS = 2
-"""The room of a walk begins with the states of two legs; the history of the sensors follows, and that of criteria."""
+"""Number of states of legs at the start of the memory of a walk.
+
+The history of the sensors follows, then the workspace of the criteria.
+"""
 
 
 class Walk(NamedTuple):
-    """What a walk goes by and leaves behind."""
+    """Inputs and records of a walk."""
 
     m: Motion
     senses: Ints  # see `senses`
@@ -79,10 +92,23 @@ def hold_several(
     first: int,
     last: int,
 ) -> int:
-    """A control step of the copies `first` to `last` - 1.
+    """Integrate one control step of the copies `first` to `last` - 1.
 
-    Args: as of `runs.run_several`; where the numbers have the controls, these of each copy, how
-    many it has; which come to the end of the step.
+    Args:
+        model: integers of the model.
+        reals: its numbers, shared; the controls are written to it.
+        data: workspace of an evaluation and of the method, shared.
+        sizes: sizes and settings, see `record.MOST_TRIES`.
+        clocks: per copy time and next step to try (s).
+        counts: per copy the counts, see `record.TAKEN`.
+        states: per copy the state; changed.
+        peaks: per copy the largest forces of contacts.
+        places: offsets in reals of the controls.
+        controls: per copy the controls.
+        held_by: number of controls.
+        going: filled with 1 for a copy that reaches the end of the step, else 0.
+        first: number of the first copy.
+        last: end of the copies.
     """
     for k in range(first, last):
         for number in range(held_by):
@@ -103,7 +129,7 @@ def motion_of(
     unused: Ints,
     k: int,
 ) -> Motion:
-    """Of one of several, which has no reports, log, events and watches."""
+    """Return the run of one of several copies, without reports, log, events and watches."""
     peak = at(peaks, 2 * k * model[MODEL.CONTACTS])
     clock, count = at(clocks, 2 * k), at(counts, COUNTED * k)
     return Motion(
@@ -111,12 +137,12 @@ def motion_of(
     )
 
 
-def held(m: Motion, y: Floats, is_going: bool) -> bool:
-    """Whether a state has gone on to the end of a control step. Each is a run of its own: no method knows what was."""
+def held(m: Motion, y: Floats, has_derivative: bool) -> bool:
+    """Integrate a state over one control step, as a run of its own; return whether it reaches the end."""
     m.clock[0] = 0.0
     for k in range(COUNTED):
         m.counts[k] = 0
-    return run(m, y, is_going) == DONE and is_finite(m.model[MODEL.STATE_SIZE], y)
+    return run(m, y, has_derivative) == DONE and is_finite(m.model[MODEL.STATE_SIZE], y)
 
 
 def walk_several(
@@ -144,12 +170,35 @@ def walk_several(
     first: int,
     last: int,
 ) -> int:
-    """The walks `first` to `last` - 1 by an order, see FEEL, each on its own rows; the first of all is recorded.
+    """Carry out an order for the walks `first` to `last` - 1, see FEEL; the first of all is recorded.
 
-    Args: as of `runs.run_several`, which has reports, logs and watches besides, and of `Walk`.
+    Args:
+        model: integers of the model.
+        reals: its numbers, shared; the excitations are written to it.
+        data: workspace of an evaluation and of the method, shared.
+        sizes: sizes and settings, see `record.MOST_TRIES`.
+        clocks: per walk time and next step to try (s).
+        counts: per walk the counts, see `record.TAKEN`.
+        states: per walk the state; changed.
+        peaks: per walk the largest forces of contacts.
+        senses: plan of the sensor rows, see `sensors.SENSES`.
+        known: numbers of the sensor rows, see `sensors.SENSED`.
+        driven: offsets in reals of the excitations.
+        plan: integers of the reflexes, see `reflexes.REFLEXES`.
+        numbers: per walk the numbers of the reflexes, see `reflexes.LIMITS`.
+        criteria: integers of the criteria, see `criteria.CRITERION`.
+        bounds: numbers of the criteria.
+        room: per walk the memory of the reflexes and the criteria, see LEGS.
+        rows: per walk the sensor row.
+        excitations: per walk the excitations.
+        record: filled per control step of the first walk with state, excitations and loads.
+        progress: per walk the progress, see STEPS.
+        order: FEEL, BEGIN, START, or a number of control steps.
+        first: number of the first walk.
+        last: end of the walks.
 
     Returns:
-        What an evaluation says where something is only felt.
+        The worst outcome of the evaluations of FEEL, BEGIN and START.
     """
     size, status = model[MODEL.STATE_SIZE], OUTCOME.OK
     for k in range(first, last):
@@ -178,7 +227,7 @@ def walk_several(
 
 
 def begun(a: Walk, y: Floats, order: int) -> int:
-    """Feel what is at a state, and begin what is to begin."""
+    """Fill the sensor row of a state, and start reflexes or criteria; return the outcome."""
     m = a.m
     for k in range(a.senses[SENSES.CONTROLS]):
         m.reals[a.driven[k]] = 0.0
@@ -198,18 +247,18 @@ def begun(a: Walk, y: Floats, order: int) -> int:
 
 
 def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
-    """So many control steps at most.
+    """Simulate at most `steps` control steps.
 
-    As in SCONE each can begin with the derivative that the one before has ended with, which knows
-    its excitations only.
+    As in SCONE, a step may begin with the derivative at the end of the previous one, which belongs to
+    the previous excitations.
     """
     m, progress, lags = a.m, a.progress, a.known[SENSED.LAGS] > 0.0
     size, controls = m.model[MODEL.STATE_SIZE], a.senses[SENSES.CONTROLS]
     if lags:
         hold(a)
-        before = at(m.data, m.model[MODEL.WORK_STATE])
-        copy(size, y, before)
-        evaluated(m, a.known[SENSED.STEP], before, at(before, size), STAGE.ACCELERATION)
+        previous = at(m.data, m.model[MODEL.WORK_STATE])
+        copy(size, y, previous)
+        evaluated(m, a.known[SENSED.STEP], previous, at(previous, size), STAGE.ACCELERATION)
     for number in range(steps):
         if progress[GOING] == 0:
             return
@@ -224,10 +273,10 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
                 at(record, size + controls),
             )
         hold(a)
-        goes_on = held(m, y, lags)
+        has_reached_end = held(m, y, lags)
         progress[STEPS] += 1
         progress[FORCES] += m.counts[EVALUATIONS]
-        if not goes_on:
+        if not has_reached_end:
             progress[GOING] = 0
             return
         if m.model[MODEL.CONTACTS] == 0 and m.data[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0:
@@ -242,18 +291,18 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
 
 
 def hold(a: Walk) -> None:
-    """Give the actuators their controls."""
+    """Write the excitations to the actuators."""
     for k in range(a.senses[SENSES.CONTROLS]):
         a.m.reals[a.driven[k]] = a.excitations[k]
 
 
 def judged_room(a: Walk) -> Floats:
-    """The room of the criteria."""
+    """Return the workspace of the criteria."""
     return at(a.room, LEGS + a.plan[REFLEXES.KEPT] * a.plan[REFLEXES.SENSORS])
 
 
 def excite(a: Walk) -> None:
-    """What reflexes drive the actuators by, within bounds; the states of the legs go on."""
+    """Advance the states of the legs, and compute the excitations by reflexes, within their bounds."""
     history, frames, count = at(a.room, LEGS), a.progress[FRAMES], a.senses[SENSES.CONTROLS]
     if a.plan[REFLEXES.HAS_STATES] > 0:
         go_on(a.senses, a.plan, a.numbers, frames, a.row, history, a.room)
@@ -298,9 +347,9 @@ def run_by_reflexes(
     first: int,
     last: int,
 ) -> int:
-    """The runs `first` to `last` - 1, as `run_several` computes them, each by reflexes of its own.
+    """Integrate the runs `first` to `last` - 1, as `run_several` does, each controlled by its reflexes.
 
-    Args: as of `run_several`, and of `Walk`: one row for each run.
+    The arguments are those of `run_several` and of `walk_several`, with one row per run.
     """
     for k in range(first, last):
         m = run_of(
@@ -342,12 +391,15 @@ def run_by_reflexes(
 
 
 def decided_size(senses: Ints, plan: Ints) -> int:
-    """How many numbers are recorded of a control step."""
+    """Return the length of the record of a control step."""
     return int(plan[REFLEXES.SENSORS] + LEGS + senses[SENSES.CONTROLS] + 1)
 
 
 def run_on(a: Walk, y: Floats) -> int:
-    """Go on from the state y, as `run` does, with controls that are new at each control step, also at the very end."""
+    """Integrate from the state y as `integrate_run` does, with new controls at each control step.
+
+    A control step also begins at the very end of the run.
+    """
     m, progress = a.m, a.progress
     h = at(m.data, m.sizes[METHOD_AT])
     end, ending = h[LAST_TIME], DONE
@@ -365,8 +417,10 @@ def run_on(a: Walk, y: Floats) -> int:
 
 
 def decide(a: Walk, y: Floats) -> bool:
-    """Begin a control step, and record it: what sensors were remembered, states of the legs,
-    controls, and the step that the method would try next; whether the forces could be computed.
+    """Begin a control step and record it; return whether the evaluation succeeded.
+
+    The record holds the remembered sensors, the states of the legs, the excitations, and the step that
+    the method would try next.
     """
     m, progress, sensors = a.m, a.progress, a.plan[REFLEXES.SENSORS]
     # No method knows what was, as the motion has a kink here.

@@ -1,7 +1,7 @@
-"""Where a path runs on its surfaces, and where as a whole: for whoever draws it.
+"""Polylines of paths and of their segments on wrap surfaces, for drawing.
 
-Of each law of a surface there is one here that is called after it, with room for points as f: it
-writes points of ground between the two tangent points there, and returns how many they are.
+For each law of a surface there is a law here that is named after it. It writes points in ground
+between the two tangent points to f and returns their number.
 """
 
 from __future__ import annotations
@@ -36,19 +36,22 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-ANGLE, MOST = 0.15, 60.0
-"""The angle (rad) between neighbouring points, at most, unless there are so many; the path then is
-0.3 % of the radius below the surface.
-"""
-FIRST, SECOND, SHAPE = BEST, BEST + SECOND_TANGENT - FIRST_TANGENT, BEST + CURVE - FIRST_TANGENT
-"""In the record of a surface: the tangent points, and what the law has told of the way between them."""
+ANGLE = 0.15
+"""Largest angle between neighbouring points (rad); the polyline is within 0.3 % of the radius."""
+MOST = 60.0
+"""Largest number of segments on a surface."""
+FIRST = BEST
+"""Offset in the record of a surface of the first tangent point."""
+SECOND = BEST + SECOND_TANGENT - FIRST_TANGENT
+"""Offset of the second tangent point."""
+SHAPE = BEST + CURVE - FIRST_TANGENT
+"""Offset of the numbers that trace the curve."""
 
 
 def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Write all corners of a path that was measured into f, in ground; returns how many there are.
+    """Write all corners of a path whose length was computed to f, in ground; return their number.
 
-    After the wraps among the integers of the path stand the laws that trace it on each surface, or
-    0.
+    After the wraps among the integers of the path follow the laws that trace it on each surface, or 0.
     """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     points, wraps = i[POINTS], i[WRAPS]
@@ -70,14 +73,14 @@ def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
 
 
 def pieces(angle: float) -> int:
-    """How many pieces a turn is drawn with."""
+    """Return the number of segments with which an angle (rad) is drawn."""
     return int(min(1.0 + abs(angle) / ANGLE, MOST)) if not isnan(angle) else 1
 
 
 def trace_cylinder(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """A helix about z."""
+    """Write the points of a helix about z; return their number."""
     e = at(data, model[item + ITEM.RECORD])
     one, two, turn = vector(e, FIRST), vector(e, SECOND), e[SHAPE]
     count = pieces(turn)
@@ -87,7 +90,7 @@ def trace_cylinder(
 
 
 def trace_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """A helix on the cylinder in the place of the ring."""
+    """Write the points of a helix on the cylinder that replaces the torus; return their number."""
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     ring, outwards = p[SIZES + 1], (e[SHAPE + 1], e[SHAPE + 2], 0.0)
     one, two = (
@@ -102,7 +105,7 @@ def trace_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
 
 
 def on_helix(one: Vector, two: Vector, turn: float, part: float) -> Vector:
-    """The point of a helix about z after a part of its way."""
+    """Return the point of a helix about z at a fraction of its length."""
     x, y, z = one
     _, _, end = two
     c, s = cos(part * turn), sin(part * turn)
@@ -110,7 +113,7 @@ def on_helix(one: Vector, two: Vector, turn: float, part: float) -> Vector:
 
 
 def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """A great circle."""
+    """Write the points of a great circle; return their number."""
     e = at(data, model[item + ITEM.RECORD])
     one, turn = vector(e, FIRST), e[SHAPE]
     across = cross(unit(cross(one, vector(e, SECOND))), one)
@@ -128,7 +131,10 @@ def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
 def trace_ellipsoid(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """The section with the plane of the path; nothing where OpenSim's points are none."""
+    """Write the points of the section with the plane of the path; return their number.
+
+    It is 0 where OpenSim's points are not numbers.
+    """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     a, b, c = vector(p, SIZES)
     factor = 3.0 / (a + b + c)
@@ -148,7 +154,7 @@ def trace_ellipsoid(
 
 
 def reach(start: Vector, way: Vector) -> float:
-    """How many times a way leads from a point to the unit sphere, NaN if it misses that."""
+    """Return the multiple of a direction that leads from a point to the unit sphere, NaN if it misses."""
     square, half = dot(way, way), dot(start, way)
     inner = half * half - square * (dot(start, start) - 1.0)
     return (sqrt(inner) - half) / square if inner >= 0.0 else nan

@@ -1,8 +1,8 @@
-"""How a path bends around a cylinder about z.
+"""Wrapping of a path around a cylinder about z.
 
-Both ends are joined to the surface by lines that touch its circle, as seen along the axis. How high
-these points lie comes from a plane through both ends and an apex on the surface; between them the
-path is a helix. So it is the shortest path only if it stays at one height, as in OpenSim.
+Both ends are joined to the surface by tangents of its circle, seen along the axis. The heights of
+the tangent points come from a plane through both ends and an apex on the surface; between them the
+path is a helix. As in OpenSim it is therefore the shortest path only at constant height.
 
 Source: OpenSim 4.6's WrapCylinder; for the choice of the tangents also B. A. Garner and M. G.
 Pandy, The obstacle-set method for representing muscle paths in musculoskeletal models, Computer
@@ -48,17 +48,21 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 PARALLEL = 2e-13
-"""Squared sine of the angle between two lines up to which OpenSim takes them for parallel."""
-FLATTEST, FARTHEST = 5e-7, 10.0002
-"""The least part of a plane's normal along an edge that meets the plane, and how far along the edge that may be, m."""
+"""Squared sine of the angle between two lines up to which OpenSim treats them as parallel."""
+FLATTEST = 5e-7
+"""Smallest axial component of a plane's normal with which an edge intersects the plane."""
+FARTHEST = 10.0002
+"""Largest distance along the edge to that intersection (m)."""
 PIECE = 0.002
-"""Length of the pieces that OpenSim draws the helix with, m."""
-BEND, ROUNDS = tan(radians(0.1)), 100
-"""Tangent of the angle by which a line and the helix may differ where they meet; in so many rounds, at most."""
+"""Length of the segments that OpenSim draws the helix with (m)."""
+BEND = tan(radians(0.1))
+"""Tangent of the largest angle between a line and the helix where they meet."""
+ROUNDS = 100
+"""Largest number of rounds in the search for such heights."""
 
 
 def wrap_cylinder(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """The law of a WrapCylinder, see :mod:`osimlite.mechanics.kernels.wrapping`."""
+    """Bend a segment around a WrapCylinder, see :mod:`osimlite.mechanics.kernels.wrapping`."""
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second = vector(e, FIRST_END), vector(e, SECOND_END)
     return around_cylinder(
@@ -76,7 +80,21 @@ def around_cylinder(
     alone: bool,
     e: Floats,
 ) -> int:
-    """The law of a cylinder, between two ends."""
+    """Bend a segment around a cylinder.
+
+    Args:
+        first: first end.
+        second: second end.
+        radius: radius of the cylinder (m).
+        length: length of the cylinder (m).
+        axis: axis of the quadrant.
+        side: its sign, 0.0 for the complete surface.
+        alone: whether the path has no other PathWrap.
+        e: record of the law; filled with tangent points and length.
+
+    Returns:
+        INSIDE, NONE, WRAPPED or MANDATORY.
+    """
     px, py, pz = first
     qx, qy, qz = second
     if px * px + py * py < radius * radius or qx * qx + qy * qy < radius * radius:
@@ -136,7 +154,11 @@ def around_cylinder(
 
 
 def closest_to_axis(first: Vector, second: Vector, radius: float) -> tuple[Vector, bool]:
-    """The point of a line that is closest to the axis, and whether it is within the radius and between the ends."""
+    """Return the point of a line that is closest to the axis.
+
+    Returns:
+        The point, and whether it is within the radius and between the ends.
+    """
     x, y, _ = first
     dx, dy, dz = way = minus(second, first)
     across = dx * dx + dy * dy
@@ -148,7 +170,7 @@ def closest_to_axis(first: Vector, second: Vector, radius: float) -> tuple[Vecto
 
 
 def lifted(point: Vector, height: float) -> Vector:
-    """The point at a height above or below."""
+    """Return a point moved to another height."""
     x, y, _ = point
     return x, y, height
 
@@ -156,9 +178,18 @@ def lifted(point: Vector, height: float) -> Vector:
 def starts_at_a(
     a1: Vector, b1: Vector, a2: Vector, b2: Vector, wide: bool, axis: int, side: float
 ) -> bool:
-    """Whether the way from a1 to b2 is that on the active side, and not the way from b1 to a2.
+    """Return whether the path from a1 to b2, and not that from b1 to a2, is on the active side.
 
-    If no point tells, it is so if that way is the wider one.
+    If no tangent point decides, the wider path is chosen.
+
+    Args:
+        a1: first candidate of the first end.
+        b1: second candidate of the first end.
+        a2: first candidate of the second end.
+        b2: second candidate of the second end.
+        wide: whether the path from a1 to b2 is the wider one.
+        axis: axis of the quadrant.
+        side: its sign.
     """
     a_active = on_side(a1, axis, side)
     if a_active != on_side(b1, axis, side):
@@ -167,11 +198,11 @@ def starts_at_a(
 
 
 def apex_between(first: Vector, second: Vector, radius: float, far: bool) -> Vector:
-    """The point of the cylinder over which the path bends.
+    """Return the point of the cylinder over which the path bends.
 
-    It is at the height of the point that divides the line between the ends as their distances from
-    the axis, and in the direction in which the plane through the ends and the axis at that height
-    cuts across the cylinder; on the far side of the axis if `far`.
+    It is at the height of the point that divides the segment in the ratio of the distances of the ends
+    from the axis, and in the direction in which the plane through the ends and the axis at that height
+    cuts the cylinder; on the far side of the axis if `far`.
     """
     px, py, pz = first
     qx, qy, qz = second
@@ -184,37 +215,48 @@ def apex_between(first: Vector, second: Vector, radius: float, far: bool) -> Vec
     return radius * ux, radius * uy, z
 
 
-def edge_height(point: Vector, own: float, end: Vector, normal: Vector) -> float:
-    """Height at which the edge of a tangent point meets a plane, or its own if that is nowhere near.
+def edge_height(point: Vector, end_height: float, end: Vector, normal: Vector) -> float:
+    """Return the height at which the edge of a tangent point intersects a plane, or `end_height` if it does not.
 
     Args:
-        point: of the edge, which is parallel to the axis.
-        own: height of the end that the point belongs to, m.
-        end: a point of the plane.
-        normal: to the plane, the zero vector if there is no plane.
+        point: point of the edge, which is parallel to the axis.
+        end_height: height of the end that the point belongs to (m).
+        end: point of the plane.
+        normal: normal of the plane, the zero vector if there is no plane.
     """
     nx, ny, nz = normal
     if abs(nz) < FLATTEST:
-        return own
+        return end_height
     dx, dy, _ = minus(end, point)
     _, _, height = end
     z = height + (dx * nx + dy * ny) / nz
-    return z if abs(z - own) <= FARTHEST else own
+    return z if abs(z - end_height) <= FARTHEST else end_height
 
 
 def helix(arc: float, rise: float) -> float:
-    """Length of a helix."""
+    """Return the length of a helix (m)."""
     return sqrt(arc * arc + rise * rise)
 
 
 def settled(
     first: Vector, second: Vector, one: Vector, two: Vector, arc: float, turn: float
 ) -> tuple[float, float]:
-    """Heights of the tangent points where the lines go over into the helix with almost no bend.
+    """Return the heights of the tangent points at which the lines continue as the helix with little bend.
 
-    OpenSim compares with the next point that it would draw, so that the result jumps where their
-    number changes. It asks for this only if a path has several PathWraps, and need not come to an
-    end.
+    OpenSim compares with the next point that it would draw, so that the result jumps where the number
+    of these points changes. It does this only if a path has several PathWraps, and without a guarantee
+    of convergence.
+
+    Args:
+        first: first end.
+        second: second end.
+        one: first tangent point.
+        two: second tangent point.
+        arc: length of the arc, seen along the axis (m).
+        turn: angle of the arc (rad).
+
+    Returns:
+        The heights of the first and second tangent point (m).
     """
     x1, y1, z1 = one
     x2, y2, z2 = two
@@ -243,11 +285,17 @@ def settled(
 
 
 def leg(end: Vector, tangent: Vector, next_point: Vector) -> tuple[float, float, float, float]:
-    """What stays as a tangent point slides along its edge.
+    """Compute what stays constant as a tangent point slides along its edge.
 
-    As seen along the axis, the lengths of the line to it and of the first piece of the helix; and
-    by how much the heights of the next point and of the end move it: 3/2 of the way to where its
-    edge is closest to their line.
+    Args:
+        end: end of the segment.
+        tangent: tangent point.
+        next_point: next point of the helix.
+
+    Returns:
+        Seen along the axis, the lengths of the line and of the first segment of the helix; then the
+        factors of the heights of the next point and of the end in the new height: 3/2 of the way to
+        where the edge is closest to their line.
     """
     lx, ly, _ = minus(tangent, end)
     nx, ny, _ = minus(next_point, tangent)
@@ -260,7 +308,14 @@ def leg(end: Vector, tangent: Vector, next_point: Vector) -> tuple[float, float,
 def moved(
     leg: tuple[float, float, float, float], end: float, tangent: float, next_point: float
 ) -> float:
-    """The next height of a tangent point from the three heights, the same if the path hardly bends there."""
+    """Return the next height of a tangent point, unchanged if the path hardly bends there.
+
+    Args:
+        leg: constants of the tangent point.
+        end: height of the end (m).
+        tangent: height of the tangent point (m).
+        next_point: height of the next point of the helix (m).
+    """
     line, piece, with_next, with_end = leg
     line_rise, piece_rise = tangent - end, next_point - tangent
     if abs(line * piece_rise - line_rise * piece) <= BEND * (line_rise * piece_rise + line * piece):

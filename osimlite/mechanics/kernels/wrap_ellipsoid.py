@@ -1,10 +1,10 @@
-"""How a path bends around an ellipsoid: in a plane through both ends and a point of the surface beside the chord.
+"""Wrapping of a path around an ellipsoid, in a plane through both ends and a point of the surface.
 
 The plane is not that of the shortest path. Its point is found beside the middle of the chord, or
-where the chord passes a plane of symmetry, or by a fan of the shortest ways out of the ellipsoid
-from points of the chord. The tangent points are searched for in it by damped least squares which
-stop at 1e-4, so that the path has little bends there, as in OpenSim. All is in units in which the
-mean radius is 1.
+where the chord crosses a plane of symmetry, or by a fan of the shortest ways out of the ellipsoid
+from points of the chord. The tangent points in the plane are found by damped least squares that
+stop at 1e-4, so that the path has small bends there, as in OpenSim. All lengths are in units of the
+mean radius.
 
 Source: OpenSim 4.6's WrapEllipsoid.
 """
@@ -54,23 +54,31 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 CLOSE = 1e-4
-"""How far in units of :func:`height` an end counts as on the surface; 1 - cosine between ends in one direction."""
-ALL_FAN, NO_FAN, BORDER = 0.7073, 0.9, 0.3
-"""Cosines of the angle between chord and axis at which the fan counts wholly and not at all; the
-part of the chord at either end in which it comes to count.
-"""
-PIECE, PIECES = 0.001, 499
-"""Length of the straight pieces that the path on the surface has in OpenSim (m), and how many it has at most."""
-EXACT, ROUNDS, TRIALS, STEPS = 1e-8, 50, 1000, 16.0
-"""Sum of squares at which the search for a tangent point ends, and after how many rounds; trials in
-each; the part of a step that is taken.
-"""
+"""Height at which an end counts as on the surface; also 1 - cosine of ends in one direction."""
+ALL_FAN = 0.7073
+"""Cosine of the angle between chord and axis up to which only the fan is used."""
+NO_FAN = 0.9
+"""Cosine from which on the fan is not used."""
+BORDER = 0.3
+"""Part of the chord at either end in which the fan is phased in."""
+PIECE = 0.001
+"""Length of the straight segments of the path on the surface in OpenSim (m)."""
+PIECES = 499
+"""Largest number of these segments."""
+EXACT = 1e-8
+"""Sum of squares at which the search for a tangent point ends."""
+ROUNDS = 50
+"""Largest number of rounds of this search."""
+TRIALS = 1000
+"""Largest number of trials in a round."""
+STEPS = 16.0
+"""Divisor of a step of this search."""
 
 
 def wrap_ellipsoid(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """The law of a WrapEllipsoid, see :mod:`osimlite.mechanics.kernels.wrapping`."""
+    """Bend a segment around a WrapEllipsoid, see :mod:`osimlite.mechanics.kernels.wrapping`."""
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     a, b, c = vector(p, SIZES)
     factor, axis, side = 3.0 / (a + b + c), int(p[AXIS]), p[SIDE]
@@ -124,20 +132,29 @@ def wrap_ellipsoid(
 
 
 def height(radii: Vector, point: Vector) -> float:
-    """(x/a)^2 + (y/b)^2 + (z/c)^2 - 1, negative inside."""
+    """Return (x/a)^2 + (y/b)^2 + (z/c)^2 - 1, negative inside."""
     x, y, z = point
     a, b, c = radii
     return (x / a) * (x / a) + (y / b) * (y / b) + (z / c) * (z / c) - 1.0
 
 
 def inverted(a: Vector) -> Vector:
-    """One by each component."""
+    """Return the reciprocal of each component."""
     x, y, z = a
     return 1.0 / x, 1.0 / y, 1.0 / z
 
 
 def crossings(radii: Vector, point: Vector, way: Vector) -> tuple[float, float]:
-    """The multiples of the way, the larger first, at which a line from a point meets the surface; NaN if nowhere."""
+    """Return the multiples of the direction, the larger first, at which a line intersects the surface.
+
+    Args:
+        radii: half axes.
+        point: point of the line.
+        way: direction of the line.
+
+    Returns:
+        Two multiples; NaN if the line misses the surface.
+    """
     way, point = elementwise(inverted(radii), way), elementwise(inverted(radii), point)
     a, b, c = dot(way, way), 2.0 * dot(way, point), dot(point, point) - 1.0
     square = b * b - 4.0 * a * c
@@ -149,7 +166,19 @@ def crossings(radii: Vector, point: Vector, way: Vector) -> tuple[float, float]:
 def support_point(
     method: float, radii: Vector, start: Vector, chord: Vector, way: Vector, room: Floats
 ) -> tuple[Vector, float, bool]:
-    """The point beside the chord that sets the plane, how far the fan sets it, whether tangent points start there."""
+    """Return the point of the surface that determines the plane.
+
+    Args:
+        method: HYBRID, MIDPOINT or AXIAL.
+        radii: half axes.
+        start: point where the chord enters.
+        chord: vector to the point where it leaves.
+        way: vector between the ends of the segment.
+        room: workspace of the fan.
+
+    Returns:
+        The point, the weight of the fan, and whether the search for tangent points starts there.
+    """
     middle = along(start, 0.5, chord)
     if method == MIDPOINT:
         return closest_point(radii, middle), 0.0, True
@@ -172,7 +201,7 @@ def support_point(
 
 
 def longest(a: Vector) -> int:
-    """The axis with the largest component, by amount."""
+    """Return the axis of the component with the largest absolute value."""
     x, y, z = a
     if abs(z) > max(abs(x), abs(y)):
         return 2
@@ -182,12 +211,19 @@ def longest(a: Vector) -> int:
 def tangent_point(
     radii: Vector, start: Vector, end: Vector, normal: Vector, offset: float
 ) -> Vector:
-    """The point of the surface in a plane whose tangent plane goes through an end, as it is found from a start on.
+    """Return the point of the surface in a plane whose tangent plane contains an end.
 
-    Four equations for the point r and a number d: r is in the plane and on the surface, and the end
-    and r are in the tangent plane n . x + d = 0 of r, n = (2 x / a a, 2 y / b b, 2 z / c c).
-    OpenSim solves them by Levenberg's and Marquardt's method in small steps, each of which is
-    repeated at double length as long as that helps.
+    Four equations determine the point r and a number d: r is in the plane and on the surface, and the
+    end and r are in the tangent plane n . x + d = 0 of r, n = (2 x / a a, 2 y / b b, 2 z / c c).
+    OpenSim solves them by the Levenberg-Marquardt method in small steps, each of which is repeated at
+    double length as long as that helps; the result depends on the start.
+
+    Args:
+        radii: half axes.
+        start: start of the search.
+        end: end of the segment.
+        normal: unit normal of the plane.
+        offset: offset of the plane along it.
     """
     weights = inverted(elementwise(radii, radii))
     by_end = times(2.0, elementwise(weights, end))
@@ -230,7 +266,11 @@ def tangent_point(
 def misfits(
     weights: Vector, by_end: Vector, normal: Vector, offset: float, r: Vector, d: float
 ) -> tuple[float, float, float, float]:
-    """What is left of the four equations."""
+    """Return the residuals of the four equations of `tangent_point`.
+
+    Returns:
+        Four residuals.
+    """
     square = dot(elementwise(weights, r), r)
     return dot(normal, r) - offset, square - 1.0, 2.0 * square + d, dot(by_end, r) + d
 
@@ -238,10 +278,21 @@ def misfits(
 def damped_step(
     normal: Vector, n: Vector, by_end: Vector, downhill: Vector, d_downhill: float, damping: float
 ) -> tuple[Vector, float]:
-    """The step of r and d: (J' J + damping D) step = downhill, where D is the diagonal of J' J.
+    """Solve (J' J + damping D) step = downhill for the step of r and d, where D is the diagonal of J' J.
 
-    The gradients of the four equations by r are the normal, n, 2 n and `by_end`, those by d are 0,
-    0, 1, 1.
+    The gradients of the four equations by r are the normal, n, 2 n and `by_end`; those by d are 0, 0,
+    1, 1.
+
+    Args:
+        normal: unit normal of the plane.
+        n: normal of the surface.
+        by_end: gradient of the fourth equation.
+        downhill: negative gradient by r.
+        d_downhill: negative gradient by d.
+        damping: damping factor.
+
+    Returns:
+        The steps of r and d.
     """
     px, py, pz = normal
     nx, ny, nz = n
@@ -266,19 +317,22 @@ def damped_step(
 def curve(
     radii: Vector, one: Vector, two: Vector, normal: Vector, offset: float, pieces: int, far: bool
 ) -> tuple[float, Vector, Vector]:
-    """Length of a broken line on the surface, in a plane, and its points next to the two that it joins.
+    """Compute the length of a polyline on the surface in a plane.
 
-    Its corners are at equal angles about the point where the plane meets the axis to which it is
-    most normal.
+    Its corners are at equal angles about the point where the plane meets the axis that is closest to
+    its normal.
 
     Args:
-        radii: of the ellipsoid.
-        one: where it starts.
-        two: where it ends.
+        radii: half axes.
+        one: first point.
+        two: last point.
         normal: unit normal n of the plane n . x = offset.
-        offset: of the plane.
-        pieces: of which it is made.
-        far: whether it goes the longer way around.
+        offset: offset of the plane.
+        pieces: number of segments.
+        far: whether the polyline takes the longer way.
+
+    Returns:
+        The length, and the corners next to the first and the last point.
     """
     centre, a, b, angle = around_axis(one, two, normal, offset)
     to_one, to_two = minus(one, centre), minus(two, centre)
@@ -308,10 +362,19 @@ def curve(
 def around_axis(
     one: Vector, two: Vector, normal: Vector, offset: float
 ) -> tuple[Vector, Vector, Vector, float]:
-    """Where a plane meets the axis to which it is most normal, and how two points of it lie about that.
+    """Return polar coordinates of two points of a plane, about its intersection with an axis.
 
-    By unit vectors from there to the first and, square to that, towards the second, and by the
-    angle between them.
+    The axis is the one closest to the normal of the plane.
+
+    Args:
+        one: first point.
+        two: second point.
+        normal: unit normal of the plane.
+        offset: offset of the plane.
+
+    Returns:
+        The intersection, unit vectors to the first point and, perpendicular to that, towards the
+        second, and the angle between the points.
     """
     axis = longest(normal)
     across = component(normal, axis)
@@ -322,5 +385,5 @@ def around_axis(
 
 
 def bends_back(end: Vector, tangent: Vector, next_point: Vector) -> bool:
-    """Whether a path on the surface sets out towards the end that it comes from."""
+    """Return whether a path on the surface starts towards the end that it comes from."""
     return dot(minus(end, tangent), minus(next_point, tangent)) > 0.0

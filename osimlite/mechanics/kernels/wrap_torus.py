@@ -1,7 +1,7 @@
-"""How a path bends through the hole of a torus: as around a cylinder in the place of the ring where that is near.
+"""Wrapping of a path through the hole of a torus, as around a cylinder at the nearest part of its ring.
 
-Source: OpenSim 4.6's WrapTorus. What it minimises there is not quite the distance from the ring,
-and it stops early; so the place is found with its very steps, those of MINPACK's lmdif (J. J. More,
+Source: OpenSim 4.6's WrapTorus. Its objective is not exactly the distance from the ring, and it stops
+early. The position is therefore found with the same steps, those of MINPACK's lmdif (J. J. More,
 The Levenberg-Marquardt algorithm: implementation and theory, 1978) in one unknown.
 """
 
@@ -40,18 +40,23 @@ from osimlite.mechanics.laws.vectors import (
 )
 
 LENGTH = 10_000.0
-"""Length of the cylinder that stands for the torus where the path touches it, m."""
-TOLERANCE, FIRST_RADIUS, EVALUATIONS = 1e-4, 0.2, 500
-"""Arguments of MINPACK's lmdif as OpenSim gives them: tolerance, factor of the first trust region, evaluations."""
+"""Length of the cylinder that replaces the torus where the path touches it (m)."""
+TOLERANCE = 1e-4
+"""Tolerance that OpenSim passes to MINPACK's lmdif."""
+FIRST_RADIUS = 0.2
+"""Factor of the first trust region that OpenSim passes to lmdif."""
+EVALUATIONS = 500
+"""Largest number of evaluations that OpenSim passes to lmdif."""
 WORTHWHILE = 1e-4
-"""Part of the expected decrease that a step must bring."""
+"""Part of the predicted decrease that an accepted step must achieve."""
 STEP = 1e-5
 """Step of the forward differences in the Jacobian, m."""
 DOWN = (0.0, 0.0, -1.0)
+"""Direction of the y axis of the cylinder."""
 
 
 def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """The law of a WrapTorus about z, see :mod:`osimlite.mechanics.kernels.wrapping`; a piece never must wrap."""
+    """Bend a segment around a WrapTorus about z; a segment never must wrap."""
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second, ring = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES + 1]
     one, two = near_ring(first, second, ring), near_ring(second, first, ring)
@@ -79,7 +84,7 @@ def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
 
 
 def in_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
-    """A point in the frame of the cylinder that is in the place of the ring where a direction meets it.
+    """Return a point in the frame of the cylinder at the ring in a direction.
 
     Its x axis points to the middle of the torus, its y axis down, its z axis along the ring.
     """
@@ -88,20 +93,20 @@ def in_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
 
 
 def out_of_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
-    """A point of the frame of the cylinder in that of the torus."""
+    """Return a point of the frame of the cylinder in the frame of the torus."""
     x, y, z = point
     inwards = times(-1.0, outwards)
     return along(along(along(times(ring, outwards), x, inwards), y, DOWN), z, cross(inwards, DOWN))
 
 
 def distance_from_ring(point: Vector, ring: float) -> float:
-    """Squared distance of a point from the ring."""
+    """Return the squared distance of a point from the ring (m²)."""
     x, y, _ = point
     return dot(point, point) + ring * ring - 2.0 * ring * sqrt(x * x + y * y)
 
 
 def near_ring(first: Vector, second: Vector, ring: float) -> Vector:
-    """The point of a line near to the ring, as it is found from the first end on."""
+    """Return a point of a line near the ring, as found from the first end."""
     dx, dy, dz = minus(second, first)
     distance = norm((dx, dy, dz))
     if not distance > 0.0:
@@ -120,9 +125,17 @@ def near_ring(first: Vector, second: Vector, ring: float) -> Vector:
 def residual(
     u: float, start: float, flat_start: float, flat: float, square: float, ring: float
 ) -> float:
-    """What is to be zero at the nearest point, u from the first end: the slope of the squared distance from the ring.
+    """Return the slope of OpenSim's objective at a distance u from the first end, which is to vanish.
 
-    OpenSim's second term is twice as large as that.
+    The second term is twice as large as in the slope of the squared distance from the ring.
+
+    Args:
+        u: distance along the line from the first end (m).
+        start: scalar product of first end and direction (m).
+        flat_start: the same in the plane of the ring (m).
+        flat: squared component of the direction in the plane of the ring.
+        square: squared distance of the first end from the axis (m²).
+        ring: radius of the ring (m).
     """
     apart = u * u * flat + 2.0 * flat_start * u + square
     if not apart > 0.0:
@@ -133,7 +146,10 @@ def residual(
 def least_squares(
     start: float, flat_start: float, flat: float, square: float, ring: float
 ) -> float:
-    """Where the residual is smallest as lmdif finds it, from 0 on."""
+    """Return the distance u that minimizes the squared residual, with lmdif's steps from 0.
+
+    The arguments are those of `compute_residual`.
+    """
     u = damping = scale = 0.0
     value, radius, moved, evaluations = (
         residual(u, start, flat_start, flat, square, ring),
@@ -181,9 +197,17 @@ def least_squares(
 def damped_step(
     slope: float, value: float, scale: float, radius: float, damping: float
 ) -> tuple[float, float]:
-    """A step that is hardly longer than a radius in units of 1 / scale, and the damping that makes it so.
+    """Return a step that is hardly longer than the trust region, as MINPACK's lmpar does.
 
-    MINPACK's lmpar, where neither slope nor value is zero.
+    Args:
+        slope: derivative of the residual, not zero.
+        value: residual, not zero.
+        scale: scale of the step.
+        radius: radius of the trust region in units of 1 / scale.
+        damping: previous damping.
+
+    Returns:
+        The step and its damping.
     """
     step = -value / slope
     over = abs(scale * step) - radius

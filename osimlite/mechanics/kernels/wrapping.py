@@ -1,19 +1,16 @@
-"""What the laws of wrap surfaces are given and say: see `wrap_cylinder.py` and its neighbours.
+"""Interface of the laws of wrap surfaces, what they share, and the law of a sphere.
 
-A surface of a path is an item, whose law finds how a straight piece of the path bends around it.
-All points are in the frame of the wrap object, in m. The numbers p of the item do not change:
-p[AXIS] is the axis (0, 1, 2) of the quadrant and p[SIDE] its sign, 0.0 for all of the surface;
-p[METHOD] is how an ellipsoid is wrapped, p[ALONE] is 1.0 if the path has no other PathWrap, and
-from p[SIZES] on stand the dimensions (cylinder: radius, length; sphere: radius; ellipsoid: three
-radii; torus: inner_radius, outer_radius). The record e of the item has the ends of the piece e[0:3]
-and e[3:6], to which the law adds the tangent points e[6:9] and e[9:12], in the same order, the
-length e[12] along the surface between them, and in e[CURVE:ROOM] what `wrap_curves.py` needs to
-trace the way there; the rest, up to ENDS, is room of the law's own.
+A surface of a path is an item, whose law finds how a straight segment of the path bends around it.
+All points are in the frame of the wrap object, in m. The numbers p of the item are constant; its
+record e holds the ends of the segment, to which the law adds two tangent points, the length on the
+surface between them, and numbers that `wrap_curves` needs to trace the curve.
 
-A law returns INSIDE if an end is inside the surface, NONE if the piece goes straight on, WRAPPED if
-it may wrap, and MANDATORY if it must; what it leaves in e counts in the last two cases only. Where
-OpenSim takes a piece to wrap but then finds no points, the tangent points are NaN: such a piece
-goes straight on.
+A law returns INSIDE, NONE, WRAPPED or MANDATORY; its results in e count in the last two cases only.
+Where OpenSim wraps a segment but then finds no points, the tangent points are NaN: such a segment
+stays straight.
+
+A path wraps around a sphere along the great circle in the plane of both ends and the centre.
+Source: OpenSim 4.6's WrapSphere.
 """
 
 from __future__ import annotations
@@ -37,32 +34,66 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-AXIS, SIDE, METHOD, ALONE, SIZES = 0, 1, 2, 3, 4
-HYBRID, MIDPOINT, AXIAL = 0.0, 1.0, 2.0
+AXIS = 0
+"""Index in the numbers of the axis of the quadrant, 0, 1 or 2."""
+SIDE = 1
+"""Index of the sign of the quadrant, 0.0 for the complete surface."""
+METHOD = 2
+"""Index of the method of an ellipsoid, such as HYBRID."""
+ALONE = 3
+"""Index of 1.0 if the path has no other PathWrap, else 0.0."""
+SIZES = 4
+"""Offset of the dimensions (m).
 
-FIRST_END, SECOND_END, FIRST_TANGENT, SECOND_TANGENT, SURFACE_LENGTH, CURVE, ROOM, ENDS = (
-    0,
-    3,
-    6,
-    9,
-    12,
-    13,
-    18,
-    98,
-)
+Cylinder: radius, length; sphere: radius; ellipsoid: three radii; torus: inner and outer radius.
+"""
+HYBRID = 0.0
+"""Method of an ellipsoid: a blend of axial point and fan, OpenSim's default."""
+MIDPOINT = 1.0
+"""Method of an ellipsoid: the point closest to the middle of the chord."""
+AXIAL = 2.0
+"""Method of an ellipsoid: the point where the chord crosses a plane of symmetry."""
 
-INSIDE, NONE, WRAPPED, MANDATORY = -1, 0, 1, 2
+FIRST_END = 0
+"""Offset in the record of the first end of the segment (m)."""
+SECOND_END = 3
+"""Offset of the second end of the segment (m)."""
+FIRST_TANGENT = 6
+"""Offset of the tangent point next to the first end (m)."""
+SECOND_TANGENT = 9
+"""Offset of the tangent point next to the second end (m)."""
+SURFACE_LENGTH = 12
+"""Index of the length on the surface between the tangent points (m)."""
+CURVE = 13
+"""Offset of the numbers that trace the curve between the tangent points."""
+ROOM = 18
+"""Offset of workspace of the law."""
+ENDS = 98
+"""End of the record of the law."""
+
+INSIDE = -1
+"""Result of a law: an end of the segment is inside the surface."""
+NONE = 0
+"""Result of a law: the segment stays straight."""
+WRAPPED = 1
+"""Result of a law: the segment may wrap."""
+MANDATORY = 2
+"""Result of a law: the segment must wrap."""
 
 
 def on_side(point: Vector, axis: int, side: float) -> bool:
-    """Whether a point is on the active side, to which points between the sides belong if it is the positive one."""
+    """Return whether a point is on the active side; points between the sides belong to the positive one."""
     return (component(point, axis) >= 0.0) == (side > 0.0)
 
 
 def action(first: bool, second: bool, closest: bool, crosses: bool) -> int:
-    """What becomes of a piece of a path, by what is on the active side: its ends, and its point closest to the middle.
+    """Return whether a segment wraps, from which of its points are on the active side.
 
-    `crosses` tells whether it goes through the surface.
+    Args:
+        first: whether the first end is on the active side.
+        second: whether the second end is.
+        closest: whether the point of the segment that is closest to the middle of the surface is.
+        crosses: whether the segment passes through the surface.
     """
     if not (first or second):
         return WRAPPED
@@ -72,7 +103,16 @@ def action(first: bool, second: bool, closest: bool, crosses: bool) -> int:
 
 
 def tangents(point: Vector, radius: float, axis: Vector) -> tuple[Vector, Vector]:
-    """Where the two lines from a point touch a circle about the origin, whose unit axis is normal to the point."""
+    """Return the two tangent points of a circle about the origin, seen from a point of its plane.
+
+    Args:
+        point: point outside of the circle.
+        radius: radius of the circle.
+        axis: unit normal of its plane.
+
+    Returns:
+        The tangent points to the left and to the right about the axis.
+    """
     distance = norm(point)
     sine = radius / distance
     foot, across = times(sine * sine, point), cross(axis, point)
@@ -81,7 +121,17 @@ def tangents(point: Vector, radius: float, axis: Vector) -> tuple[Vector, Vector
 
 
 def nearest_pair(a1: Vector, b1: Vector, a2: Vector, b2: Vector) -> tuple[Vector, Vector]:
-    """Of points on one circle, two for each end, those two that are nearest to each other."""
+    """Return the two points of a circle, of two candidates for each end, that are nearest to each other.
+
+    Args:
+        a1: first candidate of the first end.
+        b1: second candidate of the first end.
+        a2: first candidate of the second end.
+        b2: second candidate of the second end.
+
+    Returns:
+        The points of the first and of the second end.
+    """
     aa, ab, ba, bb = dot(a1, a2), dot(a1, b2), dot(b1, a2), dot(b1, b2)
     if aa > ab and aa > ba and aa > bb:
         return a1, a2
@@ -93,7 +143,7 @@ def nearest_pair(a1: Vector, b1: Vector, a2: Vector, b2: Vector) -> tuple[Vector
 
 
 def nowhere(e: Floats, code: int) -> int:
-    """The code, with tangent points that are none: OpenSim finds nothing, and the piece goes straight on."""
+    """Return a code after setting the tangent points to NaN, where OpenSim finds none."""
     put(e, FIRST_TANGENT, (nan, nan, nan))
     put(e, SECOND_TANGENT, (nan, nan, nan))
     e[SURFACE_LENGTH] = nan
@@ -101,15 +151,15 @@ def nowhere(e: Floats, code: int) -> int:
 
 
 STRAIGHT = 1e-5
-"""Sine of the angle between the line and the direction of the centre below which OpenSim finds no plane."""
+"""Sine of the angle between segment and centre below which OpenSim finds no plane."""
 
 
 def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """The law of a WrapSphere, see :mod:`osimlite.mechanics.kernels.wrapping`.
+    """Bend a segment around a WrapSphere.
 
-    As in OpenSim a line through the centre goes straight on, a length on the far side of the sphere
-    is negative, and where a side is active a line must wrap only if its first end is less than 1 m
-    from the middle of it.
+    As in OpenSim, a segment through the centre stays straight, and a length on the far side of the
+    sphere is negative. Where a side is active, a segment must wrap only if its first end is less
+    than 1 m from the point of the line that is closest to the centre.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second, radius = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES]
@@ -144,7 +194,7 @@ def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
 
 
 def crosses(first: Vector, second: Vector, radius: float) -> bool:
-    """Whether a line enters and leaves a sphere between its ends."""
+    """Return whether a segment enters and leaves a sphere between its ends."""
     way = minus(first, second)
     a, b, c = dot(way, way), 2.0 * dot(second, way), dot(second, second) - radius * radius
     discriminant = b * b - 4.0 * a * c
@@ -164,7 +214,21 @@ def pair_on_side(
     axis: int,
     side: float,
 ) -> tuple[Vector, Vector, bool]:
-    """The tangent points of the two ends on the active side, and whether the way between them is the longer one."""
+    """Return the tangent points of both ends on the active side.
+
+    Args:
+        first: first end.
+        second: second end.
+        a1: first candidate of the first end.
+        b1: second candidate of the first end.
+        a2: first candidate of the second end.
+        b2: second candidate of the second end.
+        axis: axis of the quadrant.
+        side: its sign.
+
+    Returns:
+        The points of the first and second end, and whether the arc between them is the longer one.
+    """
     to_centre = plus(first, second)
     a1_nearer, a2_nearer = (
         dot(a1, to_centre) < dot(b1, to_centre),
