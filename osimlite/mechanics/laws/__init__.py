@@ -1,6 +1,6 @@
-"""The force laws: plain functions of floats, each in the symbols of the literature.
+"""Force laws: pure functions of floats, in the symbols of the literature.
 
-No law imports anything but `math` and other laws, and none keeps anything between calls; so an
-interpreted engine calls them as they are and a compiler may take each function with the few that it
-calls. Numbers that go together are a named tuple.
+A law imports only `math` and other laws, and keeps nothing between calls. An interpreted engine
+calls laws as they are, and a compiler needs each function and the few that it calls only. Parameters
+that belong together are named tuples.
 """

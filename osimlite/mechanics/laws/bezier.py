@@ -1,11 +1,11 @@
-"""Smooth curves of quintic Bezier sections, as OpenSim's SmoothSegmentedFunction has them; straight lines outside.
+"""Smooth curves of quintic Bezier sections, as in OpenSim's SmoothSegmentedFunction; linear outside.
 
-A section is a corner: it leaves its first end along one line and reaches its second along another,
-and the more curvy it is, the nearer it comes to where the lines meet (M. Millard et al., Journal of
-Biomechanical Engineering 135, 2013, appendix A). Along it, x and y are polynomials in u, from 0 to
-1.
+A section is a corner: it leaves its first end along one line and reaches its last end along
+another; the greater its curviness, the nearer it comes to the intersection of the lines (M. Millard
+et al., Journal of Biomechanical Engineering 135, 2013, appendix A). Along it, x and y are
+polynomials in u, from 0 to 1. To evaluate y at x, u is found by Halley's method.
 
-A curve is numbers, for `curve_value`: HEAD of all, where each section ends, and SECTION of each.
+A curve is an array of numbers: HEAD of all, the end of each section, and SECTION of each section.
 """
 
 from __future__ import annotations
@@ -17,31 +17,49 @@ from math import hypot
 from osimlite.mechanics.laws.dual_numbers import plain, settled
 
 Point = tuple[float, float, float]
-"""x, y, and the slope there."""
+"""A point of a curve: x, y, and the slope there."""
 Numbers = tuple[float, ...]
-"""Those of a curve."""
+"""Numbers of a curve."""
 
-SECTIONS, FIRST, LAST = 0, 1, 4
+SECTIONS = 0
+"""Index in a curve of the number of its sections."""
+FIRST = 1
+"""Offset of the first end, a `Point`."""
+LAST = 4
+"""Offset of the last end, a `Point`."""
 HEAD = 7
-"""Count of the sections, and both ends, each as a `Point`."""
-START, SCALE, X, Y, STARTS = 0, 1, 2, 7, 13
+"""Length of the head of a curve."""
+START = 0
+"""Index in a section of x at its first end."""
+SCALE = 1
+"""Index of NODES over its width."""
+X = 2
+"""Offset of the coefficients of x from the power 1 on."""
+Y = 7
+"""Offset of the coefficients of y from the power 0 on."""
+STARTS = 13
+"""Offset of the start values of u: at NODES + 1 equidistant x, u and its increment to the next."""
 NODES = 64
+"""Number of intervals of a section with a start value of u."""
 SECTION = STARTS + 2 * (NODES + 1)
-"""x at its first end, NODES over its width, the coefficients of x from u on and those of y, and at
-NODES + 1 places that are equally far from each other in x, where u is, and how far it would go up
-to the next at its rate there.
-"""
-ROUNDS, NEAR = 20, 3e-6
-"""Halley's steps in the search for u; one that is so small is the last, since what it leaves is beyond rounding."""
+"""Length of a section."""
+ROUNDS = 20
+"""Largest number of steps of Halley's method."""
+NEAR = 3e-6
+"""Step after which the search ends, since the remaining error is below rounding."""
 
 
 def curve_size(sections: int) -> int:
-    """How many numbers a curve of some sections has."""
+    """Return the length of a curve of `sections` sections."""
     return HEAD + (1 + SECTION) * sections
 
 
 def curve(points: Sequence[Point], curviness: Sequence[float]) -> Numbers:
-    """The numbers of a curve through points, with the curviness of the sections between them, each from 0 to 1.
+    """Return the numbers of a curve through points.
+
+    Args:
+        points: points of the curve.
+        curviness: curviness of the sections between them, each from 0 to 1.
 
     Raises:
         ValueError: the lines through two points do not meet in a corner between them.
@@ -59,7 +77,7 @@ def curve(points: Sequence[Point], curviness: Sequence[float]) -> Numbers:
 
 @lru_cache(maxsize=1024)
 def _section(first: Point, last: Point, curviness: float) -> Numbers:
-    """The numbers of a section."""
+    """Return the numbers of a section."""
     (x0, y0, slope0), (x1, y1, slope1) = first, last
     if not 0.0 <= curviness <= 1.0:
         raise ValueError("its curviness is not from 0 to 1")
@@ -79,12 +97,12 @@ def _section(first: Point, last: Point, curviness: float) -> Numbers:
 
 
 def _polynomial(p: float, q: float, r: float, s: float) -> tuple[float, ...]:
-    """Coefficients, by rising powers, for the control points p, q, q, r, r, s."""
+    """Return coefficients, by rising powers, for the control points p, q, q, r, r, s."""
     return p, 5 * (q - p), 10 * (p - q), 10 * (r - p), 5 * (p + 2 * q - 3 * r), s - p + 5 * (r - q)
 
 
 def _starts(x: Sequence[float], width: float) -> list[float]:
-    """From where the search for u starts; it need not be exact."""
+    """Return the start values of the search for u; they need not be exact."""
     result: list[float] = []
     u = step = 0.0
     for node in range(NODES + 1):
@@ -113,7 +131,11 @@ def _derivative(x: Sequence[float], u: float) -> float:
 
 
 def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
-    """y and the slope of a curve; where x carries derivatives, y does, by the slope."""
+    """Return y and slope of a curve; if x carries derivatives, so does y.
+
+    Returns:
+        y and slope.
+    """
     if not x >= c[FIRST]:
         return c[FIRST + 1] + c[FIRST + 2] * (x - c[FIRST]), c[FIRST + 2]
     if x > c[LAST]:
@@ -125,7 +147,15 @@ def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
 
 
 def first_place(c: Sequence[float], x: float) -> tuple[int, float, float]:
-    """The section of a curve that has x, by the place of its numbers, how far x is from its start, and u, nearly."""
+    """Find the section that contains x, and a start value of u.
+
+    Args:
+        c: numbers of the curve.
+        x: argument within the curve.
+
+    Returns:
+        Offset of the section, distance of x from its start, and the start value of u.
+    """
     count, number = int(c[SECTIONS]), 0
     while number < count - 1 and x >= c[HEAD + number]:
         number += 1
@@ -145,15 +175,18 @@ def first_place(c: Sequence[float], x: float) -> tuple[int, float, float]:
 def on_section(
     c: Sequence[float], p: int, apart: int, u: float, rest: float, rounds: int
 ) -> tuple[float, bool, float, float]:
-    """u after some steps of Halley's search for the only root, whether more are wanted, and y and the slope there.
+    """Find u on a section by Halley's method, and evaluate y there.
 
     Args:
-        c: where the coefficients of x and y are.
-        p: place of the first of these.
-        apart: how far the others are from one another.
-        u: where the search starts.
-        rest: how far x is from the start of the section.
-        rounds: steps at most.
+        c: array that contains the coefficients of x and y.
+        p: offset of the first coefficient.
+        apart: distance between coefficients.
+        u: start of the search.
+        rest: distance of x from the start of the section.
+        rounds: largest number of steps.
+
+    Returns:
+        u, whether more steps are necessary, y and slope.
     """
     goes_on = True
     for _ in range(rounds):
@@ -167,7 +200,11 @@ def on_section(
 def nearer_place(
     c: Sequence[float], p: int, apart: int, u: float, rest: float
 ) -> tuple[float, bool]:
-    """u after a step, and whether more are wanted; the arguments are those of `on_section`."""
+    """Take one step of Halley's method; the arguments are those of `search_section`.
+
+    Returns:
+        u, and whether more steps are necessary.
+    """
     a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     # In halves, which a processor computes side by side.
     v = u * u
@@ -182,7 +219,11 @@ def nearer_place(
 
 
 def value_at(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, float]:
-    """y and the slope at u; the arguments are those of `on_section`."""
+    """Return y and slope at u; the arguments are those of `search_section`.
+
+    Returns:
+        y and slope.
+    """
     a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     v, q = u * u, p + 5 * apart
     g, h, i, j, k, m = (
@@ -199,17 +240,26 @@ def value_at(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, f
 
 
 def missed(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> float:
-    """How far u is from the root; the arguments are those of `on_section`."""
+    """Return the residual of the search; the arguments are those of `search_section`."""
     a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     v = u * u
     return u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
 
 
 def value_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tuple[float, float]:
-    """y of a curve where ``of_y * y + of_x * x`` is a total, and how far the sum is from that.
+    """Find y of a curve where ``of_y * y + of_x * x`` has a total.
 
-    On a section the sum is a polynomial in u, too, which rises with a rising curve and positive
-    factors.
+    On a section the sum is a polynomial in u, too, which is increasing for an increasing curve and
+    positive factors.
+
+    Args:
+        c: numbers of the curve.
+        of_y: factor of y.
+        of_x: factor of x.
+        total: value of the sum.
+
+    Returns:
+        y, and the residual of the sum.
     """
     end = end_of_sum(c, of_y, of_x, total)
     if end > 0:
@@ -234,14 +284,14 @@ def value_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> 
 
 
 def end_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> int:
-    """The end of a curve that a sum is beyond, FIRST or LAST; 0 if neither."""
+    """Return the end of a curve that a sum is beyond, FIRST or LAST; 0 if neither."""
     if not total >= of_y * c[FIRST + 1] + of_x * c[FIRST]:
         return FIRST
     return LAST if total > of_y * c[LAST + 1] + of_x * c[LAST] else 0
 
 
 def beyond_sum(c: Sequence[float], of_y: float, of_x: float, total: float, end: int) -> float:
-    """y beyond an end of a curve."""
+    """Return y beyond an end of a curve, where a sum has a total."""
     x, y, slope = c[end], c[end + 1], c[end + 2]
     return y + slope * ((total - (of_y * y + of_x * x)) / (of_y * slope + of_x))
 
@@ -249,7 +299,11 @@ def beyond_sum(c: Sequence[float], of_y: float, of_x: float, total: float, end: 
 def first_place_of_sum(
     c: Sequence[float], of_y: float, of_x: float, total: float
 ) -> tuple[int, float, float]:
-    """As `first_place` of a sum: its section, how far it is from what it is at its start, and u, roughly."""
+    """Find the section that contains a sum, and a rough start value of u.
+
+    Returns:
+        Offset of the section, difference of the sum from its value at the start, and u.
+    """
     count, number = int(c[SECTIONS]), 0
     k = HEAD + count
     start = of_y * c[k + Y] + of_x * c[k + START]
@@ -265,7 +319,10 @@ def first_place_of_sum(
 
 
 def curve_integral(c: Sequence[float], x: float) -> float:
-    """Integral of a curve from its first end to x; exact, while OpenSim's is a spline good to about 1e-9."""
+    """Return the integral of a curve from its first end to x.
+
+    It is exact, while OpenSim's is a spline with an error of about 1e-9.
+    """
     total, off = 0.0, x - c[FIRST]
     if off <= 0.0:
         return (c[FIRST + 1] + 0.5 * c[FIRST + 2] * off) * off
@@ -279,7 +336,7 @@ def curve_integral(c: Sequence[float], x: float) -> float:
 
 
 def _area(c: Sequence[float], k: int, u: float) -> float:
-    """Integral of y over x of a section up to u."""
+    """Return the integral of y over x of a section up to u."""
     x, y = c[k + X : k + Y], c[k + Y : k + STARTS]
     return sum(
         b * j * a * u ** (i + j) / (i + j) for i, b in enumerate(y) for j, a in enumerate(x, 1)

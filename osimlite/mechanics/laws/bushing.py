@@ -15,12 +15,21 @@ from math import atan2, cos, sin, sqrt
 def xyz_angles(
     R00: float, R01: float, R02: float, R10: float, R11: float, R12: float, R22: float
 ) -> tuple[float, float, float]:
-    """Body-fixed X-Y-Z angles (a, b, c) of a rotation, in rad; -pi/2 <= b <= pi/2.
+    """Return the body-fixed X-Y-Z angles (a, b, c) of a rotation (rad), with -pi/2 <= b <= pi/2.
 
-    Where b is a right angle, a and c turn about one axis; all of the turning is then in a.
+    Where b is a right angle, a and c turn about the same axis; then c = 0.
 
     Args:
-        R00: entry of the rotation matrix in the row and the column of these numbers.
+        R00: entry of the rotation matrix in row 0 and column 0.
+        R01: entry in row 0 and column 1.
+        R02: entry in row 0 and column 2.
+        R10: entry in row 1 and column 0.
+        R11: entry in row 1 and column 1.
+        R12: entry in row 1 and column 2.
+        R22: entry in row 2 and column 2.
+
+    Returns:
+        (a, b, c).
     """
     cosine = sqrt(0.5 * (R00 * R00 + R01 * R01 + R12 * R12 + R22 * R22))
     b = atan2(R02, cosine)
@@ -30,46 +39,56 @@ def xyz_angles(
 
 
 def xyz_rates(b: float, c: float, wx: float, wy: float, wz: float) -> tuple[float, float, float]:
-    """Rates of the angles, in rad/s; not finite where cos b = 0.
+    """Return the rates of the angles (rad/s), not finite where cos b = 0.
 
     Args:
-        b: second angle, rad.
-        c: third angle, rad.
-        wx: angular velocity (wx, wy, wz) of M in F, along the axes of M, rad/s.
+        b: second angle (rad).
+        c: third angle (rad).
+        wx: x component of the angular velocity of M in F, along the axes of M (rad/s).
+        wy: y component.
+        wz: z component.
+
+    Returns:
+        Rates of a, b and c.
     """
     first = (cos(c) * wx - sin(c) * wy) / cos(b)
     return first, sin(c) * wx + cos(c) * wy, wz - sin(b) * first
 
 
 def xyz_moment(b: float, c: float, fa: float, fb: float, fc: float) -> tuple[float, float, float]:
-    """Moment (x, y, z) on M along its axes, in N.m.
+    """Return the moment on M along its axes (N m).
 
     Args:
-        b: second angle, rad.
-        c: third angle, rad.
-        fa: generalized forces (fa, fb, fc) on the angles, N.m.
+        b: second angle (rad).
+        c: third angle (rad).
+        fa: generalized force on a (N m).
+        fb: generalized force on b (N m).
+        fc: generalized force on c (N m).
+
+    Returns:
+        Components x, y and z.
     """
     across = (fa - sin(b) * fc) / cos(b)
     return cos(c) * across + sin(c) * fb, cos(c) * fb - sin(c) * across, fc
 
 
 def bushing_load(x: float, v: float, k: float, c: float) -> float:
-    """Force -k x - c v of one of the six spring-dampers on M, in N.m (N).
+    """Return the force -k x - c v of one of the six spring-dampers on M, in N m (N).
 
     Args:
         x: deviation, rad (m).
-        v: its rate, rad/s (m/s).
-        k: stiffness, N.m/rad (N/m).
-        c: damping, N.m/(rad/s) (N/(m/s)).
+        v: rate of the deviation, rad/s (m/s).
+        k: stiffness, N m/rad (N/m).
+        c: damping, N m/(rad/s) (N/(m/s)).
     """
     return -k * x - c * v
 
 
 def bushing_dissipation(v: float, c: float) -> float:
-    """Power that one of the six dampers takes up, in W.
+    """Return the power c v^2 that one of the six dampers dissipates (W).
 
     Args:
         v: rate of its deviation, rad/s (m/s).
-        c: damping, N.m/(rad/s) (N/(m/s)).
+        c: damping, N m/(rad/s) (N/(m/s)).
     """
     return c * v * v

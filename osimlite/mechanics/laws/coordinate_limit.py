@@ -1,9 +1,9 @@
-"""Coordinate limit force: a spring and damper that act once a coordinate has left its limits.
+"""Coordinate limit force: a spring and a damper that act beyond the limits of a coordinate.
 
-Stiffness and damping grow from nothing at the limit to their full value a transition zone beyond
-it, along the quintic S(x) = 10 x^3 - 15 x^4 + 6 x^5. q is the coordinate, u its speed, Q the
+Stiffness and damping grow from zero at the limit to their full value a transition zone beyond it,
+along the quintic S(x) = 10 x^3 - 15 x^4 + 6 x^5. q is the coordinate, u its speed, Q the
 generalized force on it. Source of the formulas: OpenSim's CoordinateLimitForce and Simbody's step
-function; energy by integration of the spring force.
+function; the energy is the integral of the spring force.
 """
 
 from __future__ import annotations
@@ -20,16 +20,20 @@ def limit_constants(
     transition: float,
     rotational: bool,
 ) -> tuple[float, float, float, float, float, float]:
-    """Constants of the law in SI units, computed once per force from the properties as a file states them.
+    """Return the parameters of the law in SI units from the properties in a file.
 
-    Args: upper_stiffness: N.m/deg for a rotational coordinate, else N/m (N.m/rad for a coupled
-        one). upper_limit: deg, else m (rad). lower_stiffness: as upper_stiffness. lower_limit: as
-        upper_limit. damping: N.m/(deg/s), else N/(m/s) (N.m/(rad/s)). transition: width of the
-        transition zone, deg, else m (rad). rotational: whether the motion type of the coordinate is
-        Rotational; Translational and Coupled are not converted.
+    Args:
+        upper_stiffness: N m/deg for a rotational coordinate, else N/m (N m/rad for a coupled one).
+        upper_limit: deg, else m (rad).
+        lower_stiffness: in the unit of `upper_stiffness`.
+        lower_limit: in the unit of `upper_limit`.
+        damping: N m/(deg/s), else N/(m/s) (N m/(rad/s)).
+        transition: width of the transition zone, deg, else m (rad).
+        rotational: whether the motion type of the coordinate is Rotational; Translational and Coupled
+            are not converted.
 
     Returns:
-        (Ku, qu, Kl, ql, D, t) in rad and N.m, or m and N, as the functions below take them.
+        (Ku, qu, Kl, ql, D, t) in rad and N m, or m and N, as the functions below take them.
     """
     w = pi / 180.0 if rotational else 1.0
     return (
@@ -45,18 +49,23 @@ def limit_constants(
 def limit_force(
     q: float, u: float, Ku: float, qu: float, Kl: float, ql: float, D: float, t: float
 ) -> float:
-    """Generalized force Q on the coordinate, in N.m (N for a translation).
+    """Return the generalized force Q on the coordinate, in N m (N for a translation).
 
-    Q = -su (Ku (q - qu) + D u) + sl (Kl (ql - q) - D u), with su = S((q - qu) / t) and sl = S((ql -
-    q) / t). While the coordinate moves back inward fast, the damper may outweigh the spring and
-    pull outward.
+    Q = -su (Ku (q - qu) + D u) + sl (Kl (ql - q) - D u), with su = S((q - qu) / t) and sl = S((ql - q)
+    / t). While the coordinate moves back inwards fast, the damper may outweigh the spring and pull
+    outwards.
 
-    Args: q: coordinate, rad (m). u: its speed, rad/s (m/s). Ku: stiffness beyond the upper limit,
-        N.m/rad (N/m). With stiffness 0 the damper still acts; OpenSim 4.6 divides 0 by 0 there. qu:
-        upper limit, rad (m). Kl: stiffness beyond the lower limit, N.m/rad (N/m). ql: lower limit,
-        rad (m). Where ql > qu, both sides act between them. D: damping, N.m/(rad/s) (N/(m/s)). t:
-        width of the transition zone, rad (m). Where it is 0 (or less), S jumps from 0 to 1 at the
-        limit.
+    Args:
+        q: coordinate, rad (m).
+        u: its speed, rad/s (m/s).
+        Ku: stiffness beyond the upper limit, N m/rad (N/m). With stiffness 0 the damper still acts;
+            OpenSim 4.6 divides 0 by 0 there.
+        qu: upper limit, rad (m).
+        Kl: stiffness beyond the lower limit, N m/rad (N/m).
+        ql: lower limit, rad (m). Where ql > qu, both sides act between them.
+        D: damping, N m/(rad/s) (N/(m/s)).
+        t: width of the transition zone, rad (m). Where it is 0 or less, S jumps from 0 to 1 at the
+            limit.
     """
     if ql <= q <= qu:
         return 0.0
@@ -79,21 +88,20 @@ def limit_force(
 
 
 def limit_dissipation(q: float, u: float, qu: float, ql: float, D: float, t: float) -> float:
-    """Power that the damper takes up, (su + sl) D u^2, in W.
+    """Return the power (su + sl) D u^2 that the damper dissipates (W).
 
-    Args: as `limit_force`.
+    The arguments are those of `limit_force`.
     """
     return -u * limit_force(q, u, 0.0, qu, 0.0, ql, D, t)
 
 
 def limit_energy(q: float, Ku: float, qu: float, Kl: float, ql: float, t: float) -> float:
-    """Potential energy of the spring, in J.
+    """Return the potential energy of the spring (J).
 
-    K (delta^2 / 2 - t^2 / 7) at a distance delta >= t beyond the limit, K delta^2 x^3 (2 - 5 x / 2
-    + 6 x^2 / 7) with x = delta / t before. Where ql > qu, both springs act between the limits but,
-    as OpenSim reports it, the energy is that of the upper one alone.
-
-    Args: as `limit_force`.
+    It is K (delta^2 / 2 - t^2 / 7) at a distance delta >= t beyond the limit, and K delta^2 x^3 (2 - 5
+    x / 2 + 6 x^2 / 7) with x = delta / t before. Where ql > qu, both springs act between the limits,
+    but the energy is that of the upper one alone, as OpenSim reports it. The arguments are those of
+    `limit_force`.
     """
     if q > qu:
         K = Ku

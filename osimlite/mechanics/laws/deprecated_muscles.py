@@ -1,7 +1,8 @@
-"""The muscles that OpenSim keeps for old files: its classes whose names end in Deprecated.
+"""Muscles that OpenSim keeps for old files: its classes whose names end in Deprecated.
 
-Forces are parts of the maximum isometric force, fiber lengths of the optimal fiber length where
-they are normalized. Fibers are parallel and keep their height across the tendon, at any angle.
+Forces are normalized by the maximum isometric force, fiber lengths by the optimal fiber length
+where they are called normalized. Fibers are parallel and keep their height across the tendon, at
+any angle.
 
 Sources: L. M. Schutte, "Using musculoskeletal models to explore strategies for improving
 performance in electrical stimulation-induced leg cycle ergometry" (Stanford University, 1993); S.
@@ -15,19 +16,23 @@ from math import exp, sqrt
 from typing import NamedTuple
 
 SMALLEST = 2.220446049250313e-16
-"""Fibers that are shorter (m) are in line with the tendon."""
+"""Fiber length (m) below which fibers count as parallel to the tendon."""
 UPRIGHT = 6.123233995736766e-17
-"""Cosine of a right angle, as a float: that of the pennation angle of fibers that are no longer than high."""
+"""Cosine of a right angle as a float, for fibers that are no longer than high."""
 NOTHING = 2e-13
-"""What is no larger counts as 0."""
-ROUNDS, TOLERANCE = 100, 0.01
-"""In the search for an equilibrium: how often a length is tried, and what the forces may differ by, N."""
-TENDON_MODULUS, TENDON_STRENGTH = 1200.0, 32.0
-"""Of the material of a tendon, MPa."""
+"""Absolute value up to which a number counts as 0."""
+ROUNDS = 100
+"""Largest number of lengths that are tried in the search for an equilibrium."""
+TOLERANCE = 0.01
+"""Accepted difference of the forces of fibers and tendon (N)."""
+TENDON_MODULUS = 1200.0
+"""Elastic modulus of a tendon (MPa)."""
+TENDON_STRENGTH = 32.0
+"""Stress of a tendon at the maximum isometric force (MPa)."""
 
 
 class OldMuscle(NamedTuple):
-    """The numbers that all these muscles have."""
+    """Parameters that all these muscles have."""
 
     strength: float  # max_isometric_force, N
     optimal: float  # optimal_fiber_length, m
@@ -37,7 +42,7 @@ class OldMuscle(NamedTuple):
 
 
 class Guess(NamedTuple):
-    """A guess of where fibers and tendon are in equilibrium."""
+    """Guess of an equilibrium of fibers and tendon."""
 
     length: float  # of the fibers, m
     cos: float  # of pennation
@@ -45,7 +50,7 @@ class Guess(NamedTuple):
 
 
 def cos_upright(length: float, height: float) -> float:
-    """Cosine of the pennation angle of fibers of a length (m) and a height (m)."""
+    """Return the cosine of the pennation angle of fibers of a length (m) and a height (m)."""
     if length < SMALLEST:
         return 1.0
     return sqrt((length - height) * (length + height)) / length if height < length else UPRIGHT
@@ -54,48 +59,48 @@ def cos_upright(length: float, height: float) -> float:
 def scaled_activation_rate(
     excitation: float, activation: float, more: float, least: float, time: float
 ) -> float:
-    """Rate of activation, 1/s.
+    """Return the rate of activation (1/s).
 
     Args:
-        excitation: what the control asks for.
-        activation: the state.
-        more: activation1, by which excitation speeds up the rise.
-        least: activation2, the rate of the fall.
-        time: time_scale, s.
+        excitation: excitation.
+        activation: activation.
+        more: activation1, the increase of the rate with the excitation while rising.
+        least: activation2, the rate while falling.
+        time: time_scale (s).
     """
     speed = more * excitation + least if excitation >= activation else least
     return (excitation - activation) * speed / time
 
 
 def rigid_cos(path_length: float, m: OldMuscle) -> float:
-    """What OpenSim takes for the cosine of pennation where fibers stand across a tendon that pulls.
+    """Return OpenSim's cosine of pennation where fibers are perpendicular to a tendon that pulls.
 
-    Of a normalized length it subtracts the slack length in m.
+    OpenSim subtracts the slack length in m from a normalized length.
     """
     along = path_length / m.optimal - m.slack
     return cos_upright(sqrt(along * along + m.height * m.height), m.height)
 
 
 def generic_velocity_factor(rate: float, m: OldMuscle) -> float:
-    """What OpenSim multiplies isometric forces of any of these muscles by, for a rate (m/s) of the path."""
+    """Return the factor by which OpenSim scales isometric forces of these muscles, for a path speed (m/s)."""
     sin = m.height / m.optimal
     velocity = -sqrt(1.0 - sin * sin) * rate / (m.fastest * m.optimal)
     return 1.8 - 1.8 / (1.0 + exp((0.04 - velocity) / 0.18))
 
 
 def schutte_passive_force(length: float) -> float:
-    """Passive force of fibers of a normalized length, where the file has no curve for it."""
+    """Return the passive force of fibers of a normalized length, if the file defines no curve."""
     return exp(8.0 * (length - 1.0)) / exp(4.0)
 
 
 def schutte_velocity(activation: float, active: float, borne: float, damping: float) -> float:
-    """Velocity of fibers, optimal fiber lengths per time scale: the root of a quadratic equation on either side of 0.
+    """Return the fiber velocity (optimal fiber lengths per time scale), a root of a quadratic equation.
 
     Args:
-        activation: 1.
-        active: force at rest, fully activated.
+        activation: activation.
+        active: isometric force, fully activated.
         borne: force that depends on the velocity.
-        damping: force at a velocity of 1.
+        damping: damping force at a velocity of 1.
     """
     isometric = activation * active
     if borne < -damping:
@@ -111,7 +116,7 @@ def schutte_velocity(activation: float, active: float, borne: float, damping: fl
 
 
 def thelen_tendon_force(strain: float, strain_at_one: float) -> float:
-    """Force of a tendon: an exponential and a line, and a little at any length that is not 0."""
+    """Return the tendon force: an exponential toe and a line, plus 0.001 (1 + strain)."""
     toe = 0.609 * strain_at_one
     force = 0.001 * (1.0 + strain)
     if strain > toe:
@@ -124,7 +129,13 @@ def thelen_tendon_force(strain: float, strain_at_one: float) -> float:
 
 
 def thelen_passive_force(length: float, strain_at_one: float, shape: float) -> float:
-    """Passive force of fibers of a normalized length: an exponential, and a line beyond the strain at 1."""
+    """Return the passive force of fibers of a normalized length: an exponential, and a line beyond strain 1.
+
+    Args:
+        length: normalized fiber length.
+        strain_at_one: strain at a force of 1.
+        shape: exponent.
+    """
     beyond = length - (1.0 + strain_at_one)
     return (
         1.0 + shape / strain_at_one * beyond
@@ -134,20 +145,20 @@ def thelen_passive_force(length: float, strain_at_one: float, shape: float) -> f
 
 
 def thelen_active_force(length: float, width: float) -> float:
-    """Force at rest of fully activated fibers of a normalized length."""
+    """Return the isometric force of fully activated fibers of a normalized length."""
     return exp(-(length - 1.0) * (length - 1.0) / width)
 
 
 def thelen_velocity(
     activation: float, active: float, borne: float, damping: float, shape: float, most: float
 ) -> float:
-    """Velocity of fibers over their fastest one; the curve goes on as straight lines, through two points at its ends.
+    """Return the fiber velocity over the maximum one; the curve continues linearly at its ends.
 
     Args:
-        activation: 1.
-        active: force at rest, fully activated.
+        activation: activation.
+        active: isometric force, fully activated.
         borne: force that depends on the velocity.
-        damping: added to the denominator.
+        damping: constant that is added to the denominator.
         shape: Af.
         most: Flen.
     """
@@ -169,21 +180,21 @@ def thelen_velocity(
 
 
 def thelen_shortening(borne: float, isometric: float, damping: float, shape: float) -> float:
-    """The curve of `thelen_velocity` below the isometric force."""
+    """Return the fiber velocity below the isometric force, see `thelen_velocity`."""
     return (borne - isometric) / (isometric + borne / shape + damping)
 
 
 def thelen_lengthening(
     borne: float, isometric: float, damping: float, shape: float, most: float
 ) -> float:
-    """The curve of `thelen_velocity` from the isometric force on."""
+    """Return the fiber velocity above the isometric force, see `thelen_velocity`."""
     return (borne - isometric) / (
         (2.0 + 2.0 / shape) * (isometric * most - borne) / (most - 1.0) + damping
     )
 
 
 def fitted(path_length: float, length: float, m: OldMuscle) -> Guess:
-    """Fibers of a length (m), or of that which leaves the tendon its slack length if it would be shorter."""
+    """Return a guess with a fiber length (m), which is adjusted so that the tendon is not shorter than slack."""
     cos = cos_upright(length, m.height)
     tendon = path_length - length * cos
     if not tendon >= m.slack:
@@ -203,21 +214,21 @@ def next_length(
     tendon: float,
     m: OldMuscle,
 ) -> float:
-    """The fiber length (m) to try next.
+    """Return the fiber length to try next (m).
 
-    Between two of which one is too short and the other too long; else as the stiffness of fibers
-    and tendon, which are taken for their forces over their lengths, leads to, but no more than half
-    an optimal length away.
+    It is interpolated between two lengths of which one is too short and the other too long; else it
+    follows from the stiffness of fibers and tendon, estimated as their forces over their lengths, with
+    a step of at most half an optimal fiber length.
 
     Args:
-        guess: that was tried last.
-        before: length that was tried before, m.
-        error: what the tendon pulls more than the fibers, N.
-        error_before: the same at the length before, N.
-        fibers: their force, activated as they are.
-        fully: their force, fully activated.
-        tendon: its force.
-        m: the muscle.
+        guess: last guess.
+        before: fiber length of the previous guess (m).
+        error: tendon force less fiber force (N).
+        error_before: the same for the previous guess (N).
+        fibers: fiber force at the present activation.
+        fully: fiber force, fully activated.
+        tendon: tendon force.
+        m: muscle.
     """
     if (error >= 0.0) != (error_before >= 0.0):
         return guess.length + abs(error) / (abs(error) + abs(error_before)) * (

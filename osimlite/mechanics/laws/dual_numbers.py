@@ -1,7 +1,7 @@
-"""What is said of numbers that carry derivatives: to floats these functions do nothing new.
+"""Operations on dual numbers, which carry derivatives; for floats they do nothing.
 
-Machine code with tangents puts its own in their places, and so does
-:mod:`osimlite.simulation.engines.carrying` in Python.
+Machine code with tangents replaces them by its own, and so does
+:mod:`osimlite.simulation.engines.dual_numbers` in Python.
 """
 
 from __future__ import annotations
@@ -10,39 +10,39 @@ from typing import Any
 
 
 def settled(root: float, error: float, slope: float) -> float:
-    """A root as a search has found it; its derivatives are those that the equation says.
+    """Return a root that a search found, with the derivatives of the implicit function theorem.
 
-    A search ends when the value is good, and its derivatives may be a step behind, or those of
-    where it started.
+    A search ends when the value is good; its own derivatives may lag a step behind, or be those of the
+    start.
 
     Args:
-        root: of the equation.
-        error: of the equation at the root.
-        slope: of the error over the root.
+        root: root of an equation.
+        error: residual of the equation at the root, with derivatives by the parameters.
+        slope: derivative of the residual by the unknown.
     """
     return root
 
 
 def is_nothing(number: float) -> bool:
-    """Whether a number is 0 with all its derivatives, so that what is multiplied by it can be left out."""
+    """Return whether a number and all its derivatives are 0, so that multiplication by it can be skipped."""
     return number == 0.0
 
 
 def plain(number: float) -> float:
-    """A number without derivatives."""
+    """Return a number without its derivatives."""
     return number
 
 
 def carrying(number: float, direction: int, directions: int) -> float:
-    """A number that from here on carries derivatives along so many directions, of which it is one itself."""
+    """Return a number that carries derivatives along `directions` directions, and is number `direction`."""
     return number
 
 
 def carrying_room(vector: Any, directions: int) -> Any:
-    """Room of floats as room of numbers that carry derivatives; each takes the place of 1 + directions."""
+    """Return workspace of floats as workspace of dual numbers, each of 1 + `directions` floats."""
     return vector
 
 
 def slope_of(number: float, direction: int) -> float:
-    """The derivative of a number along a direction."""
+    """Return the derivative of a number along a direction."""
     return 0.0

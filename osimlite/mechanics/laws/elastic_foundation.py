@@ -1,11 +1,11 @@
 """Elastic foundation: a mesh covered by a layer of springs, one at the middle of every triangle.
 
-A spring acts while its middle is inside the other surface. It then pushes along the way from the
-middle to the nearest point of that surface, at that point; its opposite acts on the other surface
-at the same point. All vectors are in one frame of the caller's choice, ground as a rule.
+A spring acts while its middle is inside the other surface. It pushes from the middle towards the
+nearest point of that surface, at that point; its opposite acts on the other surface at the same
+point. All vectors are in one frame of the caller's choice, usually ground.
 
 Sources: K. L. Johnson, "Contact Mechanics" (1985), section 4.3, for the foundation; damping and
-friction in the form that Simbody's ElasticFoundationForce gives them (the friction is that of
+friction as in Simbody's ElasticFoundationForce (friction as in
 :mod:`osimlite.mechanics.laws.hunt_crossley`).
 """
 
@@ -27,32 +27,32 @@ from osimlite.mechanics.laws.vectors import (
 
 
 def spring_in_half_space(o: Vector, n: Vector, middle: Vector) -> tuple[float, Vector]:
-    """Depth of the middle of a spring in a half space, and the nearest point of the plane.
+    """Return the depth of the middle of a spring in a half space, and the nearest point of the plane.
 
     Args:
-        o: point on the plane, m.
-        n: unit normal of the plane, out of the half space, 1.
-        middle: of the spring, m.
+        o: point on the plane (m).
+        n: outward unit normal of the half space.
+        middle: middle of the spring (m).
 
     Returns:
-        Depth and point, m. The spring acts where the depth is positive.
+        Depth and point (m). The spring acts where the depth is positive.
     """
     d = dot(minus(o, middle), n)
     return d, along(middle, d, n)
 
 
 def spring_in_sphere(center: Vector, r: float, middle: Vector) -> tuple[float, Vector]:
-    """Depth of the middle of a spring in a sphere, and the nearest point of the sphere.
+    """Return the depth of the middle of a spring in a sphere, and the nearest point of the sphere.
 
-    In the very centre no point is nearest, so that the spring does not act.
+    At the very centre no point is nearest, so that the spring does not act.
 
     Args:
-        center: of the sphere, m.
-        r: its radius, m.
-        middle: of the spring, m.
+        center: centre of the sphere (m).
+        r: its radius (m).
+        middle: middle of the spring (m).
 
     Returns:
-        Depth and point, m. The spring acts where the depth is positive.
+        Depth and point (m). The spring acts where the depth is positive.
     """
     way = minus(middle, center)
     distance = norm(way)
@@ -72,20 +72,27 @@ def spring_load(
     v: Vector,
     turning: Vector,
 ) -> tuple[Vector, Vector, float]:
-    """Force of one spring on the mesh at the nearest point of the other surface, its torque about a point, its energy.
+    """Return the load of one spring on the mesh at the nearest point of the other surface.
 
-    With d the way from the middle to the end and v the velocity there, of which vn is along d: f =
-    k |d| (1 + c vn) along d, nothing where that is not positive; and f mu along the slip, mu being
-    its `friction`. The energy is k |d|^2 / 2.
+    With d the vector from the middle to the end and vn the component along d of the velocity there: f =
+    k |d| (1 + c vn) along d, zero where that is not positive; and f mu along the slip, where mu is its
+    `friction`. The energy is k |d|^2 / 2.
 
-    Args: k: stiffness of the layer times area of the triangle, N/m. c: dissipation, s/m. us:
-        coefficient as of :func:`osimlite.mechanics.laws.hunt_crossley.friction`, with ud and uv.
-        vt: transition velocity, m/s. middle: of the spring, m. end: nearest point of the other
-        surface, m. about: point for torque and velocity, m. v: velocity of the other surface
-        relative to the mesh there, m/s. turning: its angular velocity relative to the mesh, 1/s.
+    Args:
+        k: stiffness of the layer times area of the triangle (N/m).
+        c: dissipation (s/m).
+        us: coefficient of static friction, see `hunt_crossley.friction`.
+        ud: coefficient of dynamic friction.
+        uv: coefficient of viscous friction (s/m).
+        vt: transition velocity (m/s).
+        middle: middle of the spring (m).
+        end: nearest point of the other surface (m).
+        about: reference point of torque and velocity (m).
+        v: velocity of the other surface relative to the mesh there (m/s).
+        turning: its angular velocity relative to the mesh (1/s).
 
     Returns:
-        Force, N; torque, N·m; energy, J.
+        Force (N), torque about `about` (N m), and energy (J).
     """
     way = minus(end, middle)
     d = norm(way)

@@ -1,9 +1,8 @@
-"""Where an ellipsoid touches a half space or another ellipsoid; the force is that of
-:mod:`osimlite.mechanics.laws.hunt_crossley`.
+"""Contact geometry of an ellipsoid with a half space or another ellipsoid.
 
-Source: Simbody's collision detection. Its effective radius in a half space comes from the
-curvatures of the section through the centre of the ellipsoid parallel to the plane, and is that of
-the sphere for three equal half axes.
+The force is that of :mod:`osimlite.mechanics.laws.hunt_crossley`. Source: Simbody's collision
+detection. Its effective radius in a half space comes from the curvatures of the section through the
+centre of the ellipsoid parallel to the plane, and is that of the sphere for three equal half axes.
 """
 
 from __future__ import annotations
@@ -29,18 +28,19 @@ from osimlite.mechanics.laws.vectors import (
 def half_space_ellipsoid(
     o: Vector, n: Vector, center: Vector, axes: Axes, radii: Vector, a: float
 ) -> tuple[float, float, Vector]:
-    """Depth, effective radius and point of application of an ellipsoid (surface 2) in a half space (surface 1).
+    """Compute the contact of an ellipsoid (surface 2) with a half space (surface 1).
 
     Args:
-        o: point on the plane, m.
-        n: unit normal of the plane, out of the half space, 1.
-        center: of the ellipsoid, m.
-        axes: of the ellipsoid, 1.
-        radii: half axes, m.
-        a: part of the depth that is the half space's, 1.
+        o: point on the plane (m).
+        n: outward unit normal of the half space.
+        center: centre of the ellipsoid (m).
+        axes: axes of the ellipsoid.
+        radii: half axes (m).
+        a: part of the depth in the half space.
 
     Returns:
-        d, R and P, m. They touch where d > 0; otherwise -d is the gap and the rest means nothing.
+        Depth d, effective radius and point of application (m). The surfaces touch where d > 0;
+        otherwise -d is the gap and the rest is undefined.
     """
     one, two, three = axes
     rx, ry, rz = radii
@@ -59,34 +59,38 @@ def half_space_ellipsoid(
 def ellipsoid_ellipsoid(
     c1: Vector, axes1: Axes, radii1: Vector, c2: Vector, axes2: Axes, radii2: Vector, a: float
 ) -> tuple[float, float, Vector, Vector]:
-    """Depth, effective radius, normal and point of application of two ellipsoids, of which one may be a sphere.
+    """Compute the contact of two ellipsoids, of which one may be a sphere.
 
-    The normal n is the direction in which the overlap h(n) = s1 + s2 - n (c2 - c1) is least, with c
-    the centres and s the distances from them to the planes that touch the ellipsoids across n. It
-    is found by Newton's method from the line of the centres. Ellipsoids with one centre have no
-    normal and do not touch. The effective radius is 1 / sqrt(k k'), with k and k' the principal
-    curvatures of one surface relative to the other.
+    The normal n minimizes the overlap h(n) = s1 + s2 - n (c2 - c1), where c are the centres and s the
+    distances from them to the planes perpendicular to n that touch the ellipsoids. It is found by
+    Newton's method from the line of the centres. Ellipsoids with one centre have no normal and do not
+    touch. The effective radius is 1 / sqrt(k k'), where k and k' are the principal curvatures of one
+    surface relative to the other.
 
     Args:
-        c1: centre of the ellipsoid that is surface 1, m; c2 likewise.
-        axes1: of it, 1; axes2 likewise.
-        radii1: its half axes, m; radii2 likewise.
-        a: part of the depth that is surface 1's, 1.
+        c1: centre of the ellipsoid that is surface 1 (m).
+        axes1: its axes.
+        radii1: its half axes (m).
+        c2: centre of the ellipsoid that is surface 2 (m).
+        axes2: its axes.
+        radii2: its half axes (m).
+        a: part of the depth in surface 1.
 
-    Returns: d, R, n and P: d, R and the point in m; n, 1. They touch where d > 0; otherwise there
-        is a gap, and the rest means nothing.
+    Returns:
+        Depth d (m), effective radius (m), normal from surface 1 to 2, and point of application (m).
+        The surfaces touch where d > 0; otherwise there is a gap, and the rest is undefined.
     """
-    way = minus(c2, c1)
-    distance = norm(way)
+    centre_line = minus(c2, c1)
+    distance = norm(centre_line)
     if distance == 0.0:
         return 0.0, 0.0, ZERO, ZERO
-    n = over(way, distance)
+    n = over(centre_line, distance)
     squares1, squares2 = elementwise(radii1, radii1), elementwise(radii2, radii2)
     tries, least, known, step = 0, inf, n, ZERO
     while True:
         g1, g2 = stretched(axes1, squares1, n), stretched(axes2, squares2, n)
         s1, s2 = sqrt(dot(g1, n)), sqrt(dot(g2, n))
-        h = s1 + s2 - dot(n, way)
+        h = s1 + s2 - dot(n, centre_line)
         if h <= 0.0:
             # A plane across n parts the two.
             return h, 0.0, ZERO, ZERO
@@ -103,7 +107,7 @@ def ellipsoid_ellipsoid(
         gu1, gv1, huu1, huv1, hvv1 = slopes(axes1, squares1, g1, s1, u, v)
         gu2, gv2, huu2, huv2, hvv2 = slopes(axes2, squares2, g2, s2, u, v)
         # How fast the overlap grows along u and v.
-        fu, fv = gu1 + gu2 - dot(way, u), gv1 + gv2 - dot(way, v)
+        fu, fv = gu1 + gu2 - dot(centre_line, u), gv1 + gv2 - dot(centre_line, v)
         if fu * fu + fv * fv <= 1e-26 * (s1 + s2) * (s1 + s2) or tries >= 100:
             break
         huu, huv, hvv = huu1 + huu2 - h, huv1 + huv2, hvv1 + hvv2 - h
@@ -124,15 +128,15 @@ def ellipsoid_ellipsoid(
 
 
 def stretched(axes: Axes, squares: Vector, x: Vector) -> Vector:
-    """B x, with the squares of an ellipsoid's half axes as a matrix B.
+    """Return B x, where the matrix B has the axes of an ellipsoid and the squares of its half axes.
 
-    s = sqrt(n B n) is the way to the plane that touches it across n, and B n / s leads to the point
-    where it does.
+    s = sqrt(n B n) is the distance to the tangent plane perpendicular to n, and B n / s leads to the
+    point where it touches.
 
     Args:
-        axes: of the ellipsoid.
-        squares: of the half axes, m^2.
-        x: a vector.
+        axes: axes of the ellipsoid.
+        squares: squares of the half axes (m²).
+        x: vector.
     """
     one, two, three = axes
     p, q, r = squares
@@ -140,7 +144,11 @@ def stretched(axes: Axes, squares: Vector, x: Vector) -> Vector:
 
 
 def across(n: Vector) -> tuple[Vector, Vector]:
-    """Unit vectors u and v across the unit vector n and each other."""
+    """Return unit vectors u and v that are perpendicular to the unit vector n and each other.
+
+    Returns:
+        u and v.
+    """
     nx, ny, nz = n
     u = (0.0, nz, -ny) if abs(nx) < 0.6 else (-nz, 0.0, nx)
     u = over(u, norm(u))
@@ -150,14 +158,15 @@ def across(n: Vector) -> tuple[Vector, Vector]:
 def slopes(
     axes: Axes, squares: Vector, g: Vector, s: float, u: Vector, v: Vector
 ) -> tuple[float, float, float, float, float]:
-    """First and second derivatives of s = sqrt(n B n) as n turns towards u and v.
+    """Return first and second derivatives of s = sqrt(n B n) as n turns towards u and v.
 
     Args:
-        axes: of the ellipsoid, whose B is that of `stretched`.
-        squares: of the half axes, m^2.
-        g: the gradient of s, B n / s, m.
-        s: m.
-        u: unit vector across n, 1; v likewise.
+        axes: axes of the ellipsoid, whose B is that of `stretch_by_squares`.
+        squares: squares of the half axes (m²).
+        g: gradient of s, B n / s (m).
+        s: distance (m).
+        u: unit vector perpendicular to n.
+        v: unit vector perpendicular to n and u.
 
     Returns:
         (gu, gv, huu, huv, hvv), m.

@@ -1,8 +1,8 @@
-"""What may stand in the formula of an expression-based force.
+"""Functions that the formula of an expression-based force may contain.
 
-As in C, and other than in Python, an argument outside of a function's domain gives a number that is
-not finite. The names and meanings are those of Lepton, the library of formulas that OpenSim uses.
-The exponential of more than 709.78 is too large for a float.
+As in C, and unlike in Python, an argument outside of a function's domain gives a number that is not
+finite. Names and meanings are those of Lepton, the formula library of OpenSim. The exponential of
+more than 709.78 is too large for a float.
 """
 
 from __future__ import annotations
@@ -54,13 +54,14 @@ FUNCTIONS = {
     "max": "larger",
     "abs": "magnitude",
 }
-"""The law for each of Lepton's functions."""
+"""Name of the function here for each of Lepton's functions."""
 
 OF_TWO = ("min", "max")
+"""Lepton's functions of two arguments."""
 
 
 def divide(a: float, b: float) -> float:
-    """a / b, infinite for b = 0."""
+    """Return a / b, infinite for b = 0."""
     if b != 0.0:
         return a / b
     if a == 0.0 or a != a:
@@ -69,7 +70,7 @@ def divide(a: float, b: float) -> float:
 
 
 def power(a: float, b: float) -> float:
-    """a to the power b; not a number for negative a and a b that is not whole."""
+    """Return a to the power b; not a number for negative a and a fractional b."""
     if a == 0.0:
         return 1.0 if b == 0.0 else inf if b < 0.0 else 0.0
     if a != a or b != b:
@@ -83,125 +84,125 @@ def power(a: float, b: float) -> float:
 
 
 def square_root(x: float) -> float:
-    """Not a number for negative x."""
+    """Return the square root of x; not a number for negative x."""
     return sqrt(x) if x >= 0.0 else nan
 
 
 def exponential(x: float) -> float:
-    """e to the power x."""
+    """Return e to the power x."""
     return inf if x > 709.78 else exp(x)
 
 
 def logarithm(x: float) -> float:
-    """Natural logarithm."""
+    """Return the natural logarithm of x."""
     return log(x) if x > 0.0 else -inf if x == 0.0 else nan
 
 
 def sine(x: float) -> float:
-    """Sine of x in rad."""
+    """Return the sine of x (rad)."""
     return sin(x) if x - x == 0.0 else nan
 
 
 def cosine(x: float) -> float:
-    """Cosine of x in rad."""
+    """Return the cosine of x (rad)."""
     return cos(x) if x - x == 0.0 else nan
 
 
 def tangent(x: float) -> float:
-    """Tangent of x in rad."""
+    """Return the tangent of x (rad)."""
     return tan(x) if x - x == 0.0 else nan
 
 
 def secant(x: float) -> float:
-    """1 / cos x."""
+    """Return 1 / cos x."""
     return 1.0 / cos(x) if x - x == 0.0 else nan
 
 
 def cosecant(x: float) -> float:
-    """1 / sin x, infinite at 0."""
+    """Return 1 / sin x, infinite at 0."""
     return 1.0 / sin(x) if x != 0.0 and x - x == 0.0 else copysign(inf, x) if x == 0.0 else nan
 
 
 def cotangent(x: float) -> float:
-    """1 / tan x, infinite at 0."""
+    """Return 1 / tan x, infinite at 0."""
     return 1.0 / tan(x) if x != 0.0 and x - x == 0.0 else copysign(inf, x) if x == 0.0 else nan
 
 
 def arcsine(x: float) -> float:
-    """Not a number beyond -1 and 1."""
+    """Return the arcsine of x (rad); not a number beyond -1 and 1."""
     return asin(x) if -1.0 <= x <= 1.0 else nan
 
 
 def arccosine(x: float) -> float:
-    """Not a number beyond -1 and 1."""
+    """Return the arccosine of x (rad); not a number beyond -1 and 1."""
     return acos(x) if -1.0 <= x <= 1.0 else nan
 
 
 def arctangent(x: float) -> float:
-    """Between -pi/2 and pi/2."""
+    """Return the arctangent of x (rad), between -pi/2 and pi/2."""
     return atan(x)
 
 
 def hyperbolic_sine(x: float) -> float:
-    """(e^x - e^-x) / 2."""
+    """Return (e^x - e^-x) / 2."""
     return sinh(x) if abs(x) < 709.78 or x != x else copysign(inf, x)
 
 
 def hyperbolic_cosine(x: float) -> float:
-    """(e^x + e^-x) / 2."""
+    """Return (e^x + e^-x) / 2."""
     return cosh(x) if abs(x) < 709.78 or x != x else inf
 
 
 def hyperbolic_tangent(x: float) -> float:
-    """sinh x / cosh x."""
+    """Return sinh x / cosh x."""
     return tanh(x)
 
 
 def error_function(x: float) -> float:
-    """2 / sqrt(pi) times the integral of exp(-t^2) from 0 to x."""
+    """Return 2 / sqrt(pi) times the integral of exp(-t^2) from 0 to x."""
     return erf(x)
 
 
 def complementary_error_function(x: float) -> float:
-    """1 - erf x."""
+    """Return 1 - erf x."""
     return erfc(x)
 
 
 def unit_step(x: float) -> float:
-    """1 from 0 on, 0 before."""
+    """Return 1 for x >= 0, else 0."""
     return 1.0 if x >= 0.0 else 0.0
 
 
 def is_zero(x: float) -> float:
-    """1 at 0, 0 elsewhere."""
+    """Return 1 for x = 0, else 0."""
     return 1.0 if x == 0.0 else 0.0
 
 
 def square(x: float) -> float:
-    """x^2."""
+    """Return x^2."""
     return x * x
 
 
 def cube(x: float) -> float:
-    """x^3."""
+    """Return x^3."""
     return x * x * x
 
 
 def reciprocal(x: float) -> float:
-    """1 / x, infinite at 0."""
+    """Return 1 / x, infinite at 0."""
     return 1.0 / x if x != 0.0 else copysign(inf, x)
 
 
 def smaller(a: float, b: float) -> float:
-    """The smaller of two numbers."""
+    """Return the smaller of two numbers."""
     return b if b < a else a
 
 
 def larger(a: float, b: float) -> float:
-    """The larger of two numbers."""
+    """Return the larger of two numbers."""
     return b if a < b else a
 
 
 def magnitude(x: float) -> float:
-    """x without its sign."""
+    """Return |x|."""
     return abs(x)

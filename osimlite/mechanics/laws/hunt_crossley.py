@@ -32,26 +32,32 @@ def combine_materials(
     ud2: float,
     uv2: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """Effective parameters of a pair of surfaces, to be computed once per pair.
+    """Return the effective parameters of a pair of surfaces, to be computed once per pair.
 
-    With k_i = K_i^(2/3), a = k2 / (k1 + k2) of the depth is surface 1's: the softer surface yields
-    more. A surface of stiffness 0 (the default of the property) yields without resistance, so that
-    k = 0 and the pair exerts no force; that holds for two such surfaces also, where OpenSim 4.6
+    With k_i = K_i^(2/3), the part a = k2 / (k1 + k2) of the depth is in surface 1: the softer surface
+    yields more. A surface of stiffness 0 (the default of the property) yields without resistance, so
+    that k = 0 and the pair exerts no force; that holds for two such surfaces also, where OpenSim 4.6
     divides 0 by 0.
 
     Args:
-        K1: stiffness property of surface 1 (a plane-strain modulus), Pa; K2 likewise. Not negative.
-        c1: dissipation, s/m; c2 likewise.
-        us1: coefficient of static friction, 1; us2 likewise.
-        ud1: coefficient of dynamic friction, 1; ud2 likewise.
-        uv1: coefficient of viscous friction, s/m; uv2 likewise.
+        K1: stiffness property of surface 1 (a plane-strain modulus), not negative (Pa).
+        c1: dissipation (s/m).
+        us1: coefficient of static friction.
+        ud1: coefficient of dynamic friction.
+        uv1: coefficient of viscous friction (s/m).
+        K2: stiffness property of surface 2, not negative (Pa).
+        c2: dissipation (s/m).
+        us2: coefficient of static friction.
+        ud2: coefficient of dynamic friction.
+        uv2: coefficient of viscous friction (s/m).
 
-    Returns: (k, a, c, us, ud, uv): k as `contact_force` takes it, Pa^(2/3); a, 1; c, s/m; us and
-        ud, 1; uv, s/m. The coefficients of friction are harmonic means, so that one frictionless
-        surface makes the pair frictionless.
+    Returns:
+        (k, a, c, us, ud, uv): k as `contact_force` takes it (Pa^(2/3)), a, c (s/m), us, ud, uv (s/m).
+        The coefficients of friction are harmonic means, so that one frictionless surface makes the
+        pair frictionless.
 
-    Raises: ValueError: a stiffness is negative. The caller knows the component's name and says so
-        in its own words.
+    Raises:
+        ValueError: a stiffness is negative. The caller adds the component's name to the message.
     """
     if K1 < 0.0 or K2 < 0.0:
         raise ValueError("a contact stiffness must not be negative")
@@ -67,20 +73,21 @@ def combine_materials(
 def half_space_sphere(
     o: Vector, n: Vector, center: Vector, r: float, a: float
 ) -> tuple[float, Vector]:
-    """Depth and point of application of a sphere (surface 2) in a half space (surface 1).
+    """Compute the contact of a sphere (surface 2) with a half space (surface 1).
 
-    The half space has no bottom: a centre far below its plane gives a depth greater than 2 r. R of
-    the pair is r.
+    The half space has no bottom: a centre far below its plane gives a depth greater than 2 r. The
+    effective radius of the pair is r.
 
     Args:
-        o: point on the plane, m.
-        n: unit normal of the plane, out of the half space, 1.
-        center: of the sphere, m.
-        r: radius of the sphere, m.
-        a: part of the depth that is the half space's, from `combine_materials`, 1.
+        o: point on the plane (m).
+        n: outward unit normal of the half space.
+        center: centre of the sphere (m).
+        r: radius of the sphere (m).
+        a: part of the depth in the half space, from `combine_materials`.
 
     Returns:
-        d and P, m. They touch where d > 0; otherwise -d is the gap and the point means nothing.
+        Depth d and point of application (m). The surfaces touch where d > 0; otherwise -d is the gap
+        and the point is undefined.
     """
     s = dot(minus(center, o), n)
     d = r - s
@@ -90,36 +97,44 @@ def half_space_sphere(
 def sphere_sphere(
     c1: Vector, r1: float, c2: Vector, r2: float, a: float
 ) -> tuple[float, float, Vector, Vector]:
-    """Depth, effective radius, normal and point of application of two spheres.
+    """Compute the contact of two spheres.
 
-    Spheres with one and the same centre have no normal and, as in Simbody, do not touch.
+    Spheres with the same centre have no normal and do not touch, as in Simbody.
 
     Args:
-        c1: centre of the sphere that is surface 1, m; c2 likewise.
-        r1: its radius, m; r2 likewise.
-        a: part of the depth that is surface 1's, from `combine_materials`, 1.
+        c1: centre of the sphere that is surface 1 (m).
+        r1: its radius (m).
+        c2: centre of the sphere that is surface 2 (m).
+        r2: its radius (m).
+        a: part of the depth in surface 1, from `combine_materials`.
 
-    Returns: d, R = r1 r2 / (r1 + r2), n and P: d, R and the point in m; n, 1. They touch where d >
-        0; otherwise -d is the gap (0 for one centre) and the rest means nothing.
+    Returns:
+        Depth d (m), effective radius r1 r2 / (r1 + r2) (m), normal from surface 1 to 2, and point of
+        application (m). The surfaces touch where d > 0; otherwise -d is the gap (0 for one centre) and
+        the rest is undefined.
     """
-    way = minus(c2, c1)
-    distance = norm(way)
+    centre_line = minus(c2, c1)
+    distance = norm(centre_line)
     d = r1 + r2 - distance
     if d <= 0.0 or distance == 0.0:
         return min(d, 0.0), 0.0, ZERO, ZERO
-    n = over(way, distance)
+    n = over(centre_line, distance)
     return d, r1 * r2 / (r1 + r2), n, along(c1, r1 - a * d, n)
 
 
 def friction(w: float, us: float, ud: float, uv: float, vt: float) -> float:
-    """Coefficient of friction at a slip w: min(r, 1) (ud + 2 (us - ud) / (1 + r^2)) + uv w, with r = w / vt.
+    """Return the coefficient of friction min(r, 1) (ud + 2 (us - ud) / (1 + r^2)) + uv w, with r = w / vt.
 
     At w = vt it is us + uv vt and has a kink. With us < ud / 2 it is negative for small r: friction
     then drives the slip instead of opposing it.
 
-    Args: w: slip, m/s, greater than 0. us: coefficient of static friction, 1. ud: coefficient of
-        dynamic friction, 1. uv: coefficient of viscous friction, s/m. vt: transition velocity, m/s.
-        Where it is 0 (or less), the coefficient is ud + uv w, the limit for vt -> 0.
+    Args:
+        w: slip velocity, greater than 0 (m/s).
+        us: coefficient of static friction.
+        ud: coefficient of dynamic friction.
+        uv: coefficient of viscous friction (s/m).
+        vt: transition velocity (m/s). Where it is 0 or less, the coefficient is ud + uv w, the limit
+            for vt -> 0.
     """
     if not vt > 0.0:
         return ud + uv * w
@@ -140,23 +155,25 @@ def contact_force(
     n: Vector,
     v: Vector,
 ) -> Vector:
-    """Force on surface 2 at the point of application.
+    """Return the force on surface 2 at the point of application.
 
-    f = (4/3) k d sqrt(R k d) (1 + (3/2) c vn) along n, nothing where that is not positive (no
-    contact pulls); and f mu along the slip of surface 1 over surface 2, mu being its `friction`.
+    f = (4/3) k d sqrt(R k d) (1 + (3/2) c vn) along n, zero where that is not positive (no contact
+    pulls); and f mu along the slip of surface 1 over surface 2, where mu is its `friction`.
 
     Args:
-        d: depth, m; no force where d <= 0.
-        R: effective radius of curvature, m.
-        k: effective stiffness from `combine_materials`, Pa^(2/3); no force where it is 0.
-        c: effective dissipation, s/m.
-        us: effective coefficient as of `friction`, with ud and uv.
-        vt: transition velocity, m/s.
-        n: unit normal from surface 1 to surface 2, 1.
-        v: velocity of surface 1 relative to surface 2 at the point of application, m/s.
+        d: depth (m); no force where d <= 0.
+        R: effective radius of curvature (m).
+        k: effective stiffness from `combine_materials` (Pa^(2/3)); no force where it is 0.
+        c: effective dissipation (s/m).
+        us: effective coefficient of static friction.
+        ud: effective coefficient of dynamic friction.
+        uv: effective coefficient of viscous friction (s/m).
+        vt: transition velocity (m/s).
+        n: unit normal from surface 1 to surface 2.
+        v: velocity of surface 1 relative to surface 2 at the point of application (m/s).
 
     Returns:
-        Force, N. A depth or velocity that is not a number gives a force that is not a number.
+        Force (N). A depth or velocity that is not a number gives a force that is not a number.
     """
     if d <= 0.0:
         return ZERO
@@ -183,10 +200,11 @@ def contact_derivatives(
     n: Vector,
     v: Vector,
 ) -> tuple[float, float, float]:
-    """How the force of `contact_force`, whose arguments these are, changes where surfaces are pressed and slip.
+    """Return the derivatives of the force of `contact_force`, which has the same arguments.
 
-    Returns: Of the force along n its derivatives by the depth (N/m) and by the approach v n (N
-        s/m), and the force across n over the slip (N s/m); all 0 where there is no force.
+    Returns:
+        Derivatives of the normal force by the depth (N/m) and by the approach velocity v n (N s/m),
+        and tangential force over slip (N s/m); all 0 where there is no force.
     """
     if d <= 0.0:
         return 0.0, 0.0, 0.0
@@ -201,14 +219,14 @@ def contact_derivatives(
 
 
 def contact_energy(d: float, R: float, k: float) -> float:
-    """Potential energy of the elastic part, (8/15) k d^2 sqrt(R k d), in J.
+    """Return the potential energy of the elastic part, (8/15) k d^2 sqrt(R k d) (J).
 
-    Its derivative with respect to d is the elastic force of Hertz, (4/3) k d sqrt(R k d).
+    Its derivative by d is the elastic force of Hertz, (4/3) k d sqrt(R k d).
 
     Args:
-        d: depth, m; no energy where d <= 0.
-        R: effective radius of curvature, m.
-        k: effective stiffness from `combine_materials`, Pa^(2/3).
+        d: depth (m); no energy where d <= 0.
+        R: effective radius of curvature (m).
+        k: effective stiffness from `combine_materials` (Pa^(2/3)).
     """
     if d <= 0.0:
         return 0.0

@@ -1,7 +1,7 @@
-"""Metabolic power of muscles, W: heat of activation, maintenance and shortening, and work.
+"""Metabolic power of muscles (W): heat of activation, maintenance and shortening, and mechanical work.
 
-As OpenSim 4.6 computes it, whose probes are told about in T. Uchida et al., "Stretching your
-energetic budget: how tendon compliance affects the metabolic cost of running", PLoS ONE 11, 2016.
+As in OpenSim 4.6, whose probes are described in T. Uchida et al., "Stretching your energetic
+budget: how tendon compliance affects the metabolic cost of running", PLoS ONE 11, 2016.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 
 class Umberger2010(NamedTuple):
-    """What the law must know of a muscle and of the probe; the last ones are 1 for yes and 0 for no."""
+    """Parameters of a muscle and of its probe; the last ones are 1 for yes and 0 for no."""
 
     max_contraction_velocity: float  # optimal fiber lengths a second
     optimal_fiber_length: float  # m
@@ -37,16 +37,16 @@ def umberger2010(
     force_length: float,
     m: Umberger2010,
 ) -> float:
-    """The power by the model of B. Umberger et al. (2003) with the changes of B. Umberger (2010) and T. Uchida (2016).
+    """Return the power by the model of B. Umberger (2010), with the changes of T. Uchida (2016) (W).
 
     Args:
-        activation: of the fibers.
-        excitation: the control.
-        active_force: of the fibers, N.
-        fiber_length: m.
-        fiber_velocity: m/s, negative where they shorten.
+        activation: activation of the fibers.
+        excitation: excitation.
+        active_force: active fiber force (N).
+        fiber_length: fiber length (m).
+        fiber_velocity: fiber velocity, negative for shortening (m/s).
         force_length: factor of the active force by length.
-        m: the muscle.
+        m: muscle and probe.
     """
     forbids = m.forbid_negative_total_power
     activation *= m.muscle_effort_scaling_factor
@@ -99,7 +99,7 @@ def umberger2010(
 
 
 class Bhargava2004(NamedTuple):
-    """What the law must know of a muscle and of the probe; the last ones are 1 for yes and 0 for no."""
+    """Parameters of a muscle and of its probe; the last ones are 1 for yes and 0 for no."""
 
     max_isometric_force: float  # N
     optimal_fiber_length: float  # m
@@ -130,17 +130,17 @@ def bhargava2004(
     maintained: float,
     m: Bhargava2004,
 ) -> float:
-    """The power by the model of L. Bhargava et al. (2004).
+    """Return the power by the model of L. Bhargava et al. (2004) (W).
 
     Args:
-        activation: of the fibers.
-        excitation: the control.
-        active_force: of the fibers, N.
-        passive_force: of the fibers, N.
-        fiber_velocity: m/s, negative where they shorten.
+        activation: activation of the fibers.
+        excitation: excitation.
+        active_force: active fiber force (N).
+        passive_force: passive fiber force (N).
+        fiber_velocity: fiber velocity, negative for shortening (m/s).
         force_length: factor of the active force by length.
         maintained: factor of the heat of maintenance by length.
-        m: the muscle.
+        m: muscle and probe.
     """
     forbids = m.forbid_negative_total_power
     active_force *= m.muscle_effort_scaling_factor
@@ -182,7 +182,11 @@ def bhargava2004(
 
 
 def recruited(excitation: float, ratio_slow_twitch_fibers: float) -> tuple[float, float]:
-    """Which part of all fibers is excited, of slow and of fast ones."""
+    """Return the excited parts of all fibers, of slow and of fast ones.
+
+    Returns:
+        Parts of slow and of fast fibers.
+    """
     angle = 0.5 * pi * excitation
     return ratio_slow_twitch_fibers * sin(angle), (1.0 - ratio_slow_twitch_fibers) * (
         1.0 - cos(angle)
@@ -190,7 +194,7 @@ def recruited(excitation: float, ratio_slow_twitch_fibers: float) -> tuple[float
 
 
 class Smoothed(NamedTuple):
-    """What the smooth law must know besides; 1 is yes and 0 is no."""
+    """Further parameters of the smooth model."""
 
     form: float  # of the transitions: 0 is none, 1 the hyperbolic tangent, 2 the function of Huber
     velocity_smoothing: float  # how sharp the transition of shortening to lengthening is
@@ -209,12 +213,13 @@ def bhargava2004_smoothed(
     m: Bhargava2004,
     by: Smoothed,
 ) -> tuple[float, float, float, float, float]:
-    """The powers by the model of Bhargava with smooth transitions (A. Falisse et al., J. R. Soc. Interface 16, 2019).
+    """Return the powers by Bhargava's model with smooth transitions (W).
 
-    The arguments are those of :func:`bhargava2004`, whose switches of single rates do nothing here.
+    Source: A. Falisse et al., J. R. Soc. Interface 16, 2019. The arguments are those of
+    :func:`bhargava2004`, whose switches of single rates have no effect here, and the parameters `by`.
 
     Returns:
-        All power, and the part of activation, maintenance, shortening and work, W.
+        Total power, and the parts of activation, maintenance, shortening and work (W).
     """
     active_force *= m.muscle_effort_scaling_factor
     total = active_force + passive_force
@@ -250,15 +255,15 @@ def bhargava2004_smoothed(
 def transition(
     x: float, left: float, right: float, sharpness: float, direction: float, form: float
 ) -> float:
-    """From `left` where x is negative to `right` where it is positive.
+    """Return a smooth blend from `left` for negative x to `right` for positive x.
 
     Args:
-        x: what decides.
-        left: at one end.
-        right: at the other.
-        sharpness: of the transition.
-        direction: of the function of Huber, 1 or -1.
-        form: as in :class:`Smoothed`.
+        x: variable of the transition.
+        left: value for negative x.
+        right: value for positive x.
+        sharpness: steepness of the transition.
+        direction: direction of the Huber function, 1 or -1.
+        form: form of the transition, see :class:`Smoothed`.
     """
     if form == 0.0:
         return left if x <= 0.0 else right

@@ -1,8 +1,8 @@
-"""The muscle of M. Millard et al. with a mass between fibers and tendon, as OpenSim's Millard2012AccelerationMuscle.
+"""Muscle of M. Millard et al. with a mass between fibers and tendon, as in Millard2012AccelerationMuscle.
 
-Forces are parts of the maximum isometric force F; the curves are those of
-:mod:`osimlite.mechanics.laws.muscle_curves`. Each elastic force has a damper that raises it by the
-normalized velocity times a factor; what pulls never pushes thereby, nor the other way round.
+Forces are normalized by the maximum isometric force F; the curves are those of
+:mod:`osimlite.mechanics.laws.muscle_curves`. Each elastic force f is damped to f max(1 + c v, 0),
+where v is the normalized velocity and c a damping constant, so that its sign does not change.
 """
 
 from __future__ import annotations
@@ -20,12 +20,14 @@ from osimlite.mechanics.laws.muscles import (
     first_order_activation_rate,
 )
 
-ROUNDS, STEP = 500, 0.75
-"""Steps in the search for an equilibrium, each of this part of Newton's."""
+ROUNDS = 500
+"""Largest number of steps in the search for an equilibrium."""
+STEP = 0.75
+"""Part of a Newton step that is taken, as in OpenSim."""
 
 
 class Millard2012Acceleration(NamedTuple):
-    """The numbers of a muscle."""
+    """Parameters of a Millard2012AccelerationMuscle."""
 
     strength: float  # max_isometric_force F, N
     optimal: float  # optimal_fiber_length, m
@@ -48,7 +50,7 @@ class Millard2012Acceleration(NamedTuple):
 
 
 class AccelerationCurves(NamedTuple):
-    """The curves of a muscle, as `curve_value` takes them."""
+    """Curves of a muscle, as `curve_value` takes them."""
 
     active: Sequence[float]  # active force over fiber length
     velocity: Sequence[float]  # factor of the active force over fiber velocity
@@ -59,7 +61,7 @@ class AccelerationCurves(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """What fibers, tendon and the mass between them do."""
+    """Forces and accelerations of fibers, tendon and the mass between them."""
 
     cos: float  # of pennation
     by_length: float  # active force at rest, fully activated
@@ -81,16 +83,18 @@ def moment(
     rate: float,
     curves: AccelerationCurves,
 ) -> Moment:
-    """What there is at a fiber length; see calcAccelerationMuscleInfo and calcMuscleDynamicsInfo of OpenSim's class.
+    """Compute forces and accelerations at a fiber length.
+
+    See calcAccelerationMuscleInfo and calcMuscleDynamicsInfo of OpenSim's class.
 
     Args:
-        m: the muscle.
+        m: muscle.
         active: activation.
-        fiber: length of the fibers, m.
-        velocity: of it, m/s.
-        tendon: length of the tendon, m.
-        rate: of it, m/s.
-        curves: of the muscle.
+        fiber: fiber length (m).
+        velocity: fiber velocity (m/s).
+        tendon: tendon length (m).
+        rate: tendon velocity (m/s).
+        curves: curves of the muscle.
     """
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     sin = m.height / fiber
@@ -149,12 +153,12 @@ def moment(
 def millard2012_acceleration(
     now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
-    """The muscle at a moment. The activation is bounded in its rate only, and fibers may be of any length.
+    """Compute forces and rates of a muscle; only the rate of activation is bounded, and no fiber length.
 
-    Returns: Tension (N), activation, fiber length (m), cosine of pennation, factors of the active
-        force by length and by velocity, active and passive fiber force (N), whether the fibers are
-        longer than the muscle is wide, rate of activation (1/s), fiber velocity (m/s) and its rate
-        (m/s^2).
+    Returns:
+        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
+        length and by velocity, active and passive fiber force (N), whether the fibers are longer than
+        the muscle is wide, rate of activation (1/s), fiber velocity (m/s) and its rate (m/s²).
     """
     fiber_length, velocity = now.fiber_length, now.fiber_velocity
     cos = cos_pennation(fiber_length, m.height, m.shortest, m.largest_sin, m.least_cos)
@@ -183,7 +187,10 @@ def millard2012_acceleration(
 def millard2012_acceleration_rigid(
     now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
 ) -> float:
-    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim."""
+    """Return the force of fully active fibers along a rigid tendon (N).
+
+    See OpenSim's calcInextensibleTendonActiveFiberForce.
+    """
     fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
     if not fiber > m.shortest:
         return 0.0
@@ -196,12 +203,15 @@ def millard2012_acceleration_rigid(
 def millard2012_acceleration_equilibrium(
     now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
 ) -> tuple[bool, float, float]:
-    """Whether there is a fiber length that is not accelerated, that length (m), and its velocity (m/s).
+    """Find a fiber length that is not accelerated.
 
-    Step for step as in initMuscleState of OpenSim's class: parts of Newton's steps, while the rate
-    of the path is shared between fibers and tendon by their stiffness. Where the slope vanishes,
-    OpenSim goes on somewhere at random; here the search ends. It ends, as there, where a tendon
-    without stiffness becomes taut.
+    Step for step as in initMuscleState of OpenSim's class: parts of Newton steps, while the rate of the
+    path is distributed over fibers and tendon by their stiffness. Where the slope vanishes, OpenSim
+    continues at a random length; here the search ends. It ends, as there, where a tendon without
+    stiffness becomes taut.
+
+    Returns:
+        Whether there is one, the fiber length (m), and its velocity (m/s).
     """
     length, rate = now.length, now.rate
     tolerance, tendon, tendon_rate = max(1e-8 * m.strength, 10.0 * SIGNIFICANT), 1.01 * m.slack, 0.0
@@ -235,14 +245,14 @@ def millard2012_acceleration_energy(
     cos: float,
     curves: AccelerationCurves,
 ) -> float:
-    """Potential energy, J; the energy of the mass is not counted.
+    """Return the potential energy, without the kinetic energy of the mass (J).
 
     Args:
-        m: the muscle.
-        length: of the path, m.
-        fiber_length: m.
-        cos: of pennation.
-        curves: of the muscle.
+        m: muscle.
+        length: length of the path (m).
+        fiber_length: fiber length (m).
+        cos: cosine of pennation.
+        curves: curves of the muscle.
     """
     short, steep = curves.short, curves.steep
     stretched = curve_integral(curves.passive, fiber_length / m.optimal)

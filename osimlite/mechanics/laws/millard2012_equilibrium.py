@@ -1,10 +1,14 @@
-"""The muscle of M. Millard et al. (Journal of Biomechanical Engineering 135, 2013) without a mass between its parts.
+"""Muscle of M. Millard et al. without a mass, as in OpenSim's Millard2012EquilibriumMuscle.
 
-As OpenSim's Millard2012EquilibriumMuscle has it: with or without damping of the fibers, with an
-elastic or a rigid tendon, with or without dynamics of activation. Forces are parts of the maximum
-isometric force F, fiber lengths of the optimal fiber length, fiber velocities of the maximum
-contraction velocity times that length, tendon lengths of the tendon slack length. The curves are
+Source: Journal of Biomechanical Engineering 135, 2013. The fibers may be damped or not, the tendon
+elastic or rigid, with or without activation dynamics. Forces are normalized by the maximum
+isometric force F, fiber lengths by the optimal fiber length, fiber velocities by the maximum
+contraction velocity times that length, tendon lengths by the tendon slack length. The curves are
 those of :mod:`osimlite.mechanics.laws.muscle_curves`.
+
+With an elastic tendon, the fiber velocity v follows from (a fl(l) fv(v) + fp(l) + beta v) cos(phi)
+= ft, where a is the activation, fl, fv, fp, ft are the curves, beta is the damping, and phi the
+pennation angle.
 """
 
 from __future__ import annotations
@@ -24,17 +28,25 @@ from osimlite.mechanics.laws.muscles import (
 )
 
 LENGTH_ROUNDS = 200
-"""Newton's steps in the search for an equilibrium."""
+"""Largest number of Newton steps in the search for an equilibrium."""
 VELOCITY_TOLERANCE = 1e-10
-"""What a velocity may leave of a force that is to be zero, as part of the strength; nearly always it is rounding."""
-NONE, DAMPED, INVERSE, RIGID, SLACK = 0.0, 1.0, 2.0, 3.0, 4.0
-"""What tells the velocity: nothing, a sum with damping, the inverse curve; it is known and tells the force, or is 0."""
+"""Accepted residual of the equation for the velocity, relative to F; usually it is rounding."""
+NONE = 0.0
+"""The velocity is undefined."""
+DAMPED = 1.0
+"""The velocity follows from the equation with damping."""
+INVERSE = 2.0
+"""The velocity follows from the inverse force-velocity curve."""
+RIGID = 3.0
+"""The velocity follows from that of the path, with a rigid tendon."""
+SLACK = 4.0
+"""The velocity is 0, as a rigid tendon is slack."""
 SMALLEST = 2.0**-26
-"""Least part of a step, and the step (m) in the other direction where there is none."""
+"""Smallest part of a step, and the step (m) in the opposite direction if that fails."""
 
 
 class Millard2012Equilibrium(NamedTuple):
-    """The numbers of a muscle."""
+    """Parameters of a Millard2012EquilibriumMuscle."""
 
     strength: float  # max_isometric_force F, N
     optimal: float  # optimal_fiber_length, m
@@ -54,7 +66,7 @@ class Millard2012Equilibrium(NamedTuple):
 
 
 class MillardCurves(NamedTuple):
-    """The curves of a muscle, as `curve_value` takes them."""
+    """Curves of a muscle, as `curve_value` takes them."""
 
     active: Sequence[float]  # active force over fiber length
     velocity: Sequence[float]  # factor of the active force over fiber velocity
@@ -64,7 +76,7 @@ class MillardCurves(NamedTuple):
 
 
 class Fibers(NamedTuple):
-    """What is known of a muscle; before a curve was asked, its argument stands where its value will."""
+    """Intermediate results of a muscle; before a curve is evaluated, its argument is in place of its value."""
 
     told_by: float  # see NONE
     velocity: float
@@ -81,15 +93,15 @@ class Fibers(NamedTuple):
 def millard2012_equilibrium(
     now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
-    """The muscle at a moment; see calcFiberVelocityInfo and calcMuscleDynamicsInfo of OpenSim's class.
+    """Compute forces and rates of a muscle; see OpenSim's calcFiberVelocityInfo and calcMuscleDynamicsInfo.
 
-    Fibers at their least length stay there as long as they would shorten, and bear nothing then. A
-    rigid tendon does not bear pressure: the damping of fast fibers is bounded instead.
+    Fibers at their smallest length stay there as long as they would shorten, and then bear no force. A
+    rigid tendon bears no pressure: the damping of fast fibers is bounded instead.
 
-    Returns: Tension (N), activation, fiber length (m), cosine of pennation, factors of the active
-        force by length and by velocity, active and passive fiber force (N), whether a fiber
-        velocity was found, rate of activation (1/s), fiber velocity (m/s), what of the passive
-        force is not by damping (N).
+    Returns:
+        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
+        length and by velocity, active and passive fiber force (N), whether a fiber velocity exists,
+        rate of activation (1/s), fiber velocity (m/s), elastic part of the passive force (N).
     """
     fibers = fibers_resting(now, m, curves)
     is_found, velocity, by_velocity = fibers.told_by != NONE, fibers.velocity, fibers.by_velocity
@@ -109,7 +121,11 @@ def millard2012_equilibrium(
 def millard2012_again(
     now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves, fiber_velocity: float
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
-    """The same, where the velocity (m/s) that damped fibers have is known, so that its derivatives are all to find."""
+    """Compute the muscle with a known velocity (m/s) of damped fibers, to obtain all its derivatives.
+
+    Returns:
+        The results of `millard2012_equilibrium`.
+    """
     fibers = fibers_resting(now, m, curves)
     velocity = (
         plain(fiber_velocity) / (m.fastest * m.optimal)
@@ -130,7 +146,7 @@ def millard2012_again(
 
 
 def fibers_resting(now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves) -> Fibers:
-    """The fibers when the curves over length were asked, those over velocity not."""
+    """Evaluate the curves over length, but not those over velocity."""
     fibers, tendon = fibers_at(now, m), 0.0
     by_length, _ = curve_value(curves.active, fibers.by_length)
     elastic, _ = curve_value(curves.passive, fibers.by_length)
@@ -152,7 +168,7 @@ def fibers_resting(now: MuscleInputs, m: Millard2012Equilibrium, curves: Millard
 
 
 def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> Fibers:
-    """The fibers at a moment, before any curve was asked."""
+    """Compute the arguments of all curves."""
     active = min(max(now.excitation if m.is_excited else now.activation, m.least), 1.0)
     fiber = now.fiber_length
     if m.is_rigid:
@@ -179,7 +195,12 @@ def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> Fibers:
 def fibers_loaded(
     fibers: Fibers, m: Millard2012Equilibrium, by_length: float, elastic: float, tendon: float
 ) -> tuple[float, float, float, float, float]:
-    """What these curves say: velocity, or what tells it, factor of the active force, `by_length` and the two after."""
+    """Combine the values of the curves over length.
+
+    Returns:
+        Velocity or what determines it, factor of the active force by velocity, and the factor by
+        length, passive force and tendon force.
+    """
     velocity, by_velocity = fibers.velocity, 1.0
     if m.is_rigid or fibers.told_by == NONE:
         tendon = 0.0
@@ -191,9 +212,12 @@ def fibers_loaded(
 
 
 def fibers_asking(fibers: Fibers, m: Millard2012Equilibrium) -> tuple[int, float, float, float]:
-    """Which of the curves of velocity and its inverse is asked, factors of it and its argument, and what their sum is.
+    """Return which of the curves of velocity (0) and its inverse (1) is requested, and for what sum.
 
-    A curve itself is asked where the first factor is 0 and the second 1.
+    The curve itself is requested where the first factor is 0 and the second 1.
+
+    Returns:
+        Number of the curve, factors of it and of its argument, and the value of their sum.
     """
     if fibers.told_by == DAMPED:
         return 0, fibers.active * fibers.by_length, m.damping, fibers.velocity
@@ -203,7 +227,11 @@ def fibers_asking(fibers: Fibers, m: Millard2012Equilibrium) -> tuple[int, float
 def fibers_moved(
     fibers: Fibers, m: Millard2012Equilibrium, value: float, missed: float
 ) -> tuple[float, float, float]:
-    """What tells the velocity, it, and factor of the active force, by what the curve says."""
+    """Combine the value of the requested curve.
+
+    Returns:
+        What determines the velocity, the velocity, and the factor of the active force.
+    """
     if fibers.told_by == DAMPED:
         is_found, velocity = damped_by(
             m, fibers.active * fibers.by_length, fibers.velocity, value, missed
@@ -217,7 +245,11 @@ def fibers_moved(
 def muscle_of(
     fibers: Fibers, m: Millard2012Equilibrium
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
-    """What `millard2012_equilibrium` returns, when the curves were asked."""
+    """Return the results of `millard2012_equilibrium`, after all curves have been evaluated.
+
+    Returns:
+        The results of `millard2012_equilibrium`.
+    """
     of_curves = fibers.by_length, fibers.elastic, fibers.tendon
     return muscle_with(
         fibers, m, fibers.told_by != NONE, fibers.velocity, fibers.by_velocity, *of_curves
@@ -234,7 +266,11 @@ def muscle_with(
     elastic: float,
     tendon: float,
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
-    """The same, with what was found in place of what `fibers` has."""
+    """Return the results of `millard2012_equilibrium` for given values of the curves.
+
+    Returns:
+        The results of `millard2012_equilibrium`.
+    """
     active, fiber, cos = fibers.active, fibers.length, fibers.cos
     pull = m.strength * (active * by_length * by_velocity)
     spring = m.strength * elastic
@@ -264,10 +300,10 @@ def muscle_with(
 
 
 def millard2012_rigid(now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves) -> float:
-    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim.
+    """Return the force of fully active fibers along a rigid tendon (N).
 
-    As there, the pennation that takes the force to the tendon is that of fibers as many meters long
-    as they have optimal lengths: next to none.
+    See OpenSim's calcInextensibleTendonActiveFiberForce. As there, the pennation that projects the
+    force onto the tendon is that of fibers with their normalized length in m: next to none.
     """
     fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
     if fiber <= m.smallest:
@@ -288,19 +324,18 @@ def damped_velocity(
     cos: float,
     curves: MillardCurves,
 ) -> tuple[bool, float, float]:
-    """The normalized fiber velocity at which damped fibers bear what the tendon does.
+    """Find the normalized velocity at which damped fibers balance the tendon.
 
-    OpenSim looks for it by Newton's method, up to a tolerance of 1e-10; here the search is that on
-    a curve.
+    OpenSim uses Newton's method with a tolerance of 1e-10; here the search is that on a curve.
 
     Args:
-        m: the muscle.
+        m: muscle.
         active: activation.
-        by_length: active force at rest, fully activated.
+        by_length: factor of the active force by length.
         elastic: passive force.
-        tendon: its force.
-        cos: of pennation.
-        curves: of the muscle.
+        tendon: tendon force.
+        cos: cosine of pennation.
+        curves: curves of the muscle.
 
     Returns:
         Whether there is one, the velocity, and the factor of the active force there.
@@ -314,14 +349,17 @@ def damped_velocity(
 def damped_by(
     m: Millard2012Equilibrium, share: float, borne: float, factor: float, missed: float
 ) -> tuple[bool, float]:
-    """Whether a search for the velocity has found it, and what bears the rest of a load.
+    """Return whether a search for the velocity converged, and the velocity.
 
     Args:
-        m: the muscle.
-        share: active force at rest.
-        borne: by the fibers, but for their passive force at rest.
-        factor: of the active force.
-        missed: how far the search has ended from the load.
+        m: muscle.
+        share: active isometric force.
+        borne: force of the fibers without their elastic passive force.
+        factor: factor of the active force by velocity.
+        missed: residual of the search.
+
+    Returns:
+        Whether it converged, and the velocity.
     """
     return abs(missed) <= VELOCITY_TOLERANCE, (borne - share * factor) / m.damping
 
@@ -329,17 +367,17 @@ def damped_by(
 def millard2012_energy(
     m: Millard2012Equilibrium, length: float, fiber_length: float, cos: float, curves: MillardCurves
 ) -> float:
-    """Potential energy of fibers and tendon, J.
+    """Return the potential energy of fibers and tendon (J).
 
-    OpenSim has it from splines of the integrals, which are good to 1e-9 but for the ends of the
-    curves: 1e-6 there.
+    OpenSim computes it from splines of the integrals, with errors of 1e-9, and 1e-6 at the ends of the
+    curves.
 
     Args:
-        m: the muscle.
-        length: of the path, m.
-        fiber_length: m.
-        cos: of pennation.
-        curves: of the muscle.
+        m: muscle.
+        length: length of the path (m).
+        fiber_length: fiber length (m).
+        cos: cosine of pennation.
+        curves: curves of the muscle.
     """
     stored = m.optimal * curve_integral(curves.passive, fiber_length / m.optimal)
     if not m.is_rigid:
@@ -350,11 +388,13 @@ def millard2012_energy(
 def millard2012_equilibrium_length(
     now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
 ) -> tuple[bool, float]:
-    """Whether there is a fiber length at which fibers at rest and tendon bear the same, and that length (m).
+    """Find the fiber length at which resting fibers and tendon bear the same force.
 
-    Newton's method with halved steps, step for step as in estimateMuscleFiberState of OpenSim's
-    class, which knows nothing of the rate of the path. A length that would be below the least is
-    that.
+    Newton's method with halved steps, step for step as in estimateMuscleFiberState of OpenSim's class,
+    which ignores the rate of the path. A length below the smallest one is replaced by it.
+
+    Returns:
+        Whether there is one, and the fiber length (m).
     """
     length, active = (
         now.length,
@@ -385,14 +425,17 @@ def millard2012_equilibrium_length(
 def imbalance(
     m: Millard2012Equilibrium, length: float, fiber: float, active: float, curves: MillardCurves
 ) -> tuple[float, float]:
-    """What fibers at rest bear along the tendon and the tendon does not, N, and its derivative, N/m.
+    """Return the force of resting fibers along the tendon less the tendon force, and its derivative.
 
     Args:
-        m: the muscle.
-        length: of the path, m.
-        fiber: length of the fibers, m.
+        m: muscle.
+        length: length of the path (m).
+        fiber: fiber length (m).
         active: activation.
-        curves: of the muscle.
+        curves: curves of the muscle.
+
+    Returns:
+        Residual (N) and derivative by the fiber length (N/m).
     """
     if fiber <= m.height:
         return nan, nan

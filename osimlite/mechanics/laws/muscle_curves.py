@@ -1,9 +1,11 @@
-"""The curves of Millard's muscles (M. Millard et al., Journal of Biomechanical Engineering 135, 2013, section 2).
+"""Force curves of Millard's muscles.
 
-Lengths are parts of the optimal fiber length or of the tendon slack length, velocities of the
-maximum contraction velocity, forces of the maximum isometric force. Each function takes the
-properties of the class of OpenSim that has its name, in their order, and gives the numbers of a
-curve; None stands for a property that is left out.
+Source: M. Millard et al., Journal of Biomechanical Engineering 135, 2013, section 2. Lengths are
+normalized by the optimal fiber length or the tendon slack length, velocities by the maximum
+contraction velocity, forces by the maximum isometric force. Each function takes the properties of
+the OpenSim class with its name, in their order, and returns the numbers of a Bezier curve; None
+stands for an omitted property. It raises a ValueError if there is no such curve, whose message
+begins with "its" and a property, or tells which slopes make no corner.
 """
 
 from __future__ import annotations
@@ -13,24 +15,38 @@ from math import cos, radians
 
 from osimlite.mechanics.laws.bezier import Numbers, curve, curve_size
 
-ACTIVE_SIZE, VELOCITY_SIZE, PASSIVE_SIZE, TENDON_SIZE = map(curve_size, (5, 4, 2, 2))
+ACTIVE_SIZE = curve_size(5)
+"""Length of an active force-length curve."""
+VELOCITY_SIZE = curve_size(4)
+"""Length of a force-velocity curve."""
+PASSIVE_SIZE = curve_size(2)
+"""Length of a passive force-length curve."""
+TENDON_SIZE = curve_size(2)
+"""Length of a tendon force-length curve."""
 COMPRESSIVE_SIZE = curve_size(1)
-"""How many numbers each curve has."""
+"""Length of a compressive force curve."""
 NEAREST = 2.0**-26
-"""Lengths as near as that to each other count as one."""
+"""Difference up to which two lengths count as equal."""
 
 _kept = lru_cache(maxsize=256)
-"""Most muscles of a model have the same curves."""
+"""Cache of curves, since most muscles of a model have the same."""
 
 
 @_kept
 def active_force_length(
     shortest: float, transition: float, longest: float, slope: float, least: float
 ) -> Numbers:
-    """Active force over fiber length; it is 1 at 1, where the curve is flat.
+    """Return the active force over the fiber length; it is 1 at 1, where the curve is flat.
 
-    Raises: ValueError: there is no such curve; likewise for those below. The message begins with
-        "its" and a property, or tells which slopes make no corner.
+    Args:
+        shortest: smallest active fiber length.
+        transition: fiber length at the end of the steep ascending part.
+        longest: largest active fiber length.
+        slope: slope of the shallow ascending part.
+        least: smallest force.
+
+    Raises:
+        ValueError: there is no such curve.
     """
     _require(
         shortest >= 0.0 and min(transition - shortest, 1.0 - transition, longest - 1.0) > NEAREST,
@@ -71,7 +87,22 @@ def force_velocity(
     *,
     inverse: bool = False,
 ) -> Numbers:
-    """Factor of the active force over fiber velocity, or the velocity over that factor."""
+    """Return the factor of the active force over the fiber velocity.
+
+    Args:
+        concentric_end: slope at the maximum shortening velocity.
+        concentric_near: slope near it.
+        isometric: slope at zero velocity.
+        eccentric_end: slope at the maximum lengthening velocity.
+        eccentric_near: slope near it.
+        most: factor at the maximum lengthening velocity.
+        concentric_curviness: curviness for shortening.
+        eccentric_curviness: curviness for lengthening.
+        inverse: whether to return the velocity over the factor.
+
+    Raises:
+        ValueError: there is no such curve.
+    """
     _require(most > 1.0, "its max_eccentric_velocity_force_multiplier is not above 1")
     _below(concentric_end, concentric_near, "concentric_slope_at_vmax")
     _require(
@@ -113,7 +144,18 @@ def fiber_force_length(
     stiffness: float | None = None,
     curviness: float | None = None,
 ) -> Numbers:
-    """Passive force over fiber length."""
+    """Return the passive force over the fiber length.
+
+    Args:
+        zero: strain at zero force.
+        one: strain at the maximum isometric force.
+        low: stiffness at low force.
+        stiffness: stiffness at the maximum isometric force.
+        curviness: curviness.
+
+    Raises:
+        ValueError: there is no such curve.
+    """
     _require(
         one > zero,
         f"its strain_at_zero_force is not less than its strain_at_one_norm_force, {one:.4g}",
@@ -140,7 +182,17 @@ def tendon_force_length(
     toe: float | None = None,
     curviness: float | None = None,
 ) -> Numbers:
-    """Force over tendon length."""
+    """Return the force over the tendon length.
+
+    Args:
+        one: strain at the maximum isometric force.
+        stiffness: stiffness there.
+        toe: force at the end of the toe region.
+        curviness: curviness.
+
+    Raises:
+        ValueError: there is no such curve.
+    """
     _require(one > NEAREST, f"its strain_at_one_norm_force is not above {NEAREST:.1e}")
     stiffness, toe, curviness = _given_or(
         (stiffness, toe, curviness), (1.375 / one, 2.0 / 3.0, 0.5), "stiffness_at_one_norm_force"
@@ -161,7 +213,16 @@ def tendon_force_length(
 def fiber_compressive_force_length(
     zero: float, stiffness: float | None = None, curviness: float | None = None
 ) -> Numbers:
-    """Force against short fibers over their length."""
+    """Return the force against short fibers over their length.
+
+    Args:
+        zero: fiber length at zero force.
+        stiffness: stiffness at zero length.
+        curviness: curviness.
+
+    Raises:
+        ValueError: there is no such curve.
+    """
     _require(zero > 0.0, "its norm_length_at_zero_force is not positive")
     stiffness, curviness = _given_or(
         (stiffness, curviness), (-2.0 / zero, 0.5), "stiffness_at_zero_length"
@@ -176,7 +237,16 @@ def fiber_compressive_force_length(
 def fiber_compressive_force_cos_pennation(
     angle: float, stiffness: float | None = None, curviness: float | None = None
 ) -> Numbers:
-    """Force against steep fibers over the cosine of pennation; the angle of engagement is in degrees."""
+    """Return the force against steep fibers over the cosine of pennation.
+
+    Args:
+        angle: pennation angle at zero force (degrees).
+        stiffness: stiffness at a right angle.
+        curviness: curviness.
+
+    Raises:
+        ValueError: there is no such curve.
+    """
     zero = cos(radians(angle))
     _require(0.0 < zero < 1.0, "its engagement_angle_in_degrees is not between 0 and 90")
     stiffness, curviness = _given_or(
@@ -205,7 +275,7 @@ def _above(slope: float, limit: float, name: str) -> None:
 def _given_or(
     given: tuple[float | None, ...], usual: tuple[float, ...], first: str
 ) -> tuple[float, ...]:
-    """What is given, or the usual if nothing is; the first property is that of `given`."""
+    """Return optional properties, or their defaults if all are omitted; `first` is the name of the first."""
     result = [x for x in given if x is not None]
     _require(
         len(result) in (0, len(usual)),

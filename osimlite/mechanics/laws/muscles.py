@@ -1,9 +1,9 @@
-"""What muscles have in common: activation that follows excitation, and fibers that turn as they shorten.
+"""Activation dynamics and pennation, which the laws of all muscles share.
 
-The fibers of a muscle are parallel, and stay as far apart as they are (F. E. Zajac, Critical
-Reviews in Biomedical Engineering 17, 1989): the height h = l sin(phi) of fibers of length l, at the
-pennation angle phi to the tendon, is constant. OpenSim's MuscleFixedWidthPennationModel bounds the
-angle, and so the length from below.
+The fibers of a muscle are parallel and keep their distance (F. E. Zajac, Critical Reviews in
+Biomedical Engineering 17, 1989): the height h = l sin(phi) of fibers of length l, at the pennation
+angle phi to the tendon, is constant. OpenSim's MuscleFixedWidthPennationModel bounds the angle from
+above, and thereby the length from below.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from math import cos, sin, sqrt
 from typing import NamedTuple
 
 SIGNIFICANT = 2.0 ** (-52.0 * 7.0 / 8.0)
-"""Simbody's SignificantReal."""
+"""Simbody's SignificantReal, eps^(7/8)."""
 NO_ANGLE = 2.0**-52
-"""Fibers at a smaller angle are as straight as the tendon."""
+"""Pennation angle (rad) up to which fibers count as parallel to the tendon."""
 
 
 class MuscleInputs(NamedTuple):
-    """What the law of a muscle is given of a moment; a state that the muscle has not is 0."""
+    """Inputs of the law of a muscle; a state that the muscle does not have is 0."""
 
     length: float  # of the path, m
     rate: float  # of it, m/s
@@ -32,17 +32,19 @@ class MuscleInputs(NamedTuple):
 def first_order_activation_rate(
     excitation: float, activation: float, rising: float, falling: float, least: float
 ) -> float:
-    """Rate of activation, 1/s (D. G. Thelen, Journal of Biomechanical Engineering 125, 2003, eq. 1 and 2).
+    """Return the rate of activation (1/s).
 
-    As in OpenSim, the activation is kept within its bounds here, and the excitation is not: below
-    the least activation the rate stays what it is at it.
+    It is (e - a) / tau, with tau = rising (0.5 + 1.5 a) for e > a, else falling / (0.5 + 1.5 a). As in
+    OpenSim the activation is clamped to its bounds, and the excitation is not: below the smallest
+    activation the rate stays constant. Source: D. G. Thelen, Journal of Biomechanical Engineering 125,
+    2003, eq. 1 and 2.
 
     Args:
-        excitation: what the control asks for.
-        activation: the state.
-        rising: activation time constant, s.
-        falling: deactivation time constant, s.
-        least: activation.
+        excitation: excitation e.
+        activation: activation a.
+        rising: activation time constant (s).
+        falling: deactivation time constant (s).
+        least: smallest activation.
     """
     active = min(max(activation, least), 1.0)
     slow = 0.5 + 1.5 * active
@@ -52,15 +54,15 @@ def first_order_activation_rate(
 def pennation(
     optimal_length: float, optimal_angle: float, largest_angle: float
 ) -> tuple[float, float, float, float]:
-    """What the laws are given of pennation.
+    """Return the constants of pennation.
 
     Args:
-        optimal_length: of the fibers, m.
-        optimal_angle: between fibers and tendon at that length, rad.
-        largest_angle: that is possible, rad.
+        optimal_length: optimal fiber length (m).
+        optimal_angle: pennation angle at that length (rad).
+        largest_angle: largest pennation angle (rad).
 
     Returns:
-        Height (m), least length of the fibers (m), sine and cosine of the angle there.
+        Height (m), smallest fiber length (m), and sine and cosine of the largest angle.
     """
     height = optimal_length * sin(optimal_angle)
     shortest = height / sin(largest_angle) if largest_angle > SIGNIFICANT else 0.01 * optimal_length
@@ -72,12 +74,12 @@ def pennation(
 def cos_pennation(
     length: float, height: float, shortest: float, largest_sin: float, least_cos: float
 ) -> float:
-    """Cosine of the pennation angle of fibers of a length (m); the rest as of `pennation`."""
+    """Return the cosine of the pennation angle of fibers of a length (m); other arguments as of `pennation`."""
     if length <= shortest or height >= largest_sin * length:
         return least_cos
     return sqrt((length - height) * (length + height)) / length
 
 
 def fiber_length_along(along: float, height: float, shortest: float, least_cos: float) -> float:
-    """Length (m) of fibers that reach so far along the tendon (m); the rest as of `pennation`."""
+    """Return the fiber length (m) for a length along the tendon (m); other arguments as of `pennation`."""
     return sqrt(height * height + along * along) if along >= shortest * least_cos else shortest

@@ -1,4 +1,9 @@
-"""Rotations as the three axes that they turn x, y and z into: the columns of their matrices."""
+"""Rotations as three axes, the columns of their matrices; and sine and cosine of joint angles.
+
+Sources of `sine_cosine`: S. L. Moshier, Methods and Programs for Mathematical Functions, 1989 (the
+approximations of the Cephes library); W. J. Cody and W. Waite, Software Manual for the Elementary
+Functions, 1980 (the reduction of the argument). Its error is less than 1.5 units in the last place.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +13,16 @@ from osimlite.mechanics.laws.vectors import Vector
 
 Axes = tuple[Vector, Vector, Vector]
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+X = (1.0, 0.0, 0.0)
+"""Unit vector along x."""
+Y = (0.0, 1.0, 0.0)
+"""Unit vector along y."""
+Z = (0.0, 0.0, 1.0)
+"""Unit vector along z."""
 
 
 def along_axes(axes: Axes, a: Vector) -> Vector:
-    """A vector that has these components along axes."""
+    """Return the vector with these components along axes."""
     x, y, z = a
     one, two, three = axes
     return (
@@ -23,19 +33,19 @@ def along_axes(axes: Axes, a: Vector) -> Vector:
 
 
 def turned_axes(axes: Axes, others: Axes) -> Axes:
-    """Axes that have these components along others, which are the first."""
+    """Return axes whose components along `axes` are `others`: the product of both rotations."""
     one, two, three = others
     return along_axes(axes, one), along_axes(axes, two), along_axes(axes, three)
 
 
 def transposed(axes: Axes) -> Axes:
-    """The rotation back."""
+    """Return the inverse rotation."""
     one, two, three = axes
     return (one[0], two[0], three[0]), (one[1], two[1], three[1]), (one[2], two[2], three[2])
 
 
 def about_axis(axis: Vector, s: float, c: float) -> Axes:
-    """By an angle with this sine and cosine about a unit vector (Rodrigues' formula)."""
+    """Return the rotation about a unit vector by an angle with sine s and cosine c (Rodrigues' formula)."""
     x, y, z = axis
     d = 1.0 - c
     return (
@@ -46,7 +56,7 @@ def about_axis(axis: Vector, s: float, c: float) -> Axes:
 
 
 def body_fixed(s1: float, c1: float, s2: float, c2: float, s3: float, c3: float) -> Axes:
-    """Rx(a) Ry(b) Rz(c), of the sines and cosines of body-fixed X-Y-Z angles a, b, c."""
+    """Return the rotation Rx(a) Ry(b) Rz(c) from sines and cosines of body-fixed X-Y-Z angles a, b, c."""
     return (
         (c2 * c3, c1 * s3 + s1 * s2 * c3, s1 * s3 - c1 * s2 * c3),
         (-c2 * s3, c1 * c3 - s1 * s2 * s3, s1 * c3 + c1 * s2 * s3),
@@ -54,14 +64,20 @@ def body_fixed(s1: float, c1: float, s2: float, c2: float, s3: float, c3: float)
     )
 
 
-QUARTERS = 0.6366197723675814  # 2 / pi
+QUARTERS = 0.6366197723675814
+"""2 / pi, the number of quarter turns per radian."""
 LARGEST = 1e6
+"""Largest angle (rad) for which the reduction of the argument is accurate enough."""
 # pi / 2 in three parts, of which the first two have few enough digits for exact products.
 HIGH, MIDDLE, LOW = 1.5707962512969971, 7.549789415861596e-8, 5.390302858158119e-15
 
 
 def sine_cosine(angle: float) -> tuple[float, float]:
-    """(sin, cos) of an angle in rad."""
+    """Return sine and cosine of an angle (rad).
+
+    Returns:
+        Sine and cosine.
+    """
     if not abs(angle) < LARGEST:
         return sin(angle), cos(angle)
     quarters = floor(angle * QUARTERS + 0.5)

@@ -1,10 +1,14 @@
-"""Hunt-Crossley contact of a half space and a sphere, made smooth.
+"""Contact that is smooth everywhere: of a half space and a sphere, and of a station with the ground.
 
 As in :mod:`osimlite.mechanics.laws.hunt_crossley` the half space is surface 1 and the sphere
 surface 2, n is the unit normal of the half space, d the depth and v the velocity of surface 1
 relative to surface 2. Source: G. Serrancolí et al., "Subject-exoskeleton contact model calibration
 leads to accurate interaction force predictions", IEEE Transactions on Neural Systems and
-Rehabilitation Engineering 27 (2019) 1597-1605, as Simbody's SmoothSphereHalfSpaceForce has it.
+Rehabilitation Engineering 27 (2019) 1597-1605, as in Simbody's SmoothSphereHalfSpaceForce.
+
+The station touches the plane y = 0 of ground by a damped spring. Source: A. J. Meyer et al.,
+"Muscle synergies facilitate computational prediction of subject-specific walking motions",
+Frontiers in Bioengineering and Biotechnology 4 (2016) 77, as in OpenSim's MeyerFregly2016Force.
 """
 
 from __future__ import annotations
@@ -16,14 +20,14 @@ from osimlite.mechanics.laws.vectors import Vector, along, dot, times
 
 
 def smooth_hertz(d: float, R: float, E: float, cf: float, bd: float) -> float:
-    """Elastic force (4/3) k sqrt(R k) (d^2 + cf)^(3/4) (1 + tanh(bd d)) / 2, k = E^(2/3) / 2, in N.
+    """Return the elastic force (4/3) k sqrt(R k) (d^2 + cf)^(3/4) (1 + tanh(bd d)) / 2, k = E^(2/3) / 2 (N).
 
     Args:
-        d: depth, m, negative for a gap.
-        R: radius of the sphere, m.
-        E: stiffness property, Pa.
-        cf: what keeps the force from vanishing, m^2.
-        bd: how sharply the force sets in, 1/m.
+        d: depth (m), negative for a gap.
+        R: radius of the sphere (m).
+        E: stiffness property (Pa).
+        cf: constant that keeps the force differentiable (m²).
+        bd: steepness of the transition at contact (1/m).
     """
     k: float = 0.5 * E ** (2.0 / 3.0)
     s = sqrt(d * d + cf)
@@ -42,17 +46,22 @@ def smooth_contact_force(
     n: Vector,
     v: Vector,
 ) -> Vector:
-    """Force on the sphere, in N, at the point midway between the two surfaces.
+    """Return the force on the sphere at the point midway between the two surfaces (N).
 
-    f = fh (1 + (3/2) c vn) (1 + tanh(bv (vn + 2 / (3 c)))) / 2 along n, and along the slip vT
-    f mu / w with w = sqrt(|vT|^2 + cf) and mu its `friction`.
+    f = fh (1 + (3/2) c vn) (1 + tanh(bv (vn + 2 / (3 c)))) / 2 along n, and along the slip vT f mu / w
+    with w = sqrt(|vT|^2 + cf) and mu its `friction`.
 
-    Args: hertz: fh from `smooth_hertz`, N. c: dissipation, s/m. With 0, f = fh. us: coefficient as
-        of :func:`osimlite.mechanics.laws.hunt_crossley.friction`, with ud and uv. vt: transition
-        velocity, m/s. cf: what keeps w from vanishing, m^2/s^2 (the same number as in
-        `smooth_hertz`). bv: how sharply the force goes when the surfaces separate, s/m. n: unit
-        normal out of the half space, 1. v: velocity of the half space relative to the sphere at the
-        point, m/s.
+    Args:
+        hertz: elastic force fh from `smooth_hertz` (N).
+        c: dissipation (s/m); with 0, f = fh.
+        us: coefficient of static friction, see `hunt_crossley.friction`.
+        ud: coefficient of dynamic friction.
+        uv: coefficient of viscous friction (s/m).
+        vt: transition velocity (m/s).
+        cf: constant that keeps w from vanishing (m²/s²), the same number as in `smooth_hertz`.
+        bv: steepness of the transition as the surfaces separate (s/m).
+        n: outward unit normal of the half space.
+        v: velocity of the half space relative to the sphere at the point (m/s).
     """
     vn = dot(v, n)
     f = hertz * (1.0 + 1.5 * c * vn)
@@ -67,11 +76,12 @@ def smooth_contact_derivatives(
     d: float, R: float, E: float, cf: float, bd: float, c: float, us: float, ud: float, uv: float, vt: float,
     bv: float, n: Vector, v: Vector,
 ) -> tuple[float, float, float, float]:  # fmt: skip
-    """How the force of `smooth_contact_force` changes; the arguments are its own and those of `smooth_hertz`.
+    """Return the derivatives of the force; the arguments are those of both functions above.
 
-    Returns: Of the force along n its derivatives by the depth (N/m) and by the approach v n (N
-        s/m), the force across n over the slip (N s/m), and by what part the force grows with the
-        depth (1/m); all 0 where there is no force.
+    Returns:
+        Derivatives of the normal force by the depth (N/m) and by the approach velocity v n (N s/m),
+        tangential force over slip (N s/m), and relative derivative of the force by the depth (1/m);
+        all 0 where there is no force.
     """
     hertz, vn = smooth_hertz(d, R, E, cf, bd), dot(v, n)
     if hertz <= 0.0:
@@ -94,11 +104,11 @@ def smooth_contact_derivatives(
 
 
 def smooth_contact_energy(hertz: float, d: float) -> float:
-    """(2/5) fh d, in J, as Simbody approximates the energy; negative (and tiny) where the surfaces are apart.
+    """Return (2/5) fh d, Simbody's approximation of the energy (J); negative and tiny for a gap.
 
     Args:
-        hertz: fh from `smooth_hertz`, N.
-        d: depth, m.
+        hertz: elastic force fh from `smooth_hertz` (N).
+        d: depth (m).
     """
     return 0.4 * hertz * d
 
@@ -115,22 +125,24 @@ def station_contact_force(
     uv: float,
     vl: float,
 ) -> tuple[float, float, float]:
-    """Force on the point.
+    """Return the force on a station that touches the plane y = 0 of ground.
 
-    With h = 0.7 tanh((y - l0) / 0.7), s = (k - k0) / 2 and v = (k + k0) / (k - k0), the elastic
-    force is s (v (y0 - h) - e (log cosh((y0 + d) / e) - log cosh((h + d) / e))); k0 = 0.1 N/m, y0 =
-    0.01 m, d = e = 0.001 m. It is multiplied by 1 - c vy, and rubs with (ud tanh(w / vl) + uv w)
-    times its size, w being the slip.
+    With h = 0.7 tanh((y - l0) / 0.7), s = (k - k0) / 2 and v = (k + k0) / (k - k0), the elastic force
+    is s (v (y0 - h) - e (log cosh((y0 + d) / e) - log cosh((h + d) / e))), where k0 = 0.1 N/m, y0 =
+    0.01 m, d = e = 0.001 m. It is multiplied by 1 - c vy. The friction is (ud tanh(w / vl) + uv w)
+    times the normal force, where w is the slip velocity.
 
     Args:
-        y: height of the point, m.
-        vx: velocity (vx, vy, vz) of the point in ground, m/s.
-        k: stiffness, N/m, not k0.
-        c: dissipation, s/m.
-        l0: height at which the spring rests, m.
-        ud: coefficient of dynamic friction, 1.
-        uv: coefficient of viscous friction, s/m.
-        vl: latch velocity, m/s, not 0.
+        y: height of the station (m).
+        vx: velocity of the station in ground along x (m/s).
+        vy: velocity along y (m/s).
+        vz: velocity along z (m/s).
+        k: stiffness, not k0 (N/m).
+        c: dissipation (s/m).
+        l0: height at which the spring rests (m).
+        ud: coefficient of dynamic friction.
+        uv: coefficient of viscous friction (s/m).
+        vl: latch velocity, not 0 (m/s).
 
     Returns:
         (fx, fy, fz), N.

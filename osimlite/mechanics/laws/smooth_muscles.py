@@ -1,12 +1,12 @@
-"""Muscles whose curves are smooth everywhere, made for direct collocation.
+"""Muscles with curves that are smooth everywhere, for direct collocation.
 
-Forces are parts of the maximum isometric force, fiber lengths of the optimal fiber length, fiber
-velocities of the maximum contraction velocity times that length, tendon lengths of the tendon slack
-length.
+Forces are normalized by the maximum isometric force, fiber lengths by the optimal fiber length,
+fiber velocities by the maximum contraction velocity times that length, tendon lengths by the tendon
+slack length.
 
 Sources: F. De Groote, A. L. Kinney, A. V. Rao and B. J. Fregly, Annals of Biomedical Engineering 44
 (2016) 2922-2936; A. J. Meyer et al., Frontiers in Bioengineering and Biotechnology 4 (2016) 77;
-with the constants that OpenSim has for their curves.
+with OpenSim's constants for their curves.
 """
 
 from __future__ import annotations
@@ -16,18 +16,22 @@ from typing import NamedTuple
 
 from osimlite.mechanics.laws.muscles import MuscleInputs
 
-SHORTEST, PASSIVE_SHAPE = 0.2, 4.0
-"""Fiber length where De Groote's passive force is 0, and its exponent at full strain."""
+SHORTEST = 0.2
+"""Normalized fiber length at which De Groote's passive force is 0."""
+PASSIVE_SHAPE = 4.0
+"""Exponent of De Groote's passive force at full strain."""
 BELOW = 0.2
-"""How far below 0 the exponential of the tendon's force begins."""
-LARGEST_FORCE, CLOSE, ROUNDS = 5.0, 1e-10, 100
-"""Of the search for an equilibrium: the tendon force that it begins with besides 0, how well the
-force is found, and how often an interval is halved.
-"""
+"""Offset of the exponential of the tendon force below 0."""
+LARGEST_FORCE = 5.0
+"""Upper end of the initial interval of tendon forces in the search for an equilibrium."""
+CLOSE = 1e-10
+"""Length of the interval at which the search ends."""
+ROUNDS = 100
+"""Largest number of bisections."""
 
 
 class SmoothMuscle(NamedTuple):
-    """The numbers that both muscles have."""
+    """Parameters that both muscles have."""
 
     strength: float  # max_isometric_force, N
     optimal: float  # optimal_fiber_length, m
@@ -44,7 +48,7 @@ class SmoothMuscle(NamedTuple):
 
 
 class SmoothTendon(NamedTuple):
-    """The numbers of De Groote's muscle besides."""
+    """Further parameters of De Groote's muscle."""
 
     passive_strain: float  # passive_fiber_strain_at_one_norm_force
     # the k of the tendon's force 0.2 (exp(k (l - 1)) - 1) at a length l, see `tendon_growth`
@@ -58,16 +62,16 @@ class SmoothTendon(NamedTuple):
 def smooth_activation_rate(
     excitation: float, activation: float, rising: float, falling: float, sharpness: float
 ) -> float:
-    """Rate of activation, 1/s: ((1/2 + f) / (rising z) + (1/2 - f) z / falling) (e - a).
+    """Return the rate of activation ((1/2 + f) / (rising z) + (1/2 - f) z / falling) (e - a) (1/s).
 
-    z = 1/2 + 3 a / 2, and f = tanh(sharpness (e - a)) / 2 leads from falling to rising.
+    Here z = 1/2 + 3 a / 2, and f = tanh(sharpness (e - a)) / 2 blends from falling to rising.
 
     Args:
-        excitation: e, what the control asks for.
-        activation: a, the state.
-        rising: time constant, s.
-        falling: time constant, s.
-        sharpness: how suddenly one turns into the other.
+        excitation: excitation e.
+        activation: activation a.
+        rising: activation time constant (s).
+        falling: deactivation time constant (s).
+        sharpness: steepness of the transition.
     """
     lacking = excitation - activation
     z, f = 0.5 + 1.5 * activation, 0.5 * tanh(sharpness * lacking)
@@ -75,13 +79,18 @@ def smooth_activation_rate(
 
 
 def bell(x: float, height: float, middle: float, width: float, growth: float) -> float:
-    """A curve like Gauss's with a width that grows along x."""
+    """Return height exp(-d^2 / 2) with d = (x - middle) / (width + growth x), a skewed Gaussian."""
     distance = (x - middle) / (width + growth * x)
     return height * exp(-0.5 * distance * distance)
 
 
 def degroote_active(length: float, scale: float) -> float:
-    """De Groote's force at rest of fully activated fibers of a normalized length, the curve made wider by a factor."""
+    """Return De Groote's isometric force of fully active fibers, at a normalized length.
+
+    Args:
+        length: normalized fiber length.
+        scale: factor of the width of the curve.
+    """
     x = (length - 1.0) / scale + 1.0
     return (
         bell(x, 0.8150671134243542, 1.055033428970575, 0.162384573599574, 0.063303448465465)
@@ -91,32 +100,40 @@ def degroote_active(length: float, scale: float) -> float:
 
 
 def degroote_passive(length: float, strain: float) -> tuple[float, float]:
-    """Passive force of fibers of a normalized length, and its integral over the length; from the strain at 1."""
+    """Return the passive force of fibers of a normalized length, and its integral over the length.
+
+    Args:
+        length: normalized fiber length.
+        strain: strain at a force of 1.
+
+    Returns:
+        Force and integral.
+    """
     none = exp(PASSIVE_SHAPE * (SHORTEST - 1.0) / strain)
     rise, full = exp(PASSIVE_SHAPE * (length - 1.0) / strain) - none, exp(PASSIVE_SHAPE) - none
     return rise / full, (strain / PASSIVE_SHAPE * rise - none * (length - SHORTEST)) / full
 
 
 def degroote_factor(velocity: float) -> float:
-    """Factor of the active force by the normalized velocity."""
+    """Return the factor of the active force at a normalized velocity."""
     x = -8.149 * velocity - 0.374
     return -0.3211346127989808 * log(x + sqrt(x * x + 1.0)) + 0.8825327733249912
 
 
 def degroote_velocity(factor: float) -> float:
-    """What `degroote_factor` inverts."""
+    """Return the normalized velocity at a factor of the active force, the inverse of `degroote_factor`."""
     x = (factor - 0.8825327733249912) / -0.3211346127989808
     # Where there is no float for it, Python's sinh raises an error.
     return ((copysign(inf, x) if abs(x) > 710.0 else sinh(x)) + 0.374) / -8.149
 
 
 def tendon_growth(strain: float) -> float:
-    """The growth of the tendon's force from its strain at 1."""
+    """Return the exponent of the tendon force from its strain at a force of 1."""
     return log((1.0 + BELOW) / BELOW) / strain
 
 
 def smooth_tendon_length(force: float, growth: float) -> float:
-    """Normalized length of the tendon; not a number where there is none, for forces below -0.2."""
+    """Return the normalized tendon length at a force, NaN for forces of -0.2 or less."""
     return log((force + BELOW) / BELOW) / growth + 1.0 if force > -BELOW else nan
 
 
@@ -125,15 +142,16 @@ def degroote(
 ) -> tuple[
     float, float, float, float, float, float, float, float, float, float, float, float, float
 ]:
-    """De Groote's muscle at a moment; see DeGrooteFregly2016Muscle of OpenSim.
+    """Compute forces and rates of OpenSim's DeGrooteFregly2016Muscle.
 
-    As in OpenSim, damping of the fibers is not in the rate of the tendon's force: with an elastic
-    tendon it changes only what is reported of the fibers.
+    As in OpenSim, the damping of the fibers is not contained in the rate of the tendon force: with an
+    elastic tendon it changes only what is reported of the fibers.
 
-    Returns: Tension (N), activation, fiber length (m), cosine of pennation, factors of the active
-        force by length and by velocity, active and passive fiber force (N), rates of activation and
-        of the normalized tendon force (1/s), fiber velocity (m/s), what of the passive force is not
-        by damping (N), energy (J).
+    Returns:
+        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
+        length and by velocity, active and passive fiber force (N), rates of activation and of the
+        normalized tendon force (1/s), fiber velocity (m/s), elastic part of the passive force (N),
+        energy (J).
     """
     a = now.activation if m.follows else now.excitation
     force = now.normalized_tendon_force
@@ -170,13 +188,17 @@ def degroote(
 
 
 def degroote_rigid(now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon) -> float:
-    """Force (N) of fully active fibers with a rigid tendon, along the fibers as OpenSim has it."""
+    """Return the force of fully active fibers with a rigid tendon, along the fibers as in OpenSim (N)."""
     fiber_length, velocity = rigid_fibers(now, m)
     return m.strength * degroote_active(fiber_length, m.scale) * degroote_factor(velocity)
 
 
 def rigid_fibers(now: MuscleInputs, m: SmoothMuscle) -> tuple[float, float]:
-    """Normalized length and velocity of fibers whose tendon keeps its slack length."""
+    """Return normalized length and velocity of the fibers with a rigid tendon.
+
+    Returns:
+        Length and velocity.
+    """
     along = now.length - m.slack
     fiber_length = sqrt(along * along + m.height * m.height)
     return fiber_length / m.optimal, now.rate * (along / fiber_length) / (m.fastest * m.optimal)
@@ -185,9 +207,12 @@ def rigid_fibers(now: MuscleInputs, m: SmoothMuscle) -> tuple[float, float]:
 def degroote_equilibrium(
     now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
 ) -> tuple[bool, float]:
-    """Whether there is a tendon force that the fibers bear while it does not change, and that force.
+    """Find the tendon force that the fibers bear while it is constant, by bisection from 0 to 5.
 
-    The interval from 0 to 5 is halved, step for step as in OpenSim's solveBisection.
+    The steps are those of OpenSim's solveBisection.
+
+    Returns:
+        Whether there is one, and the force.
     """
     low, high = 0.0, LARGEST_FORCE
     at_low = degroote_residual(low, now, m, tendon)
@@ -208,7 +233,7 @@ def degroote_equilibrium(
 def degroote_residual(
     force: float, now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
 ) -> float:
-    """By how much the tendon's force exceeds what the fibers bear along it, if it does not change."""
+    """Return the tendon force less the force of the fibers along it, for a constant tendon force."""
     still = SmoothTendon(tendon.passive_strain, tendon.growth, tendon.elastic, 0.0)
     pulled = MuscleInputs(now.length, now.rate, now.excitation, now.activation, 0.0, 0.0, force)
     result = degroote(pulled, m, still)
@@ -216,7 +241,12 @@ def degroote_residual(
 
 
 def meyer_active(length: float, scale: float) -> float:
-    """Meyer's force at rest of fully activated fibers; as `degroote_active`."""
+    """Return Meyer's isometric force of fully active fibers, at a normalized length.
+
+    Args:
+        length: normalized fiber length.
+        scale: factor of the width of the curve.
+    """
     x = (length - 1.0) / scale + 1.0
     return (
         bell(x, 0.8174335195120225, 1.054348561163096, 0.16194288662761705, 0.06381565266097716)
@@ -228,13 +258,13 @@ def meyer_active(length: float, scale: float) -> float:
 
 
 def meyer_passive(length: float) -> float:
-    """Passive force of fibers of a normalized length."""
+    """Return Meyer's passive force of fibers of a normalized length."""
     x = 12.438535493526128 * (length - 1.329470475731338)
     return 0.232000797810576 * (log(exp(x) + 1.0) if x < 50.0 else x)
 
 
 def meyer_factor(velocity: float) -> float:
-    """Factor of the active force by the normalized velocity."""
+    """Return Meyer's factor of the active force at a normalized velocity."""
     inner = atan(-0.27671677680513945 + 8.053304562566995 * velocity)
     return -32.51401019139919 + 22.160392466960214 * atan(
         18.7932134796918 + 6.320952269683997 * inner
@@ -244,7 +274,13 @@ def meyer_factor(velocity: float) -> float:
 def meyer(
     now: MuscleInputs, m: SmoothMuscle
 ) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
-    """Meyer's muscle, whose tendon is rigid, at a moment; as `degroote`. OpenSim knows of no energy that it stores."""
+    """Compute forces and rates of Meyer's muscle, whose tendon is rigid; OpenSim defines no energy for it.
+
+    Returns:
+        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
+        length and by velocity, active and passive fiber force (N), rate of activation (1/s), fiber
+        velocity (m/s), elastic part of the passive force (N).
+    """
     a = now.activation if m.follows else now.excitation
     along = now.length - m.slack
     fiber_length = sqrt(along * along + m.height * m.height)
@@ -262,6 +298,6 @@ def meyer(
 
 
 def meyer_rigid(now: MuscleInputs, m: SmoothMuscle) -> float:
-    """Force (N) of fully active fibers; as `degroote_rigid`."""
+    """Return the force of fully active fibers with a rigid tendon, along the fibers as in OpenSim (N)."""
     fiber_length, velocity = rigid_fibers(now, m)
     return m.strength * meyer_active(fiber_length, m.scale) * meyer_factor(velocity)

@@ -14,65 +14,65 @@ from math import pi
 
 
 def coordinate_spring_force(q: float, u: float, k: float, q0: float, c: float) -> float:
-    """Generalized force -k (q - q0) - c u, in N.m (N for a translation).
+    """Return the generalized force -k (q - q0) - c u, in N m (N for a translation).
 
     Args:
         q: coordinate, rad (m).
         u: its speed, rad/s (m/s).
-        k: stiffness, N.m/rad (N/m).
-        q0: where the spring is at rest, rad (m).
-        c: viscosity, N.m/(rad/s) (N/(m/s)).
+        k: stiffness, N m/rad (N/m).
+        q0: rest value of the coordinate, rad (m).
+        c: viscosity, N m/(rad/s) (N/(m/s)).
     """
     return -k * (q - q0) - c * u
 
 
 def spring_energy(x: float, k: float) -> float:
-    """Energy k x^2 / 2 of a linear spring, in J.
+    """Return the energy k x^2 / 2 of a linear spring (J).
 
     Args:
         x: deviation from rest, rad (m).
-        k: stiffness, N.m/rad (N/m).
+        k: stiffness, N m/rad (N/m).
     """
     return 0.5 * k * x * x
 
 
 def point_spring_tension(length: float, k: float, l0: float) -> float:
-    """Tension k (l - l0) of a spring that pulls and pushes, in N.
+    """Return the tension k (l - l0) of a spring that pulls and pushes (N).
 
     Args:
-        length: l, m.
-        k: stiffness, N/m.
-        l0: length at rest, m.
+        length: length l (m).
+        k: stiffness (N/m).
+        l0: rest length (m).
     """
     return k * (length - l0)
 
 
 def path_spring_tension(length: float, rate: float, l0: float, k: float, d: float) -> float:
-    """Tension k (l - l0) (1 + d v) of a spring along a path where l > l0, else none, in N.
+    """Return the tension k (l - l0) (1 + d v) of a spring along a path where l > l0, else 0 (N).
 
-    It pushes where the path shortens faster than 1/d, as OpenSim has it.
+    It pushes where the path shortens faster than 1/d, as in OpenSim.
 
     Args:
-        length: l, m.
-        rate: v, m/s.
-        l0: length at rest, m.
-        k: stiffness, N/m.
-        d: dissipation, s/m.
+        length: length l (m).
+        rate: lengthening speed v (m/s).
+        l0: rest length (m).
+        k: stiffness (N/m).
+        d: dissipation (s/m).
     """
     return k * (length - l0) * (1.0 + d * rate) if length > l0 else 0.0
 
 
 def path_spring_energy(length: float, l0: float, k: float) -> float:
-    """Energy k (l - l0)^2 / 2 where l > l0, else none, in J; arguments as in `path_spring_tension`."""
+    """Return the energy k (l - l0)^2 / 2 where l > l0, else 0 (J); arguments as of `path_spring_tension`."""
     return 0.5 * k * (length - l0) * (length - l0) if length > l0 else 0.0
 
 
 def stretch(length: float, l0: float, clamped: bool) -> float:
-    """l - l0, where `clamped` not less than 0, in m.
+    """Return l - l0, not less than 0 if `clamped` (m).
 
     Args:
-        length: l, m.
-        l0: length at rest, m.
+        length: length l (m).
+        l0: rest length (m).
         clamped: whether a slack path has no stretch.
     """
     return 0.0 if clamped and length < l0 else length - l0
@@ -81,18 +81,19 @@ def stretch(length: float, l0: float, clamped: bool) -> float:
 def blankevoort_tension(
     length: float, rate: float, l0: float, k: float, e1: float, c: float
 ) -> float:
-    """Tension of a ligament, in N, at the strain e = l / l0 - 1.
+    """Return the tension of a ligament at the strain e = l / l0 - 1 (N).
 
-    k e^2 / (2 e1) for 0 < e < e1, k (e - e1 / 2) beyond; while the ligament is taut and lengthens,
-    c v / l0 more, which sets in along 10 x^3 - 15 x^4 + 6 x^5 with x = e / 0.01, as OpenSim has it.
+    It is k e^2 / (2 e1) for 0 < e < e1, and k (e - e1 / 2) beyond. While the ligament is taut and
+    lengthens, c v / l0 is added, which sets in along 10 x^3 - 15 x^4 + 6 x^5 with x = e / 0.01, as in
+    OpenSim.
 
     Args:
-        length: l, m.
-        rate: v, m/s.
-        l0: length at which the ligament goes slack, m.
-        k: stiffness of the linear region, N (per strain).
-        e1: strain at which the linear region begins, 1.
-        c: damping, N.s (per strain rate).
+        length: length l (m).
+        rate: lengthening speed v (m/s).
+        l0: slack length (m).
+        k: stiffness of the linear region (N per strain).
+        e1: strain at which the linear region begins.
+        c: damping (N s per strain rate).
     """
     e = length / l0 - 1.0
     if e <= 0.0:
@@ -105,10 +106,10 @@ def blankevoort_tension(
 
 
 def blankevoort_energy(length: float, l0: float, k: float, e1: float) -> float:
-    """Energy of a ligament, in J; arguments as in `blankevoort_tension`.
+    """Return the energy of a ligament (J); arguments as of `blankevoort_tension`.
 
-    The integral of the elastic tension over the length: k l0 e^3 / (6 e1) for 0 < e < e1, and
-    k l0 (e (e - e1) / 2 + e1^2 / 6) beyond.
+    It is the integral of the elastic tension over the length: k l0 e^3 / (6 e1) for 0 < e < e1, and k
+    l0 (e (e - e1) / 2 + e1^2 / 6) beyond.
     """
     e = length / l0 - 1.0
     if e <= 0.0:
@@ -119,17 +120,17 @@ def blankevoort_energy(length: float, l0: float, k: float, e1: float) -> float:
 
 
 def mckibben_tension(L: float, p: float, n: float, B: float, l0: float) -> float:
-    """Tension p (3 (L - l0)^2 - B^2) / (4 pi n^2) of a pneumatic muscle, N.
+    """Return the tension p (3 (L - l0)^2 - B^2) / (4 pi n^2) of a pneumatic muscle (N).
 
     Source: C.-P. Chou and B. Hannaford, "Measurement and modeling of McKibben pneumatic artificial
     muscles", IEEE Transactions on Robotics and Automation 12 (1996) 90-102.
 
     Args:
-        L: length of the path, m.
-        p: pressure, Pa.
-        n: number of turns of the thread, 1.
-        B: length of the thread, m.
-        l0: length of the cord in the path, m.
+        L: length of the path (m).
+        p: pressure (Pa).
+        n: number of turns of the thread.
+        B: length of the thread (m).
+        l0: length of the cord in the path (m).
     """
     length = L - l0
     return p * (3.0 * length * length - B * B) / (4.0 * pi * n * n)

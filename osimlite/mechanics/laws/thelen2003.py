@@ -1,8 +1,8 @@
-"""The muscle of D. G. Thelen (Journal of Biomechanical Engineering 125, 2003), as OpenSim's Thelen2003Muscle has it.
+"""Muscle of D. G. Thelen (Journal of Biomechanical Engineering 125, 2003), as in OpenSim's Thelen2003Muscle.
 
-Forces are parts of the maximum isometric force F, fiber lengths of the optimal fiber length, fiber
-velocities of the maximum contraction velocity times that length, tendon lengths of the tendon slack
-length.
+Forces are normalized by the maximum isometric force F, fiber lengths by the optimal fiber length,
+fiber velocities by the maximum contraction velocity times that length, tendon lengths by the tendon
+slack length.
 """
 
 from __future__ import annotations
@@ -18,18 +18,22 @@ from osimlite.mechanics.laws.muscles import (
     first_order_activation_rate,
 )
 
-TOE_SHAPE, TOE_FORCE = 3.0, 0.33
-"""Of the tendon: the exponent at the end of its toe, and the force there."""
-ROUNDS, INVERSE_ROUNDS = 20, 100
-"""Newton's steps in the search for an equilibrium, and in that for a force at a velocity."""
+TOE_SHAPE = 3.0
+"""Exponent of the tendon force at the end of its toe region."""
+TOE_FORCE = 0.33
+"""Tendon force at the end of its toe region."""
+ROUNDS = 20
+"""Largest number of Newton steps in the search for an equilibrium."""
+INVERSE_ROUNDS = 100
+"""Largest number of Newton steps in the search for a force at a velocity."""
 ENOUGH = 1e-6
-"""What the velocity may be off where the tendon is taken for rigid, as in OpenSim."""
+"""Tolerance of the normalized velocity with a rigid tendon, as in OpenSim."""
 SMALLEST = 2.0**-26
-"""Least part of a step, and the step (m) in the other direction where there is none."""
+"""Smallest part of a step, and the step (m) in the opposite direction if that fails."""
 
 
 class Thelen2003(NamedTuple):
-    """The numbers of a muscle."""
+    """Parameters of a Thelen2003Muscle."""
 
     strength: float  # max_isometric_force F, N
     optimal: float  # optimal_fiber_length, m
@@ -55,7 +59,7 @@ class Thelen2003(NamedTuple):
 
 
 class Fibers(NamedTuple):
-    """Fibers of some length (m) in a muscle: what they and the tendon would bear, and the slopes of that."""
+    """Fibers of a given length in a muscle: forces of fibers and tendon, and their slopes."""
 
     length: float  # m
     cos: float  # of pennation
@@ -69,7 +73,7 @@ class Fibers(NamedTuple):
 
 
 def fibers_at(m: Thelen2003, path_length: float, length: float) -> Fibers:
-    """Fibers of some length, m."""
+    """Evaluate the curves for a path length and a fiber length (m)."""
     cos = cos_pennation(length, m.height, m.shortest, m.largest_sin, m.least_cos)
     tendon_length = path_length - length * cos
     tendon, tendon_slope = tendon_force(
@@ -84,7 +88,10 @@ def fibers_at(m: Thelen2003, path_length: float, length: float) -> Fibers:
 
 
 def tendon_shape(strain_at_one: float) -> tuple[float, float, float, float]:
-    """The tendon's force over its strain, an exponential toe and a line, from the strain at F.
+    """Return the constants of the tendon force over strain: an exponential toe and a line.
+
+    Args:
+        strain_at_one: strain at the maximum isometric force.
 
     Returns:
         Strain at the end of the toe, exponent over strain and factor of the toe, slope of the line.
@@ -96,7 +103,11 @@ def tendon_shape(strain_at_one: float) -> tuple[float, float, float, float]:
 def tendon_force(
     strain: float, toe: float, growth: float, factor: float, slope: float
 ) -> tuple[float, float]:
-    """The tendon's force and its derivative; see `tendon_shape`."""
+    """Return the tendon force and its derivative by strain; the constants are those of `tendon_shape`.
+
+    Returns:
+        Force and derivative.
+    """
     if strain > toe:
         return slope * (strain - toe) + TOE_FORCE, slope
     if strain > 0.0:
@@ -106,7 +117,7 @@ def tendon_force(
 
 
 def tendon_energy(strain: float, toe: float, growth: float, factor: float, slope: float) -> float:
-    """Integral of the tendon's force over its strain."""
+    """Return the integral of the tendon force over its strain."""
     bent = min(max(strain, 0.0), toe)
     straight = max(strain - toe, 0.0)
     return factor * ((exp(growth * bent) - 1.0) / growth - bent) + straight * (
@@ -115,13 +126,17 @@ def tendon_energy(strain: float, toe: float, growth: float, factor: float, slope
 
 
 def passive_energy(length: float, growth: float, factor: float) -> float:
-    """Integral of the passive force over the normalized length."""
+    """Return the integral of the passive force over the normalized fiber length."""
     off = max(length - 1.0, 0.0)
     return factor * ((exp(growth * off) - 1.0) / growth - off)
 
 
 def passive_force(length: float, growth: float, factor: float) -> tuple[float, float]:
-    """The passive force of fibers of a normalized length, and its derivative."""
+    """Return the passive force of fibers of a normalized length, and its derivative.
+
+    Returns:
+        Force and derivative.
+    """
     if length <= 1.0:
         return 0.0, 0.0
     grown = exp(growth * (length - 1.0))
@@ -129,7 +144,11 @@ def passive_force(length: float, growth: float, factor: float) -> tuple[float, f
 
 
 def active_force(length: float, width: float) -> tuple[float, float]:
-    """The force at rest of fully activated fibers of a normalized length, and its derivative."""
+    """Return the isometric force exp(-(l - 1)^2 / width) of fully active fibers, and its derivative.
+
+    Returns:
+        Force and derivative.
+    """
     off = length - 1.0
     force = exp(-off * off / width)
     return force, -2.0 * off / width * force
@@ -138,16 +157,19 @@ def active_force(length: float, width: float) -> tuple[float, float]:
 def fiber_velocity(
     m: Thelen2003, force: float, activation: float, isometric: float
 ) -> tuple[float, float]:
-    """Normalized velocity of fibers that actively bear a force, and its derivative.
+    """Return the normalized velocity of fibers that actively bear a force, and its derivative.
 
-    The paper's curve goes on as a straight line for forces below 0, and near the one that fibers
-    approach that lengthen.
+    The published curve is continued by straight lines for forces below 0, and near the asymptote of
+    lengthening fibers.
 
     Args:
-        m: the muscle.
-        force: that they bear.
-        activation: within its bounds.
-        isometric: what they bear at rest.
+        m: muscle.
+        force: active force of the fibers.
+        activation: activation within its bounds.
+        isometric: their isometric force.
+
+    Returns:
+        Velocity and derivative by the force.
     """
     at = 0.0 if force <= 0.0 else min(force, m.bound * (isometric * m.most))
     speed = 0.25 + 0.75 * activation
@@ -164,14 +186,17 @@ def fiber_velocity(
 def force_at_velocity(
     m: Thelen2003, velocity: float, activation: float, isometric: float, enough: float
 ) -> float:
-    """What `fiber_velocity` inverts, over the force at rest; not a number if Newton's method does not end.
+    """Return the active force at a velocity over the isometric force: the inverse of `fiber_velocity`.
 
     Args:
-        m: the muscle.
-        velocity: of the fibers, normalized.
-        activation: within its bounds.
-        isometric: what they bear at rest.
-        enough: what the velocity may be off.
+        m: muscle.
+        velocity: normalized fiber velocity.
+        activation: activation within its bounds.
+        isometric: isometric force of the fibers.
+        enough: tolerance of the velocity.
+
+    Returns:
+        The ratio, NaN if Newton's method does not converge.
     """
     force = isometric
     for _ in range(INVERSE_ROUNDS):
@@ -184,21 +209,22 @@ def force_at_velocity(
 
 
 def tolerance(m: Thelen2003) -> float:
-    """What an equilibrium may be off, N."""
+    """Return the accepted residual of an equilibrium (N)."""
     return max(1e-8 * m.strength, 10.0 * SIGNIFICANT)
 
 
 def thelen2003(
     now: MuscleInputs, m: Thelen2003
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
-    """The muscle at a moment; see Thelen2003Muscle::calcFiberVelocityInfo and calcMuscleDynamicsInfo of OpenSim.
+    """Compute forces and rates of a muscle; see OpenSim's calcFiberVelocityInfo and calcMuscleDynamicsInfo.
 
-    Fibers at their least length stay there as long as they would shorten, and bear nothing then but
-    what is passive.
+    Fibers at their smallest length stay there as long as they would shorten, and then bear no active
+    force.
 
-    Returns: Tension (N), activation, fiber length (m), cosine of pennation, factors of the active
-        force by length and by velocity, active and passive fiber force (N), rate of activation
-        (1/s), fiber velocity (m/s).
+    Returns:
+        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
+        length and by velocity, active and passive fiber force (N), rate of activation (1/s), fiber
+        velocity (m/s).
     """
     active = min(max(now.activation, m.least), 1.0)
     fibers = fibers_at(m, now.length, max(now.fiber_length, m.shortest))
@@ -222,7 +248,10 @@ def thelen2003(
 
 
 def thelen2003_rigid(now: MuscleInputs, m: Thelen2003) -> float:
-    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim."""
+    """Return the force of fully active fibers along a rigid tendon (N).
+
+    See OpenSim's calcInextensibleTendonActiveFiberForce.
+    """
     fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
     if not fiber > m.shortest:
         return 0.0
@@ -233,16 +262,15 @@ def thelen2003_rigid(now: MuscleInputs, m: Thelen2003) -> float:
 
 
 def thelen2003_energy(m: Thelen2003, length: float, fiber_length: float, cos: float) -> float:
-    """Potential energy of tendon and fibers, J.
+    """Return the potential energy of tendon and fibers (J).
 
-    As in OpenSim, whose fibers store what those of as many optimal lengths do as they have meters:
-    none below 1 m.
+    OpenSim takes the fiber length in m for a normalized one, so that fibers below 1 m store nothing.
 
     Args:
-        m: the muscle.
-        length: of the path, m.
-        fiber_length: m.
-        cos: of pennation.
+        m: muscle.
+        length: length of the path (m).
+        fiber_length: fiber length (m).
+        cos: cosine of pennation.
     """
     strain = (length - fiber_length * cos) / m.slack - 1.0
     tendon = m.slack * tendon_energy(strain, m.toe, m.growth, m.factor, m.slope)
@@ -252,11 +280,14 @@ def thelen2003_energy(m: Thelen2003, length: float, fiber_length: float, cos: fl
 
 
 def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, float]:
-    """Whether there is a fiber length at which fibers and tendon bear the same, and that length (m).
+    """Find the fiber length at which fibers and tendon bear the same force.
 
-    Newton's method with halved steps, step for step as in Thelen2003Muscle::initMuscleState: the
-    rate of the path is shared between fibers and tendon by their stiffness, so that a muscle whose
-    path moves does not start at rest. A length that would be below the least is that.
+    Newton's method with halved steps, step for step as in Thelen2003Muscle::initMuscleState: the rate
+    of the path is distributed over fibers and tendon by their stiffness, so that a muscle whose path
+    moves does not start at rest. A length below the smallest one is replaced by it.
+
+    Returns:
+        Whether there is one, and the fiber length (m).
     """
     length, active = now.length, min(max(now.activation, m.least), 1.0)
     fibers = fibers_at(
@@ -288,21 +319,31 @@ def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, floa
 
 
 def balance(m: Thelen2003, fibers: Fibers, active: float) -> tuple[float, float]:
-    """Force of the fibers, and what of it along the tendon the tendon does not bear, N.
+    """Return the force of the fibers, and its component along the tendon less the tendon force (N).
 
     Args:
-        m: the muscle.
-        fibers: of it.
+        m: muscle.
+        fibers: its fibers.
         active: activation times the factor by velocity.
+
+    Returns:
+        Force and residual.
     """
     borne = (active * fibers.active + fibers.passive) * m.strength
     return borne, borne * fibers.cos - fibers.tendon * m.strength
 
 
 def stiffnesses(m: Thelen2003, fibers: Fibers, active: float, borne: float) -> tuple[float, float]:
-    """Derivatives of the fibers' force along the tendon and of the tendon's, over the fiber length, N/m.
+    """Return the derivatives of both forces along the tendon by the fiber length (N/m).
 
-    Args as of `balance`; `borne` is the force of the fibers, N.
+    Args:
+        m: muscle.
+        fibers: its fibers.
+        active: activation times the factor by velocity.
+        borne: force of the fibers (N).
+
+    Returns:
+        Derivatives of the fiber force and of the tendon force.
     """
     length = fibers.length
     if length <= m.height:
@@ -317,14 +358,14 @@ def stiffnesses(m: Thelen2003, fibers: Fibers, active: float, borne: float) -> t
 def shared(
     m: Thelen2003, fibers: Fibers, activation: float, rate: float, stiffness: float
 ) -> float:
-    """Factor of the active force by the velocity that the fibers have if the stiffer part moves less.
+    """Return the factor of the active force by velocity, if the stiffer part moves less.
 
     Args:
-        m: the muscle.
-        fibers: of it.
-        activation: within its bounds.
-        rate: of the path, m/s.
-        stiffness: of the fibers, as of `stiffnesses`, N/m.
+        m: muscle.
+        fibers: its fibers.
+        activation: activation within its bounds.
+        rate: lengthening speed of the path (m/s).
+        stiffness: stiffness of the fibers, see `stiffnesses` (N/m).
     """
     if rate == 0.0:
         return 1.0

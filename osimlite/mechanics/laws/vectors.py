@@ -1,4 +1,4 @@
-"""Vectors of three floats, as laws and kernels have them."""
+"""Vectors of three floats, as laws and kernels use them."""
 
 from __future__ import annotations
 
@@ -7,101 +7,103 @@ from typing import Any
 
 Vector = tuple[float, float, float]
 Numbers = Any
-"""An array, or in machine code its address."""
+"""Array of floats, or its address in machine code."""
 
 ZERO = 0.0, 0.0, 0.0
+"""Zero vector."""
 EPSILON = 2.220446049250313e-16
+"""Spacing of floats at 1."""
 
 
-def vector(numbers: Numbers, place: int) -> Vector:
-    """The three numbers from a place on."""
-    return numbers[place], numbers[place + 1], numbers[place + 2]
+def vector(numbers: Numbers, offset: int) -> Vector:
+    """Return the three numbers of an array from an offset on."""
+    return numbers[offset], numbers[offset + 1], numbers[offset + 2]
 
 
-def put(numbers: Numbers, place: int, a: Vector) -> None:
-    """Put a vector into the three numbers from a place on."""
-    numbers[place], numbers[place + 1], numbers[place + 2] = a
+def put(numbers: Numbers, offset: int, a: Vector) -> None:
+    """Store a vector in the three numbers of an array from an offset on."""
+    numbers[offset], numbers[offset + 1], numbers[offset + 2] = a
 
 
 def component(a: Vector, axis: int) -> float:
-    """The component on axis 0, 1 or 2."""
+    """Return the component on axis 0, 1 or 2."""
     x, y, z = a
     return x if axis == 0 else (y if axis == 1 else z)
 
 
 def replaced(a: Vector, axis: int, value: float) -> Vector:
-    """The vector with another component on axis 0, 1 or 2."""
+    """Return the vector with another component on axis 0, 1 or 2."""
     x, y, z = a
     return value if axis == 0 else x, value if axis == 1 else y, value if axis == 2 else z
 
 
 def plus(a: Vector, b: Vector) -> Vector:
-    """a + b."""
+    """Return a + b."""
     ax, ay, az = a
     bx, by, bz = b
     return ax + bx, ay + by, az + bz
 
 
 def minus(a: Vector, b: Vector) -> Vector:
-    """a - b."""
+    """Return a - b."""
     ax, ay, az = a
     bx, by, bz = b
     return ax - bx, ay - by, az - bz
 
 
 def times(k: float, a: Vector) -> Vector:
-    """k a."""
+    """Return k a."""
     x, y, z = a
     return k * x, k * y, k * z
 
 
 def over(a: Vector, k: float) -> Vector:
-    """a / k."""
+    """Return a / k."""
     x, y, z = a
     return x / k, y / k, z / k
 
 
 def along(a: Vector, k: float, b: Vector) -> Vector:
-    """a + k b."""
+    """Return a + k b."""
     ax, ay, az = a
     bx, by, bz = b
     return ax + k * bx, ay + k * by, az + k * bz
 
 
 def elementwise(a: Vector, b: Vector) -> Vector:
-    """The products of the components."""
+    """Return the products of the components."""
     ax, ay, az = a
     bx, by, bz = b
     return ax * bx, ay * by, az * bz
 
 
 def dot(a: Vector, b: Vector) -> float:
-    """a . b."""
+    """Return the scalar product a . b."""
     ax, ay, az = a
     bx, by, bz = b
     return ax * bx + ay * by + az * bz
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """a x b."""
+    """Return the cross product a x b."""
     ax, ay, az = a
     bx, by, bz = b
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 def norm(a: Vector) -> float:
-    """|a|."""
+    """Return |a|."""
     return sqrt(dot(a, a))
 
 
 def unit(a: Vector) -> Vector:
-    """a / |a|, or the zero vector if a is shorter than EPSILON, as OpenSim's wrapping has it."""
+    """Return a / |a|, or the zero vector if |a| < EPSILON, as OpenSim's wrapping does."""
     size = norm(a)
     return times(1.0 / size, a) if size >= EPSILON else (0.0, 0.0, 0.0)
 
 
 def turned(rows: Numbers, a: Vector) -> Vector:
-    """R a for a rotation R by rows."""
+    """Return R a for a rotation R that is stored by rows."""
     x, y, z = a
     return (
         rows[0] * x + rows[1] * y + rows[2] * z,
@@ -111,7 +113,7 @@ def turned(rows: Numbers, a: Vector) -> Vector:
 
 
 def turned_back(rows: Numbers, a: Vector) -> Vector:
-    """The transpose of R times a."""
+    """Return Rᵀ a for a rotation R that is stored by rows."""
     x, y, z = a
     return (
         rows[0] * x + rows[3] * y + rows[6] * z,
