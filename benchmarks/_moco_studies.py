@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 import osimlite
-from osimlite.io.tables.trc import write_trc
+from osimlite.io.tables.writers import write_trc
 
 MOCO = Path(__file__).resolve().parents[2] / "shared/oracle/moco"
 CORE = Path(__file__).resolve().parents[2] / "pub-opensim-core"

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import PathPoint, PathWrap
 
 SIZES: dict[str, dict[str, Any]] = {

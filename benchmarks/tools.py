@@ -34,7 +34,7 @@ from _pair import Pair, _run, pair, pair_commands
 from osimlite.fitting.orientation_data import OrientationData
 from osimlite.fitting.sensors import place_sensors
 from osimlite.io.tables.storage import write_sto
-from osimlite.io.tables.trc import write_trc
+from osimlite.io.tables.writers import write_trc
 from osimlite.mechanics.multibody.spatial import quaternion_of, rotation_xyz
 from osimlite.simulation.recorded_motion import RecordedMotion
 from validate import whole_process

@@ -28,7 +28,7 @@ def written(
         )
     names = list(tables)
     if trc:
-        from osimlite.io.tables.trc import write_trc
+        from osimlite.io.tables.writers import write_trc
 
         markers = tables["markers.sto"]
         labels = [label.removesuffix("_X") for label in markers.columns[::3]]

@@ -32,7 +32,7 @@ def format(
     from osimlite.base.files import write_atomically
     from osimlite.cli._console import complain, print_diff, say
     from osimlite.errors import OsimliteError
-    from osimlite.io.document.formatting import formatted
+    from osimlite.io.document.printer import formatted
     from osimlite.io.document.source import Source
     from osimlite.lint.project_files import DOCUMENTS, project_files
 

@@ -14,8 +14,7 @@ from osimlite.fitting.fitted_motion import FittedMotion
 from osimlite.fitting.inverse_kinematics import check_weight, fitted, marker_stations
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.pose_layout import Goal
-from osimlite.io.tables.storage import StoTable, read_sto
-from osimlite.io.tables.times import both_of
+from osimlite.io.tables.storage import StoTable, both_of, read_sto
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline

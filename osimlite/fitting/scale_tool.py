@@ -16,10 +16,10 @@ from osimlite.fitting.marker_data import Measured as Markers
 from osimlite.fitting.measuring import Measured, Measuring, scale_set
 from osimlite.fitting.placing import Placed, place_markers, pose_text
 from osimlite.fitting.scaling import scale_model
-from osimlite.io.document.kept import read_anew
+from osimlite.io.document.cache import read_anew
 from osimlite.io.document.printer import to_text
 from osimlite.io.document.reader import read_any
-from osimlite.io.tables.times import both_of
+from osimlite.io.tables.storage import both_of
 from osimlite.schema.base import Object
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.markers import MarkerSet

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from osimlite.base.files import read_at_most, read_file
 from osimlite.errors import OsimliteError
-from osimlite.io.document.kept import top_at, while_unchanged
+from osimlite.io.document.cache import top_at, while_unchanged
 from osimlite.lint.project_files import DOCUMENTS, begins_as_ours
 from osimlite.lint.table import Table
 from osimlite.schema.model import Model

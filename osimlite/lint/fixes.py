@@ -6,8 +6,8 @@ from bisect import bisect_left, insort
 from collections.abc import Iterable
 
 from osimlite.errors import OsimliteError
-from osimlite.io.document.escape import escape
 from osimlite.io.document.source import Position, Source
+from osimlite.io.document.xml_text import escape
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report
 from osimlite.lint.project_files import is_table
 

@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from osimlite.io.document.kept import top_at
+from osimlite.io.document.cache import top_at
 from osimlite.io.document.survey import Survey
 from osimlite.lint.beside import beginning, documents_of, folders_in, table_at, tree_at
 from osimlite.lint.config import Config

@@ -19,10 +19,6 @@ from osimlite.models.walking import human
 from osimlite.optimal.trajectory import MocoTrajectory
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.metabolics import (
-    Bhargava2004MuscleMetabolicsProbe,
-    Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter,
-)
 from osimlite.schema.moco.goals import (
     MocoAverageSpeedGoal,
     MocoControlGoal,
@@ -40,6 +36,10 @@ from osimlite.schema.moco.parts import (
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoPhase, MocoProblem, MocoStudy
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import DeGrooteFregly2016Muscle
+from osimlite.schema.probe_types import (
+    Bhargava2004MuscleMetabolicsProbe,
+    Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter,
+)
 from osimlite.schema.tools.processors import ModelProcessor
 
 NAME = "human-walks"

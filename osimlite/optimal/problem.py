@@ -46,7 +46,6 @@ from osimlite.optimal.schemes import Grid, make_scheme
 from osimlite.optimal.study_context import MAX_MESH_INTERVALS, MAX_MESH_VALUES, StudyContext
 from osimlite.optimal.tables import sample_function
 from osimlite.schema.base import Component, Object
-from osimlite.schema.controllers import Controller
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.moco.goals import MocoControlGoal, MocoGoal
 from osimlite.schema.moco.parts import MocoParameter, MocoWeightSet
@@ -54,6 +53,7 @@ from osimlite.schema.moco.path_constraints import MocoPathConstraint
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoStudy
 from osimlite.schema.model import Model
 from osimlite.schema.motions import PositionMotion
+from osimlite.schema.sets import Controller
 
 JOINTS_WITHOUT_RATES = "BallJoint", "EllipsoidJoint", "FreeJoint", "ScapulothoracicJoint"
 """Joints whose speeds are not the rates of their coordinates; Moco refuses them."""

@@ -21,11 +21,30 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from osimlite.errors import MissingNameError, ModelError
 from osimlite.schema.complaints import explained, misspelt, unnamed
-from osimlite.schema.equality import same
 from osimlite.schema.facts import Contradiction, Facts
 from osimlite.schema.fields import Many, ObjectList, Reference, Tag, note_change
 from osimlite.schema.layout import Home, Layout
 from osimlite.schema.specs import FieldSpec, checks, defaults, field_specs, holding, numeric_names
+
+
+def same(left: Any, right: Any) -> bool:
+    """Equality of stored values; NaN equals NaN, and a component given as a reference counts by its name."""
+    if left is right:
+        return True
+    if isinstance(left, dict):
+        return left.keys() == right.keys() and all(
+            same(value, right[key]) for key, value in left.items()
+        )
+    if isinstance(left, (tuple, list)):
+        return (
+            isinstance(right, (tuple, list))
+            and len(left) == len(right)
+            and all(same(one, other) for one, other in zip(left, right, strict=True))
+        )
+    if isinstance(left, float) and isinstance(right, float):
+        return left == right or (left != left and right != right)
+    return bool(left == right)
+
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass

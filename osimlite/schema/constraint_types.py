@@ -3,12 +3,12 @@
 import math
 from typing import Annotated
 
-from osimlite.schema.constraints import Constraint
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Number, Optional, Vec3, real, vec3
 from osimlite.schema.frames import TwoFrameLinker
 from osimlite.schema.functions import Function
 from osimlite.schema.references import CoordinateName, CoordinateNames, PhysicalFrameSocket
+from osimlite.schema.sets import Constraint
 
 
 class ConstantDistanceConstraint(Constraint):

@@ -3,11 +3,11 @@
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, Object, made, none
-from osimlite.schema.controllers import Controller
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Many, Single, Value, Vector, real
 from osimlite.schema.functions import FunctionSet
 from osimlite.schema.references import MaybeFileName, NumberInputs, reads
+from osimlite.schema.sets import Controller
 
 
 class PrescribedController(Controller):

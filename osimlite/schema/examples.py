@@ -1,10 +1,10 @@
 """Components of OpenSim's own examples; files made with them exist."""
 
 from osimlite.schema.base import ModelComponent
-from osimlite.schema.controllers import Controller
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Number
 from osimlite.schema.references import NumberInput, PathActuatorPath, ScalarActuatorSocket
+from osimlite.schema.sets import Controller
 
 
 class HopperDevice(ModelComponent):

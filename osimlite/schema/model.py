@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, cast, overl
 from osimlite.base.lazy import make_notebook_repr
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.schema.base import Component, ModelComponent, made
-from osimlite.schema.constraints import ConstraintSet
 from osimlite.schema.contact import ContactGeometrySet
-from osimlite.schema.controllers import ControllerSet
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Single, Text, Unnamed, Vec3, real, vec3
 from osimlite.schema.forces import ForceSet
@@ -19,8 +17,7 @@ from osimlite.schema.frames import BodySet, Ground
 from osimlite.schema.geometry import ModelVisualPreferences
 from osimlite.schema.joints import Joint, JointSet
 from osimlite.schema.markers import MarkerSet
-from osimlite.schema.probes import ProbeSet
-from osimlite.schema.sets import ComponentSet
+from osimlite.schema.sets import ComponentSet, ConstraintSet, ControllerSet, ProbeSet
 from osimlite.schema.wrapping import WrapObjectSet
 
 if TYPE_CHECKING:

@@ -1,22 +1,26 @@
-"""Muscles of Hill's type: fiber and tendon in series, along a path.
+"""Path actuators and muscles of Hill's type, which have fiber and tendon in series along a path.
 
 Forces are normalised by `max_isometric_force`, fiber lengths by `optimal_fiber_length`, tendon
 lengths by `tendon_slack_length`.
 """
 
+import math
 from collections.abc import Iterator
 from functools import partial
 from typing import Annotated
 
 from pydantic import Field
 
-from osimlite.schema.base import made
+from osimlite.schema.actuators import ScalarActuator
+from osimlite.schema.base import ModelComponent, made
 from osimlite.schema.default_curves import active_force_length, force_velocity, passive_force_length
 from osimlite.schema.facts import (
     BELOW_QUARTER_TURN,
+    IDLE,
     NAN,
     NO_EQUILIBRIUM,
     PATH,
+    STOPS,
     STUCK,
     UP_TO_QUARTER_TURN,
     Contradiction,
@@ -33,13 +37,88 @@ from osimlite.schema.muscle_curves import (
     ForceVelocityCurve,
     TendonForceLengthCurve,
 )
-from osimlite.schema.muscle_parts import (
-    MAXIMUM_PENNATION,
-    MuscleFirstOrderActivationDynamicModel,
-    MuscleFixedWidthPennationModel,
-)
-from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.paths import AbstractGeometryPath, GeometryPath
+
+MAXIMUM_PENNATION = 1.4706289056333368
+"""The default of the largest pennation angle, arccos 0.1."""
+
+
+class MuscleFirstOrderActivationDynamicModel(ModelComponent):
+    """Activation that follows excitation with one time constant up and one down."""
+
+    activation_time_constant: Annotated[float, real("s", "> 0")] = 0.01
+    """Time constant of rising activation; a muscle that owns the part puts in its own."""
+    deactivation_time_constant: Annotated[float, real("s", "> 0")] = 0.04
+    """Time constant of falling activation; a muscle that owns the part puts in its own."""
+    minimum_activation: Annotated[float, real(domain="0 to 1")] = 0.01
+    """Activation below which the muscle does not go, whatever its control."""
+
+
+class MuscleFixedWidthPennationModel(ModelComponent):
+    """Fibers that keep the width of the muscle: length times sine of pennation stays what it is at optimal length."""
+
+    facts = Facts(
+        domains={
+            "pennation_angle_at_optimal": BELOW_QUARTER_TURN,
+            "maximum_pennation_angle": UP_TO_QUARTER_TURN,
+        },
+        refused="optimal_fiber_length pennation_angle_at_optimal maximum_pennation_angle",
+    )
+
+    optimal_fiber_length: Annotated[float, real("m", "> 0")] = 1.0
+    """Fiber length at which `pennation_angle_at_optimal` is measured."""
+    pennation_angle_at_optimal: Annotated[float, real("rad", ">= 0")] = 0.0
+    """Angle between fibers and tendon at optimal fiber length; 0 is parallel."""
+    maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
+    """Angle that the fibers do not go beyond; it bounds their length from below."""
+
+
+class PathActuator(ScalarActuator):
+    """Pulls along its path with `optimal_force` times the control."""
+
+    facts = Facts(
+        outputs="tension", domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE}
+    )
+
+    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
+        GeometryPath, name="path"
+    )
+    """The line along which the actuator pulls."""
+    optimal_force: Annotated[float, real("N")] = 1.0
+    """Tension at a control of 1; classes with a law of their own do without it."""
+
+
+class ClutchedPathSpring(PathActuator):
+    """A spring along a path that its control engages, with the length it has then as rest length."""
+
+    facts = Facts(
+        states="stretch",
+        domains={"initial_stretch": ">= 0"},
+        refused="stiffness dissipation relaxation_time_constant initial_stretch",
+        zero={STOPS: "relaxation_time_constant"},
+    )
+
+    min_control: Number = 0.0
+    max_control: Number = 1.0
+    stiffness: Annotated[float, real("N/m", ">= 0")] = math.nan
+    """Tension per stretch at a control of 1; less control pulls proportionally less."""
+    dissipation: Annotated[float, real("s/m", ">= 0")] = math.nan
+    """The c of 1 + c v, by which the lengthening speed v raises the tension."""
+    relaxation_time_constant: Annotated[float, real("s", "> 0")] = 0.001
+    """Time constant with which the stretch fades while the control is 0."""
+    initial_stretch: Annotated[float, real("m")] = 0.0
+    """Stretch at the start of a simulation."""
+
+
+class McKibbenActuator(PathActuator):
+    """A pneumatic muscle: a tube in a braid, whose control is the pressure in it."""
+
+    number_of_turns: Annotated[float, real(domain="> 0")] = 1.5
+    """Turns of a thread around the tube, from end to end."""
+    thread_length: Annotated[float, real(domain="> 0")] = 200.0
+    """Length of one thread of the braid, unwound."""
+    cord_length: Annotated[float, real(domain=">= 0")] = 0.0
+    """Length of the path that is cord and does not shorten; the tube is the rest."""
 
 
 class Muscle(PathActuator, abstract=True):

@@ -26,7 +26,6 @@ _AREAS = {
         "ConstantDistanceConstraint CoordinateCouplerConstraint PointConstraint PointOnLineConstraint "
         "RollingOnSurfaceConstraint UnilateralConstraint WeldConstraint"
     ),
-    "constraints": "Constraint ConstraintSet",
     "contact": (
         "ContactCylinder ContactEllipsoid ContactGeometry ContactGeometrySet ContactHalfSpace ContactMesh "
         "ContactSphere ContactTorus"
@@ -40,8 +39,6 @@ _AREAS = {
         "CMC ControlDistributor ControlSetController CorrectionController InputController PrescribedController "
         "SynergyController SynergyVector TrackingController"
     ),
-    "controllers": "Controller ControllerSet",
-    "coordinate_stops": "CoordinateLinearStopForce ExponentialCoordinateLimitForce",
     "coordinates": "Coordinate CoordinateSet",
     "custom_joint": "CustomJoint SpatialTransform TransformAxis",
     "examples": "HopperDevice ToyPropMyoController ToyReflexController",
@@ -64,13 +61,6 @@ _AREAS = {
         "ScapulothoracicJoint SliderJoint UniversalJoint WeldJoint"
     ),
     "markers": "IMU Marker MarkerSet Point Station",
-    "metabolics": (
-        "Bhargava2004MuscleMetabolicsProbe Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter "
-        "Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet Bhargava2004SmoothedMuscleMetabolics "
-        "Bhargava2004SmoothedMuscleMetabolics_MuscleParameters Umberger2010MuscleMetabolicsProbe "
-        "Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter "
-        "Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet"
-    ),
     "moco.goals": (
         "MocoAverageSpeedGoal MocoControlGoal MocoExpressionBasedParameterGoal MocoFinalOutputGoal MocoFinalTimeGoal "
         "MocoGoal MocoInitialActivationGoal MocoInitialForceEquilibriumDGFGoal MocoInitialOutputGoal "
@@ -102,24 +92,30 @@ _AREAS = {
         "ActiveForceLengthCurve FiberCompressiveForceCosPennationCurve FiberCompressiveForceLengthCurve "
         "FiberForceLengthCurve ForceVelocityCurve ForceVelocityInverseCurve TendonForceLengthCurve"
     ),
-    "muscle_parts": "MuscleFirstOrderActivationDynamicModel MuscleFixedWidthPennationModel",
     "muscles": (
-        "ActivationFiberLengthMuscle DeGrooteFregly2016Muscle MeyerFregly2016Muscle Millard2012AccelerationMuscle "
-        "Millard2012EquilibriumMuscle Muscle RigidTendonMuscle Thelen2003Muscle"
+        "ActivationFiberLengthMuscle ClutchedPathSpring DeGrooteFregly2016Muscle McKibbenActuator "
+        "MeyerFregly2016Muscle Millard2012AccelerationMuscle Millard2012EquilibriumMuscle Muscle "
+        "MuscleFirstOrderActivationDynamicModel MuscleFixedWidthPennationModel PathActuator RigidTendonMuscle "
+        "Thelen2003Muscle"
     ),
     "old_muscles": (
         "ActivationFiberLengthMuscle_Deprecated Delp1990Muscle_Deprecated Schutte1993Muscle_Deprecated "
         "Thelen2003Muscle_Deprecated"
     ),
-    "path_actuators": "ClutchedPathSpring McKibbenActuator PathActuator",
     "path_forces": "Blankevoort1991Ligament ExpressionBasedPathForce Ligament PathSpring",
     "paths": (
         "AbstractGeometryPath AbstractPathPoint ConditionalPathPoint FunctionBasedPath GeometryPath MovingPathPoint "
         "PathPoint PathPointSet PathWrap PathWrapPoint PathWrapSet"
     ),
     "prescribed": "ExternalForce ExternalLoads PrescribedForce",
-    "probe_types": "ActuatorForceProbe ActuatorPowerProbe JointInternalPowerProbe SystemEnergyProbe",
-    "probes": "Probe ProbeSet",
+    "probe_types": (
+        "ActuatorForceProbe ActuatorPowerProbe Bhargava2004MuscleMetabolicsProbe "
+        "Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter "
+        "Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet Bhargava2004SmoothedMuscleMetabolics "
+        "Bhargava2004SmoothedMuscleMetabolics_MuscleParameters JointInternalPowerProbe SystemEnergyProbe "
+        "Umberger2010MuscleMetabolicsProbe Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter "
+        "Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet"
+    ),
     "reporters": (
         "AbstractReporter ConsoleReporter__Vec3_ ConsoleReporter__double_ NumberReporter SignalGenerator "
         "StatesTrajectoryReporter TableReporter__Vec3_ TableReporter__Vector_ TableReporter__double_ TableSource "
@@ -129,10 +125,14 @@ _AREAS = {
         "Scholz2015GeometryPath Scholz2015GeometryPathElement Scholz2015GeometryPathObstacle "
         "Scholz2015GeometryPathPoint"
     ),
-    "sets": "ComponentSet ModelComponentSet ObjectGroup Set",
+    "sets": (
+        "ComponentSet Constraint ConstraintSet Controller ControllerSet ModelComponentSet ObjectGroup Probe ProbeSet "
+        "Set"
+    ),
     "springs": (
-        "BushingForce ExpressionBasedBushingForce ExpressionBasedCoordinateForce ExpressionBasedPointToPointForce "
-        "FunctionBasedBushingForce PointToPointSpring SpringGeneralizedForce"
+        "BushingForce CoordinateLinearStopForce ExponentialCoordinateLimitForce ExpressionBasedBushingForce "
+        "ExpressionBasedCoordinateForce ExpressionBasedPointToPointForce FunctionBasedBushingForce PointToPointSpring "
+        "SpringGeneralizedForce"
     ),
     "tools.analyses": (
         "Actuation Analysis AnalysisSet BodyKinematics ForceReporter IMUDataReporter InducedAccelerations "

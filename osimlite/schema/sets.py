@@ -1,10 +1,11 @@
-"""Sets: the lists a model is made of, and named groups of their members."""
+"""Sets of components, and the bases of constraints, controllers and probes with their sets."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from osimlite.schema.base import ModelComponent, Object, none
-from osimlite.schema.fields import LegacyMany
-from osimlite.schema.references import SetMemberNames
+from osimlite.schema.facts import Facts
+from osimlite.schema.fields import Flag, LegacyMany, Number, Reals, reals, word
+from osimlite.schema.references import ActuatorSockets, SetMemberNames
 
 if TYPE_CHECKING:
     Member = Any  # each set says which: a list of bodies is not a list of objects
@@ -37,3 +38,57 @@ class ComponentSet(ModelComponentSet):
 
     objects: LegacyMany[ModelComponent] = none()
     """Components of any class that no other set takes, such as reporters."""
+
+
+class Constraint(ModelComponent, abstract=True):
+    """A condition that the motion keeps."""
+
+    isEnforced: Flag = True
+    """Whether the constraint holds during a simulation."""
+
+
+class ConstraintSet(ModelComponentSet):
+    """The constraints of a model."""
+
+    objects: LegacyMany[Constraint] = none()
+    """The constraints; one that is not enforced does nothing."""
+
+
+class Controller(ModelComponent, abstract=True):
+    """Computes the controls of the actuators it names."""
+
+    socket_actuators: ActuatorSockets = ()
+    """The actuators that are controlled; what several controllers want of one is added up."""
+    enabled: Flag = True
+    """Whether the controller adds anything to the controls."""
+
+
+class ControllerSet(ModelComponentSet):
+    """The controllers of a model."""
+
+    objects: LegacyMany[Controller] = none()
+    """The controllers; what several want of one actuator is added up."""
+
+
+class Probe(ModelComponent, abstract=True):
+    """Something measured along a simulation, possibly integrated or differentiated, times `gain`."""
+
+    facts = Facts(outputs="probe_outputs:Vector")
+
+    enabled: Flag = True
+    """Whether the probe is computed and reported."""
+    probe_operation: Annotated[
+        str, word("value", "integrate", "differentiate", "minimum", "minabs", "maximum", "maxabs")
+    ] = "value"
+    """What is reported of the quantity: itself, its integral, its rate, or its extreme so far."""
+    initial_conditions_for_integration: Annotated[Reals, reals()] = ()
+    """Where the integrals start, one number for each quantity of the probe."""
+    gain: Number = 1.0
+    """Factor of what is reported."""
+
+
+class ProbeSet(ModelComponentSet):
+    """The probes of a model."""
+
+    objects: LegacyMany[Probe] = none()
+    """The probes; tools write their values to a file."""

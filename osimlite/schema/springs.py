@@ -1,15 +1,16 @@
-"""Springs between points, on coordinates and between frames."""
+"""Springs between points, on coordinates and between frames, and stops of coordinates."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from osimlite.schema.base import made
 from osimlite.schema.facts import Facts
-from osimlite.schema.fields import Number, Optional, Text, Vec3, maybe, real, vec3
+from osimlite.schema.fields import Number, Optional, Text, Value, Vec2, Vec3, maybe, real, vec3
 from osimlite.schema.forces import Force, ForceProducer
 from osimlite.schema.frames import TwoFrameLinker
 from osimlite.schema.functions import Constant, Function
 from osimlite.schema.references import (
     CoordinateName,
+    CoordinateSocket,
     MaybeCoordinateName,
     MaybeFrameName,
     PhysicalFrameSocket,
@@ -156,3 +157,37 @@ class FunctionBasedBushingForce(TwoFrameLinker, ForceProducer):
     """Length drawn per force."""
     visual_aspect_ratio: Annotated[float | None, maybe()] = 1.0
     """Length over diameter of what is drawn."""
+
+
+class CoordinateLinearStopForce(Force):
+    """A stop that a coordinate runs into: a linear spring with damping that grows with its compression."""
+
+    since: ClassVar[str] = "4.6.1"
+
+    socket_coordinate: CoordinateSocket = ""
+    """The coordinate that is stopped."""
+    stiffness: Annotated[float, real("N*m/rad (rotational) | N/m", ">= 0")] = 0.0
+    """Generalized force per distance beyond a limit."""
+    damping: Annotated[float, real("s/rad (rotational) | s/m", ">= 0")] = 0.0
+    """The d of 1 + d v, by which running on at v raises the force and running back lowers it, down to none."""
+    upper_limit: Annotated[float, real("rad (rotational) | m")] = 0.0
+    """Value above which the stop pushes back."""
+    lower_limit: Annotated[float, real("rad (rotational) | m")] = 0.0
+    """Value below which the stop pushes back; not above the upper limit."""
+
+
+class ExponentialCoordinateLimitForce(ForceProducer):
+    """What ligaments do to a coordinate near its limits: an exponential at either, felt before it is reached."""
+
+    since: ClassVar[str] = "4.6.1"
+
+    socket_coordinate: CoordinateSocket = ""
+    """The coordinate that is limited."""
+    lower_limit: Number = 0.0
+    """Value at which the lower exponential has its first shape parameter."""
+    upper_limit: Number = 0.0
+    """Value at which the upper exponential has its first shape parameter."""
+    lower_shape_parameters: Annotated[Vec2, Value("double", "Vec2", domain="> 0")] = (0.0, 0.0)
+    """Generalized force at the lower limit, and how steeply it grows below (per value of the coordinate)."""
+    upper_shape_parameters: Annotated[Vec2, Value("double", "Vec2", domain="> 0")] = (0.0, 0.0)
+    """Generalized force at the upper limit, and how steeply it grows above (per value of the coordinate)."""

@@ -34,7 +34,6 @@ from osimlite.schema.specs import (
 
 if TYPE_CHECKING:
     from osimlite.schema.model import Model
-    from osimlite.schema.snapshot import Snapshot
 
 
 @dataclass(frozen=True, slots=True)
@@ -452,3 +451,24 @@ def _name_in_tree(spec: FieldSpec, item: Component) -> str:
     if form == "unnamed" and is_a(item, "ModelComponentSet"):
         return type(item).__name__.lower()
     return item.name or str(getattr(item, "class_name", "") or type(item).tag).lower()
+
+
+class Snapshot:
+    """A model as it is now. It is copied when somebody asks for it, or just before it changes.
+
+    Args:
+        tree: of the model.
+    """
+
+    def __init__(self, tree: Tree) -> None:
+        self._tree: Tree | None = tree
+        self._copy: Model | None = None
+        tree.snapshots.add(self)
+
+    @property
+    def model(self) -> Model:
+        """A copy of the model as it was; always the same one."""
+        if self._copy is None:
+            assert self._tree is not None
+            self._copy, self._tree = self._tree.model.copy_deep(), None
+        return self._copy

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from osimlite.base.files import make_folder, open_atomically
 from osimlite.base.records import dataclass, field
-from osimlite.io.tables.control_nodes import control_set
 from osimlite.io.tables.storage import StoTable, write_sto
+from osimlite.io.tables.writers import control_set
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples

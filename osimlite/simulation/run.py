@@ -20,7 +20,7 @@ from osimlite.mechanics.multibody.dynamics import require_numbers
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model, expect_model
-from osimlite.schema.snapshot import Snapshot
+from osimlite.schema.tree import Snapshot
 from osimlite.simulation.constrained import constraints_on, kept_state
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls

@@ -35,8 +35,7 @@ from osimlite.schema.actuators import (
     TorqueActuator,
 )
 from osimlite.schema.model import Model
-from osimlite.schema.muscles import Muscle
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import Muscle, PathActuator
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.engines.linking import best

@@ -20,7 +20,7 @@ from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.schema.snapshot import Snapshot
+from osimlite.schema.tree import Snapshot
 
 
 class Trajectory(Tabular):

@@ -11,7 +11,7 @@ import numpy as np
 
 from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError
-from osimlite.io.document.part import read_object
+from osimlite.io.document.cache import read_object
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.mechanics.multibody.spatial import Array

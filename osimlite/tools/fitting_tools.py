@@ -18,8 +18,7 @@ from osimlite.fitting.scale_tool import run_scale
 from osimlite.fitting.sensors import place_sensors
 from osimlite.io.document.printer import to_text
 from osimlite.io.tables.old_storage import UNITS
-from osimlite.io.tables.storage import StoTable, read_sto
-from osimlite.io.tables.times import both_of
+from osimlite.io.tables.storage import StoTable, both_of, read_sto
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tools.inverse_kinematics import (
     IKMarkerTask,

@@ -9,8 +9,7 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.base.text import join_words, suggest_name
-from osimlite.io.tables.storage import StoTable
-from osimlite.io.tables.times import both_of
+from osimlite.io.tables.storage import StoTable, both_of
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.kinematics import Kinematics
 from osimlite.mechanics.multibody.mechanism import Mechanism

@@ -8,7 +8,7 @@ from typing import Any
 
 from osimlite.base.records import dataclass
 from osimlite.errors import DocumentError, UnsupportedError
-from osimlite.io.document.kept import read_anew
+from osimlite.io.document.cache import read_anew
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.model import Model

@@ -18,7 +18,7 @@ from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_count, join_words
 from osimlite.base.writing import write_into
 from osimlite.errors import OsimliteError
-from osimlite.io.document.kept import top_at
+from osimlite.io.document.cache import top_at
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Set
 from osimlite.tools.named_files import named_files

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from osimlite.errors import DocumentError
-from osimlite.io.document.kept import while_unchanged
+from osimlite.io.document.cache import while_unchanged
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.engine import subject_of

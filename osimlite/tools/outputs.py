@@ -22,8 +22,7 @@ from osimlite.schema.frames import Body, Frame
 from osimlite.schema.joints import Joint
 from osimlite.schema.markers import Station
 from osimlite.schema.model import Model
-from osimlite.schema.muscles import Millard2012AccelerationMuscle, Muscle
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import Millard2012AccelerationMuscle, Muscle, PathActuator
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.simulation.elements.muscle import SPRING
 from osimlite.tools.motion import Motion

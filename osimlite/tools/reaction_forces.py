@@ -23,7 +23,7 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.parts import GROUND
 from osimlite.mechanics.multibody.program import Program
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema import constraints as schema
+from osimlite.schema import sets as schema
 from osimlite.schema.joints import Joint
 from osimlite.simulation.constrained import constraints_on
 from osimlite.simulation.elements import Forces

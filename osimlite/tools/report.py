@@ -16,7 +16,7 @@ from osimlite.base.records import replace
 from osimlite.base.text import join_words
 from osimlite.errors import OsimliteError
 from osimlite.fitting.fitted_motion import ADVICE
-from osimlite.io.document.kept import top_at
+from osimlite.io.document.cache import top_at
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array

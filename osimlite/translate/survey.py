@@ -6,9 +6,7 @@ from functools import cached_property
 
 from osimlite.mechanics.multibody.functions import IDENTITY
 from osimlite.schema.base import Component
-from osimlite.schema.constraints import Constraint
 from osimlite.schema.contact import ContactGeometry
-from osimlite.schema.controllers import Controller
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import PhysicalFrame
@@ -16,8 +14,7 @@ from osimlite.schema.geometry import FrameGeometry
 from osimlite.schema.joints import Joint
 from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
-from osimlite.schema.probes import Probe
-from osimlite.schema.sets import ModelComponentSet
+from osimlite.schema.sets import Constraint, Controller, ModelComponentSet, Probe
 from osimlite.schema.tree import Tree
 from osimlite.schema.wrapping import WrapObject, WrapObjectSet
 from osimlite.simulation.robot.couplings import Mimic, couplers, mimics

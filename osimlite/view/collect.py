@@ -13,8 +13,7 @@ import numpy as np
 from osimlite.base.files import MESH_FOLDER_HINT
 from osimlite.errors import ModelError, OsimliteError, UnsupportedError
 from osimlite.io.meshes import unit_shapes
-from osimlite.io.meshes.folders import MeshFolders
-from osimlite.io.meshes.read import read_surface
+from osimlite.io.meshes.folders import MeshFolders, read_surface
 from osimlite.io.meshes.surface import Surface
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.mechanics.multibody.mechanism import Mechanism

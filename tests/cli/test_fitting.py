@@ -11,7 +11,7 @@ import pytest
 import osimlite
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.io.tables.storage import read_sto
-from osimlite.io.tables.trc import write_trc
+from osimlite.io.tables.writers import write_trc
 from tests.cli.command import run
 
 POINTS = {

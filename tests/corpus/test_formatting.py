@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from osimlite.errors import DocumentError
-from osimlite.io.document.formatting import formatted
-from osimlite.io.document.printer import to_text
+from osimlite.io.document.printer import formatted, to_text
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.base import Object

@@ -12,8 +12,8 @@ from osimlite.io.document.survey import survey
 from osimlite.lint.placement import default_poses
 from osimlite.lint.subject import Subject
 from osimlite.mechanics.laws.rotations import transposed
-from osimlite.schema.constraints import Constraint
 from osimlite.schema.frames import Body
+from osimlite.schema.sets import Constraint
 from tests.conftest import ROUNDED, CorpusModel
 
 

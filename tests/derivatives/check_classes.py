@@ -19,18 +19,20 @@ from osimlite.mechanics.kernels.table import LAW_MODULES
 from osimlite.mechanics.laws import millard2012_equilibrium
 from osimlite.mechanics.multibody import Mechanism
 from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateActuator
-from osimlite.schema.coordinate_stops import (
-    CoordinateLinearStopForce,
-    ExponentialCoordinateLimitForce,
-)
-from osimlite.schema.metabolics import (
+from osimlite.schema.muscles import ClutchedPathSpring
+from osimlite.schema.probe_types import (
+    ActuatorForceProbe,
+    ActuatorPowerProbe,
     Bhargava2004MuscleMetabolicsProbe,
     Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter,
+    SystemEnergyProbe,
     Umberger2010MuscleMetabolicsProbe,
     Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter,
 )
-from osimlite.schema.path_actuators import ClutchedPathSpring
-from osimlite.schema.probe_types import ActuatorForceProbe, ActuatorPowerProbe, SystemEnergyProbe
+from osimlite.schema.springs import (
+    CoordinateLinearStopForce,
+    ExponentialCoordinateLimitForce,
+)
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.force_type import ForceType
 from osimlite.simulation.elements.laws import law_function

@@ -13,7 +13,7 @@ import pytest
 import osimlite
 from osimlite.errors import DocumentError, MissingDependency, OsimliteError, SettingError
 from osimlite.fitting.marker_data import MarkerData, read_trc
-from osimlite.io.tables.trc import write_trc
+from osimlite.io.tables.writers import write_trc
 
 TRIALS = Path(__file__).parents[2] / "fixtures" / "trials"
 MARKERS = ("one", "two", "three", "four")

@@ -14,7 +14,7 @@ from osimlite.errors import DocumentError, OsimliteError, SettingError
 from osimlite.fitting.orientation_data import OrientationData
 from osimlite.fitting.sensors import place_sensors
 from osimlite.io.tables.storage import read_sto, write_sto
-from osimlite.io.tables.trc import write_trc
+from osimlite.io.tables.writers import write_trc
 from osimlite.mechanics.multibody.spatial import (
     quaternion_of,
     rotation_about_space,

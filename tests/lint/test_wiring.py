@@ -13,8 +13,8 @@ from osimlite.lint import validate
 from osimlite.lint.axes import axes_refused
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import CustomJoint
-from osimlite.schema.outputs import outputs_of
 from osimlite.schema.registry import MODULES
+from osimlite.schema.states import outputs_of
 
 HERE = Path(__file__).resolve().parent
 _spec = importlib.util.spec_from_file_location("skeleton", HERE / "skeleton.py")

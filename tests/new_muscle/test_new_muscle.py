@@ -9,8 +9,7 @@ import pytest
 
 import osimlite
 from osimlite.schema import registry
-from osimlite.schema.outputs import outputs_of
-from osimlite.schema.states import states_of, variables
+from osimlite.schema.states import outputs_of, states_of, variables
 from osimlite.simulation.elements.registry import FORCE_TYPES
 
 TEXT = """<?xml version="1.0" encoding="UTF-8"?>

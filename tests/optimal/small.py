@@ -6,7 +6,7 @@ import numpy as np
 
 import osimlite
 from osimlite.io.tables.storage import write_sto
-from osimlite.io.tables.trc import write_trc
+from osimlite.io.tables.writers import write_trc
 
 BODIES = "/bodyset/b0", "/bodyset/b1"
 TIMES = np.linspace(0.0, 1.0, 12)

@@ -12,7 +12,7 @@ from osimlite.schema.actuators import (
     TorqueActuator,
 )
 from osimlite.schema.functions import Constant, LinearFunction, SimmSpline, Sine
-from osimlite.schema.path_actuators import McKibbenActuator, PathActuator
+from osimlite.schema.muscles import McKibbenActuator, PathActuator
 from osimlite.schema.prescribed import PrescribedForce
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

@@ -20,7 +20,7 @@ from osimlite.fitting.person_files import SETUP, UNSCALED, person_texts
 from osimlite.fitting.pose_layout import Marker
 from osimlite.fitting.scaling import scale_model
 from osimlite.io.tables.storage import read_sto
-from osimlite.io.tables.trc import write_trc
+from osimlite.io.tables.writers import write_trc
 from tests.fitting.test_person import HELD, marked, person
 from tests.fitting.test_pose_fit import cost_of
 from tests.fitting.test_scaling import assert_same

@@ -13,7 +13,7 @@ import pytest
 
 import osimlite
 from osimlite.io.tables.storage import write_sto
-from osimlite.io.tables.trc import write_trc
+from osimlite.io.tables.writers import write_trc
 from osimlite.mechanics.multibody.spatial import quaternion_of, rotation_of, rotation_xyz
 from tests.fitting.test_scaling import assert_same
 from tests.oracle.test_fitting import ask, model_with

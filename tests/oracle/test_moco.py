@@ -15,7 +15,7 @@ import pytest
 
 import osimlite
 from osimlite.io.tables.storage import read_sto, write_sto
-from osimlite.io.tables.trc import write_trc
+from osimlite.io.tables.writers import write_trc
 from tests.conftest import ROOT
 from tests.optimal.small import coupled, links
 from tests.optimal.studies import moco_said, study_file

@@ -16,10 +16,10 @@ from osimlite.schema.muscle_curves import (
     ForceVelocityCurve,
     TendonForceLengthCurve,
 )
-from osimlite.schema.muscle_parts import MuscleFirstOrderActivationDynamicModel
 from osimlite.schema.muscles import (
     Millard2012AccelerationMuscle,
     Millard2012EquilibriumMuscle,
+    MuscleFirstOrderActivationDynamicModel,
     Thelen2003Muscle,
 )
 from osimlite.simulation import Simulation

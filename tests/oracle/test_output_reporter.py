@@ -14,7 +14,7 @@ from osimlite.io.tables.storage import read_sto
 from osimlite.models.jumper import jumper
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Millard2012AccelerationMuscle
-from osimlite.schema.outputs import outputs_of
+from osimlite.schema.states import outputs_of
 from osimlite.tools.job import NotRunnable
 from osimlite.tools.outputs import LAWS
 from tests.oracle.test_muscle_analysis import with_muscles_of

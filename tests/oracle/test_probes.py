@@ -15,21 +15,23 @@ from osimlite.schema.actuators import (
     TorqueActuator,
 )
 from osimlite.schema.functions import PiecewiseLinearFunction, Sine
-from osimlite.schema.metabolics import (
+from osimlite.schema.muscles import (
+    DeGrooteFregly2016Muscle,
+    PathActuator,
+    RigidTendonMuscle,
+    Thelen2003Muscle,
+)
+from osimlite.schema.probe_types import (
+    ActuatorForceProbe,
+    ActuatorPowerProbe,
     Bhargava2004MuscleMetabolicsProbe,
     Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter,
     Bhargava2004SmoothedMuscleMetabolics,
     Bhargava2004SmoothedMuscleMetabolics_MuscleParameters,
-    Umberger2010MuscleMetabolicsProbe,
-    Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter,
-)
-from osimlite.schema.muscles import DeGrooteFregly2016Muscle, RigidTendonMuscle, Thelen2003Muscle
-from osimlite.schema.path_actuators import PathActuator
-from osimlite.schema.probe_types import (
-    ActuatorForceProbe,
-    ActuatorPowerProbe,
     JointInternalPowerProbe,
     SystemEnergyProbe,
+    Umberger2010MuscleMetabolicsProbe,
+    Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter,
 )
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements

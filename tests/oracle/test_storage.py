@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from osimlite.io.tables.trc import write_trc
+from osimlite.io.tables.writers import write_trc
 from osimlite.simulation import read_sto, write_sto
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

@@ -8,13 +8,13 @@ from osimlite.io.document.printer import to_text
 from osimlite.schema.contact_forces import MeyerFregly2016Force
 from osimlite.schema.frames import Body
 from osimlite.schema.markers import Station
-from osimlite.schema.metabolics import (
-    Umberger2010MuscleMetabolicsProbe,
-    Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter,
-)
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Thelen2003Muscle
 from osimlite.schema.paths import PathPoint
+from osimlite.schema.probe_types import (
+    Umberger2010MuscleMetabolicsProbe,
+    Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter,
+)
 
 
 @pytest.fixture

@@ -39,7 +39,7 @@ from osimlite.schema.functions import (
     StepFunction,
 )
 from osimlite.schema.markers import Station
-from osimlite.schema.path_actuators import McKibbenActuator, PathActuator
+from osimlite.schema.muscles import McKibbenActuator, PathActuator
 from osimlite.schema.path_forces import (
     Blankevoort1991Ligament,
     ExpressionBasedPathForce,

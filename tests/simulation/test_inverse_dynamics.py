@@ -12,7 +12,7 @@ import osimlite
 from osimlite.errors import DocumentError, SettingError
 from osimlite.io.tables.c3d import read_c3d_forces
 from osimlite.io.tables.storage import StoTable, write_sto
-from osimlite.io.tables.trc import write_trc
+from osimlite.io.tables.writers import write_trc
 
 TRIALS = Path(__file__).parents[2] / "fixtures" / "trials"
 TIMES = np.linspace(0.0, 1.0, 51)

@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from osimlite import Body, Model
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import PathPoint, PathWrap
 from osimlite.simulation.elements.geometries.paths.geometry_path import LAWS
 from tests.conftest import ROOT

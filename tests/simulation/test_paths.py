@@ -12,7 +12,7 @@ import osimlite
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody.spatial import invert_transform
 from osimlite.schema.functions import Constant, Sine
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import MovingPathPoint, PathPoint
 from tests.simulation.elements.muscle_rows import hung, line
 from tests.simulation.force_cases import FORCES, with_force

@@ -7,7 +7,7 @@ import pytest
 
 import osimlite
 from osimlite.schema.contact import ContactEllipsoid, ContactSphere
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import PathPoint, PathWrap
 from tests.simulation.checked import Checked
 from tests.simulation.test_cables import LEFT, RIGHT, cable, over

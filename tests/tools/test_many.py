@@ -15,7 +15,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.io.tables.trc import write_trc
+from osimlite.io.tables.writers import write_trc
 from osimlite.tools.many import JOURNAL, digest_of, found, run_many
 from osimlite.tools.running import runnable
 from tests.cli.command import ROOT, run

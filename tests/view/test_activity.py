@@ -9,7 +9,7 @@ from osimlite import Model
 from osimlite.io.tables.storage import write_sto
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import PathPoint
 from osimlite.view import Shown
 from osimlite.view.motion import activity

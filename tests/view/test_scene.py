@@ -8,8 +8,7 @@ import pytest
 from osimlite import Body, Coordinate, Model, SliderJoint
 from osimlite.errors import OsimliteError
 from osimlite.io.meshes import unit_shapes
-from osimlite.io.meshes.folders import MeshFolders
-from osimlite.io.meshes.read import read_surface
+from osimlite.io.meshes.folders import MeshFolders, read_surface
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.geometry import Brick, Cylinder, LineGeometry, Mesh, Sphere, Torus

@@ -11,7 +11,7 @@ from typing import Any
 
 from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.io.document.kept import read_anew
+from osimlite.io.document.cache import read_anew
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.mechanics.multibody import build_mechanism
@@ -26,9 +26,9 @@ from osimlite.schema.muscles import (
     DeGrooteFregly2016Muscle,
     Millard2012EquilibriumMuscle,
     Muscle,
+    PathActuator,
     Thelen2003Muscle,
 )
-from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.prescribed import ExternalLoads
 from osimlite.schema.tools import processors as p
 from osimlite.schema.tools.processors import ModelOperator, ModelProcessor

@@ -9,11 +9,10 @@ from typing import Any, NamedTuple, TypeVar
 
 from lxml import etree
 
-from osimlite.io.document.comments import is_generated
-from osimlite.io.document.foreign import is_element, xml_of
 from osimlite.io.document.lexical import ABSENT, Unclean, converter
 from osimlite.io.document.names import as_parsed, as_written
 from osimlite.io.document.notes import Note, NoteKind
+from osimlite.io.document.xml_text import is_element, is_generated, xml_of
 from osimlite.schema.base import Object, Unknown
 from osimlite.schema.fields import Held, ObjectList
 from osimlite.schema.layout import Home, Include, Layout, Remark

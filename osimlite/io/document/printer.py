@@ -7,10 +7,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
+from lxml import etree
+
 from osimlite.base.files import get_relative_path, write_atomically
-from osimlite.io.document.escape import escape, quoted
-from osimlite.io.document.foreign import relaid
-from osimlite.io.document.lexical import formatter
+from osimlite.errors import NotWellFormedError
+from osimlite.io.document.lexical import formatter, split
+from osimlite.io.document.reader import document_of, parse, version_of
+from osimlite.io.document.source import Source
+from osimlite.io.document.xml_text import escape, lines_of, quoted, relaid
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.layout import Include, Layout, Remark
@@ -252,3 +256,28 @@ def has_content(value: Any, spec: FieldSpec | None = None) -> bool:
     if value.model_fields_set - {"name"} or value.layout is not None:
         return True
     return any(has_content(held, inner) for inner, held in value.objects_held())
+
+
+def formatted(source: Source) -> str:
+    """The text of a document in the layout in which it would be printed.
+
+    A document of the current version is read and printed. One of another keeps its version and its
+    words: only white space changes, and the comments that OpenSim prints by itself are dropped.
+
+    Raises:
+        DocumentError: the text is not an OpenSim document; with line and column.
+    """
+    try:
+        root = parse(source)
+    except NotWellFormedError as fault:
+        from osimlite.io.document.repair import read_repaired
+
+        root, _ = read_repaired(source, fault, parse)
+    version = version_of(source, root)
+    if version == CURRENT_VERSION:
+        return to_text(document_of(source, root, version, Object).top)
+    for element in root.iter(etree.Element):
+        if not len(element):
+            element.text = " ".join(split(element.text or "")) or None
+    nodes = [*[*root.itersiblings(preceding=True)][::-1], root, *root.itersiblings()]
+    return "\n".join([DECLARATION, *(line for node in nodes for line in lines_of(node, 0))]) + "\n"

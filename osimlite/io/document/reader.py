@@ -23,13 +23,12 @@ from osimlite.errors import (
     SpecialFileError,
     VersionError,
 )
-from osimlite.io.document.comments import all_generated
-from osimlite.io.document.foreign import is_element
 from osimlite.io.document.names import as_written, without_namespaces
 from osimlite.io.document.notes import Note
 from osimlite.io.document.objects import Included, ObjectReader, layout_of, remember, size
 from osimlite.io.document.source import Source
 from osimlite.io.document.syntax import expect_plain_doctype, place_of, plain_words
+from osimlite.io.document.xml_text import all_generated, is_element
 from osimlite.schema.base import Object, put_index
 from osimlite.schema.layout import Include, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model

@@ -1,13 +1,17 @@
-"""Where the mesh files of a model are: the folders that OpenSim looks into, and names in other capitals."""
+"""Search for the mesh files of a model as OpenSim does, and reading of their surfaces."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from osimlite.base.files import MESH_FOLDER_HINT, list_mesh_folders
+from osimlite.base.files import MESH_FOLDER_HINT, list_mesh_folders, read_file
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
+
+if TYPE_CHECKING:
+    from osimlite.io.meshes.surface import Surface
 
 
 class OutsideError(OsimliteError):
@@ -99,3 +103,29 @@ def _descend(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
     for entry in entries:
         if entry.name.casefold() == parts[0].casefold():
             yield from _descend(entry, parts[1:])
+
+
+def read_surface(path: Path) -> Surface:
+    """Return the surface in a file (.vtp, .stl or .obj).
+
+    Raises:
+        OsimliteError: the file cannot be read, or has no surface.
+    """
+    # Imported here, because a check searches meshes without reading them.
+    import numpy as np
+
+    from osimlite.io.meshes.obj import read_obj
+    from osimlite.io.meshes.stl import stl_corners
+    from osimlite.io.meshes.surface import Surface
+    from osimlite.io.meshes.vtp import read_vtp
+
+    content = read_file(path)
+    match path.suffix.lower():
+        case ".vtp":
+            return read_vtp(content, path.name)
+        case ".stl":
+            points = stl_corners(content, path.name).reshape(-1, 3)
+            return Surface(points, np.arange(len(points)).reshape(-1, 3))
+        case ".obj":
+            return read_obj(content, path.name)
+    raise OsimliteError(f"osimlite does not read {path.suffix or 'such'} files", file=path.name)

@@ -12,7 +12,8 @@ import numpy as np
 
 from osimlite.base.files import open_atomically
 from osimlite.base.records import dataclass, field
-from osimlite.errors import OsimliteError, SimulationError
+from osimlite.base.text import format_count
+from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.io.tables.headers import suffixes
 from osimlite.io.tables.table_stream import TableStream
 from osimlite.io.tables.tabular import Tabular
@@ -214,3 +215,11 @@ def number_text(value: float) -> str:
     """All digits of a number, without a needless point."""
     text = repr(float(value))
     return text[:-2] if text.endswith(".0") else text
+
+
+def both_of(time_range: Sequence[float]) -> tuple[float, float]:
+    """The first and the last time (s) of a setup; SettingError if it does not give two."""
+    if len(time_range) != 2:
+        count = format_count(len(time_range), "number")
+        raise SettingError(f"time_range has {count}; give it two, the first and the last time")
+    return time_range[0], time_range[1]

@@ -12,7 +12,6 @@ from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.base import Component, Object
-from osimlite.schema.controllers import Controller
 from osimlite.schema.forces import Force
 from osimlite.schema.functions import (
     Function,
@@ -29,6 +28,7 @@ from osimlite.schema.functions import (
     StepFunction,
 )
 from osimlite.schema.paths import FunctionBasedPath
+from osimlite.schema.sets import Controller
 
 Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstantFunction
 

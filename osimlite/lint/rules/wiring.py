@@ -13,7 +13,7 @@ from osimlite.lint.words import a, called
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
-from osimlite.schema.outputs import outputs_of
+from osimlite.schema.states import outputs_of
 from osimlite.schema.tree import Use, normalised
 
 

@@ -29,7 +29,7 @@ from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.schema_joints import joint_motions, unknown_joint
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.mechanics.multibody.topology import new_base, spanning_tree
-from osimlite.schema import constraints as schema
+from osimlite.schema import sets as schema
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Body, PhysicalFrame

@@ -18,7 +18,7 @@ from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema import constraint_types as schema
 from osimlite.schema.base import Component
-from osimlite.schema.constraints import Constraint as SchemaConstraint
+from osimlite.schema.sets import Constraint as SchemaConstraint
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 
 from osimlite.base.text import suggest_name
 from osimlite.derivatives.symbols import casadi
-from osimlite.io.document.kept import read_anew
+from osimlite.io.document.cache import read_anew
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.point import (
     Formula,

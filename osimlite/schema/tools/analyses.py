@@ -3,7 +3,6 @@
 from typing import Annotated
 
 from osimlite.schema.base import Object, made, none
-from osimlite.schema.constraints import ConstraintSet
 from osimlite.schema.fields import (
     Flag,
     LegacyFlag,
@@ -26,7 +25,7 @@ from osimlite.schema.references import (
     Names,
     several,
 )
-from osimlite.schema.sets import Set
+from osimlite.schema.sets import ConstraintSet, Set
 
 
 class Analysis(Object, abstract=True):

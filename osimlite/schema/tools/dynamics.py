@@ -3,7 +3,6 @@
 from typing import Annotated
 
 from osimlite.schema.base import Object, made
-from osimlite.schema.controllers import ControllerSet
 from osimlite.schema.fields import (
     LegacyFlag,
     LegacyInteger,
@@ -27,6 +26,7 @@ from osimlite.schema.references import (
     several,
     writes,
 )
+from osimlite.schema.sets import ControllerSet
 from osimlite.schema.tools.analyses import AnalysisSet
 from osimlite.schema.tools.inverse_kinematics import Tool
 

@@ -11,7 +11,7 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError
-from osimlite.io.document.part import read_object
+from osimlite.io.document.cache import read_object
 from osimlite.io.tables.storage import beside
 from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseConstant
 from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial

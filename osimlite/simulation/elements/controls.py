@@ -17,7 +17,7 @@ from osimlite.mechanics.multibody.functions import Function
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Unknown
 from osimlite.schema.controller_types import ControlSetController, TrackingController
-from osimlite.schema.controllers import Controller
+from osimlite.schema.sets import Controller
 from osimlite.simulation.elements.integral import value_of
 from osimlite.simulation.elements.registry import CONTROLLERS
 

@@ -16,8 +16,7 @@ import numpy as np
 
 from osimlite.base.text import find_nearest, join_words
 from osimlite.errors import DocumentError, ModelError, SettingError
-from osimlite.io.document.kept import while_unchanged
-from osimlite.io.document.part import read_object
+from osimlite.io.document.cache import read_object, while_unchanged
 from osimlite.io.tables.c3d import ENDING, read_c3d_forces
 from osimlite.io.tables.storage import StoTable, beside, read_sto
 from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseLinear

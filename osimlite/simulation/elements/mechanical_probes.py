@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite.mechanics.multibody.constraints import Lock, Prescribed
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.probe_types import (
     ActuatorForceProbe,
     ActuatorPowerProbe,

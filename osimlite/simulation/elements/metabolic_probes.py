@@ -17,7 +17,7 @@ from osimlite.mechanics.laws.metabolics import (
     umberger2010,
 )
 from osimlite.mechanics.multibody.functions import Function, PiecewiseLinear
-from osimlite.schema.metabolics import (
+from osimlite.schema.probe_types import (
     Bhargava2004MuscleMetabolicsProbe,
     Bhargava2004SmoothedMuscleMetabolics,
     Umberger2010MuscleMetabolicsProbe,

@@ -16,10 +16,10 @@ from osimlite.mechanics.multibody.constraints import Lock
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.base import Component
-from osimlite.schema.controllers import Controller
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
+from osimlite.schema.sets import Controller
 from osimlite.simulation.batches import Renewed
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.controls import Controls, ModelControls

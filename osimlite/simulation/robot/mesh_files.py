@@ -7,8 +7,7 @@ from pathlib import Path
 from osimlite.base.files import MESH_FOLDER_HINT, read_file
 from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError
-from osimlite.io.meshes.folders import MeshFolders
-from osimlite.io.meshes.read import read_surface
+from osimlite.io.meshes.folders import MeshFolders, read_surface
 from osimlite.io.meshes.stl import binary_stl, is_binary
 from osimlite.io.meshes.surface import Surface
 from osimlite.simulation.robot.names import legal

@@ -29,8 +29,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 
-from osimlite.io.document.escape import quoted
 from osimlite.io.document.lexical import shortest
+from osimlite.io.document.xml_text import quoted
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.robot.couplings import Mimic, mimics
 from osimlite.simulation.robot.names import UniqueNames

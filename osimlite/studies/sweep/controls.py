@@ -26,7 +26,6 @@ from osimlite.base.text import suggest_name, suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.controller_types import PrescribedController
-from osimlite.schema.controllers import Controller
 from osimlite.schema.functions import (
     Constant,
     Function,
@@ -36,6 +35,7 @@ from osimlite.schema.functions import (
     PiecewiseLinearFunction,
 )
 from osimlite.schema.model import Model
+from osimlite.schema.sets import Controller
 
 OFFSET, NODE, SWITCH, SCALE = "offset", "node", "switch", "scale"
 

@@ -21,10 +21,10 @@ from osimlite.base.records import dataclass, replace
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Component
-from osimlite.schema.controllers import Controller
 from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
+from osimlite.schema.sets import Controller
 from osimlite.simulation.batches import Renewal
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout

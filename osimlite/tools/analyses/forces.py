@@ -14,7 +14,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.actuators import Actuator, ScalarActuator
 from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.tools.analyses import Actuation, JointReaction
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.run_controls import driven

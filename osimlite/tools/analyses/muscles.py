@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.io.tables.control_nodes import control_set
 from osimlite.io.tables.old_storage import UNITS
+from osimlite.io.tables.writers import control_set
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.tools.analyses import MuscleAnalysis, StaticOptimization

@@ -10,8 +10,8 @@ from osimlite.base.text import join_words, suggest_name
 from osimlite.io.tables.old_storage import DEGREES, UNITS
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.base import Component
-from osimlite.schema.outputs import outputs_of
-from osimlite.schema.probes import Probe
+from osimlite.schema.sets import Probe
+from osimlite.schema.states import outputs_of
 from osimlite.schema.tools.analyses import (
     ForceReporter,
     OutputReporter,

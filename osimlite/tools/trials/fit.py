@@ -16,7 +16,7 @@ from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.pose_fit import PoseFit
 from osimlite.fitting.pose_layout import Marker
 from osimlite.fitting.scale_tool import run_scale
-from osimlite.io.tables.times import both_of
+from osimlite.io.tables.storage import both_of
 from osimlite.lint.trial import Number
 from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.mechanics.multibody.spatial import Array

@@ -13,8 +13,7 @@ import numpy as np
 from osimlite.base.files import make_missing_error
 from osimlite.base.records import replace
 from osimlite.errors import OsimliteError
-from osimlite.io.document.kept import top_at
-from osimlite.io.document.part import read_object
+from osimlite.io.document.cache import read_object, top_at
 from osimlite.io.document.reader import read_any
 from osimlite.io.document.source import Position, Source
 from osimlite.io.tables.storage import StoTable, read_sto

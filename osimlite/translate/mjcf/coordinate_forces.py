@@ -12,7 +12,7 @@ import numpy as np
 from osimlite.mechanics.laws.coordinate_limit import limit_force
 from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateActuator
 from osimlite.schema.forces import CoordinateLimitForce
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.springs import SpringGeneralizedForce
 from osimlite.simulation.elements.force_types.coordinate_forces import read_limit_constants
 from osimlite.translate.fidelity import Error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from osimlite.schema.base import ModelComponent
 from osimlite.schema.contact import ContactGeometry
-from osimlite.schema.controllers import Controller
+from osimlite.schema.sets import Controller
 from osimlite.schema.wrapping import WrapObject
 from osimlite.simulation.elements import force_elements
 from osimlite.translate.fidelity import LEFT_OUT

@@ -7,7 +7,7 @@ from lxml.etree import _Element
 
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.coordinate_forces import scaled

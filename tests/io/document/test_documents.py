@@ -8,7 +8,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import DocumentError, OsimliteError
-from osimlite.io.document.formatting import formatted
+from osimlite.io.document.printer import formatted
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.base import Object

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from osimlite.errors import DocumentError
-from osimlite.io.document.formatting import formatted
+from osimlite.io.document.printer import formatted
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 

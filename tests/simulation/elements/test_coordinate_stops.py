@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import ModelError
-from osimlite.schema.coordinate_stops import (
+from osimlite.schema.springs import (
     CoordinateLinearStopForce,
     ExponentialCoordinateLimitForce,
 )

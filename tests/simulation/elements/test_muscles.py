@@ -17,7 +17,7 @@ from osimlite.schema.muscle_curves import (
     ForceVelocityCurve,
     TendonForceLengthCurve,
 )
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.system import System

@@ -12,16 +12,14 @@ from osimlite import Model
 from osimlite.errors import DoubtfulWarning, ModelError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
-from osimlite.schema.metabolics import (
-    Umberger2010MuscleMetabolicsProbe,
-    Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter,
-)
 from osimlite.schema.muscles import Thelen2003Muscle
 from osimlite.schema.probe_types import (
     ActuatorForceProbe,
     ActuatorPowerProbe,
     JointInternalPowerProbe,
     SystemEnergyProbe,
+    Umberger2010MuscleMetabolicsProbe,
+    Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter,
 )
 from osimlite.simulation import Simulation, read_sto
 from osimlite.simulation.batches import run_many

@@ -10,7 +10,7 @@ from osimlite.mechanics.multibody.functions import Polynomial, Sine
 from osimlite.schema.frames import Body
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import GeometryPath, PathPoint, PathWrap
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapTorus
 from osimlite.translate.mjcf.fits import fitted

@@ -14,7 +14,7 @@ from osimlite.schema.frames import Body
 from osimlite.schema.functions import Sine
 from osimlite.schema.joints import PinJoint, SliderJoint
 from osimlite.schema.model import Model
-from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.muscles import PathActuator
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import (
     ConditionalPathPoint,

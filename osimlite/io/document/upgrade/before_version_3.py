@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from osimlite.io.document.foreign import is_element
 from osimlite.io.document.upgrade.draft import (
     Draft,
     Element,
@@ -15,6 +14,7 @@ from osimlite.io.document.upgrade.draft import (
     list_members,
     parse_reals,
 )
+from osimlite.io.document.xml_text import is_element
 from osimlite.mechanics.laws.vectors import Vector, cross, norm, vector
 
 

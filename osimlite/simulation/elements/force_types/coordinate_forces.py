@@ -13,12 +13,13 @@ from osimlite.mechanics.laws.coordinate_limit import (
 )
 from osimlite.mechanics.laws.springs import coordinate_spring_force, spring_energy
 from osimlite.mechanics.multibody.mechanism import CoordinateInfo
-from osimlite.schema.coordinate_stops import (
+from osimlite.schema.forces import CoordinateLimitForce
+from osimlite.schema.springs import (
     CoordinateLinearStopForce,
     ExponentialCoordinateLimitForce,
+    ExpressionBasedCoordinateForce,
+    SpringGeneralizedForce,
 )
-from osimlite.schema.forces import CoordinateLimitForce
-from osimlite.schema.springs import ExpressionBasedCoordinateForce, SpringGeneralizedForce
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_type import ForceType, State
 from osimlite.simulation.elements.geometries.coordinate import COORDINATE, OnCoordinate

@@ -42,8 +42,11 @@ from osimlite.mechanics.laws.muscle_curves import (
     tendon_force_length,
 )
 from osimlite.mechanics.laws.muscles import SIGNIFICANT, pennation
-from osimlite.schema.muscle_parts import MuscleFirstOrderActivationDynamicModel
-from osimlite.schema.muscles import Millard2012AccelerationMuscle, Millard2012EquilibriumMuscle
+from osimlite.schema.muscles import (
+    Millard2012AccelerationMuscle,
+    Millard2012EquilibriumMuscle,
+    MuscleFirstOrderActivationDynamicModel,
+)
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_type import DeclaredForce, State
 from osimlite.simulation.elements.kernel_text import Abreast, Asked, Sought

@@ -12,7 +12,7 @@ from osimlite.mechanics.laws.springs import (
     path_spring_tension,
     stretch,
 )
-from osimlite.schema.path_actuators import ClutchedPathSpring
+from osimlite.schema.muscles import ClutchedPathSpring
 from osimlite.schema.path_forces import (
     Blankevoort1991Ligament,
     ExpressionBasedPathForce,

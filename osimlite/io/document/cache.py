@@ -1,4 +1,4 @@
-"""Documents that were read, kept as long as their files do not change."""
+"""Cache of documents by file, and reading of documents with one object."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from osimlite.base.files import get_file_stamp
-from osimlite.errors import OsimliteError
+from osimlite.base.text import find_nearest
+from osimlite.errors import DocumentError, OsimliteError
 from osimlite.io.document.objects import layout_of
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.base import Object
 from osimlite.schema.registry import forgotten_with_classes
+from osimlite.schema.specs import field_specs
 
 T = TypeVar("T")
 Top = TypeVar("Top", bound=Object)
@@ -98,3 +100,27 @@ def read_anew(path: str | Path, of: type[Top]) -> Top:
         copied = top.copy_deep()
         layout_of(copied).file = file
         return copied
+
+
+AnyObject = TypeVar("AnyObject", bound=Object)
+
+
+def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
+    """Read a document that holds one object of a class; what is like nothing of that class is ignored, as in OpenSim.
+
+    Raises:
+        DocumentError: the file is missing or holds something else; with line and column.
+    """
+    document = read_document(Source.of_file(path), of=cls)
+    for note in document.notes:
+        # Properties of older versions are still in many files; what is like one of today is
+        # misspelt.
+        if (
+            note.kind == "unknown-tag"
+            and note.owner
+            and (near := find_nearest(note.word, field_specs(type(note.owner))))
+        ):
+            message = f"<{note.word}> means nothing in this document; did you mean <{near}>?"
+            raise document.source.fault(DocumentError, message, document.source.of_tag(note.number))
+    assert isinstance(document.top, cls)
+    return document.top

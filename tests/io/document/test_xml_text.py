@@ -7,7 +7,7 @@ from xml.sax import saxutils
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.io.document.escape import NO_XML, escape, quoted
+from osimlite.io.document.xml_text import NO_XML, escape, quoted
 
 texts = st.text(st.sampled_from("ab&<>\"'\n\r\t é")) | st.text().filter(
     lambda text: not NO_XML.search(text)

@@ -1,13 +1,73 @@
-"""XML that no class of ours stands for: plug-in classes and misspelt tags, kept as they were written."""
+"""Text of XML: escapes, generated comments, and elements without a class in OpenSim's layout.
+
+Elements of plug-in classes and misspelt tags are written as they were read. OpenSim prints the
+description of a property as a comment before each property. The comments that a person wrote are
+kept; those that OpenSim prints are recognized by their digests and dropped.
+"""
 
 from __future__ import annotations
+
+import re
+from functools import cache, lru_cache
+from pathlib import Path
 
 from lxml import etree
 
 from osimlite.errors import ModelError
-from osimlite.io.document.comments import is_generated
-from osimlite.io.document.escape import escape, quoted
 from osimlite.io.document.names import as_written, without_namespaces
+
+DIGEST_SIZE = 6
+
+_COMMENT = re.compile(rb"<!--([^-]*+(?:-[^-]++)*+)-->")
+
+
+@lru_cache(maxsize=4096)
+def is_generated(text: str) -> bool:
+    """Whether a comment is one that some version of OpenSim prints by itself."""
+    return digest(text) in _known()
+
+
+def all_generated(data: bytes) -> bool:
+    """Whether a UTF-8 text has no comment but OpenSim's own; half of the nodes of such a text are comments."""
+    return all(is_generated(text.decode(errors="replace")) for text in set(_COMMENT.findall(data)))
+
+
+def digest(text: str) -> bytes:
+    """Digest of a comment, white space and digits aside."""
+    # The library behind it takes longer to load than most files do to read, and many have no
+    # comments.
+    from hashlib import blake2b
+
+    plain = re.sub(r"[\s\d]+", " ", text).strip()
+    return blake2b(plain.encode(), digest_size=DIGEST_SIZE).digest()
+
+
+@cache
+def _known() -> frozenset[bytes]:
+    data = Path(__file__).with_name("generated_comments.bin").read_bytes()
+    return frozenset(data[i : i + DIGEST_SIZE] for i in range(0, len(data), DIGEST_SIZE))
+
+
+NO_XML = re.compile("[\\0-\\x08\\x0b\\x0c\\x0e-\\x1f\\ud800-\\udfff\\ufffe\\uffff]")
+"""Characters that XML cannot hold."""
+
+
+def escape(text: str) -> str:
+    """`text` as the content of an element; ModelError if XML cannot hold it."""
+    if not text.isprintable() and (odd := NO_XML.search(text)):
+        start = odd.start()
+        raise ModelError(
+            f"no file can hold the last character of '{text[max(0, start - 40) : start + 1]}'; take it out"
+        )
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def quoted(text: str) -> str:
+    """`text` as the value of an attribute, with its quotation marks."""
+    inner = escape(text).replace("\n", "&#10;").replace("\r", "&#13;").replace("\t", "&#9;")
+    if '"' not in inner:
+        return f'"{inner}"'
+    return f"'{inner}'" if "'" not in inner else '"' + inner.replace('"', "&quot;") + '"'
 
 
 def is_element(node: etree._Element) -> bool:

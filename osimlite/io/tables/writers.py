@@ -1,13 +1,15 @@
-"""Marker files (.trc), as motion capture programs and OpenSim's tools exchange them."""
+"""Writers of marker files (.trc) and of documents of ControlSets."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from osimlite.base.files import open_atomically
 from osimlite.io.tables.headers import MARKER_KEYS
-from osimlite.io.tables.storage import number_text
+from osimlite.io.tables.storage import StoTable, number_text
 
 
 def write_trc(
@@ -59,3 +61,51 @@ def _lines(
     for frame, (time, row) in enumerate(zip(times, rows, strict=True), start=1):
         words = ("" if number != number else number_text(number) for number in row)
         yield "\t".join((str(frame), number_text(time), *words, ""))
+
+
+_START = """<?xml version="1.0" encoding="UTF-8" ?>
+<OpenSimDocument Version="40600">
+	<ControlSet name="Control Set">
+		<objects>
+"""
+_BEFORE = """			<ControlLinear name={name}>
+				<is_model_control>true</is_model_control>
+				<extrapolate>true</extrapolate>
+				<default_min>0.02</default_min>
+				<default_max>1</default_max>
+				<filter_on>false</filter_on>
+				<use_steps>false</use_steps>
+				<x_nodes>
+"""
+_NODE = """					<ControlLinearNode>
+						<t>%.17g</t>
+						<value>%.17g</value>
+					</ControlLinearNode>
+"""
+_AFTER = """				</x_nodes>
+				<min_nodes />
+				<max_nodes />
+				<kp>100</kp>
+				<kv>20</kv>
+			</ControlLinear>
+"""
+_END = """		</objects>
+		<groups />
+	</ControlSet>
+</OpenSimDocument>
+"""
+
+
+def control_set(table: StoTable) -> Iterator[str]:
+    """The text of a ControlSet, in parts: a ControlLinear for each column; what is no number has no node."""
+    # Imported here, because it imports the network code of the standard library.
+    from xml.sax.saxutils import quoteattr
+
+    yield _START
+    for name, values in zip(table.columns, table.rows.T, strict=True):
+        known = ~np.isnan(values)
+        nodes = np.column_stack([table.times[known], values[known]])
+        yield _BEFORE.format(name=quoteattr(name))
+        yield _NODE * len(nodes) % tuple(nodes.ravel().tolist())
+        yield _AFTER
+    yield _END
