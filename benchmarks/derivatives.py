@@ -65,7 +65,7 @@ def measured(path: Path) -> dict[str, Any]:
     row["size"] = dynamics.n_instructions()
     for seed in range(STATES):
         x = both.state(seed, 0.03)
-        found = both.errors(both.kept(x) if f.constraints_kept else x, seed)
+        found = both.errors(both.kept(x) if f.constraint_count else x, seed)
         row |= {key: max(value, row.get(key, 0.0)) for key, value in found.items()}
     u, symbol = f.u, casadi.MX.sym("x", len(x))
     xdot = dynamics(both.t, symbol, u, f.p)

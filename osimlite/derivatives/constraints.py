@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.derivatives.symbolic import on_symbols
+from osimlite.derivatives.symbolic import make_symbolic
 from osimlite.derivatives.symbols import Vector, casadi
 from osimlite.mechanics.kernels.constrained_dynamics import away_from_ground, bind, toward_ground
 from osimlite.mechanics.kernels.dynamics import evaluate, solve
@@ -20,11 +20,11 @@ from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.pack import Packed
 from osimlite.simulation.states import StateLayout
 
-POSES = 3
+TESTED_POSES = 3
 """In so many poses is looked which equations follow from others."""
 
 
-def position_equations(structure: Sequence[int]) -> list[int]:
+def list_position_equations(structure: Sequence[int]) -> list[int]:
     """Numbers of the equations that bind positions, in the order of their errors."""
     h = structure[structure[MODEL.CONSTRAINED] :]
     records = structure[h[CONSTRAINED.CONSTRAINT_AT] :][: h[CONSTRAINED.CONSTRAINTS]]
@@ -35,7 +35,9 @@ def position_equations(structure: Sequence[int]) -> list[int]:
     return [row for first, end, _ in ranges for row in range(first, end)]
 
 
-def independent_equations(mechanism: Mechanism, packed: Packed, state: StateLayout) -> list[int]:
+def find_independent_equations(
+    mechanism: Mechanism, packed: Packed, state: StateLayout
+) -> list[int]:
     """Numbers of as many equations as say something beyond others, where the constraints hold.
 
     Raises:
@@ -49,19 +51,19 @@ def independent_equations(mechanism: Mechanism, packed: Packed, state: StateLayo
     rng = np.random.default_rng(0)
     infos = mechanism.coordinates
     start = np.array([info.default_value for info in infos])
-    for number in range(POSES):
+    for number in range(TESTED_POSES):
         q = start + (0.05 * rng.normal(size=len(start)) if number else 0.0)
         values, speeds = kept_state(mechanism, q.tolist(), [0.0] * len(infos), (), ())
         y = np.array(state.pack(values.tolist(), speeds.tolist()))
         w, f = np.zeros(int(ints[MODEL.WORK_SIZE])), np.zeros(len(y))
         evaluate(ints, packed.numbers, w, y, f, STAGE.VELOCITY)
         bind(ints, packed.numbers, w, y, f)
-        rows = _independent(w[at_rows : at_rows + count * size].reshape(count, size))
+        rows = _select_independent_rows(w[at_rows : at_rows + count * size].reshape(count, size))
         best = max(best, rows, key=len)
     return sorted(best)
 
 
-def _independent(rows: Array) -> list[int]:
+def _select_independent_rows(rows: Array) -> list[int]:
     """The longest rest first, of equations that weigh the same."""
     lengths = np.linalg.norm(rows, axis=1)
     rest = (
@@ -82,7 +84,7 @@ def _independent(rows: Array) -> list[int]:
     return chosen
 
 
-def dynamics_with(equations: Sequence[int]) -> Law:
+def make_constrained_dynamics(equations: Sequence[int]) -> Law:
     """The law of accelerations that fulfil some of the equations, which all others follow from.
 
     As in `by_multipliers`: the tree's own factor of the mass matrix gives what each equation's
@@ -92,8 +94,8 @@ def dynamics_with(equations: Sequence[int]) -> Law:
     def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector, unused: int) -> int:
         h, size = model.rest(model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
         right, freedoms = f.rest(size), model.rest(model[MODEL.DOF_AT])
-        on_symbols(bind)(model, reals, data, y, f)
-        on_symbols(solve)(model, data, right)
+        make_symbolic(bind)(model, reals, data, y, f)
+        make_symbolic(solve)(model, data, right)
         inverse = [1.0 / data[freedoms[DOF.SIZE * k + DOF.ROW]] for k in range(size)]
         rows, missing = [], []
         for number in equations:
@@ -103,7 +105,7 @@ def dynamics_with(equations: Sequence[int]) -> Law:
                 - sum(a * right[k] for k, a in enumerate(row))
             )
             turned = Vector(row)
-            on_symbols(toward_ground)(model, data, turned)
+            make_symbolic(toward_ground)(model, data, turned)
             rows.append(casadi.horzcat(*turned.cells))
         g = casadi.sparsify(casadi.SX(casadi.vertcat(*rows)))
         scaled = g @ casadi.diag(casadi.vertcat(*inverse))
@@ -111,7 +113,7 @@ def dynamics_with(equations: Sequence[int]) -> Law:
             casadi.SX(casadi.vertcat(*missing)), *casadi.ldl(scaled @ g.T)
         )
         push = Vector(casadi.vertsplit(casadi.densify(scaled.T @ multipliers)))
-        on_symbols(away_from_ground)(model, data, push)
+        make_symbolic(away_from_ground)(model, data, push)
         for k in range(size):
             right[k] += push[k]
         return OUTCOME.OK

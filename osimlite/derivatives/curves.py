@@ -6,7 +6,16 @@ from collections.abc import Sequence
 from functools import cache, reduce
 from typing import Any
 
-from osimlite.derivatives.symbols import SX, casadi, divide, is_symbol, minus, plain, plus, times
+from osimlite.derivatives.symbols import (
+    SX,
+    casadi,
+    divide,
+    is_symbol,
+    minus,
+    plus,
+    simplify_number,
+    times,
+)
 from osimlite.mechanics.kernels.functions import PIECES_OF_OPENSIM, pieces_at
 from osimlite.mechanics.laws.bezier import (
     FIRST,
@@ -22,18 +31,18 @@ from osimlite.mechanics.laws.bezier import (
     curve_value,
 )
 
-STEPS = 5
+HALLEY_STEPS = 5
 """Of Halley's method in the search for a place: four meet all curves and velocities of damped fibers to rounding."""
-GRID = 2.0**53
+ROUNDING_GRID = 2.0**53
 """To whose parts a place is rounded: those of a number from a half to one."""
 
 
-def pieces_on_symbols(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
+def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
     """As :func:`osimlite.mechanics.kernels.functions.pieces_at`: the piece that counts is chosen before anything is computed."""
-    knots, width = int(plain(table[2])), int(plain(table[3]))
+    knots, width = int(simplify_number(table[2])), int(simplify_number(table[3]))
     if not is_symbol(z):
-        numbers: Any = [plain(number) for number in table[: 4 + knots * (1 + width)]]
-        return pieces_at(numbers, float(plain(z)), kind)
+        numbers: Any = [simplify_number(number) for number in table[: 4 + knots * (1 + width)]]
+        return pieces_at(numbers, float(simplify_number(z)), kind)
     below = [SX.binary(casadi.OP_LT, z, table[4 + k]) for k in range(1, knots)]
     # Of the tests that something counts one holds.
     beyond = [SX(1.0), *(SX.unary(casadi.OP_NOT, test) for test in below)]
@@ -54,24 +63,27 @@ def pieces_on_symbols(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
     return value, slope, slope if kind == PIECES_OF_OPENSIM else times(2.0, curvature)
 
 
-def curve_value_on_symbols(c: Any, x: Any) -> tuple[Any, Any]:
+def evaluate_curve(c: Any, x: Any) -> tuple[Any, Any]:
     """As :func:`osimlite.mechanics.laws.bezier.curve_value`, with its derivatives."""
-    count = int(plain(c[SECTIONS]))
+    count = int(simplify_number(c[SECTIONS]))
     if not is_symbol(x):
-        numbers = [float(plain(c[k])) for k in range(HEAD + (1 + SECTION) * count)]
-        return curve_value(numbers, float(plain(x)))
-    start, scale, *rest = _section(c, [x >= c[HEAD + number] for number in range(count - 1)])
+        numbers = [float(simplify_number(c[k])) for k in range(HEAD + (1 + SECTION) * count)]
+        return curve_value(numbers, float(simplify_number(x)))
+    start, scale, *rest = _select_section(c, [x >= c[HEAD + number] for number in range(count - 1)])
     of_x, of_y = rest[:5], rest[5:]
-    off = _between(x, c[FIRST], c[LAST]) - start
-    u = _place([-off, *of_x], off * scale / NODES)
-    y, slope = _value(of_y, u), divide(_slope(of_y, u), _slope([0.0, *of_x], u))
+    off = _clamp_value(x, c[FIRST], c[LAST]) - start
+    u = _find_root([-off, *of_x], off * scale / NODES)
+    y, slope = (
+        _evaluate_polynomial(of_y, u),
+        divide(_evaluate_slope(of_y, u), _evaluate_slope([0.0, *of_x], u)),
+    )
     for test, end in ((x < c[FIRST], FIRST), (x > c[LAST], LAST)):
         y = casadi.if_else(test, c[end + 1] + c[end + 2] * (x - c[end]), y)
         slope = casadi.if_else(test, c[end + 2], slope)
     return y, slope
 
 
-def damped_velocity_on_symbols(
+def solve_damped_velocity(
     m: Any, active: Any, by_length: Any, elastic: Any, tendon: Any, cos: Any, curves: Any
 ) -> tuple[bool, Any, Any]:
     """As :func:`osimlite.mechanics.laws.millard2012_equilibrium.damped_velocity`, without that one's tolerance.
@@ -84,17 +96,17 @@ def damped_velocity_on_symbols(
     def borne(velocity: Any, factor: Any) -> Any:
         return share * factor + m.damping * velocity
 
-    count = int(plain(c[SECTIONS]))
+    count = int(simplify_number(c[SECTIONS]))
     first = HEAD + count
     knots = [borne(c[HEAD + k], c[first + SECTION * (k + 1) + Y]) for k in range(count - 1)]
-    start, _, *rest = _section(c, [wanted >= knot for knot in knots])
+    start, _, *rest = _select_section(c, [wanted >= knot for knot in knots])
     of_x, of_y = [start, *rest[:5]], rest[5:]
     low, high = (borne(c[end], c[end + 1]) for end in (FIRST, LAST))
-    off = _between(wanted, low, high)
+    off = _clamp_value(wanted, low, high)
     both = [borne(*pair) for pair in zip(of_x, of_y, strict=True)]
     both[0] -= off
-    u = _place(both, divide(-both[0], sum(both[1:])))
-    velocity, factor = _value(of_x, u), _value(of_y, u)
+    u = _find_root(both, divide(-both[0], sum(both[1:])))
+    velocity, factor = _evaluate_polynomial(of_x, u), _evaluate_polynomial(of_y, u)
     for test, end, edge in ((wanted < low, FIRST, low), (wanted > high, LAST, high)):
         beyond = divide(wanted - edge, borne(1.0, c[end + 2]))
         velocity = casadi.if_else(test, c[end] + beyond, velocity)
@@ -102,7 +114,7 @@ def damped_velocity_on_symbols(
     return True, velocity, factor
 
 
-def _section(c: Any, beyond: Sequence[Any]) -> list[Any]:
+def _select_section(c: Any, beyond: Sequence[Any]) -> list[Any]:
     """Start, scale and coefficients of the section behind the last of the ends that something is beyond."""
     first = HEAD + len(beyond) + 1
     places = [START, SCALE, *range(X, Y + 6)]
@@ -116,50 +128,52 @@ def _section(c: Any, beyond: Sequence[Any]) -> list[Any]:
     return result
 
 
-def _place(c: Sequence[Any], u: Any) -> Any:
+def _find_root(c: Sequence[Any], u: Any) -> Any:
     """The zero of a polynomial that rises from u = 0 to 1.
 
     The search has no derivatives: what it finds is rounded to a grid as fine as its digits. A last
     step of Halley's method, whose error is the third power of that before, brings first and second
     derivatives with it.
     """
-    return _search()(casadi.vertcat(*c), u)
+    return _make_root_function()(casadi.vertcat(*c), u)
 
 
 @cache
-def _search() -> Any:
-    """`_place` as a function, which CasADi writes into expressions sooner than Python."""
+def _make_root_function() -> Any:
+    """`_find_root` as a function, which CasADi writes into expressions sooner than Python."""
     given = casadi.SX.sym("c", 6), casadi.SX.sym("u")
     c, u = casadi.vertsplit(given[0]), given[1]
-    for _ in range(STEPS):
-        u = _between(_better(c, u), 0.0, 1.0)
-    return casadi.Function("search", given, [_better(c, casadi.floor(u * GRID) / GRID)])
+    for _ in range(HALLEY_STEPS):
+        u = _clamp_value(_apply_halley_step(c, u), 0.0, 1.0)
+    return casadi.Function(
+        "search", given, [_apply_halley_step(c, casadi.floor(u * ROUNDING_GRID) / ROUNDING_GRID)]
+    )
 
 
-def _better(c: Sequence[Any], u: Any) -> Any:
+def _apply_halley_step(c: Sequence[Any], u: Any) -> Any:
     """A step of Halley's method."""
-    value, slope = _value(c, u), _slope(c, u)
-    divisor = slope * slope - value * _slope(_derivative(c), u) / 2.0
+    value, slope = _evaluate_polynomial(c, u), _evaluate_slope(c, u)
+    divisor = slope * slope - value * _evaluate_slope(_differentiate_polynomial(c), u) / 2.0
     return u - casadi.if_else(
         divisor > 0.0, value * slope / casadi.if_else(divisor > 0.0, divisor, 1.0), 0.0
     )
 
 
-def _between(x: Any, low: Any, high: Any) -> Any:
+def _clamp_value(x: Any, low: Any, high: Any) -> Any:
     """x, or the end that it is beyond; the derivative at an end is that within."""
     return casadi.if_else(x < low, low, casadi.if_else(x > high, high, x))
 
 
-def _value(c: Sequence[Any], u: Any) -> Any:
+def _evaluate_polynomial(c: Sequence[Any], u: Any) -> Any:
     result: Any = 0.0
     for coefficient in reversed(c):
         result = result * u + coefficient
     return result
 
 
-def _slope(c: Sequence[Any], u: Any) -> Any:
-    return _value(_derivative(c), u)
+def _evaluate_slope(c: Sequence[Any], u: Any) -> Any:
+    return _evaluate_polynomial(_differentiate_polynomial(c), u)
 
 
-def _derivative(c: Sequence[Any]) -> list[Any]:
+def _differentiate_polynomial(c: Sequence[Any]) -> list[Any]:
     return [k * coefficient for k, coefficient in enumerate(c)][1:]

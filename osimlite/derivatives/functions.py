@@ -13,7 +13,7 @@ import numpy as np
 from osimlite.base.files import make_folder
 from osimlite.base.text import suggest_name
 from osimlite.base.writing import write_into
-from osimlite.derivatives.stated import StatedModel
+from osimlite.derivatives.differentiable_model import DifferentiableModel
 from osimlite.derivatives.tangents import TangentModel
 from osimlite.errors import SettingError, UnsupportedError
 from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, STAGE
@@ -27,8 +27,8 @@ from osimlite.simulation.pack import Packed, pack
 from osimlite.simulation.states import in_model_order
 
 if TYPE_CHECKING:
-    from osimlite.derivatives.given_paths import SearchedPaths
-    from osimlite.derivatives.traced import Evaluated, Traced
+    from osimlite.derivatives.symbolic_evaluator import SymbolicEvaluator, SymbolicWorkspace
+    from osimlite.derivatives.wrapped_paths import WrappedPaths
 
 FUNCTIONS = "dynamics", "residual", "constraints", "outputs", "paths"
 """Those that `save` writes."""
@@ -54,7 +54,7 @@ def casadi(
     return CasadiModel(model, tuple(parameters), Path(folder or "."))
 
 
-class CasadiModel(StatedModel):
+class CasadiModel(DifferentiableModel):
     """Functions of CasADi (``casadi.Function``), each made when it is first asked for.
 
     All are functions of columns: time t (s); the state x, named by `states`; its derivative xdot;
@@ -63,7 +63,7 @@ class CasadiModel(StatedModel):
     are those of OpenSim's files of states: m, rad, s, N. Where a result does not exist (a joint
     stands where its rates are not defined), it is not a number.
 
-    The arguments and attributes are those of :class:`osimlite.derivatives.stated.StatedModel`, and:
+    The arguments and attributes are those of :class:`osimlite.derivatives.differentiable_model.DifferentiableModel`, and:
 
     Args: loads_given: whether t has, behind the time, what the functions of time of measured and
         prescribed forces are then (`loads`; of a model with parameters it has none): thousands of
@@ -80,60 +80,64 @@ class CasadiModel(StatedModel):
         loads_given: bool = False,
     ) -> None:
         # Before all else: it says what is missing.
+        from osimlite.derivatives.symbolic_evaluator import list_load_functions
         from osimlite.derivatives.symbols import casadi as library
-        from osimlite.derivatives.traced import given_loads
 
         self._library = library
         super().__init__(model, parameters, folder, apart=apart)
-        self.loads = given_loads(self.forces.elements) if loads_given and not parameters else []
+        self.loads = (
+            list_load_functions(self.forces.elements) if loads_given and not parameters else []
+        )
         self._symbols = {
             "t": library.SX.sym("t", 1 + len(self.loads)),
             "x": library.SX.sym("x", len(self.states)),
             "xdot": library.SX.sym("xdot", len(self.states)),
             "u": library.SX.sym("u", len(self.controls)),
             "p": library.SX.sym("p", len(self.parameters)),
-            "multipliers": library.SX.sym("multipliers", self.constraints_kept),
-            "paths": library.SX.sym("paths", self._searched.size),
+            "multipliers": library.SX.sym("multipliers", self.constraint_count),
+            "paths": library.SX.sym("paths", self._wrapped_paths.size),
         }
-        self._searched.name(self._entries("paths"))
-        self._measured = self._searched.function() if self._searched.size else None
+        self._wrapped_paths.set_symbols(self._list_symbols("paths"))
+        self._path_function = (
+            self._wrapped_paths.make_function() if self._wrapped_paths.size else None
+        )
         # What has no formula is refused at once.
-        self._traced  # noqa: B018
+        self._evaluator  # noqa: B018
 
-    def _forces_of(self, model: Model, mechanism: Mechanism) -> Forces:
-        self._searched = self._searched_of(model, mechanism)
-        return self._searched.forces
+    def _collect_forces(self, model: Model, mechanism: Mechanism) -> Forces:
+        self._wrapped_paths = self._find_wrapped_paths(model, mechanism)
+        return self._wrapped_paths.forces
 
-    def _searched_of(self, model: Model, mechanism: Mechanism) -> SearchedPaths:
+    def _find_wrapped_paths(self, model: Model, mechanism: Mechanism) -> WrappedPaths:
         """The forces, and those of their paths whose way is searched for."""
-        from osimlite.derivatives.given_paths import SearchedPaths
+        from osimlite.derivatives.wrapped_paths import WrappedPaths
 
         infos = mechanism.coordinates
         moving = [k for k, info in enumerate(infos) if not info.locked]
         paths = in_model_order(model, [f"{infos[k].path}/value" for k in moving])
         places = {f"{infos[k].path}/value": k for k in moving}
-        return SearchedPaths(
-            mechanism, super()._forces_of(model, mechanism), [places[path] for path in paths]
+        return WrappedPaths(
+            mechanism, super()._collect_forces(model, mechanism), [places[path] for path in paths]
         )
 
     @property
     def searched(self) -> tuple[str, ...]:
         """Paths of the forces along paths around surfaces, whose way is searched for."""
-        return self._searched.names
+        return self._wrapped_paths.names
 
-    def _numbers_of(self, changed: Model) -> Array:
+    def _pack_numbers(self, changed: Model) -> Array:
         mechanism = build_mechanism(changed)
-        searched = self._searched_of(changed, mechanism)
+        searched = self._find_wrapped_paths(changed, mechanism)
         packed = pack(mechanism, searched.forces, apart=self._apart)
         if not np.array_equal(packed.structure, self._packed.structure):
             return np.zeros(0)
         # Ways that are searched for may not change: lengths are no lines over anything.
         ways = (
-            [searched.measured(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)]
+            [searched.measure_paths(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)]
             if searched.size
             else []
         )
-        return np.concatenate((packed.numbers, *_fixed_numbers(mechanism, packed), *ways))
+        return np.concatenate((packed.numbers, *_list_fixed_numbers(mechanism, packed), *ways))
 
     @cached_property
     def in_tangents(self) -> TangentModel:
@@ -144,81 +148,83 @@ class CasadiModel(StatedModel):
 
     # ----------------------------------------------------------------------------------------------- tracing
     @cached_property
-    def _traced(self) -> Traced:
-        from osimlite.derivatives.constraints import independent_equations
-        from osimlite.derivatives.parameters import filled
-        from osimlite.derivatives.traced import Traced
+    def _evaluator(self) -> SymbolicEvaluator:
+        from osimlite.derivatives.constraints import find_independent_equations
+        from osimlite.derivatives.parameters import insert_parameters
+        from osimlite.derivatives.symbolic_evaluator import SymbolicEvaluator
 
         numbers = self._packed.numbers.tolist()
         if self._parameters:
-            numbers = filled(
-                self._parameters.base.tolist(), self._parameters.slopes, self._entries("p")
+            numbers = insert_parameters(
+                self._parameters.base.tolist(), self._parameters.slopes, self._list_symbols("p")
             )
         equations = (
-            independent_equations(self.mechanism, self._packed, self._state)
-            if self.constraints_kept
+            find_independent_equations(self.mechanism, self._packed, self._state)
+            if self.constraint_count
             else ()
         )
-        return Traced(
+        return SymbolicEvaluator(
             self._packed,
             self.forces,
             numbers,
             self._symbols["t"][0],
-            self._engine_order("x"),
-            self._entries("u"),
+            self._sort_by_engine("x"),
+            self._list_symbols("u"),
             equations,
-            self._entries("t")[1:],
+            self._list_symbols("t")[1:],
         )
 
-    def _entries(self, name: str) -> list[Any]:
+    def _list_symbols(self, name: str) -> list[Any]:
         symbol = self._symbols[name]
         return [symbol[k] for k in range(symbol.numel())]
 
-    def _engine_order(self, name: str) -> list[Any]:
+    def _sort_by_engine(self, name: str) -> list[Any]:
         result: list[Any] = [0.0] * len(self.states)
-        for place, entry in zip(self.state_indices, self._entries(name), strict=True):
+        for place, entry in zip(self.state_indices, self._list_symbols(name), strict=True):
             result[place] = entry
         return result
 
-    def _in_order(self, y: Sequence[Any]) -> list[Any]:
+    def _sort_by_model(self, y: Sequence[Any]) -> list[Any]:
         return [y[place] for place in self.state_indices]
 
     @cached_property
-    def _evaluated(self) -> Evaluated:
-        return self._traced.evaluated(STAGE.ACCELERATION)
+    def _evaluation(self) -> SymbolicWorkspace:
+        return self._evaluator.evaluate(STAGE.ACCELERATION)
 
-    def _function(self, name: str, given: Sequence[str], results: dict[str, Any]) -> Any:
+    def _make_function(self, name: str, given: Sequence[str], results: dict[str, Any]) -> Any:
         symbols = [self._symbols[item] for item in given]
-        if self._measured is None or "x" not in given:
+        if self._path_function is None or "x" not in given:
             return self._library.Function(name, symbols, [*results.values()], [*given], [*results])
         inner = self._library.Function(
             f"{name}_of_paths", [*symbols, self._symbols["paths"]], [*results.values()]
         )
-        outer = self._arguments(given)
-        found = inner(*outer, self._measured(outer[given.index("x")][: len(self.coordinates)]))
+        outer = self._make_arguments(given)
+        found = inner(*outer, self._path_function(outer[given.index("x")][: len(self.coordinates)]))
         return self._library.Function(
             name, outer, [*found] if len(results) > 1 else [found], [*given], [*results]
         )
 
-    def _arguments(self, given: Sequence[str]) -> list[Any]:
+    def _make_arguments(self, given: Sequence[str]) -> list[Any]:
         """Symbols for the arguments of a function: of expressions, if one of its parts is none."""
-        kind = self._library.SX if self._measured is None else self._library.MX
+        kind = self._library.SX if self._path_function is None else self._library.MX
         return [kind.sym(name, self._symbols[name].numel()) for name in given]
 
     # --------------------------------------------------------------------------------------------- functions
     @cached_property
     def dynamics(self) -> Any:
         """``dynamics(t, x, u, p) -> xdot``: the derivative of the state."""
-        found = self._evaluated
-        return self._function(
-            "dynamics", ("t", "x", "u", "p"), {"xdot": found.sure(self._in_order(found.f.cells))}
+        found = self._evaluation
+        return self._make_function(
+            "dynamics",
+            ("t", "x", "u", "p"),
+            {"xdot": found.mask_failures(self._sort_by_model(found.f.cells))},
         )
 
     @cached_property
     def linear(self) -> Any:
         """``linear(t, x, u, p) -> xdot, A, B``: the same with its exact derivatives by the state and the controls."""
         given = "t", "x", "u", "p"
-        symbols = self._arguments(given)
+        symbols = self._make_arguments(given)
         xdot = self.dynamics(*symbols)
         slopes = [self._library.jacobian(xdot, symbols[given.index(name)]) for name in ("x", "u")]
         return self._library.Function(
@@ -234,20 +240,22 @@ class CasadiModel(StatedModel):
         the rates of auxiliary states are beyond those that the laws give. The multipliers (N, N m)
         are those of the rows of G in `constraints`; none without.
         """
-        size, xdot = len(self.coordinates), self._engine_order("xdot")
-        found = self._traced.missing(xdot[size : 2 * size])
+        size, xdot = len(self.coordinates), self._sort_by_engine("xdot")
+        found = self._evaluator.compute_missing_forces(xdot[size : 2 * size])
         f = found.f.cells
         rows = [given - own for given, own in zip(xdot, f, strict=True)]
         rows[size : 2 * size] = f[size : 2 * size]
-        if self.constraints_kept:
-            push = self._bound["jacobian"].T @ self._symbols["multipliers"]
+        if self.constraint_count:
+            push = self._constraint_errors["jacobian"].T @ self._symbols["multipliers"]
             rows[size : 2 * size] = [
-                rows[size + k] + push[self._speed_place(k)] for k in range(size)
+                rows[size + k] + push[self._find_coordinate(k)] for k in range(size)
             ]
         given = "t", "x", "xdot", "u", "p", "multipliers"
-        return self._function("residual", given, {"residual": found.sure(self._in_order(rows))})
+        return self._make_function(
+            "residual", given, {"residual": found.mask_failures(self._sort_by_model(rows))}
+        )
 
-    def _speed_place(self, k: int) -> int:
+    def _find_coordinate(self, k: int) -> int:
         """Number among `coordinates` of a degree of freedom."""
         return self.state_indices.index(k)
 
@@ -260,11 +268,13 @@ class CasadiModel(StatedModel):
         Returns: A ``casadi.Function`` whose result (k, 1) is in the order of `coordinates`, N and N
             m; constraints do not push.
         """
-        size, xdot = len(self.coordinates), self._engine_order("xdot")
-        found = self._traced.missing(xdot[size : 2 * size], pushing)
-        forces = self._in_order(found.f.cells)[size : 2 * size]
-        return self._function(
-            "generalized_forces", ("t", "x", "xdot", "u", "p"), {"missing": found.sure(forces)}
+        size, xdot = len(self.coordinates), self._sort_by_engine("xdot")
+        found = self._evaluator.compute_missing_forces(xdot[size : 2 * size], pushing)
+        forces = self._sort_by_model(found.f.cells)[size : 2 * size]
+        return self._make_function(
+            "generalized_forces",
+            ("t", "x", "xdot", "u", "p"),
+            {"missing": found.mask_failures(forces)},
         )
 
     def joint_load(self, path: str, side: str) -> Any:
@@ -280,7 +290,7 @@ class CasadiModel(StatedModel):
         Returns: A ``casadi.Function`` of the force (3,), N, and the moment (3,), N m, about the
             origin of the joint's frame on that side, along the axes of ground.
         """
-        from osimlite.derivatives.outputs import frame_places, joint_load_columns
+        from osimlite.derivatives.outputs import compute_joint_load_columns, locate_frames
 
         bodies, placements = self.mechanism.bodies, self._packed.placements
         body = next(body for body in bodies if body.mobilizer.joint == path)
@@ -293,14 +303,14 @@ class CasadiModel(StatedModel):
         # The body that the joint carries in the tree gets what is missing there, the other one the
         # opposite.
         sign = 1.0 if (side == "child") != body.mobilizer.reversed else -1.0
-        size, xdot = len(self.coordinates), self._engine_order("xdot")
-        found = self._traced.missing(xdot[size : 2 * size])
+        size, xdot = len(self.coordinates), self._sort_by_engine("xdot")
+        found = self._evaluator.compute_missing_forces(xdot[size : 2 * size])
         pushes = []
-        if self.constraints_kept:
-            multipliers = self._entries("multipliers")
+        if self.constraint_count:
+            multipliers = self._list_symbols("multipliers")
             pushes = [
                 (of, multipliers[row], unit)
-                for (row, of), unit in self._traced.bound().result.items()
+                for (row, of), unit in self._evaluator.evaluate_constraints().result.items()
             ]
         joint: Any = self._model.find(path)
         frame = (
@@ -308,12 +318,12 @@ class CasadiModel(StatedModel):
             .target(joint, f"socket_{side}_frame", getattr(joint, f"socket_{side}_frame"))
             .path
         )
-        places = frame_places(self.mechanism, self._packed)
+        places = locate_frames(self.mechanism, self._packed)
         number = [*places].index(frame)
-        origin = places[frame][0], self._fixed[1][12 * number + 9 : 12 * number + 12]
+        origin = places[frame][0], self._fixed_numbers[1][12 * number + 9 : 12 * number + 12]
         given = "t", "x", "xdot", "u", "p", "multipliers"
-        return self._function(
-            "joint_load", given, joint_load_columns(found, link, origin, sign, pushes)
+        return self._make_function(
+            "joint_load", given, compute_joint_load_columns(found, link, origin, sign, pushes)
         )
 
     @cached_property
@@ -324,13 +334,13 @@ class CasadiModel(StatedModel):
         is to be), and in accelerations (likewise G udot); G (m, n) has a row for each equation and
         a column for each of `coordinates`.
         """
-        return self._function("constraints", ("t", "x", "xdot", "p"), self._bound)
+        return self._make_function("constraints", ("t", "x", "xdot", "p"), self._constraint_errors)
 
     @cached_property
-    def _bound(self) -> dict[str, Any]:
-        from osimlite.derivatives.constraints import position_equations
+    def _constraint_errors(self) -> dict[str, Any]:
+        from osimlite.derivatives.constraints import list_position_equations
 
-        size, count, column = len(self.coordinates), self.constraints_kept, self._library.vertcat
+        size, count, column = len(self.coordinates), self.constraint_count, self._library.vertcat
         if not count:
             nothing = self._library.SX(0, 1)
             empty = self._library.SX(0, size)
@@ -340,7 +350,7 @@ class CasadiModel(StatedModel):
                 "acceleration": nothing,
                 "jacobian": empty,
             }
-        found, structure = self._traced.bound(), self._traced.structure
+        found, structure = self._evaluator.evaluate_constraints(), self._evaluator.structure
         h, data = structure[structure[MODEL.CONSTRAINED] :], found.data
         order = [self.state_indices.index(k) for k in range(size)]
         rows = []
@@ -353,16 +363,17 @@ class CasadiModel(StatedModel):
         jacobian = self._library.sparsify(self._library.SX(column(*rows)))
         u, udot = self._symbols["x"][size : 2 * size], self._symbols["xdot"][size : 2 * size]
 
-        def wanted(place: int) -> Any:
+        def get_rows(place: int) -> Any:
             return column(*data[h[place] : h[place] + count])
 
         errors = [
-            data[h[CONSTRAINED.WORK_ERRORS] + number] for number in position_equations(structure)
+            data[h[CONSTRAINED.WORK_ERRORS] + number]
+            for number in list_position_equations(structure)
         ]
         return {
             "position": self._library.SX(column(*errors)),
-            "velocity": jacobian @ u - wanted(CONSTRAINED.WORK_RATES),
-            "acceleration": jacobian @ udot - wanted(CONSTRAINED.WORK_DRIFTS),
+            "velocity": jacobian @ u - get_rows(CONSTRAINED.WORK_RATES),
+            "acceleration": jacobian @ udot - get_rows(CONSTRAINED.WORK_DRIFTS),
             "jacobian": jacobian,
         }
 
@@ -378,7 +389,7 @@ class CasadiModel(StatedModel):
         gain, before it is integrated or compared over time. Probes of energies and of joints are
         not among them.
         """
-        return self._function(
+        return self._make_function(
             "outputs",
             ("t", "x", "u", "p"),
             {key: column for key, (_, column) in self._outputs.items()},
@@ -391,21 +402,25 @@ class CasadiModel(StatedModel):
 
     @cached_property
     def _outputs(self) -> dict[str, tuple[list[str], Any]]:
-        from osimlite.derivatives.outputs import output_columns
+        from osimlite.derivatives.outputs import compute_output_columns
 
-        found = self._evaluated
+        found = self._evaluation
         if any(isinstance(element, DeclaredProbe) for element in self.forces.elements):
-            found = self._traced.probed()
-        return output_columns(self.mechanism, self._packed, self.forces, found, self._fixed[0])
+            found = self._evaluator.evaluate_probes()
+        return compute_output_columns(
+            self.mechanism, self._packed, self.forces, found, self._fixed_numbers[0]
+        )
 
     @cached_property
-    def _fixed(self) -> tuple[list[Any], list[Any]]:
+    def _fixed_numbers(self) -> tuple[list[Any], list[Any]]:
         """Points of stations, and axes and origins of frames, of which some may be symbols."""
-        stations, frames = (part.tolist() for part in _fixed_numbers(self.mechanism, self._packed))
+        stations, frames = (
+            part.tolist() for part in _list_fixed_numbers(self.mechanism, self._packed)
+        )
         if self._parameters:
             first = len(self._packed.numbers)
             second = first + len(stations)
-            numbers = [*self._traced.numbers]
+            numbers = [*self._evaluator.numbers]
             stations, frames = numbers[first:second], numbers[second : second + len(frames)]
         return stations, frames
 
@@ -421,11 +436,11 @@ class CasadiModel(StatedModel):
         Raises:
             SettingError: there is no such frame.
         """
-        from osimlite.derivatives.outputs import frame_columns, frame_places
+        from osimlite.derivatives.outputs import compute_frame_columns, locate_frames
 
-        places, chosen = frame_places(self.mechanism, self._packed), []
+        places, chosen = locate_frames(self.mechanism, self._packed), []
         numbers = {
-            path: self._fixed[1][12 * number : 12 * number + 12]
+            path: self._fixed_numbers[1][12 * number : 12 * number + 12]
             for number, path in enumerate(places)
         }
         for path in paths:
@@ -434,13 +449,13 @@ class CasadiModel(StatedModel):
             chosen.append((places[path][0], numbers[path]))
         given = "t", "x", "p"
         symbols = [self._symbols[name] for name in given]
-        results = frame_columns(self._moving, chosen)
+        results = compute_frame_columns(self._velocity_evaluation, chosen)
         return self._library.Function("frames", symbols, [*results.values()], [*given], [*results])
 
     @cached_property
-    def _moving(self) -> Evaluated:
+    def _velocity_evaluation(self) -> SymbolicWorkspace:
         """The poses and speeds of the links, without forces."""
-        return self._traced.evaluated(STAGE.VELOCITY)
+        return self._evaluator.evaluate(STAGE.VELOCITY)
 
     @cached_property
     def paths(self) -> Any:
@@ -453,7 +468,7 @@ class CasadiModel(StatedModel):
         _, lengths, speeds = self._paths
         size = len(self.coordinates)
         arms = -self._library.jacobian(speeds, self._symbols["x"])[:, size : 2 * size]
-        return self._function(
+        return self._make_function(
             "paths", ("t", "x", "p"), {"lengths": lengths, "speeds": speeds, "moment_arms": arms}
         )
 
@@ -464,9 +479,9 @@ class CasadiModel(StatedModel):
 
     @cached_property
     def _paths(self) -> tuple[list[str], Any, Any]:
-        from osimlite.derivatives.outputs import path_entries
+        from osimlite.derivatives.outputs import compute_path_columns
 
-        return path_entries(self._packed, self.forces, self._evaluated)
+        return compute_path_columns(self._packed, self.forces, self._evaluation)
 
     # ------------------------------------------------------------------------------------------------- files
     def save(self, folder: str | Path, functions: Iterable[str] = FUNCTIONS) -> list[Path]:
@@ -489,7 +504,7 @@ class CasadiModel(StatedModel):
             raise SettingError(
                 f"there is no function '{unknown[0]}'; there are {', '.join(FUNCTIONS)}"
             )
-        if self._measured is not None:
+        if self._path_function is not None:
             raise UnsupportedError(
                 "paths around surfaces are searched for by osimlite, which files cannot do; put polynomials in their "
                 "places first (osimlite modify --replace paths=polynomial)"
@@ -517,12 +532,12 @@ class CasadiModel(StatedModel):
         return [*written, folder / "model.c", folder / "model.h", folder / "model.json"]
 
 
-def _fixed_numbers(mechanism: Mechanism, packed: Packed) -> tuple[Array, Array]:
+def _list_fixed_numbers(mechanism: Mechanism, packed: Packed) -> tuple[Array, Array]:
     """Points in their links of all stations (3 k,), and of all frames axes and origins there (12 m,)."""
-    from osimlite.derivatives.outputs import frame_places, station_places
+    from osimlite.derivatives.outputs import locate_frames, locate_stations
 
-    stations = [number for _, _, point in station_places(mechanism, packed) for number in point]
+    stations = [number for _, _, point in locate_stations(mechanism, packed) for number in point]
     frames = [
-        number for _, numbers in frame_places(mechanism, packed).values() for number in numbers
+        number for _, numbers in locate_frames(mechanism, packed).values() for number in numbers
     ]
     return np.array(stations), np.array(frames)

@@ -16,7 +16,7 @@ from osimlite.errors import SettingError, SimulationError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 
-Given = Mapping[str, float] | Sequence[float] | None
+NamedValues = Mapping[str, float] | Sequence[float] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +54,8 @@ class Linearization:
 
 def linearize(
     model: Model | TangentModel | CasadiModel,
-    state: Given = None,
-    controls: Given = None,
+    state: NamedValues = None,
+    controls: NamedValues = None,
     *,
     outputs: Sequence[str] = (),
     time: float = 0.0,
@@ -85,16 +85,16 @@ def linearize(
         model = model.in_tangents
     elif not isinstance(model, TangentModel):
         model = tangents(model, (), folder)
-    x = _filled("state", model.states, model.x, state)
-    u = _filled("control", model.controls, model.u, controls)
+    x = _fill_vector("state", model.states, model.x, state)
+    u = _fill_vector("control", model.controls, model.u, controls)
     xdot, a, b = model.linear(time, x, u)
     if len(xdot) and np.isnan(xdot).all():
         raise SimulationError(
             "the model has no accelerations in this state; a simulation from it says why"
         )
-    chosen = _chosen(model.output_names if outputs else {}, outputs)
+    chosen = _find_outputs(model.output_names if outputs else {}, outputs)
     if not (np.isfinite(xdot).all() and np.isfinite(a).all() and np.isfinite(b).all()):
-        raise SimulationError(_odd_entry(model.states, model.controls, xdot, a, b))
+        raise SimulationError(_describe_invalid_entry(model.states, model.controls, xdot, a, b))
     y, c, d = (
         model.observed(time, x, u, chosen)
         if outputs
@@ -110,7 +110,7 @@ def linearize(
     )
 
 
-def _odd_entry(
+def _describe_invalid_entry(
     states: Sequence[str], controls: Sequence[str], xdot: Array, a: Array, b: Array
 ) -> str:
     """Return which derivative is NaN or infinite, in words."""
@@ -124,7 +124,7 @@ def _odd_entry(
     return "a derivative is no finite number"
 
 
-def _chosen(
+def _find_outputs(
     output_names: Mapping[str, Sequence[str]], names: Sequence[str]
 ) -> list[tuple[str, int]]:
     """The groups of outputs and the places in these that names stand for."""
@@ -144,7 +144,7 @@ def _chosen(
     return result
 
 
-def _filled(what: str, names: Sequence[str], default: Array, given: Any) -> Array:
+def _fill_vector(what: str, names: Sequence[str], default: Array, given: Any) -> Array:
     result = default.copy()
     if isinstance(given, Mapping):
         for name, value in given.items():

@@ -1,6 +1,6 @@
 """What is known of a state besides its derivative: where points are, forces, muscles, paths.
 
-As formulas, or as numbers that carry derivatives: `found` runs the kernels on whichever it has.
+As formulas, or as numbers that carry derivatives: `workspace` runs the kernels on whichever it has.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from osimlite.simulation.engines.dual_numbers import Carrying
 from osimlite.simulation.pack import Packed
 
 if TYPE_CHECKING:
-    from osimlite.derivatives.tangents import Seen
-    from osimlite.derivatives.traced import Evaluated
+    from osimlite.derivatives.symbolic_evaluator import SymbolicWorkspace
+    from osimlite.derivatives.tangents import DualWorkspace
 
-    Found: TypeAlias = Evaluated | Seen
+    Workspace: TypeAlias = SymbolicWorkspace | DualWorkspace
 
 AXES = "xyz"
 
 
-def station_places(
+def locate_stations(
     mechanism: Mechanism, packed: Packed
 ) -> list[tuple[str, int, tuple[float, ...]]]:
     """Of every station its path, its link, and where in that it is."""
@@ -49,7 +49,7 @@ def station_places(
     ]
 
 
-def frame_places(mechanism: Mechanism, packed: Packed) -> dict[str, tuple[int, list[float]]]:
+def locate_frames(mechanism: Mechanism, packed: Packed) -> dict[str, tuple[int, list[float]]]:
     """By the path of every frame its link, and its axes and origin in that (12,)."""
     places = Places(mechanism, {}, packed.placements)
     return {
@@ -58,7 +58,7 @@ def frame_places(mechanism: Mechanism, packed: Packed) -> dict[str, tuple[int, l
     }
 
 
-def probe_places(packed: Packed, elements: Sequence[Any]) -> list[int]:
+def list_probe_items(packed: Packed, elements: Sequence[Any]) -> list[int]:
     """Places of the items of all probes."""
     return [
         place
@@ -67,35 +67,41 @@ def probe_places(packed: Packed, elements: Sequence[Any]) -> list[int]:
     ]
 
 
-def frame_columns(found: Evaluated, frames: Sequence[tuple[int, Sequence[Any]]]) -> dict[str, Any]:
+def compute_frame_columns(
+    workspace: SymbolicWorkspace, frames: Sequence[tuple[int, Sequence[Any]]]
+) -> dict[str, Any]:
     """What `CasadiModel.frames` gives of a state.
 
     Args:
-        found: of the state, up to its speeds.
+        workspace: of the state, up to its speeds.
         frames: link, and axes and origin in the link (12,), which may be symbols.
     """
     from osimlite.derivatives.symbols import casadi
 
     columns: list[list[Any]] = [[], [], [], []]
     for link, numbers in frames:
-        origin = found.on(station)(found.model, found.data, link, tuple(numbers[9:]))
+        origin = workspace.wrap(station)(workspace.model, workspace.data, link, tuple(numbers[9:]))
         columns[0] += origin
         for axis in range(3):
-            columns[1] += found.on(direction)(
-                found.model, found.data, link, tuple(numbers[3 * axis : 3 * axis + 3])
+            columns[1] += workspace.wrap(direction)(
+                workspace.model, workspace.data, link, tuple(numbers[3 * axis : 3 * axis + 3])
             )
-        columns[2] += found.on(velocity)(found.model, found.data, link, origin)
-        columns[3] += found.on(angular_velocity)(found.model, found.data, link)
+        columns[2] += workspace.wrap(velocity)(workspace.model, workspace.data, link, origin)
+        columns[3] += workspace.wrap(angular_velocity)(workspace.model, workspace.data, link)
     names = "position", "rotation", "velocity", "angular_velocity"
     sizes = 3, 9, 3, 3
     return {
-        name: casadi.reshape(found.sure(column), size, len(frames))
+        name: casadi.reshape(workspace.mask_failures(column), size, len(frames))
         for name, column, size in zip(names, columns, sizes, strict=True)
     }
 
 
-def output_columns(
-    mechanism: Mechanism, packed: Packed, forces: Forces, found: Found, points: Sequence[Any]
+def compute_output_columns(
+    mechanism: Mechanism,
+    packed: Packed,
+    forces: Forces,
+    workspace: Workspace,
+    points: Sequence[Any],
 ) -> dict[str, tuple[list[str], Any]]:
     """Columns and the names of their entries, as of `CasadiModel.outputs`.
 
@@ -103,58 +109,66 @@ def output_columns(
         mechanism: of the model.
         packed: the same.
         forces: of it.
-        found: of the state.
+        workspace: of the state.
         points: in their links, of all stations (3 k,), which may be symbols.
     """
-    at_station, speed_of = found.on(station), found.on(velocity)
+    at_station, speed_of = workspace.wrap(station), workspace.wrap(velocity)
     labels: list[str] = []
     places: list[Any] = []
     speeds: list[Any] = []
-    for number, (path, link, _) in enumerate(station_places(mechanism, packed)):
+    for number, (path, link, _) in enumerate(locate_stations(mechanism, packed)):
         labels += [f"{path}|{axis}" for axis in AXES]
         point = at_station(
-            found.model, found.data, link, tuple(points[3 * number : 3 * number + 3])
+            workspace.model, workspace.data, link, tuple(points[3 * number : 3 * number + 3])
         )
         places += point
-        speeds += speed_of(found.model, found.data, link, point)
-    center, rate = _mass_center(mechanism, packed, found)
-    pushed = _contacts(packed, forces, found)
+        speeds += speed_of(workspace.model, workspace.data, link, point)
+    center, rate = _compute_mass_center(mechanism, packed, workspace)
+    pushed = _list_contact_values(packed, forces, workspace)
     known = [
-        (f"{element.path}|{name}", found.data[items[-1][0] + place])
+        (f"{element.path}|{name}", workspace.data[items[-1][0] + place])
         for element, items in zip(forces.elements, packed.items, strict=True)
         if isinstance(element, DeclaredForce) and items
         for name, place in element.force_type.recorded.items()
     ]
     probed = [
-        (f"{probe.path}|{label}", probe.gain * found.data[items[-1][0] + place])
+        (f"{probe.path}|{label}", probe.gain * workspace.data[items[-1][0] + place])
         for probe, items in zip(forces.elements, packed.items, strict=True)
         if isinstance(probe, DeclaredProbe)
         for place, label in enumerate(probe.reading.labels)
     ]
     return {
-        "stations": (labels, found.sure(places)),
-        "station_velocities": (labels, found.sure(speeds)),
-        "mass_center": ([*AXES], found.sure(center)),
-        "mass_center_velocity": ([*AXES], found.sure(rate)),
+        "stations": (labels, workspace.mask_failures(places)),
+        "station_velocities": (labels, workspace.mask_failures(speeds)),
+        "mass_center": ([*AXES], workspace.mask_failures(center)),
+        "mass_center_velocity": ([*AXES], workspace.mask_failures(rate)),
         "contact_forces": (
             [name for name, _ in pushed],
-            found.sure([value for _, value in pushed]),
+            workspace.mask_failures([value for _, value in pushed]),
         ),
-        "forces": ([name for name, _ in known], found.sure([value for _, value in known])),
-        "probes": ([name for name, _ in probed], found.sure([value for _, value in probed])),
+        "forces": (
+            [name for name, _ in known],
+            workspace.mask_failures([value for _, value in known]),
+        ),
+        "probes": (
+            [name for name, _ in probed],
+            workspace.mask_failures([value for _, value in probed]),
+        ),
     }
 
 
-def _mass_center(mechanism: Mechanism, packed: Packed, found: Found) -> tuple[list[Any], list[Any]]:
+def _compute_mass_center(
+    mechanism: Mechanism, packed: Packed, workspace: Workspace
+) -> tuple[list[Any], list[Any]]:
     """Where the mass centre of all bodies is, and how it moves."""
     parts = []
     for link in range(int(packed.structure[MODEL.LINKS])):
         first = INERTIA_AT + INERTIA.SIZE * link
         parts.append(
             (
-                found.reals[first],
+                workspace.reals[first],
                 link,
-                tuple(found.reals[first + INERTIA.CENTER : first + INERTIA.MOMENTS]),
+                tuple(workspace.reals[first + INERTIA.CENTER : first + INERTIA.MOMENTS]),
             )
         )
     for placement, body in zip(packed.placements, mechanism.bodies, strict=True):
@@ -165,8 +179,8 @@ def _mass_center(mechanism: Mechanism, packed: Packed, found: Found) -> tuple[li
             )
     total, center, rate = 0.0, [0.0] * 3, [0.0] * 3
     for mass, link, point in parts:
-        place = found.on(station)(found.model, found.data, link, point)
-        moves = found.on(velocity)(found.model, found.data, link, place)
+        place = workspace.wrap(station)(workspace.model, workspace.data, link, point)
+        moves = workspace.wrap(velocity)(workspace.model, workspace.data, link, place)
         total = total + mass
         center = [a + mass * b for a, b in zip(center, place, strict=True)]
         rate = [a + mass * b for a, b in zip(rate, moves, strict=True)]
@@ -176,7 +190,9 @@ def _mass_center(mechanism: Mechanism, packed: Packed, found: Found) -> tuple[li
     return [a / total for a in center], [a / total for a in rate]
 
 
-def _contacts(packed: Packed, forces: Forces, found: Found) -> list[tuple[str, Any]]:
+def _list_contact_values(
+    packed: Packed, forces: Forces, workspace: Workspace
+) -> list[tuple[str, Any]]:
     """Force and point of each contact, which stand at the beginning of what the kernels know of it."""
     pairs: list[tuple[str, int]] = []
     for element, items in zip(forces.elements, packed.items, strict=True):
@@ -193,14 +209,16 @@ def _contacts(packed: Packed, forces: Forces, found: Found) -> list[tuple[str, A
         ):
             pairs.append((element.path, items[-1][0] + len(element.force_type.recorded)))
     return [
-        (f"{name}|{what}_{axis}", found.data[place + 3 * part + k])
+        (f"{name}|{what}_{axis}", workspace.data[place + 3 * part + k])
         for name, place in pairs
         for part, what in enumerate(("force", "point"))
         for k, axis in enumerate(AXES)
     ]
 
 
-def path_entries(packed: Packed, forces: Forces, found: Evaluated) -> tuple[list[str], Any, Any]:
+def compute_path_columns(
+    packed: Packed, forces: Forces, workspace: SymbolicWorkspace
+) -> tuple[list[str], Any, Any]:
     """Names, lengths and lengthening speeds of all paths along which something pulls."""
     names, lengths, speeds = list[str](), list[Any](), list[Any]()
     for element, items in zip(forces.elements, packed.items, strict=True):
@@ -211,13 +229,13 @@ def path_entries(packed: Packed, forces: Forces, found: Evaluated) -> tuple[list
         ):
             record = items[-2][0]
             names.append(element.path)
-            lengths.append(found.data[record + LENGTH])
-            speeds.append(found.data[record + SPEED])
-    return names, found.sure(lengths), found.sure(speeds)
+            lengths.append(workspace.data[record + LENGTH])
+            speeds.append(workspace.data[record + SPEED])
+    return names, workspace.mask_failures(lengths), workspace.mask_failures(speeds)
 
 
-def joint_load_columns(
-    found: Evaluated,
+def compute_joint_load_columns(
+    workspace: SymbolicWorkspace,
     link: int,
     origin: tuple[int, Sequence[Any]],
     sign: float,
@@ -226,7 +244,7 @@ def joint_load_columns(
     """What `CasadiModel.joint_load` gives of a state.
 
     Args:
-        found: what is missing for accelerations.
+        workspace: what is missing for accelerations.
         link: that the joint carries.
         origin: link of the frame at whose origin the load acts, and where that is in the link (3,).
         sign: 1 if the load acts on what the joint carries, -1 if on what carries the joint.
@@ -235,17 +253,22 @@ def joint_load_columns(
     from osimlite.derivatives.symbols import casadi
 
     beyond = {link}
-    for later in range(link + 1, found.model[MODEL.LINKS]):
-        if found.on(link_ints)(found.model, later)[LINK.PARENT] in beyond:
+    for later in range(link + 1, workspace.model[MODEL.LINKS]):
+        if workspace.wrap(link_ints)(workspace.model, later)[LINK.PARENT] in beyond:
             beyond.add(later)
-    first = found.model[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
-    wrench = casadi.vertcat(*found.data[first + LINK_WORK.WRENCH : first + LINK_WORK.WRENCH + 6])
+    first = workspace.model[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
+    wrench = casadi.vertcat(
+        *workspace.data[first + LINK_WORK.WRENCH : first + LINK_WORK.WRENCH + 6]
+    )
     for of, multiplier, unit in pushes:
         if of in beyond:
             wrench -= multiplier * casadi.vertcat(*unit)
     wrench *= -sign
-    place = found.on(station)(found.model, found.data, origin[0], tuple(origin[1]))
-    start = found.data[first + LINK_WORK.ORIGIN : first + LINK_WORK.ORIGIN + 3]
+    place = workspace.wrap(station)(workspace.model, workspace.data, origin[0], tuple(origin[1]))
+    start = workspace.data[first + LINK_WORK.ORIGIN : first + LINK_WORK.ORIGIN + 3]
     arm = casadi.vertcat(*place) - casadi.vertcat(*start)
     moment = wrench[:3] - casadi.cross(arm, wrench[3:])
-    return {"force": found.sure([wrench[3:]]), "moment": found.sure([moment])}
+    return {
+        "force": workspace.mask_failures([wrench[3:]]),
+        "moment": workspace.mask_failures([moment]),
+    }

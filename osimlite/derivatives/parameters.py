@@ -13,11 +13,11 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.properties import Setter, places, spellings
 
-SAME = 1e-11
+LINEARITY_TOLERANCE = 1e-11
 """What the numbers of a model may be off from a straight line, over the largest part of them."""
-TRIED = 1.125, 1.375
+TRIAL_FACTORS = 1.125, 1.375
 """What the values are multiplied by to find the lines and to test them."""
-SHIFTS = 0.125, -0.0625
+TRIAL_SHIFTS = 0.125, -0.0625
 """What values of zero are changed by instead."""
 
 
@@ -46,20 +46,22 @@ class Parameters:
         self, model: Model, names: Sequence[str], numbers_of: Callable[[Model], Array]
     ) -> None:
         self.names = tuple(names)
-        self._setters = [_setters(model, name) for name in names]
-        given = [_value(name, setters) for name, setters in zip(names, self._setters, strict=True)]
+        self._setters = [_find_setters(model, name) for name in names]
+        given = [
+            _read_value(name, setters) for name, setters in zip(names, self._setters, strict=True)
+        ]
         self.values = np.array(given)
         base = numbers_of(model)
         self.slopes: dict[int, list[tuple[int, float]]] = {}
 
         def numbers_at(values: Array, what: str) -> Array:
-            self._put(values)
+            self._set_values(values)
             try:
                 result = numbers_of(model)
             except OsimliteError as error:
                 raise UnsupportedError(f"{what} cannot be a parameter: {error}") from error
             finally:
-                self._put(self.values)
+                self._set_values(self.values)
             if len(result) != len(base):
                 raise UnsupportedError(
                     f"{what} cannot be a parameter: more of the model depends on it than numbers"
@@ -68,9 +70,9 @@ class Parameters:
 
         columns = np.zeros((len(base), len(given)))
         for k, name in enumerate(names):
-            one, two = (self._changed(number, [k]) for number in range(2))
-            columns[:, k] = _apart(numbers_at(one, f"'{name}'"), base) / (one[k] - given[k])
-            _require(
+            one, two = (self._change_values(number, [k]) for number in range(2))
+            columns[:, k] = _subtract_base(numbers_at(one, f"'{name}'"), base) / (one[k] - given[k])
+            _check_linear(
                 numbers_at(two, f"'{name}'"),
                 base,
                 columns[:, [k]],
@@ -84,38 +86,38 @@ class Parameters:
                 else "these parameters"
             )
             for number in range(2):
-                values = self._changed(number, range(len(given)))
+                values = self._change_values(number, range(len(given)))
                 what = f"{every} together"
-                _require(numbers_at(values, what), base, columns, values - self.values, what)
+                _check_linear(numbers_at(values, what), base, columns, values - self.values, what)
         self.base = base - columns @ self.values if len(given) else base
         for place, number in zip(*np.nonzero(columns), strict=True):
             self.slopes.setdefault(int(place), []).append(
                 (int(number), float(columns[place, number]))
             )
 
-    def _changed(self, number: int, which: Sequence[int] | range) -> Array:
+    def _change_values(self, number: int, which: Sequence[int] | range) -> Array:
         values = self.values.copy()
         for k in which:
             # Not all by the same factor, which quotients would not notice.
             values[k] = (
-                values[k] * (TRIED[number] + k / 64.0)
+                values[k] * (TRIAL_FACTORS[number] + k / 64.0)
                 if values[k]
-                else SHIFTS[number] * (1.0 + k / 8.0)
+                else TRIAL_SHIFTS[number] * (1.0 + k / 8.0)
             )
         return values
 
-    def _put(self, values: Array) -> None:
+    def _set_values(self, values: Array) -> None:
         for setters, value in zip(self._setters, values.tolist(), strict=True):
             for setter in setters:
                 setter.put(value)
 
 
-def number_of(model: Model, name: str) -> float:
+def read_parameter(model: Model, name: str) -> float:
     """The value that a parameter has in a model; errors as those of `Parameters`."""
-    return _value(name, _setters(model, name))
+    return _read_value(name, _find_setters(model, name))
 
 
-def _setters(model: Model, name: str) -> list[Setter]:
+def _find_setters(model: Model, name: str) -> list[Setter]:
     setters = [place.setter(model) for place in places(model, name)]
     if not setters:
         raise SettingError(
@@ -124,31 +126,33 @@ def _setters(model: Model, name: str) -> list[Setter]:
     return setters
 
 
-def _value(name: str, setters: Sequence[Setter]) -> float:
+def _read_value(name: str, setters: Sequence[Setter]) -> float:
     values = {setter.get() for setter in setters}
     if len(values) > 1:
         raise SettingError(f"'{name}' stands for numbers that differ; name them one by one")
     return values.pop()
 
 
-def _apart(found: Array, base: Array) -> Array:
+def _subtract_base(found: Array, base: Array) -> Array:
     """How much numbers have changed; one without end has not."""
     same = found == base
     return np.where(same, 0.0, found - np.where(same, 0.0, base))
 
 
-def _require(found: Array, base: Array, columns: Array, change: Array, what: str) -> None:
+def _check_linear(found: Array, base: Array, columns: Array, change: Array, what: str) -> None:
     """Refuse what does not lie on the lines."""
     parts = columns * change
     size = np.abs(base) + np.abs(parts).sum(axis=1)
-    if not np.all(np.abs(_apart(found, base) - parts.sum(axis=1)) <= SAME * size):
+    if not np.all(
+        np.abs(_subtract_base(found, base) - parts.sum(axis=1)) <= LINEARITY_TOLERANCE * size
+    ):
         raise UnsupportedError(
             f"{what} cannot stay a symbol: what the equations are given is no linear function of it; "
             "change it in the model and make the functions anew"
         )
 
 
-def filled(
+def insert_parameters(
     numbers: Sequence[float], slopes: Mapping[int, Sequence[tuple[int, float]]], p: Sequence[Any]
 ) -> list[Any]:
     """The numbers of the kernels with symbols in them."""

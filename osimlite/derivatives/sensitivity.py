@@ -18,9 +18,9 @@ import numpy as np
 
 from osimlite.base.records import dataclass
 from osimlite.base.text import suggest_path
-from osimlite.derivatives.parameters import number_of
-from osimlite.derivatives.stated import StatedModel
-from osimlite.derivatives.tangents import Steps, TangentModel, tangents
+from osimlite.derivatives.differentiable_model import DifferentiableModel
+from osimlite.derivatives.parameters import read_parameter
+from osimlite.derivatives.tangents import TangentModel, TangentSteps, tangents
 from osimlite.errors import SettingError, SimulationError
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.multibody.spatial import Array
@@ -32,19 +32,19 @@ from osimlite.simulation.properties import places
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.trajectory import Trajectory
 
-CHOICES = {*PER_RUN, "folder"} - {"fixed_step", "integrator", "controller", "resume"}
+OPTIONS = {*PER_RUN, "folder"} - {"fixed_step", "integrator", "controller", "resume"}
 """Options of `simulate` that leave the motion one of the rates as they are, in steps of Merson's method."""
-ACCURACY = 1e-6
+DEFAULT_ACCURACY = 1e-6
 """That is taken where none is chosen."""
-LOOSER = 10.0
+DERIVATIVE_ERROR_FACTOR = 10.0
 """So many times the accuracy is what the error of a derivative may be in a step, over the largest
 by that number: less makes them no better, for the motion is not.
 """
-SAME = 1e-6
+RATE_TOLERANCE = 1e-6
 """What rates of the tangents may be off from those of the motion, over the largest of a state or 1."""
-YIELDING, SAME_EQUATION = 1e5, 1e-9
+YIELDING_FACTOR, RANK_TOLERANCE = 1e5, 1e-9
 """How much more readily coordinates move that do not count; what an equation says beyond others if it counts."""
-SHORTEST = 1e-9
+MIN_STEP_S = 1e-9
 """Part of a step, s, to which a bend of the equations is narrowed down."""
 
 
@@ -74,7 +74,7 @@ class Sensitivity(Tabular):
             SettingError: there is no such state, or no such number.
         """
         at = [
-            _place(*names)
+            _find_index(*names)
             for names in (("state", self.states, state), ("number", self.numbers, number))
         ]
         result: Array = self.derivatives[:, at[0], at[1]]
@@ -93,7 +93,7 @@ class Sensitivity(Tabular):
 
 def sensitivity(
     model: Model,
-    parameters: Iterable[str] | StatedModel = (),
+    parameters: Iterable[str] | DifferentiableModel = (),
     to: float = 2.0,
     *,
     states: Iterable[str] = (),
@@ -106,7 +106,7 @@ def sensitivity(
     Where constraints bind the motion the start goes with them, as little as they need.
 
     Args: model: what moves. parameters: numbers of the model, by paths as :func:`osimlite.tangents`
-        takes them; or its tangents, so that they are made once for many motions; or its functions
+        takes them; or its tangents, so that they are tangent_model once for many motions; or its functions
         (:func:`osimlite.casadi`), for their parameters. Their values are those in the model now.
         to: how long, s. states: names of states (``/jointset/knee/flexion/value``) that the
         derivatives are by, too, at the start. choices: `accuracy`, `report_interval`, `initial`,
@@ -123,44 +123,55 @@ def sensitivity(
     """
     expect_model(model)
     for name in choices:
-        if name not in CHOICES:
+        if name not in OPTIONS:
             raise SettingError(
                 f"'{name}' does not go with sensitivities, which follow Merson's steps of the model as it is; "
-                f"leave it out ({', '.join(sorted(CHOICES))} can be chosen)"
+                f"leave it out ({', '.join(sorted(OPTIONS))} can be chosen)"
             )
-    accuracy = choices["accuracy"] = choices.get("accuracy") or ACCURACY
+    accuracy = choices["accuracy"] = choices.get("accuracy") or DEFAULT_ACCURACY
     folder = Path(choices.get("folder") or ".")
     with Simulation(model, "compiled", folder=folder) as simulation:
         if isinstance(parameters, TangentModel):
-            made = parameters
+            tangent_model = parameters
         else:
-            made = tangents(
+            tangent_model = tangents(
                 model,
-                parameters.parameters if isinstance(parameters, StatedModel) else parameters,
+                parameters.parameters
+                if isinstance(parameters, DifferentiableModel)
+                else parameters,
                 folder,
             )
-        initial = [_place("state", made.states, name) for name in states]
-        for name in made.parameters:
-            _require_held(model, made, name)
-        made.take(np.array([number_of(model, name) for name in made.parameters]))
+        initial = [_find_index("state", tangent_model.states, name) for name in states]
+        for name in tangent_model.parameters:
+            _check_not_initial(model, tangent_model, name)
+        tangent_model.take(
+            np.array([read_parameter(model, name) for name in tangent_model.parameters])
+        )
         trajectory = simulation.run(
             to, **{name: choices[name] for name in choices if name != "folder"}
         )
         _, _, held = starting(
-            simulation.mechanism, _moving(simulation, choices), choices.get("initial_speeds") or {}
+            simulation.mechanism,
+            _select_coordinate_values(simulation, choices),
+            choices.get("initial_speeds") or {},
         )
-        motion = _Followed(made, simulation, initial, held)
-        rows = motion.rows(trajectory, accuracy)
-    names = *made.parameters, *(made.states[k] for k in initial)
+        motion = _SensitivityRun(tangent_model, simulation, initial, held)
+        rows = motion.compute_rows(trajectory, accuracy)
+    names = *tangent_model.parameters, *(tangent_model.states[k] for k in initial)
     return Sensitivity(
-        trajectory, trajectory.times, made.states, names, motion.states(trajectory), rows
+        trajectory,
+        trajectory.times,
+        tangent_model.states,
+        names,
+        motion.sort_states(trajectory),
+        rows,
     )
 
 
-class _Followed:
+class _SensitivityRun:
     """The derivatives along the steps of a motion.
 
-    Args: made: tangents of the model, with the parameters that it has. simulation: of it, with the
+    Args: tangent_model: tangents of the model, with the parameters that it has. simulation: of it, with the
         controls of the motion. initial: places of the states of which the start counts. held:
         places in the mechanism of the coordinates whose values, and of those whose speeds, were
         given.
@@ -168,12 +179,17 @@ class _Followed:
 
     def __init__(
         self,
-        made: TangentModel,
+        tangent_model: TangentModel,
         simulation: Simulation,
         initial: Sequence[int],
         held: Sequence[Sequence[int]],
     ) -> None:
-        self._made, self._simulation, self._initial, self._held = made, simulation, initial, held
+        self._tangent_model, self._simulation, self._initial, self._prescribed = (
+            tangent_model,
+            simulation,
+            initial,
+            held,
+        )
         engine: Any = simulation.engine
         self._engine = engine
         infos, order = simulation.mechanism.coordinates, self._engine.order
@@ -182,24 +198,26 @@ class _Followed:
             *moving,
             *(variable.path for variable in simulation.state.variables if variable.is_named),
         ]
-        if {*known} != {*made.states} or made.controls != simulation.forces.controls.names:
+        if {*known} != {
+            *tangent_model.states
+        } or tangent_model.controls != simulation.forces.controls.names:
             raise SettingError("the tangents are of another model; make them of this one")
         own = [*moving, *simulation.state.paths]
-        self._places = [own.index(name) for name in made.states]
-        count = len(made.parameters)
-        self._steps = made.steps(engine.driving, np.eye(count, count + len(initial)))
+        self._places = [own.index(name) for name in tangent_model.states]
+        count = len(tangent_model.parameters)
+        self._steps = tangent_model.steps(engine.driving, np.eye(count, count + len(initial)))
 
-    def states(self, trajectory: Trajectory) -> Array:
+    def sort_states(self, trajectory: Trajectory) -> Array:
         """The motion (n, x), in the order of the tangents."""
-        return self._rows(trajectory)[:, self._places]
+        return self._pack_rows(trajectory)[:, self._places]
 
-    def _rows(self, trajectory: Trajectory) -> Array:
+    def _pack_rows(self, trajectory: Trajectory) -> Array:
         auxiliary = trajectory.auxiliary
         return self._simulation.state.rows(trajectory.values, trajectory.speeds, auxiliary)
 
-    def rows(self, trajectory: Trajectory, accuracy: float) -> Array:
+    def compute_rows(self, trajectory: Trajectory, accuracy: float) -> Array:
         """The derivatives (n, x, k) at the times of the motion."""
-        start = self._rows(trajectory)[0].tolist()
+        start = self._pack_rows(trajectory)[0].tolist()
         wanted = trajectory.times.tolist()
         times, states, ended = self._simulation.every_step(
             0.0, start, wanted[-1], Settings(accuracy)
@@ -207,52 +225,65 @@ class _Followed:
         if ended is not None:
             raise ended
         for place in (0, len(times) // 2, -1):
-            self._require_same(times[place], states[place])
-        count, initial = len(self._made.parameters), self._initial
+            self._check_same_rates(times[place], states[place])
+        count, initial = len(self._tangent_model.parameters), self._initial
         slopes = np.zeros((len(self._places), count + len(initial)))
         slopes[initial, range(count, count + len(initial))] = 1.0
         rows = np.array(states)[:, self._places]
         if self._simulation.constraints:
-            self._bind(rows[0], slopes)
-        return followed(self._steps, times, rows, slopes, wanted, accuracy, self._made.states)
+            self._project_start(rows[0], slopes)
+        return integrate_sensitivities(
+            self._steps, times, rows, slopes, wanted, accuracy, self._tangent_model.states
+        )
 
-    def _bind(self, x: Array, slopes: Array) -> None:
+    def _project_start(self, x: Array, slopes: Array) -> None:
         """Have the start (x,) go with the constraints along all directions, by derivatives (x, m) of it.
 
         As it was found: of what is not held, values that do not count give way, then all as little
         as can be, and speeds relative to themselves where they are above 1.
         """
-        made, size = self._made, len(self._made.coordinates)
-        infos = {info.path: info for info in made.mechanism.coordinates}
+        tangent_model, size = self._tangent_model, len(self._tangent_model.coordinates)
+        infos = {info.path: info for info in tangent_model.mechanism.coordinates}
         eases = np.ones(size), np.maximum(np.abs(x[size : 2 * size]), 1.0)
-        eases[0][[infos[path].yielding for path in made.coordinates]] = YIELDING
-        by_numbers = np.eye(len(made.parameters), slopes.shape[1])
+        eases[0][[infos[path].yielding for path in tangent_model.coordinates]] = YIELDING_FACTOR
+        by_numbers = np.eye(len(tangent_model.parameters), slopes.shape[1])
         for part, (held, ease, equations) in enumerate(
-            zip(self._held, eases, made.bound(0.0, x), strict=True)
+            zip(
+                self._prescribed,
+                eases,
+                tangent_model.compute_constraint_slopes(0.0, x),
+                strict=True,
+            )
         ):
             places = slice(part * size, (part + 1) * size)
-            paths = [made.mechanism.coordinates[place].path for place in held]
-            scales = np.where(np.isin(made.coordinates, paths), 0.0, ease)
+            paths = [tangent_model.mechanism.coordinates[place].path for place in held]
+            scales = np.where(np.isin(tangent_model.coordinates, paths), 0.0, ease)
             missing = equations @ np.vstack((slopes, by_numbers))
-            change = np.linalg.lstsq(equations[:, places] * scales, missing, rcond=SAME_EQUATION)[0]
+            change = np.linalg.lstsq(equations[:, places] * scales, missing, rcond=RANK_TOLERANCE)[
+                0
+            ]
             slopes[places] -= scales[:, None] * change
 
-    def _require_same(self, t: float, y: Sequence[float]) -> None:
+    def _check_same_rates(self, t: float, y: Sequence[float]) -> None:
         """SettingError where the tangents say another derivative of the state than the motion has."""
         wanted = np.array(self._engine.derivative(t, y))[self._places]
         state = np.asarray(y)[self._places]
-        found, _ = self._made.along(t, state, self._engine.controls(), np.zeros((len(state), 0)))
+        found, _ = self._tangent_model.along(
+            t, state, self._engine.controls(), np.zeros((len(state), 0))
+        )
         off = np.abs(found - wanted)
-        if not np.all(off <= SAME * max(1.0, np.abs(wanted).max(initial=0.0))):
-            worst = self._made.states[int(np.argmax(np.where(np.isfinite(off), off, np.inf)))]
+        if not np.all(off <= RATE_TOLERANCE * max(1.0, np.abs(wanted).max(initial=0.0))):
+            worst = self._tangent_model.states[
+                int(np.argmax(np.where(np.isfinite(off), off, np.inf)))
+            ]
             raise SettingError(
                 f"at {t:g} s the tangents say another derivative of '{worst}' than the motion has; make them of this "
                 "very model"
             )
 
 
-def followed(
-    steps: Steps,
+def integrate_sensitivities(
+    steps: TangentSteps,
     times: Sequence[float],
     states: Array,
     slopes: Array,
@@ -290,7 +321,7 @@ def followed(
         weights = 1.0 / np.maximum(1.0, before[:, :, :1])
         sizes = (np.maximum(before, size) * weights).max(axis=1)
         errors = (np.abs(error) * weights).max(axis=1)
-        if h > SHORTEST and (errors > LOOSER * accuracy * sizes)[:, 1:].any():
+        if h > MIN_STEP_S and (errors > DERIVATIVE_ERROR_FACTOR * accuracy * sizes)[:, 1:].any():
             middle = t0 + h / 2.0
             return stepped(middle, t1, stepped(t0, middle, y0))
         return y
@@ -310,18 +341,20 @@ def followed(
     return result
 
 
-def _require_held(model: Model, made: TangentModel, name: str) -> None:
+def _check_not_initial(model: Model, tangent_model: TangentModel, name: str) -> None:
     """SettingError for a number that says where a state starts."""
     for place in places(model, name):
         what = str(place.steps[0])
         state = f"{place.component}/{what.removeprefix('default_').removesuffix('_value')}"
-        if what.startswith("default_") and state in made.states:
+        if what.startswith("default_") and state in tangent_model.states:
             raise SettingError(
                 f"'{name}' is where a state starts, which is held; take '{state}' among the states"
             )
 
 
-def _moving(simulation: Simulation, choices: Mapping[str, Any]) -> dict[str, float]:
+def _select_coordinate_values(
+    simulation: Simulation, choices: Mapping[str, Any]
+) -> dict[str, float]:
     """What was given of the values of coordinates at the start, and not of auxiliary states."""
     auxiliary = simulation.state.paths
     return {
@@ -331,7 +364,7 @@ def _moving(simulation: Simulation, choices: Mapping[str, Any]) -> dict[str, flo
     }
 
 
-def _place(what: str, names: Sequence[str], name: str) -> int:
+def _find_index(what: str, names: Sequence[str], name: str) -> int:
     if name not in names:
         raise SettingError(f"there is no {what} '{name}'{suggest_path(name, names)}")
     return names.index(name)

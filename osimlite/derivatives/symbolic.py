@@ -1,4 +1,4 @@
-"""Kernels as Python that runs on symbols: the same text, in which what branches does so by `ways`."""
+"""Kernels as Python that runs on symbols: the same text, in which what branches does so by `branches`."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from contextlib import contextmanager
 from types import FunctionType
 from typing import Any
 
-from osimlite.derivatives import symbols, ways
+from osimlite.derivatives import branches, symbols
 from osimlite.derivatives.curves import (
-    curve_value_on_symbols,
-    damped_velocity_on_symbols,
-    pieces_on_symbols,
+    evaluate_curve,
+    evaluate_pieces,
+    solve_damped_velocity,
 )
 from osimlite.derivatives.symbols import COUNTERPARTS, UNSET, NoFormula, Vector
 from osimlite.mechanics.codegen.reader import Function, Kernel, copy_tree, name_of, stored
@@ -24,25 +24,25 @@ from osimlite.mechanics.laws.dual_numbers import is_nothing
 from osimlite.mechanics.laws.millard2012_equilibrium import damped_velocity
 from osimlite.mechanics.laws.rotations import sine_cosine
 
-HELP = {
+HELPERS = {
     "plus_": symbols.plus,
     "minus_": symbols.minus,
     "times_": symbols.times,
     "divide_": symbols.divide,
     "power_": symbols.power,
-    "both_": symbols.both,
-    "either_": symbols.either,
-    "negated_": symbols.negated,
-    "choose_": symbols.choose,
-    "branch_": ways.Branch,
-    "decide_": ways.decide,
-    "fails_": ways.fails,
+    "both_": symbols.logical_and,
+    "either_": symbols.logical_or,
+    "negated_": symbols.logical_not,
+    "choose_": symbols.select_value,
+    "branch_": branches.Branch,
+    "decide_": branches.decide,
+    "fails_": branches.record_failure,
     "unset_": UNSET,
 }
 """What the rewritten text calls."""
 
-LEAVING = ast.Return, ast.Break, ast.Continue
-SIGNS: dict[type, str] = {
+EXIT_STATEMENTS = ast.Return, ast.Break, ast.Continue
+OPERATOR_HELPERS: dict[type, str] = {
     ast.Add: "plus_",
     ast.Sub: "minus_",
     ast.Mult: "times_",
@@ -51,110 +51,112 @@ SIGNS: dict[type, str] = {
 }
 
 
-def _at(vector: Any, place: int) -> Any:
+def _slice_vector(vector: Any, place: int) -> Any:
     return vector.rest(place) if isinstance(vector, Vector) else vector[place:]
 
 
-def _call(address: int, *given: Any) -> int:
+def _call_law(address: int, *given: Any) -> int:
     law = pointers.laws[address]
     try:
-        result: int = ways.in_ways(f"the law {name_of(law)}", on_symbols(law), *given)
+        result: int = branches.run_all_branches(
+            f"the law {name_of(law)}", make_symbolic(law), *given
+        )
     except NoFormula as error:
         error.items.append(given[-1])
         raise
     return result
 
 
-_known: dict[Any, Any] = {
-    pointers.at: _at,
-    pointers.call: _call,
+_counterparts: dict[Any, Any] = {
+    pointers.at: _slice_vector,
+    pointers.call: _call_law,
     sine_cosine: symbols.sine_cosine,
-    is_nothing: symbols.is_nothing,
-    curve_value: curve_value_on_symbols,
-    damped_velocity: damped_velocity_on_symbols,
-    pieces_at: pieces_on_symbols,
+    is_nothing: symbols.is_zero,
+    curve_value: evaluate_curve,
+    damped_velocity: solve_damped_velocity,
+    pieces_at: evaluate_pieces,
 }
 """The counterparts of functions that have been asked for."""
 
 
-def on_symbols(function: Any) -> Any:
+def make_symbolic(function: Any) -> Any:
     """A kernel or a law as a function that takes symbols too.
 
     Raises:
         NotImplementedError: there is something in it that has no meaning for symbols.
     """
-    if function not in _known:
-        writer = _Writer(function, "formula")
-        made = writer.made()
-        _known[function] = made
-    return _known[function]
+    if function not in _counterparts:
+        writer = _KernelRewriter(function, "formula")
+        made = writer.compile_function()
+        _counterparts[function] = made
+    return _counterparts[function]
 
 
 @contextmanager
-def standing_in(function: Any, twin: Any) -> Iterator[None]:
+def replace_kernel(function: Any, twin: Any) -> Iterator[None]:
     """While this is open, another function is called on symbols in the place of a kernel."""
-    before = on_symbols(function)
-    _known[function] = twin
+    before = make_symbolic(function)
+    _counterparts[function] = twin
     try:
         yield
     finally:
-        _known[function] = before
+        _counterparts[function] = before
 
 
-def taken(function: Any) -> Any:
+def register_symbolic(function: Any) -> Any:
     """A function that takes symbols as it is, known as such from then on."""
-    _known[function] = function
+    _counterparts[function] = function
     return function
 
 
-class _Scope(dict[str, Any]):
+class _KernelScope(dict[str, Any]):
     """The names of a module, each with its counterpart; these are made when they are first asked for."""
 
     def __init__(self, function: Any) -> None:
-        super().__init__(HELP, __builtins__=builtins)
+        super().__init__(HELPERS, __builtins__=builtins)
         for name in function.__code__.co_names:
             value = function.__globals__.get(name, getattr(builtins, name, None))
-            if _is_ours(value):
-                self[name] = _Later(value)
+            if _is_own_function(value):
+                self[name] = _LazyFunction(value)
             elif (isinstance(value, type) and value not in COUNTERPARTS) or not callable(value):
                 self[name] = value
             else:
                 self[name] = COUNTERPARTS.get(value, value)
 
 
-class _Later:
+class _LazyFunction:
     """A function of ours that is written when it is first called."""
 
     def __init__(self, function: Any) -> None:
         self.function = function
 
     def __call__(self, *given: Any) -> Any:
-        return on_symbols(self.function)(*given)
+        return make_symbolic(self.function)(*given)
 
 
-def _is_ours(value: Any) -> bool:
+def _is_own_function(value: Any) -> bool:
     return isinstance(value, FunctionType) and value.__module__.startswith("osimlite.")
 
 
-class _Writer(Kernel, ast.NodeTransformer):
+class _KernelRewriter(Kernel, ast.NodeTransformer):
     """Rewrites one function."""
 
     def __init__(self, function: Function, language: str) -> None:
         super().__init__(function, language)
-        self.number, self.is_divided = 0, False
-        self.cleared: set[str] = set()
+        self.number, self.returns_early = 0, False
+        self.branch_variables: set[str] = set()
 
     def parse(self, function: Function) -> ast.FunctionDef:
         """Return a tree that can be rewritten."""
         return copy_tree(super().parse(function))
 
-    def made(self) -> Any:
+    def compile_function(self) -> Any:
         """The function."""
         tree = self.tree
-        body = [part for item in self.body for part in self._listed(self.visit(item))]
+        body = [part for item in self.body for part in self._as_list(self.visit(item))]
         clear = [
-            ast.Assign([_set(name)], _name("unset_"))
-            for name in sorted(self.cleared - set(self.given))
+            ast.Assign([_store_name(name)], _load_name("unset_"))
+            for name in sorted(self.branch_variables - set(self.given))
         ]
         tree.body, tree.returns, tree.decorator_list = [*clear, *body], None, []
         for argument in tree.args.args:
@@ -162,35 +164,39 @@ class _Writer(Kernel, ast.NodeTransformer):
         code = compile(
             ast.fix_missing_locations(ast.Module([tree], [])), f"<{self.name} on symbols>", "exec"
         )
-        scope = _Scope(self.function)
+        scope = _KernelScope(self.function)
         exec(code, scope)
         made = scope[tree.name]
-        return (lambda *given: ways.in_ways(self.name, made, *given)) if self.is_divided else made
+        return (
+            (lambda *given: branches.run_all_branches(self.name, made, *given))
+            if self.returns_early
+            else made
+        )
 
     @staticmethod
-    def _listed(node: Any) -> list[ast.stmt]:
+    def _as_list(node: Any) -> list[ast.stmt]:
         return node if isinstance(node, list) else [node]
 
     # ------------------------------------------------------------------------------------------- expressions
-    def _part(self, node: ast.AST) -> ast.Constant:
+    def _number_part(self, node: ast.AST) -> ast.Constant:
         """A part of the code, for messages and to tell it from others."""
         self.number += 1
         return ast.Constant(f"{self.name} {self.number}")
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         self.generic_visit(node)
-        sign = SIGNS.get(type(node.op))
-        return _call_of(sign, node.left, node.right) if sign else node
+        sign = OPERATOR_HELPERS.get(type(node.op))
+        return _make_call(sign, node.left, node.right) if sign else node
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         self.generic_visit(node)
-        return _call_of(
-            "both_" if isinstance(node.op, ast.And) else "either_", *map(_lazy, node.values)
+        return _make_call(
+            "both_" if isinstance(node.op, ast.And) else "either_", *map(_wrap_lambda, node.values)
         )
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
         self.generic_visit(node)
-        return _call_of("negated_", node.operand) if isinstance(node.op, ast.Not) else node
+        return _make_call("negated_", node.operand) if isinstance(node.op, ast.Not) else node
 
     def visit_Compare(self, node: ast.Compare) -> ast.expr:
         self.generic_visit(node)
@@ -198,24 +204,28 @@ class _Writer(Kernel, ast.NodeTransformer):
             return node
         sides = [node.left, *node.comparators]
         pairs = zip(sides, node.ops, sides[1:], strict=False)
-        return _call_of("both_", *(_lazy(ast.Compare(a, [op], [b])) for a, op, b in pairs))
+        return _make_call("both_", *(_wrap_lambda(ast.Compare(a, [op], [b])) for a, op, b in pairs))
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
         self.generic_visit(node)
-        return _call_of(
-            "choose_", node.test, _lazy(node.body), _lazy(node.orelse), self._part(node)
+        return _make_call(
+            "choose_",
+            node.test,
+            _wrap_lambda(node.body),
+            _wrap_lambda(node.orelse),
+            self._number_part(node),
         )
 
     # -------------------------------------------------------------------------------------------- statements
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
-        sign = SIGNS.get(type(node.op))
+        sign = OPERATOR_HELPERS.get(type(node.op))
         if sign is None:
             self.generic_visit(node)
             return node
         before: Any = copy_tree(node.target)
         before.ctx = ast.Load()
         return ast.Assign(
-            [self.visit(node.target)], _call_of(sign, self.visit(before), self.visit(node.value))
+            [self.visit(node.target)], _make_call(sign, self.visit(before), self.visit(node.value))
         )
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
@@ -223,43 +233,45 @@ class _Writer(Kernel, ast.NodeTransformer):
         return ast.Assign([node.target], self.visit(node.value))
 
     def visit_While(self, node: ast.While) -> ast.stmt:
-        self.is_divided = True
-        part = self._part(node)
+        self.returns_early = True
+        part = self._number_part(node)
         self.generic_visit(node)
-        node.test = _call_of("decide_", part, node.test)
+        node.test = _make_call("decide_", part, node.test)
         return node
 
     def visit_If(self, node: ast.If) -> Any:
-        part, is_failure = self._part(node), self._is_failure(node)
-        leaves = any(map(_leaves, (*node.body, *node.orelse)))
+        part, is_failure = self._number_part(node), self._is_failure(node)
+        leaves = any(map(_exits_block, (*node.body, *node.orelse)))
         names = stored(*node.body, *node.orelse)
         self.generic_visit(node)
         if is_failure:
-            node.test = _call_of("fails_", node.test)
+            node.test = _make_call("fails_", node.test)
             return node
         if leaves:
-            self.is_divided = True
-            node.test = _call_of("decide_", part, node.test)
+            self.returns_early = True
+            node.test = _make_call("decide_", part, node.test)
             return node
         # for side in branch.sides(): the variables as before; if side: ... else: ...;
         # branch.ends.append(the variables)
-        self.cleared.update(names)
+        self.branch_variables.update(names)
         branch, side, before = (f"{name}{self.number}_" for name in ("branch", "side", "before"))
         self.number += 1
-        test, node.test = node.test, _name(side)
+        test, node.test = node.test, _load_name(side)
         append = ast.Attribute(
-            ast.Attribute(_name(branch), "ends", ast.Load()), "append", ast.Load()
+            ast.Attribute(_load_name(branch), "ends", ast.Load()), "append", ast.Load()
         )
-        sides = ast.Call(ast.Attribute(_name(branch), "sides", ast.Load()), [], [])
-        back: list[ast.stmt] = [_assign(names, _name(before))] if names else []
+        sides = ast.Call(ast.Attribute(_load_name(branch), "sides", ast.Load()), [], [])
+        back: list[ast.stmt] = [_assign_names(names, _load_name(before))] if names else []
         after: list[ast.stmt] = (
-            [_assign(names, ast.Attribute(_name(branch), "end", ast.Load()))] if names else []
+            [_assign_names(names, ast.Attribute(_load_name(branch), "end", ast.Load()))]
+            if names
+            else []
         )
-        kept = ast.Expr(ast.Call(append, [_tuple(names)], []))
+        kept = ast.Expr(ast.Call(append, [_load_tuple(names)], []))
         return [
-            ast.Assign([_set(branch)], _call_of("branch_", part, test)),
-            ast.Assign([_set(before)], _tuple(names)),
-            ast.For(_set(side), sides, [*back, node, kept], []),
+            ast.Assign([_store_name(branch)], _make_call("branch_", part, test)),
+            ast.Assign([_store_name(before)], _load_tuple(names)),
+            ast.For(_store_name(side), sides, [*back, node, kept], []),
             *after,
         ]
 
@@ -277,35 +289,35 @@ class _Writer(Kernel, ast.NodeTransformer):
         return False
 
 
-def _leaves(node: ast.AST) -> bool:
+def _exits_block(node: ast.AST) -> bool:
     """Whether a statement returns, or leaves a loop that it is not the whole of."""
-    if isinstance(node, LEAVING):
+    if isinstance(node, EXIT_STATEMENTS):
         return True
     if isinstance(node, ast.For | ast.While):
         # Its own `break` is none of ours.
         return any(isinstance(part, ast.Return) for part in ast.walk(node))
-    return any(map(_leaves, ast.iter_child_nodes(node)))
+    return any(map(_exits_block, ast.iter_child_nodes(node)))
 
 
-def _name(name: str) -> ast.Name:
+def _load_name(name: str) -> ast.Name:
     return ast.Name(name, ast.Load())
 
 
-def _set(name: str) -> ast.Name:
+def _store_name(name: str) -> ast.Name:
     return ast.Name(name, ast.Store())
 
 
-def _tuple(names: list[str]) -> ast.Tuple:
-    return ast.Tuple([_name(name) for name in names], ast.Load())
+def _load_tuple(names: list[str]) -> ast.Tuple:
+    return ast.Tuple([_load_name(name) for name in names], ast.Load())
 
 
-def _assign(names: list[str], value: ast.expr) -> ast.Assign:
-    return ast.Assign([ast.Tuple([_set(name) for name in names], ast.Store())], value)
+def _assign_names(names: list[str], value: ast.expr) -> ast.Assign:
+    return ast.Assign([ast.Tuple([_store_name(name) for name in names], ast.Store())], value)
 
 
-def _lazy(node: ast.expr) -> ast.Lambda:
+def _wrap_lambda(node: ast.expr) -> ast.Lambda:
     return ast.Lambda(ast.arguments([], [], None, [], [], None, []), node)
 
 
-def _call_of(function: str, *given: ast.expr) -> ast.Call:
-    return ast.Call(_name(function), list(given), [])
+def _make_call(function: str, *given: ast.expr) -> ast.Call:
+    return ast.Call(_load_name(function), list(given), [])

@@ -29,11 +29,11 @@ Number = Any
 """A float, an integer, or an `SX`."""
 
 
-class Unset:
+class UnsetVariable:
     """What a variable is before anything is assigned to it."""
 
 
-UNSET = Unset()
+UNSET = UnsetVariable()
 
 
 class NoFormula(Exception):
@@ -48,7 +48,7 @@ class NoFormula(Exception):
         self.items: list[int] = []
 
 
-class WiderWays(Exception):
+class WiderBranchNeeded(Exception):
     """What one part of the code has merged is needed apart by a later one: a wider part has to be run in both ways.
 
     Attributes:
@@ -60,23 +60,23 @@ class WiderWays(Exception):
         self.part = part
 
 
-class Torn:
+class UnmergeableValue:
     """An integer, or something like one, that differs between the two sides of a branch: nobody may ask for it."""
 
     def __init__(self, part: Any) -> None:
         self.part = part
 
-    def _asked(self, *_: Any) -> Any:
-        raise WiderWays(self.part)
+    def _require_wider(self, *_: Any) -> Any:
+        raise WiderBranchNeeded(self.part)
 
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = (
         __neg__
-    ) = _asked
+    ) = _require_wider
     __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __index__ = __int__ = __float__ = (
         __bool__
-    ) = _asked
+    ) = _require_wider
     __getitem__ = __setitem__ = __floordiv__ = __mod__ = __pow__ = __and__ = __iter__ = __len__ = (
-        _asked
+        _require_wider
     )
     __hash__ = None  # type: ignore[assignment]
 
@@ -119,13 +119,13 @@ class Vector:
         return Vector(self.cells, self.first + place)
 
 
-class _Where:
+class _ActiveCondition:
     """Where what is being computed counts: None everywhere, else a condition."""
 
     condition: Any = None
 
 
-where = _Where()
+where = _ActiveCondition()
 
 
 def is_symbol(value: Any) -> bool:
@@ -133,51 +133,51 @@ def is_symbol(value: Any) -> bool:
     return isinstance(value, SX) and not value.is_constant()
 
 
-def plain(value: Any) -> Any:
+def simplify_number(value: Any) -> Any:
     """A number that depends on no symbol as a float; others as they are."""
     return float(value) if isinstance(value, SX) and value.is_constant() else value
 
 
 @contextmanager
-def counting(test: Any) -> Iterator[None]:
+def restrict_condition(test: Any) -> Iterator[None]:
     """While something is computed that counts only where a test holds too."""
     before = where.condition
-    where.condition = also(test)
+    where.condition = combine_condition(test)
     try:
         yield
     finally:
         where.condition = before
 
 
-def also(test: Any) -> Any:
+def combine_condition(test: Any) -> Any:
     """Where what is being computed counts, and a test holds."""
     return test if where.condition is None else casadi.logic_and(where.condition, test)
 
 
-def safe(value: Any, instead: float = 1.0) -> Any:
+def guard_value(value: Any, instead: float = 1.0) -> Any:
     """A symbol, and a number for which all is defined where it does not count."""
     return value if where.condition is None else casadi.if_else(where.condition, value, instead)
 
 
-def merged(test: Any, a: Any, b: Any, part: Any) -> Any:
+def merge_values(test: Any, a: Any, b: Any, part: Any) -> Any:
     """`a` where a test holds, else `b`.
 
     Args: test: a symbol. a: numbers, tuples of them, or what is the same in both. b: likewise.
         part: of the code, which is run once more for each way if what cannot be merged is asked
         for.
     """
-    if a is b or isinstance(b, Unset):
+    if a is b or isinstance(b, UnsetVariable):
         return a
-    if isinstance(a, Unset):
+    if isinstance(a, UnsetVariable):
         return b
     if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
-        parts = [merged(test, x, y, part) for x, y in zip(a, b, strict=True)]
+        parts = [merge_values(test, x, y, part) for x, y in zip(a, b, strict=True)]
         return type(a)(*parts) if hasattr(a, "_fields") else tuple(parts)
-    a, b = plain(a), plain(b)
+    a, b = simplify_number(a), simplify_number(b)
     if isinstance(a, bool) and isinstance(b, bool):
         return a if a == b else (test if a else casadi.logic_not(test))
-    if isinstance(a, Torn) or isinstance(b, Torn):
-        return Torn(part)
+    if isinstance(a, UnmergeableValue) or isinstance(b, UnmergeableValue):
+        return UnmergeableValue(part)
     if isinstance(a, SX) or isinstance(b, SX):
         if isinstance(a, SX) and isinstance(b, SX) and casadi.is_equal(a, b, 1):
             return a
@@ -186,11 +186,13 @@ def merged(test: Any, a: Any, b: Any, part: Any) -> Any:
         return a
     if isinstance(a, float) or isinstance(b, float):
         return casadi.if_else(test, a, b)
-    return Torn(part)
+    return UnmergeableValue(part)
 
 
 # ------------------------------------------------------------------------------------------ instead of Python's own
-def _joining(operation: Callable[[Any, Any], Any], number: int) -> Callable[[Any, Any], Any]:
+def _make_binary_operation(
+    operation: Callable[[Any, Any], Any], number: int
+) -> Callable[[Any, Any], Any]:
     """An operation on two numbers; CasADi takes eight times as long to find by its operators what it is given."""
     binary = SX.binary
 
@@ -200,16 +202,16 @@ def _joining(operation: Callable[[Any, Any], Any], number: int) -> Callable[[Any
     return joined
 
 
-plus = _joining(operator.add, casadi.OP_ADD)
-minus = _joining(operator.sub, casadi.OP_SUB)
-times = _joining(operator.mul, casadi.OP_MUL)
+plus = _make_binary_operation(operator.add, casadi.OP_ADD)
+minus = _make_binary_operation(operator.sub, casadi.OP_SUB)
+times = _make_binary_operation(operator.mul, casadi.OP_MUL)
 
 
 def divide(a: Any, b: Any) -> Any:
     """a / b; also by zero, as machine code has it."""
     if is_symbol(b):
-        return a / safe(b)
-    a, b = plain(a), plain(b)
+        return a / guard_value(b)
+    a, b = simplify_number(a), simplify_number(b)
     if b == 0.0 and not isinstance(a, SX):
         return (
             math.nan
@@ -221,30 +223,30 @@ def divide(a: Any, b: Any) -> Any:
 
 def power(a: Any, b: Any) -> Any:
     """a to the power of b."""
-    a, b = plain(a), plain(b)
+    a, b = simplify_number(a), simplify_number(b)
     if not (isinstance(a, SX) or isinstance(b, SX)):
         return a**b
     if not isinstance(b, SX) and b == int(b) and b >= 0:
         return a ** int(b)
-    return (safe(a) if isinstance(a, SX) else a) ** b
+    return (guard_value(a) if isinstance(a, SX) else a) ** b
 
 
-def both(*parts: Callable[[], Any]) -> Any:
+def logical_and(*parts: Callable[[], Any]) -> Any:
     """`and`."""
-    return _joined(parts, stop=False)
+    return _evaluate_logical(parts, stop=False)
 
 
-def either(*parts: Callable[[], Any]) -> Any:
+def logical_or(*parts: Callable[[], Any]) -> Any:
     """`or`."""
-    return _joined(parts, stop=True)
+    return _evaluate_logical(parts, stop=True)
 
 
-def _joined(parts: Iterable[Callable[[], Any]], *, stop: bool) -> Any:
+def _evaluate_logical(parts: Iterable[Callable[[], Any]], *, stop: bool) -> Any:
     known: Any = None
     before = where.condition
     try:
         for part in parts:
-            value = plain(part())
+            value = simplify_number(part())
             if not is_symbol(value):
                 if bool(value) is stop:
                     return stop
@@ -254,80 +256,80 @@ def _joined(parts: Iterable[Callable[[], Any]], *, stop: bool) -> Any:
                 if known is None
                 else (casadi.logic_or if stop else casadi.logic_and)(known, value)
             )
-            where.condition = also(casadi.logic_not(value) if stop else value)
+            where.condition = combine_condition(casadi.logic_not(value) if stop else value)
     finally:
         where.condition = before
     return (not stop) if known is None else known
 
 
-def negated(value: Any) -> Any:
+def logical_not(value: Any) -> Any:
     """`not`."""
-    return casadi.logic_not(value) if is_symbol(value) else not plain(value)
+    return casadi.logic_not(value) if is_symbol(value) else not simplify_number(value)
 
 
-def choose(test: Any, a: Callable[[], Any], b: Callable[[], Any], part: Any) -> Any:
+def select_value(test: Any, a: Callable[[], Any], b: Callable[[], Any], part: Any) -> Any:
     """`a() if test else b()`."""
     if not is_symbol(test):
-        return a() if plain(test) else b()
-    with counting(test):
+        return a() if simplify_number(test) else b()
+    with restrict_condition(test):
         one = a()
-    with counting(casadi.logic_not(test)):
+    with restrict_condition(casadi.logic_not(test)):
         other = b()
-    return merged(test, one, other, part)
+    return merge_values(test, one, other, part)
 
 
-def is_nothing(value: Any) -> bool:
+def is_zero(value: Any) -> bool:
     """Whether a number is 0 whatever the symbols are."""
-    return not is_symbol(value) and plain(value) == 0.0
+    return not is_symbol(value) and simplify_number(value) == 0.0
 
 
-def smallest(*values: Any) -> Any:
+def minimum_of(*values: Any) -> Any:
     """`min`."""
-    return _reduced(casadi.fmin, min, values)
+    return _reduce_values(casadi.fmin, min, values)
 
 
-def largest(*values: Any) -> Any:
+def maximum_of(*values: Any) -> Any:
     """`max`."""
-    return _reduced(casadi.fmax, max, values)
+    return _reduce_values(casadi.fmax, max, values)
 
 
-def _reduced(symbolic: Any, numeric: Any, values: tuple[Any, ...]) -> Any:
-    result, *rest = map(plain, values)
+def _reduce_values(symbolic: Any, numeric: Any, values: tuple[Any, ...]) -> Any:
+    result, *rest = map(simplify_number, values)
     for value in rest:
         take = symbolic if isinstance(result, SX) or isinstance(value, SX) else numeric
         result = take(result, value)
     return result
 
 
-def magnitude(value: Any) -> Any:
+def absolute_value(value: Any) -> Any:
     """`abs`."""
-    return casadi.fabs(value) if is_symbol(value) else abs(plain(value))
+    return casadi.fabs(value) if is_symbol(value) else abs(simplify_number(value))
 
 
-def whole(value: Any) -> int:
+def truncate_number(value: Any) -> int:
     """`int`; a kernel that asks for the integer of a symbol has no formula."""
     if is_symbol(value):
         raise NoFormula("a place in a table depends on the state")
-    return int(plain(value))
+    return int(simplify_number(value))
 
 
-def root(value: Any) -> Any:
+def square_root(value: Any) -> Any:
     """`sqrt`; its derivative at 0, and at a square that was kept from below zero, is 0."""
     if not is_symbol(value):
-        return math.sqrt(plain(value))
+        return math.sqrt(simplify_number(value))
     test = value > 0.0 if value.op() == casadi.OP_FMAX else value != 0.0
-    with counting(test):
-        return casadi.if_else(test, casadi.sqrt(safe(value)), 0.0)
+    with restrict_condition(test):
+        return casadi.if_else(test, casadi.sqrt(guard_value(value)), 0.0)
 
 
-def length_of(*values: Any) -> Any:
+def hypotenuse(*values: Any) -> Any:
     """`hypot`."""
     if not any(map(is_symbol, values)):
-        return math.hypot(*map(plain, values))
-    return root(sum(value * value for value in values))
+        return math.hypot(*map(simplify_number, values))
+    return square_root(sum(value * value for value in values))
 
 
-def _of(name: str, instead: float | None = None) -> Callable[..., Any]:
+def _make_counterpart(name: str, instead: float | None = None) -> Callable[..., Any]:
     """A function of `math` for symbols too.
 
     Args:
@@ -338,9 +340,12 @@ def _of(name: str, instead: float | None = None) -> Callable[..., Any]:
 
     def function(*values: Any) -> Any:
         if not any(map(is_symbol, values)):
-            return numeric(*map(plain, values))
+            return numeric(*map(simplify_number, values))
         return symbolic(
-            *(safe(v, instead) if instead is not None and is_symbol(v) else v for v in values)
+            *(
+                guard_value(v, instead) if instead is not None and is_symbol(v) else v
+                for v in values
+            )
         )
 
     return function
@@ -352,24 +357,26 @@ def sine_cosine(angle: Any) -> tuple[Any, Any]:
 
 
 COUNTERPARTS: dict[Any, Any] = {
-    min: smallest,
-    max: largest,
-    abs: magnitude,
-    int: whole,
-    float: lambda value: value if is_symbol(value) else float(plain(value)),
-    bool: lambda value: value if is_symbol(value) else bool(plain(value)),
-    math.sqrt: root,
-    math.hypot: length_of,
-    math.isnan: lambda value: False if is_symbol(value) else math.isnan(plain(value)),
-    math.isfinite: lambda value: True if is_symbol(value) else math.isfinite(plain(value)),
+    min: minimum_of,
+    max: maximum_of,
+    abs: absolute_value,
+    int: truncate_number,
+    float: lambda value: value if is_symbol(value) else float(simplify_number(value)),
+    bool: lambda value: value if is_symbol(value) else bool(simplify_number(value)),
+    math.sqrt: square_root,
+    math.hypot: hypotenuse,
+    math.isnan: lambda value: False if is_symbol(value) else math.isnan(simplify_number(value)),
+    math.isfinite: lambda value: (
+        True if is_symbol(value) else math.isfinite(simplify_number(value))
+    ),
 }
 """What stands in the place of Python's own functions."""
 for _name in ("sin", "cos", "tan", "atan", "tanh", "floor", "ceil", "erf", "copysign"):
-    COUNTERPARTS[getattr(math, _name)] = _of(_name)
+    COUNTERPARTS[getattr(math, _name)] = _make_counterpart(_name)
 for _name in ("exp", "expm1", "sinh", "cosh", "asin", "acos"):
-    COUNTERPARTS[getattr(math, _name)] = _of(_name, 0.0)
+    COUNTERPARTS[getattr(math, _name)] = _make_counterpart(_name, 0.0)
 for _name in ("log", "log1p", "atan2"):
-    COUNTERPARTS[getattr(math, _name)] = _of(_name, 1.0)
+    COUNTERPARTS[getattr(math, _name)] = _make_counterpart(_name, 1.0)
 COUNTERPARTS[math.erfc] = lambda value: (
     1.0 - COUNTERPARTS[math.erf](value) if is_symbol(value) else math.erfc(value)
 )

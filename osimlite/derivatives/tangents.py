@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.records import replace
-from osimlite.derivatives.outputs import output_columns, probe_places, station_places
-from osimlite.derivatives.stated import StatedModel
+from osimlite.derivatives.differentiable_model import DifferentiableModel
+from osimlite.derivatives.outputs import compute_output_columns, list_probe_items, locate_stations
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.kernels import merson
 from osimlite.mechanics.kernels.error_control import ACCEPTED, ERRORS, LAST_TIME, NEXT_STEP, REACHED
@@ -52,14 +52,14 @@ def tangents(
     return TangentModel(model, tuple(parameters), Path(folder or "."))
 
 
-class Machine:
+class DualMachine:
     """Machine code of a packed model, and the vectors that it works on: rows of numbers and their derivatives.
 
     Args:
         packed: the model.
         forces: of it.
         entries: names of the kernels that are called.
-        room: for so many numbers more in the work vector.
+        extra_size: for so many numbers more in the work vector.
 
     Attributes:
         program: the model with the addresses of its code.
@@ -71,7 +71,7 @@ class Machine:
     """
 
     def __init__(
-        self, packed: Packed, forces: Forces, entries: Sequence[str], room: int = 0
+        self, packed: Packed, forces: Forces, entries: Sequence[str], extra_size: int = 0
     ) -> None:
         for place, kernel in packed.kernels.items():
             if place in packed.owners and not isinstance(kernel, str):
@@ -81,12 +81,12 @@ class Machine:
                 )
         # Nothing is projected.
         laws = tuple(name for name in packed.laws if name != "project")
-        self.program = Program(replace(packed, laws=laws), _code(), entries)
+        self.program = Program(replace(packed, laws=laws), _load_tangent_code(), entries)
         self.x = np.zeros((len(packed.numbers), 1 + DIRECTIONS))
         self.x[:, 0] = packed.numbers
-        self.w = np.zeros((int(packed.structure[MODEL.WORK_SIZE]) + room, 1 + DIRECTIONS))
+        self.w = np.zeros((int(packed.structure[MODEL.WORK_SIZE]) + extra_size, 1 + DIRECTIONS))
 
-    def entry(self, name: str, y: Array, f: Array) -> Callable[[int], int]:
+    def bind_kernel(self, name: str, y: Array, f: Array) -> Callable[[int], int]:
         """A kernel that is called with the last of its arguments."""
         return self.program.code.bound(name, self.program.ints, self.x, self.w, y, f)
 
@@ -96,7 +96,7 @@ class Machine:
         self.w[WORK.TIME, 0] = t
 
 
-class TangentModel(StatedModel):
+class TangentModel(DifferentiableModel):
     """A model whose rates xdot = f(t, x, u, p) are found with derivatives along directions of x, u and p.
 
     The controls u stand in the place of what the model's controllers say (to which a stretch reflex
@@ -104,24 +104,27 @@ class TangentModel(StatedModel):
     is not a number. Where a law bends, or a path touches a surface, the derivative is that of the
     side that machine code takes there.
 
-    The arguments and attributes are those of :class:`osimlite.derivatives.stated.StatedModel`.
+    The arguments and attributes are those of :class:`osimlite.derivatives.differentiable_model.DifferentiableModel`.
     """
 
     def __init__(self, model: Model, parameters: Sequence[str] = (), folder: Path = Path()) -> None:
         super().__init__(model, parameters, folder)
         packed = self._packed
         slopes = self._parameters.slopes if self._parameters else {}
-        self._parametric, self._slopes = [*slopes], np.zeros((len(slopes), len(self.parameters)))
+        self._parameter_rows, self._slopes = (
+            [*slopes],
+            np.zeros((len(slopes), len(self.parameters))),
+        )
         for row, parts in zip(self._slopes, slopes.values(), strict=True):
             for number, factor in parts:
                 row[number] = factor
-        self._machine = machine = Machine(packed, self.forces, ("evaluate",))
+        self._machine = machine = DualMachine(packed, self.forces, ("evaluate",))
         # The controls are given, whatever the controllers of the model say.
         machine.program.ints[MODEL.CONTROLS] = 0
         first = int(packed.structure[MODEL.WORK_CONTROL])
-        self._driven = machine.w[first : first + len(self.controls)]
+        self._control_rows = machine.w[first : first + len(self.controls)]
         self._y, self._f = (np.zeros((len(self.states), 1 + DIRECTIONS)) for _ in range(2))
-        self._evaluate = machine.entry("evaluate", self._y, self._f)
+        self._evaluate = machine.bind_kernel("evaluate", self._y, self._f)
 
     def take(self, p: Array) -> None:
         """Have the parameters (p,) be these from now on."""
@@ -131,13 +134,13 @@ class TangentModel(StatedModel):
     def put(self, numbers: Array) -> None:
         """Put what depends on the parameters into numbers (k,) of the model."""
         if self._parameters:
-            numbers[self._parametric] = (
-                self._parameters.base[self._parametric] + self._slopes @ self.p
+            numbers[self._parameter_rows] = (
+                self._parameters.base[self._parameter_rows] + self._slopes @ self.p
             )
 
     def put_along(self, dp: Array, numbers: Array) -> None:
         """Likewise its derivatives (k, m) along directions of the parameters (p, m)."""
-        numbers[self._parametric] = self._slopes @ dp
+        numbers[self._parameter_rows] = self._slopes @ dp
 
     def along(
         self,
@@ -157,13 +160,13 @@ class TangentModel(StatedModel):
             behind a number.
         """
         machine, y, f = self._machine, self._y, self._f
-        y[self.state_indices, 0], self._driven[:, 0] = x, u
+        y[self.state_indices, 0], self._control_rows[:, 0] = x, u
         rates, result = np.full(len(x), np.nan), np.full(dx.shape, np.nan)
-        for part, own in batches(dx.shape[1]):
+        for part, own in split_directions(dx.shape[1]):
             machine.begin(t)
             y[self.state_indices, own] = dx[:, part]
             if du is not None:
-                self._driven[:, own] = du[:, part]
+                self._control_rows[:, own] = du[:, part]
             if dp is not None:
                 self.put_along(dp[:, part], machine.x[:, own])
             if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:
@@ -177,7 +180,7 @@ class TangentModel(StatedModel):
     @cached_property
     def output_names(self) -> dict[str, tuple[str, ...]]:
         """What is known of a state, by groups, and the names of the entries of each; see `CasadiModel.outputs`."""
-        return {group: tuple(labels) for group, (labels, _) in self._outputs().items()}
+        return {group: tuple(labels) for group, (labels, _) in self._compute_outputs().items()}
 
     def observed(
         self, t: float, x: Array, u: Array, chosen: Sequence[tuple[str, int]]
@@ -195,9 +198,9 @@ class TangentModel(StatedModel):
         y, slopes = np.full(len(chosen), np.nan), np.full((len(chosen), size + len(u)), np.nan)
 
         def look(part: slice, own: slice) -> None:
-            for place, probe in self._probes:
+            for place, probe in self._probe_kernels:
                 probe(place)
-            known = self._outputs()
+            known = self._compute_outputs()
             for row, (group, k) in enumerate(chosen):
                 number = known[group][1][k]
                 y[row] = number
@@ -208,25 +211,25 @@ class TangentModel(StatedModel):
         self.along(t, x, u, both[:size], both[size:], look=look)
         return y, slopes[:, :size], slopes[:, size:]
 
-    def _outputs(self) -> dict[str, tuple[list[str], list[Any]]]:
+    def _compute_outputs(self) -> dict[str, tuple[list[str], list[Any]]]:
         """Of the state that was evaluated last."""
         points = [
-            axis for _, _, point in station_places(self.mechanism, self._packed) for axis in point
+            axis for _, _, point in locate_stations(self.mechanism, self._packed) for axis in point
         ]
         machine = self._machine
-        found = Seen(machine.program.ints, machine.x, machine.w)
-        return output_columns(self.mechanism, self._packed, self.forces, found, points)
+        found = DualWorkspace(machine.program.ints, machine.x, machine.w)
+        return compute_output_columns(self.mechanism, self._packed, self.forces, found, points)
 
     @cached_property
-    def _probes(self) -> list[tuple[int, Callable[[int], int]]]:
+    def _probe_kernels(self) -> list[tuple[int, Callable[[int], int]]]:
         """Places of the items of probes, and what computes them."""
-        places, kernels = probe_places(self._packed, self.forces.elements), self._packed.kernels
+        places, kernels = list_probe_items(self._packed, self.forces.elements), self._packed.kernels
         return [
-            (place, self._machine.entry(str(kernels[place + ITEM.LAW]), self._y, self._f))
+            (place, self._machine.bind_kernel(str(kernels[place + ITEM.LAW]), self._y, self._f))
             for place in places
         ]
 
-    def bound(self, t: float, x: Array) -> tuple[Array, Array]:
+    def compute_constraint_slopes(self, t: float, x: Array) -> tuple[Array, Array]:
         """The derivatives of the errors of constraints at positions (m, x + p) and at speeds (k, x + p).
 
         They are by the state and by the parameters; in units of the equations, m and rad, m/s and
@@ -271,10 +274,13 @@ class TangentModel(StatedModel):
         rates, found = self.along(t, x, u, both[:size], both[size:])
         return rates, found[:, :size], found[:, size:]
 
-    def steps(self, controls: Controls, dp: Array) -> Steps:
+    def steps(self, controls: Controls, dp: Array) -> TangentSteps:
         """What follows a motion that controls drive, along directions of the parameters (p, m) and of the start."""
         packed = pack(self.mechanism, replace(self.forces, controls=controls), apart=self._apart)
-        result, numbers = Steps(packed, self.forces, self.state_indices), packed.numbers.copy()
+        result, numbers = (
+            TangentSteps(packed, self.forces, self.state_indices),
+            packed.numbers.copy(),
+        )
         changes = np.zeros((len(numbers), dp.shape[1]))
         self.put(numbers)
         self.put_along(dp, changes)
@@ -282,7 +288,7 @@ class TangentModel(StatedModel):
         return result
 
 
-class Seen:
+class DualWorkspace:
     """What an evaluation has left, as numbers that carry derivatives.
 
     Args:
@@ -291,17 +297,17 @@ class Seen:
         data: the work vector (k, 1 + DIRECTIONS).
     """
 
-    on = staticmethod(carried_by)
+    wrap = staticmethod(carried_by)
 
     def __init__(self, model: Any, reals: Array, data: Array) -> None:
         self.model, self.reals, self.data = model, DualVector(reals), DualVector(data)
 
-    def sure(self, numbers: Sequence[Any]) -> list[Any]:
+    def mask_failures(self, numbers: Sequence[Any]) -> list[Any]:
         """Numbers as they are: where the evaluation fails, nobody looks."""
         return [*numbers]
 
 
-class Steps:
+class TangentSteps:
     """Steps of Merson's method, with derivatives of where they lead by where they begin and by numbers of the model.
 
     They work on blocks (b, x, 1 + DIRECTIONS): for so many directions at once, in the packed order,
@@ -321,28 +327,28 @@ class Steps:
         )
         # Where constraints bind the motion, no step is good enough to be projected.
         self._accepted = -1.0 if packed.structure[MODEL.CONSTRAINED] else np.inf
-        self._machine = machine = Machine(
+        self._machine = machine = DualMachine(
             packed, forces, ("evaluate", MERSON), merson.HEAD + merson.STATES * size
         )
         self._start, self._end = (np.zeros((2 * size, 1 + DIRECTIONS)) for _ in range(2))
         self._errors, self._h = machine.w[first + ERRORS * size :][:size], machine.w[method:, 0]
-        self._evaluate = machine.entry("evaluate", self._start, self._start[size:])
+        self._evaluate = machine.bind_kernel("evaluate", self._start, self._start[size:])
         self._step: Callable[[], int] = partial(
-            machine.entry(MERSON, self._start, self._end), method
+            machine.bind_kernel(MERSON, self._start, self._end), method
         )
 
     def take(self, numbers: Array, changes: Array) -> None:
         """Have the numbers of the model (k,) be these from now on, and change so along all directions (k, m)."""
         self._count, self._number = changes.shape[1], -1
-        self._numbers = [np.zeros(self._machine.x.shape) for _ in batches(self._count)]
-        for (part, own), block in zip(batches(self._count), self._numbers, strict=True):
+        self._numbers = [np.zeros(self._machine.x.shape) for _ in split_directions(self._count)]
+        for (part, own), block in zip(split_directions(self._count), self._numbers, strict=True):
             block[:, 0], block[:, own] = numbers, changes[:, part]
 
     def blocks(self, y: Array, slopes: Array) -> Array:
         """Of a state (x,) with its derivatives (x, m), in the order of the model."""
         result = np.zeros((len(self._numbers), len(y), 1 + DIRECTIONS))
         result[:, self.state_indices, 0] = y
-        for block, (part, own) in zip(result, batches(slopes.shape[1]), strict=True):
+        for block, (part, own) in zip(result, split_directions(slopes.shape[1]), strict=True):
             block[self.state_indices, own] = slopes[:, part]
         return result
 
@@ -350,7 +356,7 @@ class Steps:
         """The derivatives (x, m) in blocks."""
         parts = [
             block[self.state_indices, own]
-            for block, (_, own) in zip(blocks, batches(self._count), strict=True)
+            for block, (_, own) in zip(blocks, split_directions(self._count), strict=True)
         ]
         return np.hstack(parts)
 
@@ -378,7 +384,7 @@ class Steps:
         return end, error
 
 
-def batches(count: int) -> Iterator[tuple[slice, slice]]:
+def split_directions(count: int) -> Iterator[tuple[slice, slice]]:
     """Directions that are taken at once: which of so many, and their places behind a number."""
     for first in range(0, max(count, 1), DIRECTIONS):
         size = min(DIRECTIONS, max(count - first, 0))
@@ -386,5 +392,5 @@ def batches(count: int) -> Iterator[tuple[slice, slice]]:
 
 
 @cache
-def _code() -> Tangents:
+def _load_tangent_code() -> Tangents:
     return Tangents(DIRECTIONS)

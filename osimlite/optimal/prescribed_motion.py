@@ -104,7 +104,7 @@ class PrescribedMotion:
         self.bench = make_casadi_model(build_test_bench(actuators, own))
         size = len(self.bench.coordinates)
         known = dict(zip(own, self._paths, strict=True))
-        self.states = self.in_system = tuple(
+        self.states = self.system_states = tuple(
             _rename_to_model(name, known) for name in self.bench.states[2 * size :]
         )
         self.controls = tuple(_rename_to_model(name, known) for name in self.bench.controls)
@@ -114,7 +114,7 @@ class PrescribedMotion:
         self.path_names = tuple(self._paths)
         self.is_muscle = [isinstance(item, Muscle) for item in actuators]
         self.moving = self._force_balance.moving
-        self.constraints_kept = self._force_balance.equation_count
+        self.constraint_count = self._force_balance.equation_count
         self.numbers = cache_last(self._tabulate_numbers)
         self._model_paths, self._model, self._folder = known, model, folder
 
@@ -185,7 +185,7 @@ class PrescribedMotion:
             len(self._paths),
         )
         found = []
-        for unit in np.eye(1 + count + self.constraints_kept):
+        for unit in np.eye(1 + count + self.constraint_count):
             u = np.zeros(len(force_model.controls))
             u[indices] = unit[1 : 1 + count]
             found.append(np.array(function(times[None], x, xdot, u, [], unit[1 + count :])))

@@ -362,7 +362,7 @@ class Problem(StudyContext):
 
     def _name_constraints(self) -> list[str]:
         """Return the names of the equations of the model's constraints, as OpenSim numbers them."""
-        count = self.functions.constraints_kept
+        count = self.functions.constraint_count
         if not count:
             return []
         if not isinstance(self.functions, PrescribedMotion):

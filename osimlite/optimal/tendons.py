@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from osimlite.derivatives.symbolic import on_symbols
+from osimlite.derivatives.symbolic import make_symbolic
 from osimlite.derivatives.symbols import casadi
 from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.mechanics.laws.smooth_muscles import (
@@ -78,7 +78,7 @@ class TendonEquations:
             return [], casadi.SX(0, 1)
         functions, rows = self.problem.functions, []
         lengths, speeds = self.problem.dynamics.compute_path_lengths(point)
-        residual = on_symbols(degroote_residual)
+        residual = make_symbolic(degroote_residual)
         for number, (path, muscle, tendon) in enumerate(self.muscles):
             place = functions.path_names.index(path)
             force = point.state(f"{path}/normalized_tendon_force")
@@ -116,14 +116,16 @@ class TendonEquations:
             length = casadi.sqrt(along**2 + muscle.height**2)
             fiber = speeds[place] - muscle.slack * rate / (tendon.growth * (force + BELOW))
             velocity = casadi.SX.sym("velocity")
-            active = activation * on_symbols(degroote_active)(length / muscle.optimal, muscle.scale)
-            passive, _ = on_symbols(degroote_passive)(
+            active = activation * make_symbolic(degroote_active)(
+                length / muscle.optimal, muscle.scale
+            )
+            passive, _ = make_symbolic(degroote_passive)(
                 length / muscle.optimal, tendon.passive_strain
             )
             springs = passive * muscle.passive + muscle.damping * velocity
-            borne = active * on_symbols(degroote_factor)(velocity) + springs
+            borne = active * make_symbolic(degroote_factor)(velocity) + springs
             stiffness = casadi.jacobian(borne * along / length, along)
-            now = lengths[place] - muscle.slack * on_symbols(smooth_tendon_length)(
+            now = lengths[place] - muscle.slack * make_symbolic(smooth_tendon_length)(
                 force, tendon.growth
             )
             moves = (

@@ -72,7 +72,7 @@ class MocoTrajectory:
         # Of a guess Moco takes the columns as they come, whatever their names.
         rank = {
             name.removesuffix("/value"): k
-            for k, name in enumerate(layout.problem.functions.in_system)
+            for k, name in enumerate(layout.problem.functions.system_states)
         }
         names = {
             kind: tuple(

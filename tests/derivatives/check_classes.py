@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.derivatives.constraints import independent_equations
-from osimlite.derivatives.symbolic import on_symbols
-from osimlite.derivatives.traced import Traced
+from osimlite.derivatives.constraints import find_independent_equations
+from osimlite.derivatives.symbolic import make_symbolic
+from osimlite.derivatives.symbolic_evaluator import SymbolicEvaluator
 from osimlite.errors import SimulationError, UnsupportedError
 from osimlite.mechanics.codegen.sources import collect_functions
 from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, STAGE
@@ -131,7 +131,7 @@ def test_paths_over_obstacles():
 def test_every_kernel_is_written_for_symbols():
     names = [*LAW_MODULES, *(kind.name for kind in FORCE_TYPES if isinstance(kind, ForceType))]
     parts = {part for name in names for part in collect_functions(law_function(name))}
-    assert len(parts) > 500 and all(map(on_symbols, parts))
+    assert len(parts) > 500 and all(map(make_symbolic, parts))
 
 
 def test_probes():
@@ -214,7 +214,7 @@ def test_trees_of_joints(held, seed):
     try:
         q = mechanism.assemble(q, 0.3)
         u = mechanism.project_speeds(q, u, 0.3)
-        equations = independent_equations(mechanism, packed, layout) if held != "none" else ()
+        equations = find_independent_equations(mechanism, packed, layout) if held != "none" else ()
     except SimulationError:
         return
     at = packed.structure[MODEL.CONSTRAINED]
@@ -223,11 +223,11 @@ def test_trees_of_joints(held, seed):
     way = rng.normal(size=len(y))
     value, jacobian, bends = carried(packed, 0.3, y, [], way)
     x, d = casadi.SX.sym("x", len(y)), casadi.SX.sym("d", len(y))
-    traced = Traced(
+    traced = SymbolicEvaluator(
         packed, forces, packed.numbers.tolist(), 0.3, casadi.vertsplit(x), (), equations
     )
-    found = traced.evaluated(STAGE.ACCELERATION)
-    xdot = found.sure(found.f.cells)
+    found = traced.evaluate(STAGE.ACCELERATION)
+    xdot = found.mask_failures(found.f.cells)
     slopes = casadi.jacobian(xdot, x)
     turned = casadi.jtimes(slopes @ d, x, d)
     got = [

@@ -64,7 +64,7 @@ def test_derivatives_are_those_of_the_kernels(name):
     both = beside(name)
     for seed in range(2):
         x = both.state(seed, 0.03)
-        found = both.errors(both.kept(x) if both.functions.constraints_kept else x, seed)
+        found = both.errors(both.kept(x) if both.functions.constraint_count else x, seed)
         assert found["value"] < 1e-11 and found["jacobian"] < 1e-8 and found["hessian"] < 1e-6
 
 
@@ -75,7 +75,7 @@ def test_nothing_is_left_of_the_equations_of_a_motion(name):
     for seed in range(4):
         x = both.state(seed)
         u, xdot = both.controls(x), both.derivative(x)
-        left = matrix(f.residual(both.t, x, xdot, u, f.p, np.zeros(f.constraints_kept))).ravel()
+        left = matrix(f.residual(both.t, x, xdot, u, f.p, np.zeros(f.constraint_count))).ravel()
         kept = f.constraints(both.t, x, xdot, f.p)
         g = matrix(kept[3])
         scale = 1.0 + np.abs(xdot).max()
@@ -90,7 +90,7 @@ def test_nothing_is_left_of_the_equations_of_a_motion(name):
 def test_constraints_hold_at_the_first_state_and_have_their_derivatives():
     both = beside("m0097")
     f = both.functions
-    assert f.constraints_kept > 0
+    assert f.constraint_count > 0
     position, velocity, _, jacobian = f.constraints(0.0, f.x, np.zeros(len(f.x)), f.p)
     assert np.abs(matrix(position)).max() < 1e-9 and np.abs(matrix(velocity)).max() < 1e-9
     by_value = f.constraints.jacobian()(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.derivatives.curves import curve_value_on_symbols
+from osimlite.derivatives.curves import evaluate_curve
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.laws.bezier import curve, curve_value
 from osimlite.mechanics.multibody.functions import Constant
@@ -104,7 +104,7 @@ def test_what_depends_on_the_way_is_no_parameter(tmp_path):
 def test_curves_are_met_to_rounding():
     numbers = curve(((0.0, 0.0, 0.0), (0.7, 0.3, 2.0), (1.6, 0.9, 0.0)), (1.0, 0.4))
     x = casadi.SX.sym("x")
-    y, slope = curve_value_on_symbols(numbers, x)
+    y, slope = evaluate_curve(numbers, x)
     function = casadi.Function("curve", [x], [y, slope, casadi.gradient(y, x)])
     for at in np.linspace(-0.2, 1.8, 401):
         mine, wanted = [float(part) for part in function(at)], curve_value(numbers, at)

@@ -134,7 +134,7 @@ def test_bends_are_narrowed_down(monkeypatch):
     wanted = osimlite.sensitivity(model, [mass], 0.8, accuracy=1e-11).derivatives
     rough = osimlite.sensitivity(model, [mass], 0.8).derivatives
     assert np.abs(rough - wanted).max() < 1e-4 * np.abs(wanted).max()
-    monkeypatch.setattr("osimlite.derivatives.sensitivity.SHORTEST", 1.0)
+    monkeypatch.setattr("osimlite.derivatives.sensitivity.MIN_STEP_S", 1.0)
     rough = osimlite.sensitivity(model, [mass], 0.8).derivatives
     assert np.abs(rough - wanted).max() > 1e-3 * np.abs(wanted).max()
 
@@ -223,7 +223,8 @@ def test_a_start_that_is_bound_goes_with_a_number(held):
 
 def test_derivatives_that_are_no_numbers_are_told(monkeypatch):
     monkeypatch.setattr(
-        "osimlite.derivatives.tangents.Steps.step", lambda self, t0, t1, y: (y + np.nan, 0.0 * y)
+        "osimlite.derivatives.tangents.TangentSteps.step",
+        lambda self, t0, t1, y: (y + np.nan, 0.0 * y),
     )
     with pytest.raises(
         SimulationError, match=r"the derivatives of '/jointset/hinge/angle/value' are no finite"

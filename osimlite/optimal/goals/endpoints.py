@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from osimlite.derivatives.symbolic import on_symbols
+from osimlite.derivatives.symbolic import make_symbolic
 from osimlite.derivatives.symbols import Vector, casadi
 from osimlite.errors import ModelError, SettingError
 from osimlite.mechanics.kernels.programs import compute
@@ -156,7 +156,7 @@ def build_expression_based_parameter_goal(
             numbers[path] if path in numbers else ends.start.p[known.index(path)] for path in paths
         ]
         registers = Vector([*arguments, *[0.0] * len(formula.steps)])
-        return on_symbols(compute)(
+        return make_symbolic(compute)(
             Vector(steps), len(formula.steps), Vector(constants), registers, len(arguments)
         )
 

@@ -14,8 +14,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from osimlite.base.records import dataclass, replace
-from osimlite.derivatives.sensitivity import followed
-from osimlite.derivatives.tangents import Steps
+from osimlite.derivatives.sensitivity import integrate_sensitivities
+from osimlite.derivatives.tangents import TangentSteps
 from osimlite.errors import SettingError, SimulationError, UnsupportedError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.batches import Runs, run_many
@@ -83,7 +83,7 @@ class Gradients:
         self._times = (
             [0.0, plan.to] if plan.interval is None else report_times(plan.to, plan.interval)
         )
-        self._steps: tuple[bytes, Steps] | None = None
+        self._steps: tuple[bytes, TangentSteps] | None = None
 
     def at(self, values: Sequence[float], free: Sequence[int]) -> Array:
         """The derivatives (f,) by the variables whose places are `free`, at values of all (d,).
@@ -119,7 +119,7 @@ class Gradients:
         runs = self._run(here)
         steps, (times, states) = self._steps_of(here.variant), self._motion(here)
         steps.take(here.variant.numbers, dx)
-        moved = followed(
+        moved = integrate_sensitivities(
             steps, times, states, dy, self._times, self._plan.accuracy, here.variant.state.names
         )
         count, by = len(near), np.repeat(np.arange(len(free)), 2)
@@ -192,12 +192,12 @@ class Gradients:
             raise stepper.ended
         return times, np.array(states)
 
-    def _steps_of(self, variant: Variant) -> Steps:
+    def _steps_of(self, variant: Variant) -> TangentSteps:
         if self._steps is None or self._steps[0] != variant.structure:
             engine = variant.engine
             packed = pack(engine.mechanism, replace(engine.forces, controls=engine.driving))
             self._steps = (
                 variant.structure,
-                Steps(packed, engine.forces, range(len(variant.state.names))),
+                TangentSteps(packed, engine.forces, range(len(variant.state.names))),
             )
         return self._steps[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.derivatives.parameters import Parameters
+from osimlite.errors import DeprecatedWarning
 from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -21,7 +23,7 @@ from osimlite.simulation.pack import Packed, pack
 from osimlite.simulation.states import StateLayout, in_model_order
 
 
-class StatedModel:
+class DifferentiableModel:
     """What is the same of a model for every way in which its derivatives are found.
 
     Args:
@@ -32,11 +34,11 @@ class StatedModel:
 
     Attributes: name: of the model. states: the entries of x as in ``states.sto``: values, speeds,
         and then auxiliary states, each in the order of the model. Coordinates that are locked are
-        none. in_system: the same in the order in which Simbody holds them. controls: the entries of
+        none. system_states: the same in the order in which Simbody holds them. controls: the entries of
         u: paths of the actuators. parameters: the entries of p. p: the values (p,) that the model
         has for these. x: the state (x,) that the model starts from, where its constraints hold. u:
         controls (u,) of zero. coordinates: paths of the coordinates whose accelerations are found,
-        in the order of the speeds. constraints_kept: how many equations constrain the motion.
+        in the order of the speeds. constraint_count: how many equations constrain the motion.
     """
 
     def __init__(
@@ -48,7 +50,7 @@ class StatedModel:
         self.name = model.name or "model"
         self.parameters = tuple(parameters)
         self.mechanism: Mechanism = build_mechanism(model)
-        self.forces = self._forces_of(model, self.mechanism)
+        self.forces = self._collect_forces(model, self.mechanism)
         self._packed: Packed = pack(self.mechanism, self.forces, apart=self._apart)
         self._state = StateLayout(self.mechanism, self._packed.order, self.forces.elements)
         infos = self.mechanism.coordinates
@@ -65,8 +67,8 @@ class StatedModel:
             [f"{path}/{what}" for path in self.coordinates] for what in ("value", "speed")
         )
         self.states = (*values, *speeds, *in_model_order(model, paths))
-        self.in_system = (*own, *paths)
-        names = {name: place for place, name in enumerate(self.in_system)}
+        self.system_states = (*own, *paths)
+        names = {name: place for place, name in enumerate(self.system_states)}
         self.state_indices = [names[name] for name in self.states]
         self.controls = self.forces.controls.names
         self.u = np.zeros(len(self.controls))
@@ -79,15 +81,29 @@ class StatedModel:
         )
         self.x = np.array(self._state.pack(start.tolist(), rates.tolist()))[self.state_indices]
         self._parameters = (
-            Parameters(model.copy_deep(), self.parameters, self._numbers_of) if parameters else None
+            Parameters(model.copy_deep(), self.parameters, self._pack_numbers)
+            if parameters
+            else None
         )
         self.p = self._parameters.values if self._parameters else np.zeros(0)
         at_equations = self._packed.structure[MODEL.CONSTRAINED]
-        self.constraints_kept = (
+        self.constraint_count = (
             int(self._packed.structure[at_equations + CONSTRAINED.EQUATIONS]) if at_equations else 0
         )
 
-    def _forces_of(self, model: Model, mechanism: Mechanism) -> Forces:
+    @property
+    def constraints_kept(self) -> int:
+        """Deprecated name of `constraint_count`."""
+        warnings.warn("use constraint_count", DeprecatedWarning, stacklevel=2)
+        return self.constraint_count
+
+    @property
+    def in_system(self) -> tuple[str, ...]:
+        """Deprecated name of `system_states`."""
+        warnings.warn("use system_states", DeprecatedWarning, stacklevel=2)
+        return self.system_states
+
+    def _collect_forces(self, model: Model, mechanism: Mechanism) -> Forces:
         forces = force_elements(model, mechanism, folder=self._folder)
         # Probes are outputs, whatever they make of their results over time; some look at more than
         # the kernels.
@@ -101,10 +117,10 @@ class StatedModel:
         )
         return replace(forces, elements=tuple(elements))
 
-    def _numbers_of(self, changed: Model) -> Array:
+    def _pack_numbers(self, changed: Model) -> Array:
         """The numbers that depend on parameters, of the model with others; none if more than numbers are others."""
         mechanism = build_mechanism(changed)
-        packed = pack(mechanism, self._forces_of(changed, mechanism), apart=self._apart)
+        packed = pack(mechanism, self._collect_forces(changed, mechanism), apart=self._apart)
         return (
             packed.numbers
             if np.array_equal(packed.structure, self._packed.structure)

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from osimlite.base.records import replace
-from osimlite.derivatives.symbolic import taken
+from osimlite.derivatives.symbolic import register_symbolic
 from osimlite.derivatives.symbols import casadi
 from osimlite.mechanics.kernels.function_paths import ARMS, DERIVATIVES
 from osimlite.mechanics.kernels.layout import ITEM, MODEL, OUTCOME
@@ -30,13 +30,13 @@ from osimlite.simulation.elements.force_type import DeclaredForce
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.path_system import MeasuredPath, PathSystem
 
-STEP = 1e-4
+DIFFERENCE_STEP = 1e-4
 """Of the differences, rad or m: where paths jump they do so all at once, and what the search leaves is some 1e-13."""
-POSES = 60
+SAMPLED_POSES = 60
 """In so many poses is looked about which coordinates a path has a moment arm."""
 
 
-class GivenPath:
+class SymbolicPath:
     """A path of which length, moment arms and speed are symbols.
 
     In OpenSim the speed of a path around a surface may be another than its moment arms say.
@@ -79,15 +79,17 @@ class GivenPath:
             return OUTCOME.OK
 
         law.takes_symbols = speed_law.takes_symbols = True  # type: ignore[attr-defined]
-        given = ForceRecord("", room=DERIVATIVES + count, is_part=True, python=taken(law))
-        speed = ForceRecord("", room=1, is_part=True, python=taken(speed_law))
+        given = ForceRecord(
+            "", room=DERIVATIVES + count, is_part=True, python=register_symbolic(law)
+        )
+        speed = ForceRecord("", room=1, is_part=True, python=register_symbolic(speed_law))
         before = [ForceRecord("pull_coordinates", is_part=True), given, speed]
         backs = [sum(ITEM.OWN + len(item.ints) for item in before[first:]) for first in range(3)]
         ints = backs[0], count, backs[1], backs[2], *freedoms, *[0] * count
         return [*before, ForceRecord("function_path", ints, room=ARMS + count, is_part=True)]
 
 
-class SearchedPaths:
+class WrappedPaths:
     """The paths of a model whose way is searched for.
 
     Args:
@@ -97,16 +99,16 @@ class SearchedPaths:
 
     Attributes:
         forces: with given paths in the place of those.
-        given: these.
+        symbolic_paths: these.
         names: of what acts along these.
         size: how many numbers they have together.
     """
 
     def __init__(self, mechanism: Mechanism, forces: Forces, order: Sequence[int]) -> None:
-        owners: list[Any] = [item for item in forces.elements if _is_searched(item)]
-        self.forces, self.given, self.names, self.size = (
+        owners: list[Any] = [item for item in forces.elements if _is_wrapped(item)]
+        self.forces, self.symbolic_paths, self.names, self.size = (
             forces,
-            list[GivenPath](),
+            list[SymbolicPath](),
             tuple[str, ...](),
             0,
         )
@@ -119,51 +121,55 @@ class SearchedPaths:
             mechanism.released(),
             Forces(tuple(MeasuredPath(item.path, item.place) for item in owners)),
         )
-        poses = self._poses(mechanism)
+        poses = self._sample_poses(mechanism)
         arms = np.abs(self._system.pulled(poses)).max(axis=0)
         moved = [[k for k in self._order if row[k] > 0.0] for row in arms]
-        self.given = [GivenPath(coordinates) for coordinates in moved]
-        self._groups = _apart(moved)
+        self.symbolic_paths = [SymbolicPath(coordinates) for coordinates in moved]
+        self._groups = _group_coordinates(moved)
         self.names = tuple(item.path for item in owners)
-        self.size = sum(item.size for item in self.given)
-        others = {item.path: given for item, given in zip(owners, self.given, strict=True)}
+        self.size = sum(item.size for item in self.symbolic_paths)
+        others = {item.path: given for item, given in zip(owners, self.symbolic_paths, strict=True)}
         elements = (
             replace(e, place=others[e.path]) if e.path in others else e for e in forces.elements
         )
         self.forces = replace(forces, elements=tuple(elements))
 
-    def _speeds(self, pose: Array) -> list[Array]:
+    def _measure_speeds(self, pose: Array) -> list[Array]:
         """Of each path what a speed of 1 of each of its coordinates gives to its own."""
-        result = np.zeros((len(self.given), len(pose)))
+        result = np.zeros((len(self.symbolic_paths), len(pose)))
         for group in self._groups:
             moving = np.zeros(len(pose))
             moving[group] = 1.0
             # No path has two of these coordinates.
             result[:, group] = self._system.measured(pose, moving, SPEED)[:, None]
-        return [row[[*item.coordinates]] for row, item in zip(result, self.given, strict=True)]
+        return [
+            row[[*item.coordinates]] for row, item in zip(result, self.symbolic_paths, strict=True)
+        ]
 
-    def _poses(self, mechanism: Mechanism) -> Array:
+    def _sample_poses(self, mechanism: Mechanism) -> Array:
         rng = np.random.default_rng(0)
         bounds = np.array([info.range for info in mechanism.coordinates]).reshape(-1, 2)
         wide = bounds[:, 1] - bounds[:, 0] > 2.0 * np.pi
         bounds[wide] = self._default[wide, None] + np.array([-1.0, 1.0])
-        return bounds[:, 0] + rng.random((POSES, len(bounds))) * (bounds[:, 1] - bounds[:, 0])
+        return bounds[:, 0] + rng.random((SAMPLED_POSES, len(bounds))) * (
+            bounds[:, 1] - bounds[:, 0]
+        )
 
-    def name(self, symbols: Sequence[Any]) -> None:
+    def set_symbols(self, symbols: Sequence[Any]) -> None:
         """Have the paths be symbols (size,)."""
         first = 0
-        for item in self.given:
+        for item in self.symbolic_paths:
             item.symbols = [symbols[first + k] for k in range(item.size)]
             first += len(item.symbols)
 
-    def measured(self, q: Array) -> Array:
+    def measure_paths(self, q: Array) -> Array:
         """Lengths and moment arms (size,) at values (n,) of the coordinates that the functions are of."""
         pose = self._default.copy()
         pose[self._order] = q
         lengths = self._system.measured(pose, self._still, LENGTH)
         (arms,) = self._system.pulled(pose[None])
-        speeds = self._speeds(pose)
-        parts = zip(lengths, arms, speeds, self.given, strict=True)
+        speeds = self._measure_speeds(pose)
+        parts = zip(lengths, arms, speeds, self.symbolic_paths, strict=True)
         return np.concatenate(
             [
                 np.concatenate([[length], arm[[*item.coordinates]], speed])
@@ -171,28 +177,30 @@ class SearchedPaths:
             ]
         )
 
-    def slopes(self, q: Array) -> Array:
-        """Derivatives (size, n) of `measured`."""
+    def compute_slopes(self, q: Array) -> Array:
+        """Derivatives (size, n) of `measure_paths`."""
         result = np.zeros((self.size, len(q)))
-        owners = np.repeat(np.arange(len(self.given)), [item.size for item in self.given])
+        owners = np.repeat(
+            np.arange(len(self.symbolic_paths)), [item.size for item in self.symbolic_paths]
+        )
         for group in self._groups:
             columns = [self._order.index(place) for place in group]
             one, two = (
-                [self.measured(_moved(q, columns, sign * h)) for sign in (1, -1)]
-                for h in (STEP, 2.0 * STEP)
+                [self.measure_paths(_shift_coordinates(q, columns, sign * h)) for sign in (1, -1)]
+                for h in (DIFFERENCE_STEP, 2.0 * DIFFERENCE_STEP)
             )
-            slope = (8.0 * (one[0] - one[1]) - (two[0] - two[1])) / (12.0 * STEP)
+            slope = (8.0 * (one[0] - one[1]) - (two[0] - two[1])) / (12.0 * DIFFERENCE_STEP)
             for place, column in zip(group, columns, strict=True):
-                own = np.array([place in item.coordinates for item in self.given])[owners]
+                own = np.array([place in item.coordinates for item in self.symbolic_paths])[owners]
                 result[own, column] = slope[own]
         return result
 
     @property
     def pattern(self) -> Any:
-        """Which of `slopes` can be other than 0."""
+        """Which of `compute_slopes` can be other than 0."""
         places = {place: k for k, place in enumerate(self._order)}
         rows, columns, first = list[int](), list[int](), 0
-        for item in self.given:
+        for item in self.symbolic_paths:
             count = item.size
             for row in range(first, first + count):
                 rows += [row] * len(item.coordinates)
@@ -200,22 +208,27 @@ class SearchedPaths:
             first += count
         return casadi.Sparsity.triplet(self.size, len(self._order), rows, columns)
 
-    def function(self) -> Any:
+    def make_function(self) -> Any:
         """``paths(q)`` as a function of CasADi, with its derivative. It must be kept as long as it is used."""
-        slopes = _Called(
-            "path_slopes", [len(self._order), self.size], self.pattern, lambda q, _: self.slopes(q)
+        slopes = _NumericCallback(
+            "path_slopes",
+            [len(self._order), self.size],
+            self.pattern,
+            lambda q, _: self.compute_slopes(q),
         )
         dense = casadi.Sparsity.dense(self.size, 1)
-        return _Called("path_lengths", [len(self._order)], dense, self.measured, slopes)
+        return _NumericCallback(
+            "path_lengths", [len(self._order)], dense, self.measure_paths, slopes
+        )
 
 
-def _moved(q: Array, places: Sequence[int], by: float) -> Array:
+def _shift_coordinates(q: Array, places: Sequence[int], by: float) -> Array:
     result = q.copy()
     result[places] += by
     return result
 
 
-def _apart(paths: Sequence[Sequence[int]]) -> list[list[int]]:
+def _group_coordinates(paths: Sequence[Sequence[int]]) -> list[list[int]]:
     """The coordinates of some paths in groups of which no path has two, so that all of a group can move at once."""
     groups: list[list[int]] = []
     for place in dict.fromkeys(place for own in paths for place in own):
@@ -228,7 +241,7 @@ def _apart(paths: Sequence[Sequence[int]]) -> list[list[int]]:
     return groups
 
 
-def _is_searched(element: Any) -> bool:
+def _is_wrapped(element: Any) -> bool:
     if (
         not (isinstance(element, DeclaredForce) and element.force_type.geometry is PATH)
         or element.place is None
@@ -238,7 +251,7 @@ def _is_searched(element: Any) -> bool:
     return bool(surfaces) if surfaces is not None else not hasattr(element.place, "length")
 
 
-class _Called(casadi.Callback):  # type: ignore[misc]
+class _NumericCallback(casadi.Callback):  # type: ignore[misc]
     """A function in machine code as CasADi calls it.
 
     Args:

@@ -7,10 +7,10 @@ from contextlib import nullcontext
 from functools import reduce
 from typing import Any
 
-from osimlite.derivatives import ways
-from osimlite.derivatives.constraints import dynamics_with
-from osimlite.derivatives.outputs import probe_places
-from osimlite.derivatives.symbolic import on_symbols, standing_in, taken
+from osimlite.derivatives import branches
+from osimlite.derivatives.constraints import make_constrained_dynamics
+from osimlite.derivatives.outputs import list_probe_items
+from osimlite.derivatives.symbolic import make_symbolic, register_symbolic, replace_kernel
 from osimlite.derivatives.symbols import Vector, casadi
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.kernels.constrained_dynamics import bind
@@ -24,30 +24,32 @@ from osimlite.simulation.elements.geometries.load import Load, find_load
 from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.pack import Packed
 
-WRAPS = "its path bends around surfaces; put a FunctionBasedPath that is fitted to it in its place"
-MESH = "a mesh is in contact; take spheres and half spaces"
-CLOSEST = "the point of an ellipsoid that is in contact is searched for; take spheres"
-SURFACES = "what touches is said at the sizes of a state that is known only later; leave simbody_early_return out"
-REFUSED = {
-    "wrapped_path": WRAPS,
-    "geodesic_path": WRAPS,
-    "cable_path": WRAPS,
-    "touch_mesh": MESH,
-    "elastic_foundation_force": MESH,
-    "touch_ellipsoid": CLOSEST,
-    "touch_ellipsoids": CLOSEST,
-    "early_return": SURFACES,
+WRAPPED_PATH_REASON = (
+    "its path bends around surfaces; put a FunctionBasedPath that is fitted to it in its place"
+)
+MESH_REASON = "a mesh is in contact; take spheres and half spaces"
+ELLIPSOID_REASON = "the point of an ellipsoid that is in contact is searched for; take spheres"
+EARLY_RETURN_REASON = "what touches is said at the sizes of a state that is known only later; leave simbody_early_return out"
+UNSUPPORTED_KERNELS = {
+    "wrapped_path": WRAPPED_PATH_REASON,
+    "geodesic_path": WRAPPED_PATH_REASON,
+    "cable_path": WRAPPED_PATH_REASON,
+    "touch_mesh": MESH_REASON,
+    "elastic_foundation_force": MESH_REASON,
+    "touch_ellipsoid": ELLIPSOID_REASON,
+    "touch_ellipsoids": ELLIPSOID_REASON,
+    "early_return": EARLY_RETURN_REASON,
 }
 """By the names of kernels, why they have no formula, and what to do instead."""
 
 
-class Traced:
+class SymbolicEvaluator:
     """What the kernels compute of a state of symbols.
 
     Args: packed: the model. forces: of it. numbers: of it, some of which may be symbols. t: time,
         s. y: the state, in the order of the packed model. controls: of the actuators. equations:
         numbers of those of the constraints that the others follow from. loads: at this time, one
-        after the other as `given_loads` has them; none if they are computed of the time.
+        after the other as `list_load_functions` has them; none if they are computed of the time.
 
     Raises:
         UnsupportedError: a force has no formula; the message names it.
@@ -71,8 +73,14 @@ class Traced:
             if not isinstance(kernel, str) and hasattr(kernel, "takes_symbols"):
                 given[place] = address(kernel)  # type: ignore[arg-type]
                 continue
-            if place in packed.owners and (not isinstance(kernel, str) or kernel in REFUSED):
-                reason = REFUSED[kernel] if isinstance(kernel, str) else "it is computed in Python"
+            if place in packed.owners and (
+                not isinstance(kernel, str) or kernel in UNSUPPORTED_KERNELS
+            ):
+                reason = (
+                    UNSUPPORTED_KERNELS[kernel]
+                    if isinstance(kernel, str)
+                    else "it is computed in Python"
+                )
                 raise UnsupportedError(f"'{self._path(place)}' has no formula for CasADi: {reason}")
         self.structure: list[int] = Program(packed, PYTHON).ints.tolist()
         for place, law_address in given.items():
@@ -81,29 +89,35 @@ class Traced:
         self.structure[MODEL.CONTROLS] = 0
         if self.structure[MODEL.CONSTRAINED]:
             law = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.DYNAMICS]
-            self.structure[MODEL.LAWS + law] = address(taken(dynamics_with(equations)))
+            self.structure[MODEL.LAWS + law] = address(
+                register_symbolic(make_constrained_dynamics(equations))
+            )
 
     def _path(self, item: int) -> str:
         return self._elements[self._packed.owners[item]].path
 
-    def evaluated(self, stage: int) -> Evaluated:
+    def evaluate(self, stage: int) -> SymbolicWorkspace:
         """All that `evaluate` finds up to a stage."""
         return self.run(
-            lambda model, reals, data, y, f: on_symbols(evaluate)(model, reals, data, y, f, stage)
+            lambda model, reals, data, y, f: make_symbolic(evaluate)(
+                model, reals, data, y, f, stage
+            )
         )
 
-    def probed(self) -> Evaluated:
+    def evaluate_probes(self) -> SymbolicWorkspace:
         """All that `evaluate` finds, and after it what the probes do."""
-        places = probe_places(self._packed, self._elements)
+        places = list_probe_items(self._packed, self._elements)
 
         def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> None:
-            on_symbols(evaluate)(model, reals, data, y, f, STAGE.ACCELERATION)
+            make_symbolic(evaluate)(model, reals, data, y, f, STAGE.ACCELERATION)
             for place in places:
-                on_symbols(call)(model[place + ITEM.LAW], model, reals, data, y, f, place)
+                make_symbolic(call)(model[place + ITEM.LAW], model, reals, data, y, f, place)
 
         return self.run(law)
 
-    def missing(self, udot: Sequence[Any], pushing: Container[str] | None = None) -> Evaluated:
+    def compute_missing_forces(
+        self, udot: Sequence[Any], pushing: Container[str] | None = None
+    ) -> SymbolicWorkspace:
         """What `inverse` finds for accelerations (n,), if of the forces only those of some paths push."""
         size, structure = self.structure[MODEL.DOFS], [*self.structure]
         if pushing is not None:
@@ -119,11 +133,11 @@ class Traced:
         def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> None:
             for k in range(size):
                 f[size + k] = udot[k]
-            on_symbols(inverse)(model, reals, data, y, f, 0)
+            make_symbolic(inverse)(model, reals, data, y, f, 0)
 
         return self.run(law, structure)
 
-    def bound(self) -> Evaluated:
+    def evaluate_constraints(self) -> SymbolicWorkspace:
         """The equations of the constraints, see `bind`; the result has the wrench of a unit of each on each link."""
         first = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS]
         size = self.structure[MODEL.DOFS]
@@ -132,7 +146,7 @@ class Traced:
             model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector
         ) -> dict[tuple[int, int], list[Any]]:
             wrenches: dict[tuple[int, int], list[Any]] = {}
-            kernel = on_symbols(add_wrench)
+            kernel = make_symbolic(add_wrench)
 
             def add(
                 model: Vector, data: Vector, link: int, torque: Any, force: Any, row: Vector
@@ -144,9 +158,9 @@ class Traced:
                 ]
                 kernel(model, data, link, torque, force, row)
 
-            on_symbols(evaluate)(model, reals, data, y, f, STAGE.VELOCITY)
-            with standing_in(add_wrench, add):
-                on_symbols(bind)(model, reals, data, y, f)
+            make_symbolic(evaluate)(model, reals, data, y, f, STAGE.VELOCITY)
+            with replace_kernel(add_wrench, add):
+                make_symbolic(bind)(model, reals, data, y, f)
             return wrenches
 
         return self.run(law)
@@ -155,10 +169,10 @@ class Traced:
         self,
         law: Callable[[Vector, Vector, Vector, Vector, Vector], Any],
         structure: list[int] | None = None,
-    ) -> Evaluated:
+    ) -> SymbolicWorkspace:
         """What a function of the five vectors leaves."""
 
-        def run() -> Evaluated:
+        def run() -> SymbolicWorkspace:
             model, reals = (
                 Vector(self.structure if structure is None else structure),
                 Vector(list(self.numbers)),
@@ -168,13 +182,13 @@ class Traced:
             data[WORK.TIME] = self._t
             for k, control in enumerate(self._controls):
                 data[self.structure[MODEL.WORK_CONTROL] + k] = control
-            with standing_in(find_load, self._find_load) if self._loads else nullcontext():
+            with replace_kernel(find_load, self._find_load) if self._loads else nullcontext():
                 result = law(model, reals, data, y, f)
-            return Evaluated(model, reals, data, f, result, ways.run.failures)
+            return SymbolicWorkspace(model, reals, data, f, result, branches.run.failures)
 
         try:
-            return ways.repeated(run)
-        except ways.NoFormula as error:
+            return branches.run_until_mergeable(run)
+        except branches.NoFormula as error:
             named = next(
                 (self._path(item) for item in error.items if item in self._packed.owners), ""
             )
@@ -187,14 +201,14 @@ class Traced:
         """As :func:`find_load`, of what is given."""
         owner = self._packed.owners[max(item for item in self._packed.owners if item <= g.first)]
         element: Any = self._elements[owner]
-        first = len(given_loads(self._elements[:owner]))
+        first = len(list_load_functions(self._elements[:owner]))
         for group, functions in enumerate(element.place.groups):
             for k in range(len(functions)):
                 room[3 * group + k] = self._loads[first + k]
             first += len(functions)
 
 
-def given_loads(elements: Sequence[Any]) -> list[Function]:
+def list_load_functions(elements: Sequence[Any]) -> list[Function]:
     """The functions of time of all forces, points and torques that are given."""
     loads = (
         element.place for element in elements if isinstance(getattr(element, "place", None), Load)
@@ -202,7 +216,7 @@ def given_loads(elements: Sequence[Any]) -> list[Function]:
     return [function for load in loads for group in load.groups for function in group]
 
 
-class Evaluated:
+class SymbolicWorkspace:
     """What an evaluation has left.
 
     Args:
@@ -224,13 +238,16 @@ class Evaluated:
         failures: Sequence[Any],
     ) -> None:
         self.model, self.reals, self.data, self.f, self.result = model, reals, data, f, result
-        self.on, self._failed = on_symbols, reduce(casadi.logic_or, failures) if failures else None
+        self.wrap, self._failure = (
+            make_symbolic,
+            reduce(casadi.logic_or, failures) if failures else None,
+        )
 
-    def sure(self, numbers: Sequence[Any]) -> Any:
+    def mask_failures(self, numbers: Sequence[Any]) -> Any:
         """Numbers as one column, which are none where the evaluation fails."""
         column = casadi.SX(casadi.vertcat(*numbers))
         return (
             column
-            if self._failed is None
-            else casadi.if_else(self._failed, casadi.DM.nan(column.shape), column)
+            if self._failure is None
+            else casadi.if_else(self._failure, casadi.DM.nan(column.shape), column)
         )
