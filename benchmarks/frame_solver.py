@@ -50,7 +50,7 @@ def timed(step: Callable[[int], object], frames: int) -> tuple[list[float], list
 def solvers(model: osimlite.Model, frames: int) -> Iterator[tuple[str, Callable[[int], object]]]:
     """What solves a frame by its number: from markers, from sensors."""
     standing = {f"{body.name}_imu": np.eye(3) for body in model.components(osimlite.Body)}
-    place_sensors(model, OrientationData.of(standing))
+    place_sensors(model, OrientationData.from_source(standing))
     mechanism, rng = osimlite.mechanism(model), np.random.default_rng(1)
     turning = np.array([info.motion_type == "rotational" for info in mechanism.coordinates])
     paths = [marker.path for marker in model.components(osimlite.Marker)]

@@ -19,7 +19,7 @@ import numpy as np
 
 import osimlite
 from _moco_studies import CORE, GAIT, TESTS, gait_tool, sources
-from osimlite.fitting.modifying.operators import processed
+from osimlite.fitting.modifying.operators import process_model
 from osimlite.io.tables.storage import StoTable, read_sto, write_sto
 
 THEIRS = (
@@ -42,7 +42,7 @@ def main(core: Path, picture: str) -> None:
         write_sto(folder / "states.sto", "", states.times, states.columns, states.rows)
         # Loads come from the setup of a tool.
         for file, own in (("moco.osim", operators[:-1]), ("millard.osim", operators[:1])):
-            model = processed(osimlite.ModelProcessor(filepath=GAIT[0], operators=own), folder)
+            model = process_model(osimlite.ModelProcessor(filepath=GAIT[0], operators=own), folder)
             osimlite.write(model, folder / file)
         muscles = [
             muscle.name for muscle in model.components(osimlite.Millard2012EquilibriumMuscle)

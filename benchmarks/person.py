@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import osimlite
-from osimlite.fitting.inverse_kinematics import marker_stations
+from osimlite.fitting.inverse_kinematics import find_marker_stations
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.person import Person
 from osimlite.fitting.scaling import scale_model
@@ -54,13 +54,13 @@ def of_people(folder: Path) -> list[Array]:
     print(f"{'trial':16} {'fitted':>7} {'expert':>7} {'published':>9}   mm")
     poses = []
     for path in trials:
-        data = MarkerData.of(path)
+        data = MarkerData.from_source(path)
         shared = [
             name for name in person.markers if name in data.names and expert_has(expert, name)
         ]
         weights = {
             name: float(name in shared)
-            for name in data.shared([marker.name for marker in markers(generic)])
+            for name in data.find_shared_names([marker.name for marker in markers(generic)])
         }
         row = []
         for model in (person.model, expert):
@@ -96,9 +96,9 @@ def expert_has(model: osimlite.Model, name: str) -> bool:
 def as_published(model: osimlite.Model, data: MarkerData, names: list[str], path: Path) -> float:
     """Errors of published poses."""
     mechanism, table = osimlite.mechanism(model), read_sto(path)
-    stations, errors = marker_stations(model, mechanism), []
+    stations, errors = find_marker_stations(model, mechanism), []
     infos = mechanism.coordinates
-    for time_, places in zip(data.times, data.only(names), strict=True):
+    for time_, places in zip(data.times, data.select_values(names), strict=True):
         row = int(np.argmin(np.abs(table.times - time_)))
         q = mechanism.values({})
         for k, info in enumerate(infos):
@@ -151,7 +151,7 @@ def made_up(generic: osimlite.Model, poses: Array, seed: int) -> None:
             offsets[marker.name] = rng.normal(0.0, ELSEWHERE, 3)
             marker.location = tuple((np.array(marker.location) + offsets[marker.name]).tolist())
     mechanism = osimlite.mechanism(model)
-    stations = marker_stations(model, mechanism)
+    stations = find_marker_stations(model, mechanism)
     rows: dict[str, list[Any]] = {name: [] for name in stations}
     for q in poses:
         state = mechanism.at(mechanism.assemble(q))

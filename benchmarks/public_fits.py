@@ -25,10 +25,10 @@ import numpy as np
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.fitting.fitted_motion import FittedMotion
-from osimlite.fitting.ik_tool import run_inverse_kinematics, tasks_of
-from osimlite.fitting.inverse_kinematics import marker_stations
+from osimlite.fitting.ik_tool import collect_targets, run_inverse_kinematics
+from osimlite.fitting.inverse_kinematics import find_marker_stations
 from osimlite.fitting.marker_data import MarkerData
-from osimlite.fitting.scale_tool import run_scale
+from osimlite.fitting.scale_tool import compute_scaled_model
 from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.multibody.constraints import Lock
 from osimlite.mechanics.multibody.spatial import Array
@@ -77,7 +77,7 @@ def degrees(motion: FittedMotion, apart: Array) -> Array:
 def errors(motion: FittedMotion, poses: Array, frames: Iterable[int]) -> Array:
     """How far the markers of poses are from where they were measured in some frames (t, m), m."""
     assert motion.model is not None
-    stations, rows = marker_stations(motion.model, motion.mechanism), []
+    stations, rows = find_marker_stations(motion.model, motion.mechanism), []
     for q, frame in zip(poses, frames, strict=True):
         state = motion.mechanism.at(q)
         rows.append(
@@ -94,7 +94,7 @@ def costs(motion: FittedMotion, tasks: Any, poses: Array) -> Array:
         MarkerData(motion.markers, motion.times, motion.measured),
         motion.mechanism.coordinates,
     )
-    asked = tasks_of(motion.model, motion.mechanism, tasks, data, None)
+    asked = collect_targets(motion.model, motion.mechanism, tasks, data, None)
     squares = errors(motion, poses, range(len(poses))) ** 2
     weights = np.where(np.isfinite(squares), [asked.weights[name] for name in motion.markers], 0.0)
     found = np.sum(weights * np.nan_to_num(squares), axis=1) / weights.sum(axis=1)
@@ -107,7 +107,7 @@ def costs(motion: FittedMotion, tasks: Any, poses: Array) -> Array:
 def kinematics(tool: Any, setup: Path) -> Iterator[str]:
     """How the motions differ."""
     model = osimlite.read(setup.parent / tool.model_file.strip())
-    data = MarkerData.of(setup.parent / tool.marker_file.strip())
+    data = MarkerData.from_source(setup.parent / tool.marker_file.strip())
     whole = run_inverse_kinematics(tool, model, data)
     yield f"{len(whole.times)} frames, {len(whole.unsettled)} unsettled"
     theirs, first = setup.with_name("theirs.xml"), tool.time_range[0]
@@ -171,7 +171,7 @@ def otherwise(ours: Object, theirs: Object) -> list[str]:
 
 def scaling(tool: Any, setup: Path) -> Iterator[str]:
     """How the scaled models and the static poses differ."""
-    found = run_scale(tool, setup.parent)
+    found = compute_scaled_model(tool, setup.parent)
     if opensim_runs(tool, setup) is None:
         yield "OpenSim does not come to an end"
         return

@@ -211,7 +211,7 @@ def worn(folder: Path, frames: int) -> Case:
     (folder / "plain.osim").write_bytes(gzip.decompress((CORPUS / "m0954.osim.gz").read_bytes()))
     model = osimlite.read(folder / "plain.osim")
     names = [f"{body.name}_imu" for body in model.body_set.objects]
-    place_sensors(model, OrientationData.of({name: np.eye(3) for name in names}))
+    place_sensors(model, OrientationData.from_source({name: np.eye(3) for name in names}))
     osimlite.write(model, folder / "model.osim")
     motion, rng = swung(model, frames), np.random.default_rng(1)
     placed = {path.rpartition("/")[2]: frame for path, frame in motion.mechanism.frames.items()}

@@ -52,7 +52,7 @@ def fit(
     from osimlite.base.files import make_folder, write_atomically
     from osimlite.cli._console import say
     from osimlite.fitting.person import fit as fitted
-    from osimlite.fitting.person_files import person_texts
+    from osimlite.fitting.person_files import create_person_files
     from osimlite.io.document.reader import read
 
     person = fitted(
@@ -67,7 +67,7 @@ def fit(
         mass=mass,
     )
     folder = options.results_folder(file, output)
-    texts = person_texts(person, file, folder, mass)
+    texts = create_person_files(person, file, folder, mass)
     make_folder(folder)
     for name, text in texts.items():
         write_atomically(folder / name, text)

@@ -47,8 +47,8 @@ def ik(
     from osimlite.base.files import make_folder, write_atomically
     from osimlite.base.text import join_words
     from osimlite.cli._console import say
-    from osimlite.fitting.fit_messages import IGNORED, describe_unknown, told
-    from osimlite.fitting.ik_tool import motion_table
+    from osimlite.fitting.fit_messages import NO_EFFECT, describe_fit, describe_unknown
+    from osimlite.fitting.ik_tool import create_motion_table
     from osimlite.fitting.inverse_kinematics import inverse_kinematics
     from osimlite.fitting.marker_data import MarkerData
     from osimlite.fitting.orientation_data import holds_orientations
@@ -59,7 +59,7 @@ def ik(
 
     weights, kept = options.named_numbers(weight, "--weight"), options.named_numbers(keep, "--keep")
     of_sensors = holds_orientations(trial)
-    model, data = read(file), None if of_sensors else MarkerData.of(trial)
+    model, data = read(file), None if of_sensors else MarkerData.from_source(trial)
     motion = inverse_kinematics(
         model,
         data,
@@ -72,7 +72,7 @@ def ik(
     )
     folder = options.results_folder(file, output)
     make_folder(folder)
-    write_atomically(folder / "ik.mot", "".join(printed(motion_table(motion), f"\n{UNITS}")))
+    write_atomically(folder / "ik.mot", "".join(printed(create_motion_table(motion), f"\n{UNITS}")))
     what, names, errors = "marker", motion.markers, motion.marker_errors
     if of_sensors:
         what, names, errors = "orientation", motion.sensors, motion.orientation_errors
@@ -84,9 +84,9 @@ def ik(
         errors.tolist(),
         has_missing=True,
     )
-    for line in told(motion):
+    for line in describe_fit(motion):
         say(line)
-    if words := describe_unknown(model, IGNORED):
+    if words := describe_unknown(model, NO_EFFECT):
         say(words, err=True)
     if data is not None:
         known = {marker.name: None for marker in model.components(Marker)}

@@ -49,8 +49,8 @@ def modify(
     from osimlite.base.text import format_count
     from osimlite.cli._console import add_row, plain_console, plain_table, say
     from osimlite.errors import DocumentError, SettingError
-    from osimlite.fitting.modifying.operators import processed
-    from osimlite.fitting.modifying.words import change_of
+    from osimlite.fitting.modifying.operators import process_model
+    from osimlite.fitting.modifying.words import find_change
     from osimlite.io.document.printer import write
     from osimlite.io.document.reader import read, read_any
     from osimlite.schema.model import Model
@@ -61,7 +61,7 @@ def modify(
         name, equals, value = word.partition("=")
         if not equals:
             raise SettingError(f"--replace takes NAME=WORD, such as muscles=degroote; got '{word}'")
-        changes.append(change_of(name, value))
+        changes.append(find_change(name, value))
     top = read_any(file)
     if isinstance(top, Model):
         if not changes:
@@ -73,7 +73,7 @@ def modify(
         processor = next((part for part in top.walk() if isinstance(part, ModelProcessor)), None)
         if processor is None:
             raise DocumentError(f"a {type(top).__name__} has no model to change", file=str(file))
-        model = processed(processor, file.parent)
+        model = process_model(processor, file.parent)
     fitted = [item for change in changes for item in change(model, file.parent) or ()]
     target = output or file.with_name(f"{file.stem}_modified.osim")
     write(model, target)

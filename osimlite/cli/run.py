@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from osimlite.lint.diagnostic import Report
-    from osimlite.tools.many import Trial
+    from osimlite.tools.many import RunRecord
     from osimlite.tools.outcome import Outcome
 
 WORTH_SHARING = 4
@@ -104,17 +104,17 @@ def run(
     from osimlite.base.files import expect_folder_of
     from osimlite.cli._progress import progress_bar
     from osimlite.errors import SettingError
-    from osimlite.tools.many import found, run_many
-    from osimlite.tools.named_files import inputs_among
+    from osimlite.tools.many import find_setups, run_many
+    from osimlite.tools.named_files import find_inputs
 
-    files = found(setups)
+    files = find_setups(setups)
     if report is not None:
         if resume or cluster or workers not in (None, 1):
             raise SettingError(
                 "--report runs setups one after the other; leave out --workers, --cluster and --resume"
             )
         expect_folder_of(report)
-        if any(inputs_among([report], setup) for setup in files):
+        if any(find_inputs([report], setup) for setup in files):
             raise SettingError(
                 f"--report would replace '{report}', which the results come from; give it another name"
             )
@@ -161,7 +161,7 @@ def run(
     raise SystemExit(max(_codes(trials), default=0))
 
 
-def _codes(trials: list[Trial]) -> list[int]:
+def _codes(trials: list[RunRecord]) -> list[int]:
     from osimlite.tools.many import DONE, NO
 
     return [{DONE: 0, NO: 1}.get(trial.status, 2) for trial in trials]
@@ -236,7 +236,7 @@ def _show(setup: Path, outcome: Outcome) -> None:
     facts.show()
 
 
-def _show_trials(trials: list[Trial]) -> None:
+def _show_trials(trials: list[RunRecord]) -> None:
     from collections import Counter
 
     from osimlite.base.text import format_count

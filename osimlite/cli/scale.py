@@ -92,7 +92,7 @@ def scale(
     for note in result.measured.notes:
         say(note)
     if result.placed is not None:
-        for line in result.placed.told():
+        for line in result.placed.describe_pose():
             say(line)
     if result.unknown:
         say(result.unknown, err=True)

@@ -1,5 +1,5 @@
-"""Models and poses that fit measurements: inverse kinematics, scaling, placing of markers.
+"""Models and poses that fit measurements: inverse kinematics, scaling, placement of markers.
 
-:mod:`pose_fit <osimlite.fitting.pose_fit>` lays a mechanism and what is measured of it out for the
-kernel that finds poses, which is :mod:`osimlite.mechanics.kernels.pose_fit`.
+:mod:`pose_fit <osimlite.fitting.pose_fit>` packs a mechanism and its measurements for the kernel
+that computes poses, :mod:`osimlite.mechanics.kernels.pose_fit`.
 """

@@ -6,22 +6,31 @@ import math
 from collections.abc import Iterator
 
 from osimlite.base.text import format_count, join_words
-from osimlite.fitting.fitted_motion import ADVICE, FittedMotion
+from osimlite.fitting.fitted_motion import MARKER_ERROR_LIMITS_M, FittedMotion
 from osimlite.schema.base import Unknown
 from osimlite.schema.model import Model
 
-ABSURD = 1.0
-"""A root mean square of the marker errors (m) that no pose of a person leaves."""
+IMPLAUSIBLE_ERROR_M = 1.0
+"""Root mean square of marker errors (m) that no pose of a person leaves."""
 MAX_NAMED_COORDINATES = 8
-"""Coordinates that no measurement determines, which a message names."""
-IGNORED = "without effect on the fit"
-"""What becomes of parts of unknown classes where a motion is fitted to markers."""
+"""Number of undetermined coordinates that a message names."""
+NO_EFFECT = "without effect on the fit"
+"""Consequence for parts of unknown classes where a motion is fitted to markers."""
 MAX_NAMED_PARTS = 3
-"""Parts that a message names one by one."""
+"""Number of parts that a message names."""
 
 
-def told(motion: FittedMotion, advice: tuple[float, float] = ADVICE, of: str = "") -> Iterator[str]:
-    """What a user should know of a motion, beside what OpenSim's documentation advises of (some) markers, m."""
+def describe_fit(
+    motion: FittedMotion, advice: tuple[float, float] = MARKER_ERROR_LIMITS_M, of: str = ""
+) -> Iterator[str]:
+    """Yield messages about a fitted motion.
+
+    Args:
+        motion: the motion.
+        advice: limits of the root mean square and of the largest marker error that OpenSim's
+            documentation advises, m.
+        of: text that says for which markers the limits hold.
+    """
     result = motion.summary
     if "rms_marker_error" in result:
         rms, largest = result["rms_marker_error"], result["largest_marker_error"]
@@ -31,7 +40,7 @@ def told(motion: FittedMotion, advice: tuple[float, float] = ADVICE, of: str = "
             if rms < advice[0] and largest < advice[1]
             else f"; OpenSim advises less than {most} cm{of}"
         )
-        advised += "; check the units of the data" if rms > ABSURD else ""
+        advised += "; check the units of the data" if rms > IMPLAUSIBLE_ERROR_M else ""
         yield (
             f"{format_count(result['frames'], 'frame')}, {format_count(result['markers'], 'marker')}: "
             f"errors of {100.0 * rms:.2f} cm (root mean square), "
@@ -61,22 +70,18 @@ def told(motion: FittedMotion, advice: tuple[float, float] = ADVICE, of: str = "
 
 
 def find_unknown(model: Model) -> list[str]:
-    """Return the parts of a model whose classes are unknown, each as ``path (class)``.
-
-    Args:
-        model: which is searched, with all that its components hold.
-    """
+    """Return the parts of a model whose classes are unknown, each as ``path (class)``."""
     tree = model.tree()
     parts = [part for part in model.walk() if isinstance(part, Unknown)]
     return [f"{tree.path_of(part) or part.name or 'a part'} ({part.class_name})" for part in parts]
 
 
 def describe_unknown(model: Model, consequence: str) -> str:
-    """Return a sentence that names the components of unknown classes, or "" without such components.
+    """Return a sentence that names the parts of unknown classes, or "" without such parts.
 
     Args:
-        model: that was read.
-        consequence: what became of them, as in "not scaled".
+        model: the model.
+        consequence: consequence for these parts, for example "not scaled".
     """
     parts = find_unknown(model)
     if not parts:

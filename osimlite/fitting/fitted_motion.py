@@ -1,4 +1,4 @@
-"""A motion that fits measurements, and how far from them it is."""
+"""Motion that fits measurements, and its errors."""
 
 from __future__ import annotations
 
@@ -12,26 +12,32 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.trajectory import Movement
 
-ADVICE = 0.02, 0.04
-"""What OpenSim's documentation calls good: a root mean square of the marker errors of less than 2
-cm, and a largest one of less than 4 cm (m).
-"""
+MARKER_ERROR_LIMITS_M = 0.02, 0.04
+"""Limits of good fits in OpenSim's documentation: 2 cm root mean square, 4 cm largest error."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedMotion(Movement):
-    """A motion of a model that fits measured markers and orientations.
+    """Motion of a model that fits measured markers and orientations.
 
-    Attributes: mechanism: what moves. times: of the frames (t,), s. values: of all n coordinates
-        (t, n), in the mechanism's order, rad and m. markers: names of the m markers that were
-        fitted. measured: where they were measured (t, m, 3), m; NaN where one was not seen. places:
-        where they are in the fitted poses (t, m, 3), m. costs: what is least in each frame (t,).
-        steps: Newton steps of each frame (t,). unseen: numbers of the frames in which nothing was
-        seen: they have the pose before. unsettled: numbers of the frames whose best pose was not
-        reached. model: what was fitted. sensors: names of the k sensors that were fitted. turns: of
-        the sensors from where they were measured (t, k, 3), in ground, rad; NaN where one was not.
-        undetermined: names of coordinates that no measurement determines: they start at their
-        default values.
+    Attributes:
+        mechanism: mechanism of the model.
+        times: times of the frames (t,), s.
+        values: values of all coordinates (t, n), in the mechanism's order, rad and m.
+        markers: names of the m fitted markers.
+        measured: measured positions (t, m, 3), m; NaN where a marker was not seen.
+        places: positions of the markers in the fitted poses (t, m, 3), m.
+        costs: minimum of the cost in each frame (t,).
+        steps: Newton steps of each frame (t,).
+        unseen: numbers of the frames without any measurement, which have the pose of the frame
+            before.
+        unsettled: numbers of the frames in which the solver did not converge.
+        model: the model.
+        sensors: names of the k fitted sensors.
+        turns: rotation vectors of the sensors from their measured orientations (t, k, 3), in
+            ground, rad; NaN where one was not measured.
+        undetermined: names of coordinates that no measurement determines; they start at their
+            default values.
     """
 
     mechanism: Mechanism
@@ -51,18 +57,19 @@ class FittedMotion(Movement):
 
     @property
     def marker_errors(self) -> Array:
-        """How far each marker is from where it was measured (t, m), m; NaN where it was not seen."""
+        """Distances of the markers from their measured positions (t, m), m; NaN where unseen."""
         return np.asarray(np.linalg.norm(self.places - self.measured, axis=2))
 
     @property
     def orientation_errors(self) -> Array:
-        """The angle of each sensor from where it was measured (t, k), rad; NaN where it was not."""
+        """Angles of the sensors from their measurements (t, k), rad; NaN where not measured."""
         return np.asarray(np.linalg.norm(self.turns, axis=2))
 
     def to_xarray(self) -> Any:
-        """An xarray Dataset: ``value`` over ``time`` and ``coordinate``, ``marker_error`` over ``time`` and ``marker``.
+        """Return an xarray Dataset of values and errors.
 
-        If there are sensors, also ``orientation_error`` over ``time`` and ``sensor``.
+        It has ``value`` over ``time`` and ``coordinate``, ``marker_error`` over ``time`` and
+        ``marker``, and with sensors ``orientation_error`` over ``time`` and ``sensor``.
 
         Raises:
             MissingDependency: xarray is not installed.
@@ -76,7 +83,12 @@ class FittedMotion(Movement):
 
     @property
     def summary(self) -> dict[str, Any]:
-        """Root mean square and largest of each kind of errors (m, rad), where they are worst, and what was not seen."""
+        """Errors (m, rad), worst markers, sensors and times, and unseen measurements, by name.
+
+        Returns:
+            Root mean square and largest error of each kind with where they occur, share of frames
+            in which a marker or sensor is unseen, and numbers of frames.
+        """
         result: dict[str, Any] = {"frames": len(self.times), "markers": len(self.markers)}
         partly: dict[str, float] = {}
         kinds = [("marker", self.markers, self.marker_errors)]

@@ -1,4 +1,4 @@
-"""Poses frame by frame, as they are measured: inverse kinematics of live markers and sensors."""
+"""Inverse kinematics of live markers and sensors, frame by frame."""
 
 from __future__ import annotations
 
@@ -9,11 +9,15 @@ from numpy.typing import ArrayLike
 
 from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
-from osimlite.fitting.inverse_kinematics import first_pose, marker_stations, without_slides
-from osimlite.fitting.orientation_data import rotations
+from osimlite.fitting.inverse_kinematics import (
+    compute_first_pose,
+    find_marker_stations,
+    lock_translations,
+)
+from osimlite.fitting.orientation_data import to_rotations
 from osimlite.fitting.pose_fit import PoseFit
-from osimlite.fitting.pose_layout import Marker, Sensor
-from osimlite.fitting.sensors import sensor_frames
+from osimlite.fitting.pose_layout import MarkerTarget, SensorTarget
+from osimlite.fitting.sensors import find_sensor_frames
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Values
 from osimlite.mechanics.multibody.spatial import Array
@@ -21,21 +25,24 @@ from osimlite.schema.model import Model
 
 
 class FrameSolver:
-    """Finds the pose that fits markers, sensors or both, each from the one before.
+    """Solver of the pose that fits markers, sensors or both; each frame starts from the one before.
 
-    Args: model: whose poses. markers: names of its markers whose positions `step` is given, in that
-        order; if neither they nor sensors are named, all of them. weights: of markers and sensors
-        by name; those left out weigh 1. sensors: names of frames whose orientations `step` is
-        given, in that order. constraints: whether those of the model hold.
+    Args:
+        model: the model.
+        markers: names of the markers whose positions :meth:`step` receives, in that order; by
+            default all markers, or none if sensors are named.
+        weights: weights of markers and sensors by name; the others have weight 1.
+        sensors: names of the frames whose orientations :meth:`step` receives, in that order.
+        constraints: whether the constraints of the model hold.
 
     Attributes:
-        markers: as given.
-        sensors: as given.
-        coordinates: names of the coordinates, in the order of what `step` returns.
+        markers: names of the markers.
+        sensors: names of the sensors.
+        coordinates: names of the coordinates, in the order of the result of :meth:`step`.
 
     Raises:
-        SettingError: the model has no such marker or frame, or no markers at all.
-        UnsupportedError: the model has a joint or a constraint that cannot be computed.
+        SettingError: the model lacks a marker or frame, or has no markers at all.
+        UnsupportedError: osimlite does not support a joint or constraint of the model.
     """
 
     def __init__(
@@ -48,7 +55,7 @@ class FrameSolver:
         constraints: bool = True,
     ) -> None:
         mechanism = build_mechanism(model)
-        stations = marker_stations(model, mechanism)
+        stations = find_marker_stations(model, mechanism)
         self.markers = tuple((() if sensors else stations) if markers is None else markers)
         self.sensors = tuple(sensors)
         for name in (*self.markers, *(weights or {})):
@@ -58,36 +65,44 @@ class FrameSolver:
                 )
         if not self.markers and not sensors:
             raise SettingError(f"'{model.name}' has no markers; add some, or name those to fit")
-        frames = {name: sensor_frames(model, mechanism, (name,))[name] for name in self.sensors}
-        self._mechanism = mechanism if self.markers else without_slides(mechanism)
+        frames = {
+            name: find_sensor_frames(model, mechanism, (name,))[name] for name in self.sensors
+        }
+        self._mechanism = mechanism if self.markers else lock_translations(mechanism)
         weighed = dict.fromkeys((*self.markers, *self.sensors), 1.0) | dict(weights or {})
         self.coordinates = mechanism.coordinate_names
         self._fit = PoseFit(
             self._mechanism,
-            [Marker(stations[name], weighed[name]) for name in self.markers],
-            [Sensor(frame, weighed[name]) for name, frame in frames.items()],
+            [MarkerTarget(stations[name], weighed[name]) for name in self.markers],
+            [SensorTarget(frame, weighed[name]) for name, frame in frames.items()],
             constraints=constraints,
         )
-        self._begin = first_pose(self._mechanism, 0.0, constraints)
-        self._frame = self._fit.frame()
+        self._begin = compute_first_pose(self._mechanism, 0.0, constraints)
+        self._frame = self._fit.create_single_frame_fit()
         self.reset()
 
     def reset(self, q: Values | None = None) -> None:
-        """Begin anew, from a pose or from the default one: the next frame has nothing to do with those before."""
-        self._fit.start(self._begin if q is None else self._mechanism.values(q))
+        """Forget the frames before, and start from a pose, or from the default pose."""
+        self._fit.set_pose(self._begin if q is None else self._mechanism.values(q))
 
     def step(
         self, positions: ArrayLike = (), time: float = 0.0, *, orientations: ArrayLike = ()
     ) -> Array:
-        """The pose that fits one frame best: values of all coordinates (n,), rad and m.
+        """Return the pose that fits one frame best.
 
-        Args: positions: of the markers in ground (m, 3), m; NaN for one that is not seen. If
-            nothing is, the pose stays. time: s, for prescribed coordinates. orientations: of the
-            sensors in ground, quaternions (k, 4), scalar first, or rotation matrices (k, 3, 3).
+        Args:
+            positions: positions of the markers in ground (m, 3), m; NaN for an unseen marker.
+                Without any measurement the pose stays.
+            time: time in s, for prescribed coordinates.
+            orientations: orientations of the sensors in ground, quaternions (k, 4), scalar first,
+                or rotation matrices (k, 3, 3).
+
+        Returns:
+            Values of all coordinates (n,), rad and m.
 
         Raises:
-            SettingError: the values are not those of so many markers and sensors.
-            SimulationError: no pose fulfils the constraints.
+            SettingError: the arrays do not fit the numbers of markers and sensors.
+            SimulationError: no pose satisfies the constraints.
         """
         places, turned = np.asarray(positions, dtype=float), np.asarray(orientations, dtype=float)
         if places.shape != (len(self.markers), 3) and (self.markers or places.size):
@@ -96,7 +111,7 @@ class FrameSolver:
                 f"{' × '.join(map(str, places.shape)) or 'one number'}"
             )
         if self.sensors or turned.size:
-            turned = rotations(turned, "the frame")
+            turned = to_rotations(turned, "the frame")
             if turned.shape != (len(self.sensors), 3, 3):
                 raise SettingError(
                     f"the orientations of {len(self.sensors)} sensors are as many quaternions or matrices; got "
@@ -106,10 +121,13 @@ class FrameSolver:
 
     @property
     def places(self) -> Array:
-        """Where the markers are in the pose that was found last (m, 3), m."""
+        """Positions of the markers in the latest pose (m, 3), m."""
         return self._frame.places
 
     @property
     def turns(self) -> Array:
-        """How the sensors are turned from where they were measured in that pose (k, 3), in ground, rad."""
+        """Rotation vectors of the sensors from their measurements (k, 3), in ground, rad.
+
+        They belong to the latest pose.
+        """
         return self._frame.turns

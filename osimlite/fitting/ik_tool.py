@@ -1,4 +1,4 @@
-"""OpenSim's InverseKinematicsTool: tasks become weights and goals, results its files."""
+"""OpenSim's InverseKinematicsTool: weights and targets from its tasks, and its result."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.fitted_motion import FittedMotion
-from osimlite.fitting.inverse_kinematics import check_weight, fitted, marker_stations
+from osimlite.fitting.inverse_kinematics import check_weight, find_marker_stations, fit_motion
 from osimlite.fitting.marker_data import MarkerData
-from osimlite.fitting.pose_layout import Goal
+from osimlite.fitting.pose_layout import CoordinateTarget
 from osimlite.io.tables.storage import StoTable, both_of, read_sto
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -27,34 +27,42 @@ from osimlite.schema.tools.inverse_kinematics import (
     InverseKinematicsTool,
 )
 
-UNNAMED = ("", "Unassigned")
-"""What stands for no file."""
+NO_FILE = ("", "Unassigned")
+"""Values of a file property that name no file."""
 
 
-class Tasks(NamedTuple):
-    """What inverse kinematics is asked for."""
+class FitTargets(NamedTuple):
+    """Targets of inverse kinematics."""
 
     # of the markers that are fitted or reported, in the order of the data
     weights: dict[str, float]
-    goals: list[Goal]  # coordinates that are to have values
+    goals: list[CoordinateTarget]  # coordinates that are to have values
     wanted: Array  # these values (t, k), rad or m
 
 
-def tasks_of(
+def collect_targets(
     model: Model,
     mechanism: Mechanism,
     tasks: Iterable[IKTask],
     data: MarkerData,
     coordinates: StoTable | None,
-) -> Tasks:
-    """What a set of tasks asks for of a model and data.
+) -> FitTargets:
+    """Return the targets that a set of tasks defines.
 
-    Without a marker task that applies, all markers weigh 1. Values from a file are taken in
-    degrees, whatever it says, and from splines of fifth degree, as in OpenSim.
+    Without a marker task that applies, all markers have weight 1. As in OpenSim, values from a file
+    are taken as degrees, whatever its header says, and interpolated by splines of degree five.
+
+    Args:
+        model: the model.
+        mechanism: mechanism of the model.
+        tasks: tasks of the setup.
+        data: measured markers.
+        coordinates: values of coordinates from a file, or None.
 
     Raises:
-        SettingError: a coordinate is not there, has no value in the file, or a weight is none.
-        OsimliteError: no marker of the tasks is in the model and in the data.
+        SettingError: a coordinate does not exist or has no value in the file, or a weight is
+            invalid.
+        OsimliteError: the model and the data share no marker of the tasks.
     """
     applied = [task for task in tasks if task.apply]
     for task in applied:
@@ -62,25 +70,25 @@ def tasks_of(
     asked = {
         task.name: float(task.weight) for task in applied if isinstance(task, IKMarkerTask)
     } or None
-    names = data.shared([*marker_stations(model, mechanism)], asked)
+    names = data.find_shared_names([*find_marker_stations(model, mechanism)], asked)
     weights = {name: 1.0 if asked is None else asked[name] for name in names}
     goals, wanted = [], []
     for task in applied:
         if isinstance(task, IKCoordinateTask):
             place = mechanism.coordinate_index(task.name)
-            goals.append(Goal(place, float(task.weight)))
-            wanted.append(_values(task, mechanism, place, data.times, coordinates))
-    return Tasks(weights, goals, np.array(wanted).reshape(len(goals), len(data.times)).T)
+            goals.append(CoordinateTarget(place, float(task.weight)))
+            wanted.append(_compute_target_values(task, mechanism, place, data.times, coordinates))
+    return FitTargets(weights, goals, np.array(wanted).reshape(len(goals), len(data.times)).T)
 
 
-def _values(
+def _compute_target_values(
     task: IKCoordinateTask,
     mechanism: Mechanism,
     place: int,
     times: Array,
     coordinates: StoTable | None,
 ) -> Array:
-    """The values of a coordinate task over time, rad or m."""
+    """Return the target values of a coordinate over time, rad or m."""
     info = mechanism.coordinates[place]
     if task.value_type == "manual_value":
         return np.full(len(times), float(task.value))
@@ -111,21 +119,31 @@ def _values(
 def run_inverse_kinematics(
     tool: InverseKinematicsTool, model: Model, data: MarkerData, coordinates: StoTable | None = None
 ) -> FittedMotion:
-    """What the tool computes, for a model and data that are read already; errors as those of `tasks_of`."""
+    """Compute the motion of an InverseKinematicsTool.
+
+    Args:
+        tool: the setup.
+        model: the model.
+        data: measured markers.
+        coordinates: values of coordinates from a file, or None.
+
+    Raises:
+        OsimliteError: as for :func:`collect_targets`.
+    """
     first, last = both_of(tool.time_range)
-    frames = data.between(first, last)
+    frames = data.select_times(first, last)
     mechanism = build_mechanism(model)
-    tasks = tasks_of(model, mechanism, tool.ik_task_set.objects, frames, coordinates)
-    return fitted(model, mechanism, frames, tasks.weights, tasks.goals, tasks.wanted)
+    tasks = collect_targets(model, mechanism, tool.ik_task_set.objects, frames, coordinates)
+    return fit_motion(model, mechanism, frames, tasks.weights, tasks.goals, tasks.wanted)
 
 
-def motion_table(motion: FittedMotion) -> StoTable:
-    """The coordinates as the tool writes them, in degrees."""
+def create_motion_table(motion: FittedMotion) -> StoTable:
+    """Return the table of coordinates that the tool writes, in degrees."""
     return StoTable(
         "Coordinates", motion.times, motion.coordinates, motion.in_degrees, in_degrees=True
     )
 
 
-def coordinate_table(name: str, folder: Path) -> StoTable | None:
-    """The coordinate file of a setup, if it names one."""
-    return None if name in UNNAMED else read_sto(folder / name)
+def read_coordinate_table(name: str, folder: Path) -> StoTable | None:
+    """Return the coordinate file of a setup; None if the setup names none."""
+    return None if name in NO_FILE else read_sto(folder / name)

@@ -1,9 +1,9 @@
-"""Inverse kinematics: the motion of a model that fits measured markers and orientations best, to the last digits.
+"""Inverse kinematics: motion of a model that fits measured markers and orientations best.
 
-OpenSim minimises the same cost, but for numbers that it leaves out: half the weighted mean of the
-squared distances of the markers that were seen, half that of the squared angles by which sensors
-are turned from where they were measured, and half of the weighted squared deviations of
-coordinates.
+The cost of a frame is half the weighted mean of the squared distances of the markers that were
+seen, plus half the weighted mean of the squared rotation angles of sensors from their measurements,
+plus half the weighted squared deviations of coordinates. OpenSim minimizes the same cost up to
+constant factors.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from osimlite.base.records import replace
 from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.fitted_motion import FittedMotion
-from osimlite.fitting.marker_data import MarkerData, Measured
-from osimlite.fitting.orientation_data import OrientationData, Orientations
-from osimlite.fitting.pose_fit import PoseFit, Poses
-from osimlite.fitting.pose_layout import Goal, Marker, Sensor
-from osimlite.fitting.sensors import sensor_frames
+from osimlite.fitting.marker_data import MarkerData, MarkerSource
+from osimlite.fitting.orientation_data import OrientationData, OrientationSource
+from osimlite.fitting.pose_fit import FittedPoses, PoseFit
+from osimlite.fitting.pose_layout import CoordinateTarget, MarkerTarget, SensorTarget
+from osimlite.fitting.sensors import find_sensor_frames
 from osimlite.fitting.undetermined import find_undetermined
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.constraints import Lock, Prescribed
@@ -30,15 +30,15 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.markers import Marker as ModelMarker
 from osimlite.schema.model import Model
 
-SAME_TIMES = 1e-9
-"""What the times of markers and orientations may be apart (s)."""
+TIME_TOLERANCE_S = 1e-9
+"""Largest difference between the times of markers and of orientations, s."""
 
 
 def inverse_kinematics(
     model: Model,
-    markers: Measured | None = None,
+    markers: MarkerSource | None = None,
     *,
-    orientations: Orientations | None = None,
+    orientations: OrientationSource | None = None,
     times: ArrayLike | None = None,
     weights: Mapping[str, float] | None = None,
     coordinates: Mapping[str, float | tuple[float, float]] | None = None,
@@ -46,45 +46,54 @@ def inverse_kinematics(
     start: float = -np.inf,
     end: float = np.inf,
 ) -> FittedMotion:
-    """Fit the pose of a model to measured markers, orientations of sensors, or both, frame by frame.
+    """Fit the pose of a model to measured markers, orientations of sensors, or both, in each frame.
 
-    Args: model: whose markers have the names of the measured ones, and frames those of the sensors.
+    Args:
+        model: model with markers named as the measured ones, and frames named as the sensors.
         markers: a .trc, .c3d or .sto file, or arrays (t, 3) by name in ground, m; NaN where a
-        marker was not seen. orientations: a .sto file of quaternions, or by name arrays of
-        quaternions (t, 4), scalar first, or rotation matrices (t, 3, 3) that turn what is given
-        along the axes of a sensor into ground; NaN where one was not measured. Without markers they
-        say nothing of where the model is: coordinates that are translations keep their default
-        values, as in OpenSim. With markers they are of the same times. times: of the frames of
-        arrays, s; by default 0, 1, 2 ... weights: of markers and sensors by name; those left out
-        weigh 1, those of 0 do not count. coordinates: weights (1/rad², 1/m²) of coordinates that
-        are to keep their default values, by name, or the weight and the value (rad or m) that one
-        is to have. Beside the mean over the markers such a weight of 1 is large. constraints:
-        whether those of the model hold. start: first time, s. end: last time, s.
+            marker was not seen.
+        orientations: a .sto file of quaternions, or by name arrays of quaternions (t, 4), scalar
+            first, or rotation matrices (t, 3, 3) from the axes of a sensor to ground; NaN where one
+            was not measured. Without markers, translational coordinates keep their default values,
+            as in OpenSim. With markers, both must have the same times.
+        times: times of the frames of arrays, s; by default 0, 1, 2 ...
+        weights: weights of markers and sensors by name; the others have weight 1, and weight 0
+            excludes.
+        coordinates: by name, the weight (1/rad², 1/m²) with which a coordinate keeps its default
+            value, or the weight and the target value (rad or m). A weight of 1 is large compared
+            with the mean over the markers.
+        constraints: whether the constraints of the model hold.
+        start: first time, s.
+        end: last time, s.
 
-    Returns: The motion, every frame at its minimum to 1e-8 rad. Clamped coordinates stay in their
-        ranges, locked ones at their defaults.
+    Returns:
+        The motion, each frame at its minimum to 1e-8 rad. Clamped coordinates stay in their ranges,
+        locked ones at their default values.
 
     Raises:
-        OsimliteError: a file cannot be read, or no marker is in both the model and the data.
-        SettingError: nothing is given, or a weight, a goal or all sensors name what is not there.
-        SimulationError: no pose fulfils the constraints.
-        UnsupportedError: the model has a joint or a constraint that cannot be computed.
+        OsimliteError: a file cannot be read, or the model and the data share no marker.
+        SettingError: there is nothing to fit, or a weight, a target or all sensors have unknown
+            names.
+        SimulationError: no pose satisfies the constraints.
+        UnsupportedError: osimlite does not support a joint or constraint of the model.
     """
     if markers is None and orientations is None:
         raise SettingError("there is nothing to fit; give markers, orientations, or both")
     turned = (
         None
         if orientations is None
-        else OrientationData.of(orientations, times).between(start, end)
+        else OrientationData.from_source(orientations, times).select_times(start, end)
     )
     if markers is not None:
-        data = MarkerData.of(markers, times).between(start, end)
+        data = MarkerData.from_source(markers, times).select_times(start, end)
     elif turned is not None:
-        data = MarkerData.nothing(turned.times)
+        data = MarkerData.create_empty(turned.times)
     mechanism = build_mechanism(model)
-    stations = marker_stations(model, mechanism)
-    frames = {} if turned is None else sensor_frames(model, mechanism, turned.names)
-    weighed = {name: 1.0 for name in (data.shared([*stations]) if markers is not None else ())}
+    stations = find_marker_stations(model, mechanism)
+    frames = {} if turned is None else find_sensor_frames(model, mechanism, turned.names)
+    weighed = {
+        name: 1.0 for name in (data.find_shared_names([*stations]) if markers is not None else ())
+    }
     sensed = {name: 1.0 for name in frames}
     for name, weight in (weights or {}).items():
         if name not in stations and name not in frames:
@@ -101,50 +110,61 @@ def inverse_kinematics(
         weight, value = (
             goal if isinstance(goal, tuple) else (goal, mechanism.coordinates[place].default_value)
         )
-        goals.append(Goal(place, float(weight)))
+        goals.append(CoordinateTarget(place, float(weight)))
         wanted.append(float(value))
     rows = np.tile(wanted, (len(data.times), 1))
-    return fitted(model, mechanism, data, weighed, goals, rows, constraints, turned, sensed)
+    return fit_motion(model, mechanism, data, weighed, goals, rows, constraints, turned, sensed)
 
 
-def fitted(
+def fit_motion(
     model: Model,
     mechanism: Mechanism,
     data: MarkerData,
     weights: Mapping[str, float],
-    goals: Sequence[Goal],
+    goals: Sequence[CoordinateTarget],
     wanted: Array,
     constraints: bool = True,
     orientations: OrientationData | None = None,
     sensed: Mapping[str, float] | None = None,
 ) -> FittedMotion:
-    """Fit markers and sensors of a model that are in the data, by their weights, and coordinates to values (t, k).
+    """Fit markers, sensors and coordinates of a model.
+
+    Args:
+        model: the model.
+        mechanism: mechanism of the model.
+        data: measured markers.
+        weights: weights of the markers to fit, by name.
+        goals: k coordinates with target values.
+        wanted: target values (t, k), rad or m.
+        constraints: whether the constraints of the model hold.
+        orientations: measured orientations of sensors, or None.
+        sensed: weights of the sensors to fit, by name.
 
     Raises:
-        SettingError: markers and orientations are not of the same times.
+        SettingError: markers and orientations have different times.
     """
-    turned = OrientationData.nothing(data.times) if orientations is None else orientations
+    turned = OrientationData.create_empty(data.times) if orientations is None else orientations
     if (
         data.times.shape != turned.times.shape
-        or np.abs(data.times - turned.times).max() > SAME_TIMES
+        or np.abs(data.times - turned.times).max() > TIME_TOLERANCE_S
     ):
         raise SettingError(
             f"the {len(data.times)} frames of the markers and the {len(turned.times)} of the orientations are not of "
             "the same times; give both at the times of one"
         )
     if not data.names:
-        mechanism = without_slides(mechanism)
-    names, sensors = tuple(weights), sensor_frames(model, mechanism, sensed) if sensed else {}
-    stations = marker_stations(model, mechanism)
-    points = [Marker(stations[name], weights[name]) for name in names]
-    turning = [Sensor(frame, (sensed or {})[name]) for name, frame in sensors.items()]
+        mechanism = lock_translations(mechanism)
+    names, sensors = tuple(weights), find_sensor_frames(model, mechanism, sensed) if sensed else {}
+    stations = find_marker_stations(model, mechanism)
+    points = [MarkerTarget(stations[name], weights[name]) for name in names]
+    turning = [SensorTarget(frame, (sensed or {})[name]) for name, frame in sensors.items()]
     fit = PoseFit(mechanism, points, turning, goals, constraints=constraints)
-    measured, count = data.only(names), len(data.times)
-    given = measured, turned.only([*sensors]), wanted
-    poses: Poses = fit.fit(
+    measured, count = data.select_values(names), len(data.times)
+    given = measured, turned.select_values([*sensors]), wanted
+    poses: FittedPoses = fit.fit_frames(
         np.hstack([item.reshape(count, -1) for item in given]),
         data.times,
-        first_pose(mechanism, float(data.times[0]), constraints),
+        compute_first_pose(mechanism, float(data.times[0]), constraints),
     )
     seen = np.asarray(np.isfinite(measured).all(axis=2))
     undetermined = find_undetermined(
@@ -169,17 +189,21 @@ def fitted(
 
 
 def check_weight(weight: float, what: str) -> None:
-    """Refuse what is no weight.
+    """Raise an error for an invalid weight.
+
+    Args:
+        weight: the weight.
+        what: what it belongs to, for the message.
 
     Raises:
-        SettingError: it is negative, infinite or no number.
+        SettingError: the weight is negative, infinite or NaN.
     """
     if not 0.0 <= weight < np.inf:
         raise SettingError(f"the weight {weight:g} of {what} is no weight; give one from 0 on")
 
 
-def without_slides(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with all translations locked at their default values, as OpenSim fits orientations."""
+def lock_translations(mechanism: Mechanism) -> Mechanism:
+    """Return a mechanism with all translations locked, as OpenSim fits orientations."""
     infos = tuple(
         replace(info, locked=True) if info.motion_type == "translational" else info
         for info in mechanism.coordinates
@@ -190,13 +214,21 @@ def without_slides(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, coordinates=infos, constraints=others)
 
 
-def first_pose(mechanism: Mechanism, time: float, constraints: bool) -> Array:
-    """Where a fit begins: the default pose."""
+def compute_first_pose(mechanism: Mechanism, time: float, constraints: bool) -> Array:
+    """Return the default pose (n,), in which a fit starts."""
     return mechanism.assemble({}, time) if constraints else mechanism.values({})
 
 
-def marker_stations(model: Model, mechanism: Mechanism) -> dict[str, StationPlacement]:
-    """Where the markers of a model are on its bodies, by their names; of markers that share a name the first."""
+def find_marker_stations(model: Model, mechanism: Mechanism) -> dict[str, StationPlacement]:
+    """Return body and location of each marker by name; the first of several with one name counts.
+
+    Args:
+        model: the model.
+        mechanism: mechanism of the model.
+
+    Returns:
+        Stations by name.
+    """
     tree, result = model.tree(), dict[str, StationPlacement]()
     for marker in model.components(ModelMarker):
         placed = mechanism.stations.get(tree.path_of(marker) or "")

@@ -1,4 +1,4 @@
-"""Measured markers: from .trc and .c3d files, tables, and arrays."""
+"""Measured markers from .trc and .c3d files, tables and arrays."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from osimlite.base.files import read_file
 from osimlite.base.records import dataclass
 from osimlite.errors import DocumentError
-from osimlite.fitting.recorded import Recording
+from osimlite.fitting.measurements import Measurements
 from osimlite.io.tables.c3d import ENDING, read_c3d_markers
 from osimlite.io.tables.headers import METRES, MarkerHeader
 from osimlite.io.tables.storage import read_sto
@@ -19,22 +19,22 @@ from osimlite.mechanics.multibody.spatial import Array
 
 
 @dataclass(frozen=True, eq=False)
-class MarkerData(Recording):
-    """Places of m markers in ground at t times (t, m, 3), m; NaN where a marker was not seen."""
+class MarkerData(Measurements):
+    """Measured positions of m markers in ground (t, m, 3), m; NaN where a marker was not seen."""
 
     noun, shape = "marker", (3,)
 
     @classmethod
-    def of(cls, source: Measured, times: ArrayLike | None = None) -> MarkerData:
-        """Markers from a file, or from arrays (t, 3) or (3,) in metres by their names.
+    def from_source(cls, source: MarkerSource, times: ArrayLike | None = None) -> MarkerData:
+        """Return markers from a file, or from arrays (t, 3) or (3,) by name, m.
 
         Args:
-            source: a .trc, .c3d or .sto file, arrays by name, or what is markers already.
-            times: of the frames of arrays, s; by default 0, 1, 2 ...
+            source: a .trc, .c3d or .sto file, arrays by name, or MarkerData.
+            times: times of the frames of arrays, s; by default 0, 1, 2 ...
 
         Raises:
-            MissingFileError: there is no such file.
-            DocumentError: it is damaged.
+            MissingFileError: the file does not exist.
+            DocumentError: the file is damaged.
             SettingError: the arrays do not fit together.
             MissingDependency: ezc3d, which reads .c3d files, is not installed.
         """
@@ -42,33 +42,37 @@ class MarkerData(Recording):
             return source
         if isinstance(source, str | Path):
             return _READERS.get(Path(source).suffix.lower(), read_trc)(source)
-        return cls.of_arrays(source, times)
+        return cls.from_arrays(source, times)
 
     @property
     def positions(self) -> Array:
-        """The places (t, m, 3), m."""
+        """Positions (t, m, 3), m."""
         return self.values
 
-    def between(self, first: float, last: float) -> MarkerData:
-        """The frames from the one nearest to a time to the one nearest to another, both cut to the data.
+    def select_times(self, first: float, last: float) -> MarkerData:
+        """Return the frames between those nearest to two times.
+
+        Args:
+            first: first time, s; earlier than the data means from the start.
+            last: last time, s; later than the data means to the end.
 
         Raises:
-            SettingError: no frame lies between.
+            SettingError: there is no frame between these times.
         """
         low, high = max(first, float(self.times[0])), min(last, float(self.times[-1]))
         if not low <= high:
-            raise self.none_between(first, last)
+            raise self.create_range_error(first, last)
         start, end = (int(np.argmin(np.abs(self.times - t))) for t in (low, high))
-        return self.rows(start, end + 1)
+        return self.slice_frames(start, end + 1)
 
 
 def read_trc(path: str | Path) -> MarkerData:
-    """The markers of a .trc file.
+    """Read the markers of a .trc file.
 
     An empty cell, or NaN, is a marker that was not seen.
 
     Raises:
-        MissingFileError: there is no such file.
+        MissingFileError: the file does not exist.
         DocumentError: its header or a row is damaged; with line and column.
     """
     data, file = read_file(path), str(path)
@@ -100,7 +104,7 @@ def read_trc(path: str | Path) -> MarkerData:
                 line=number,
             )
         rows.append(
-            [_number(cell, file, number, index) for index, cell in enumerate(cells[:width])]
+            [_parse_number(cell, file, number, index) for index, cell in enumerate(cells[:width])]
         )
         rows[-1] += [np.nan] * (width - len(rows[-1]))
     table = np.array(rows, dtype=float).reshape(-1, width)
@@ -109,7 +113,8 @@ def read_trc(path: str | Path) -> MarkerData:
     )
 
 
-def _number(cell: str, file: str, line: int, place: int) -> float:
+def _parse_number(cell: str, file: str, line: int, place: int) -> float:
+    """Return the number in a cell; NaN for an empty one."""
     text = cell.strip()
     try:
         return float(text) if text else np.nan
@@ -122,11 +127,11 @@ def _number(cell: str, file: str, line: int, place: int) -> float:
 
 
 def read_sto_markers(path: str | Path) -> MarkerData:
-    """The markers of a table of Vec3 (.sto), or of one with three columns for each marker, in metres.
+    """Read the markers of a table of Vec3 (.sto), or of three columns for each marker, in metres.
 
     Raises:
-        MissingFileError: there is no such file.
-        DocumentError: it is damaged, or its columns are no markers.
+        MissingFileError: the file does not exist.
+        DocumentError: the file is damaged, or its columns are not markers.
     """
     table = read_sto(path)
     ends = ("_x", "_y", "_z") if table.kind == "Vec3" else ("_tx", "_ty", "_tz")
@@ -142,17 +147,18 @@ def read_sto_markers(path: str | Path) -> MarkerData:
 
 
 def read_c3d(path: str | Path) -> MarkerData:
-    """The markers of a .c3d file, in the axes of the file.
+    """Read the markers of a .c3d file, along the axes of the file.
 
     Raises:
-        MissingFileError: there is no such file.
-        DocumentError: it is no .c3d file.
+        MissingFileError: the file does not exist.
+        DocumentError: the file is not a .c3d file.
         MissingDependency: ezc3d is not installed.
     """
     return MarkerData(*read_c3d_markers(path), str(path))
 
 
-Measured = MarkerData | str | Path | Mapping[str, ArrayLike]
-"""Markers in any form."""
+MarkerSource = MarkerData | str | Path | Mapping[str, ArrayLike]
+"""Anything from which markers can be read."""
 
 _READERS = {".trc": read_trc, ENDING: read_c3d, ".sto": read_sto_markers}
+"""Readers by suffix of the file; .trc is the default."""

@@ -1,4 +1,4 @@
-"""How large the bodies of a subject are beside those of a generic model: ratios of distances between markers."""
+"""Scale factors of bodies from ratios of distances between markers, measured to model."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError
-from osimlite.fitting.inverse_kinematics import marker_stations
+from osimlite.fitting.inverse_kinematics import find_marker_stations
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -18,12 +18,12 @@ from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.model import Model
 from osimlite.schema.tools.scale import Measurement, Scale, ScaleSet
 
-NEARLY = 1e-16
-"""By how much (s) a time may fall short of the end of a range and be taken for it, as in OpenSim."""
+TIME_TOLERANCE_S = 1e-16
+"""Time by which the last frame of a range may precede its end, as in OpenSim, s."""
 
 
-class Measured(NamedTuple):
-    """What measurements come to."""
+class ScaleFactors(NamedTuple):
+    """Scale factors of bodies, and the measurements behind them."""
 
     # along the three axes of every physical frame, by their names in the order of the model
     factors: dict[str, list[float]]
@@ -31,52 +31,54 @@ class Measured(NamedTuple):
     notes: list[str]  # what was left out, and why
 
 
-class Measuring:
-    """Finds factors for the bodies of a model.
+class ScaleFactorFinder:
+    """Finder of scale factors for the bodies of a model.
 
     Args:
-        model: the generic one.
+        model: the generic model.
 
     Attributes:
-        mechanism: of it.
+        mechanism: mechanism of the model.
+        found: scale factors so far.
+        frames: names of the physical frames.
     """
 
     def __init__(self, model: Model) -> None:
         self._model, self.mechanism = model, build_mechanism(model)
-        self._stations = marker_stations(model, self.mechanism)
-        self._state = self.mechanism.at(_default(self.mechanism))
+        self._stations = find_marker_stations(model, self.mechanism)
+        self._state = self.mechanism.at(_compute_default_pose(self.mechanism))
         names = [frame.name for frame in model.components(PhysicalFrame)]
-        self.found = Measured({name: [1.0, 1.0, 1.0] for name in names}, {}, [])
+        self.found = ScaleFactors({name: [1.0, 1.0, 1.0] for name in names}, {}, [])
         self.frames = names
 
-    def by_hand(self, scales: Iterable[Scale]) -> None:
-        """Take factors that are given."""
+    def apply_factors(self, scales: Iterable[Scale]) -> None:
+        """Set scale factors that a setup prescribes."""
         for scale in scales:
             if scale.apply:
                 name = str(getattr(scale.segment, "name", scale.segment))
                 if self._is_known(name, "scale factors given by hand"):
                     self.found.factors[name] = [float(factor) for factor in scale.scales]
 
-    def by_measurements(
+    def apply_measurements(
         self, measurements: Iterable[Measurement], data: MarkerData, first: float, last: float
     ) -> None:
-        """Take those that distances of markers give, the mean of their ratios over the pairs of each measurement.
+        """Set scale factors by measurements: mean ratios of distances over the pairs of markers.
 
-        A measurement of which a marker is missing, or was not seen in a frame of the range, is left
-        out.
+        A measurement is left out if one of its markers is missing or unseen in a frame of the
+        range.
 
         Args:
-            measurements: in the order in which they overwrite one another.
+            measurements: measurements; later ones overwrite earlier ones.
             data: measured markers of the standing subject.
-            first: time from which distances are averaged, s.
-            last: time up to which, s.
+            first: start of the range over which distances are averaged, s.
+            last: end of the range, s.
         """
-        frames = frames_between(data.times, first, last)
+        frames = select_frames(data.times, first, last)
         for number, measurement in enumerate(measurements, start=1):
             if not measurement.apply:
                 continue
             name = measurement.name or f"number {number}"
-            ratio, reason = self._ratio(measurement, data, frames)
+            ratio, reason = self._compute_ratio(measurement, data, frames)
             if reason:
                 self.found.notes.append(f"measurement '{name}' is left out: {reason}")
                 continue
@@ -86,10 +88,14 @@ class Measuring:
                     if axis.lower() in ("x", "y", "z"):
                         self.found.factors[body.name]["xyz".index(axis.lower())] = ratio
 
-    def _ratio(
+    def _compute_ratio(
         self, measurement: Measurement, data: MarkerData, frames: slice
     ) -> tuple[float, str]:
-        """Measured to model, or why there is none."""
+        """Return the ratio of measured to model distances.
+
+        Returns:
+            The ratio, and ""; or 0 and the reason why the measurement is left out.
+        """
         ratios = []
         for pair in measurement.marker_pair_set.objects:
             names = [getattr(marker, "name", None) or str(marker) for marker in pair.markers]
@@ -108,7 +114,7 @@ class Measuring:
                     )
             one, two = (self._state.point(*self._stations[marker]) for marker in names)
             length = float(np.linalg.norm(one - two))
-            places = data.only(names)[frames]
+            places = data.select_values(names)[frames]
             measured = float(np.mean(np.linalg.norm(places[:, 0] - places[:, 1], axis=1)))
             if not np.isfinite(measured):
                 return 0.0, f"{join_words(names)} were not seen in every frame of the time range"
@@ -118,7 +124,7 @@ class Measuring:
         return (float(np.mean(ratios)), "") if ratios else (0.0, "it has no pairs of markers")
 
     def _is_known(self, name: str, what: str) -> bool:
-        """Whether there is a frame of a name; if not it is noted."""
+        """Return whether the model has a frame of a name; add a note if not."""
         if name not in self.found.factors:
             self.found.notes.append(
                 f"{what}: the model has no body '{name}'{suggest_name(name, self.found.factors)}"
@@ -126,16 +132,28 @@ class Measuring:
         return name in self.found.factors
 
 
-def scale_set(frames: Iterable[str], measured: Measured) -> ScaleSet:
-    """The factors of physical frames, by their names, as OpenSim writes them."""
+def create_scale_set(frames: Iterable[str], measured: ScaleFactors) -> ScaleSet:
+    """Return scale factors as the object that OpenSim writes.
+
+    Args:
+        frames: names of physical frames, in order.
+        measured: their factors.
+    """
     scales = [
         Scale(scales=tuple(measured.factors[name]), segment=name, apply=True) for name in frames
     ]
     return ScaleSet(objects=scales)
 
 
-def frames_between(times: Array, first: float, last: float) -> slice:
-    """The frames from the last one not after a time to the first one not before another, as OpenSim counts them.
+def select_frames(times: Array, first: float, last: float) -> slice:
+    """Return the frames that OpenSim averages over a range of times.
+
+    They reach from the last frame up to the first time to the first frame from the last time on.
+
+    Args:
+        times: times of the frames (t,), s.
+        first: start of the range, s.
+        last: end of the range, s.
 
     Raises:
         SettingError: the range ends before it begins.
@@ -143,9 +161,10 @@ def frames_between(times: Array, first: float, last: float) -> slice:
     if first > last:
         raise SettingError(f"the time range ends at {last:g} s, before it begins at {first:g} s")
     start = max(int(np.searchsorted(times, first, side="right")) - 1, 0)
-    later = np.flatnonzero(times[start:] >= last - NEARLY)
+    later = np.flatnonzero(times[start:] >= last - TIME_TOLERANCE_S)
     return slice(start, start + int(later[0]) + 1 if len(later) else len(times))
 
 
-def _default(mechanism: Mechanism) -> Array:
+def _compute_default_pose(mechanism: Mechanism) -> Array:
+    """Return the default pose (n,), which satisfies the constraints."""
     return mechanism.assemble({})

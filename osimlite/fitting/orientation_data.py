@@ -1,4 +1,4 @@
-"""Measured orientations of sensors: from tables of quaternions, and from arrays."""
+"""Measured orientations of sensors, from tables of quaternions and from arrays."""
 
 from __future__ import annotations
 
@@ -10,68 +10,82 @@ from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import DocumentError, SettingError
-from osimlite.fitting.recorded import Recording
+from osimlite.fitting.measurements import Measurements
 from osimlite.io.tables.storage import read_sto
 from osimlite.io.tables.table_stream import TableStream
 from osimlite.mechanics.multibody.spatial import Array, rotation_about_space, rotation_of
 
-KIND = "Quaternion"
-"""What a table of orientations holds."""
-SAME_TIME = 1e-14
-"""What times may be off that are taken for the same, as OpenSim has it (s)."""
+QUATERNION = "Quaternion"
+"""Type of the values in a table of orientations."""
+TIME_TOLERANCE_S = 1e-14
+"""Largest difference of times that count as equal in OpenSim, s."""
 
 
 @dataclass(frozen=True, eq=False)
-class OrientationData(Recording):
-    """Rotation matrices of k sensors in ground at t times (t, k, 3, 3); NaN where one was not measured."""
+class OrientationData(Measurements):
+    """Rotation matrices of k sensors in ground (t, k, 3, 3); NaN where one was not measured."""
 
     noun, shape = "sensor", (3, 3)
 
     @classmethod
-    def of(cls, source: Orientations, times: ArrayLike | None = None) -> OrientationData:
-        """Orientations from a file, or from arrays by the names of the sensors.
+    def from_source(
+        cls, source: OrientationSource, times: ArrayLike | None = None
+    ) -> OrientationData:
+        """Return orientations from a file, or from arrays by the names of the sensors.
 
-        Args: source: a .sto file of quaternions; or by name quaternions (t, 4), scalar first, or
-            rotation matrices (t, 3, 3), which turn what is given along the axes of a sensor into
-            ground; or what is these already. times: of the frames of arrays, s; by default 0, 1, 2
-            ...
+        Args:
+            source: a .sto file of quaternions; or by name quaternions (t, 4), scalar first, or
+                rotation matrices (t, 3, 3) from the axes of a sensor to ground; or OrientationData.
+            times: times of the frames of arrays, s; by default 0, 1, 2 ...
 
         Raises:
-            MissingFileError: there is no such file.
-            DocumentError: it is damaged, or it holds no quaternions.
+            MissingFileError: the file does not exist.
+            DocumentError: the file is damaged, or has no quaternions.
             SettingError: the arrays do not fit together.
         """
         if isinstance(source, OrientationData):
             return source
         if isinstance(source, str | Path):
             return read_orientations(source)
-        return cls.of_arrays(
-            {name: rotations(value, f"sensor '{name}'") for name, value in source.items()}, times
+        return cls.from_arrays(
+            {name: to_rotations(value, f"sensor '{name}'") for name, value in source.items()}, times
         )
 
-    def between(self, first: float, last: float) -> OrientationData:
-        """The frames from a time up to another, these included.
+    def select_times(self, first: float, last: float) -> OrientationData:
+        """Return the frames between two times, both included.
+
+        Args:
+            first: first time, s.
+            last: last time, s.
 
         Raises:
-            SettingError: no frame lies between.
+            SettingError: there is no frame between these times.
         """
         inside = np.flatnonzero(
-            (self.times >= first - SAME_TIME) & (self.times <= last + SAME_TIME)
+            (self.times >= first - TIME_TOLERANCE_S) & (self.times <= last + TIME_TOLERANCE_S)
         )
         if not len(inside):
-            raise self.none_between(first, last)
-        return self.rows(int(inside[0]), int(inside[-1]) + 1)
+            raise self.create_range_error(first, last)
+        return self.slice_frames(int(inside[0]), int(inside[-1]) + 1)
 
-    def turned(self, angles: ArrayLike) -> OrientationData:
-        """The same in a ground whose axes are turned by angles (3,) about X, Y and Z of space (rad)."""
+    def rotate_ground(self, angles: ArrayLike) -> OrientationData:
+        """Return the orientations in a rotated ground.
+
+        Args:
+            angles: rotation of the ground about X, Y and Z of space (3,), rad.
+        """
         return replace(self, values=rotation_about_space(angles) @ self.values)
 
 
-def rotations(values: ArrayLike, what: str) -> Array:
-    """Rotation matrices (..., 3, 3) of quaternions (..., 4), or of what is rotation matrices.
+def to_rotations(values: ArrayLike, what: str) -> Array:
+    """Return rotation matrices (..., 3, 3) from quaternions (..., 4) or from rotation matrices.
+
+    Args:
+        values: quaternions, scalar first, or rotation matrices.
+        what: what they belong to, for the message.
 
     Raises:
-        SettingError: it is neither.
+        SettingError: the array has neither shape.
     """
     given = np.asarray(values, dtype=float)
     if given.ndim >= 1 and given.shape[-1] == 4:
@@ -85,24 +99,30 @@ def rotations(values: ArrayLike, what: str) -> Array:
 
 
 def holds_orientations(path: str | Path) -> bool:
-    """Whether a file is a table of quaternions; errors as those of :class:`TableStream`."""
+    """Return whether a file is a table of quaternions.
+
+    Raises:
+        OsimliteError: as for :class:`TableStream`.
+    """
     if Path(path).suffix.lower() != ".sto":
         return False
     with TableStream(path) as stream:
-        return stream.kind == KIND
+        return stream.kind == QUATERNION
 
 
 def read_orientations(path: str | Path) -> OrientationData:
-    """The orientations of a .sto file; a quaternion of zeros, or with NaN, is a sensor that was not heard.
+    """Read the orientations of a .sto file.
+
+    A quaternion of zeros, or with NaN, is a sensor that was not measured.
 
     Raises:
-        MissingFileError: there is no such file.
-        DocumentError: it is damaged, or it holds no quaternions.
+        MissingFileError: the file does not exist.
+        DocumentError: the file is damaged, or has no quaternions.
     """
     table = read_sto(path)
-    if table.kind != KIND:
+    if table.kind != QUATERNION:
         raise DocumentError(
-            f"the table holds {table.kind}, not quaternions; its header must say DataType={KIND}",
+            f"the table holds {table.kind}, not quaternions; its header must say DataType={QUATERNION}",
             file=str(path),
         )
     names = tuple(label.removesuffix("_1") for label in table.columns[::4])
@@ -111,5 +131,5 @@ def read_orientations(path: str | Path) -> OrientationData:
     )
 
 
-Orientations = OrientationData | str | Path | Mapping[str, ArrayLike]
-"""Orientations in any form."""
+OrientationSource = OrientationData | str | Path | Mapping[str, ArrayLike]
+"""Anything from which orientations can be read."""

@@ -1,10 +1,10 @@
-"""A model that fits a person: sizes of the segments, places of the markers and all poses at once, from any trials.
+"""Model that fits a person: sizes of segments, positions of markers and poses from any trials.
 
-What is least is the sum of the squared distances of the markers over chosen frames, and of how
-unlikely sizes and offsets are (a maximum a posteriori estimate). In each frame the best pose is
-found for itself (variable projection, G. Golub and V. Pereyra, Inverse Problems 19, 2003): a step
-of Gauss and Newton is taken in sizes and offsets alone, with the normal equations of the poses
-eliminated frame by frame, and the poses follow it.
+The objective is the sum of the squared marker distances over selected frames, minus the log prior
+of sizes and offsets (a maximum a posteriori estimate). Variable projection (G. Golub and V.
+Pereyra, Inverse Problems 19, 2003) eliminates the poses: each frame has its best pose, and a
+Gauss-Newton step changes sizes and offsets alone, with normal equations from which the poses are
+eliminated frame by frame.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError
-from osimlite.fitting.chosen_frames import STATIC, ChosenFrames
-from osimlite.fitting.inverse_kinematics import first_pose, marker_stations
+from osimlite.fitting.inverse_kinematics import compute_first_pose, find_marker_stations
 from osimlite.fitting.marker_data import MarkerData
-from osimlite.fitting.marker_data import Measured as Markers
+from osimlite.fitting.marker_data import MarkerSource as Markers
 from osimlite.fitting.scaling import scale_model
 from osimlite.fitting.segments import Segments
-from osimlite.fitting.shape import Posed, Shape
+from osimlite.fitting.selected_frames import STATIC_TRIAL, SelectedFrames
+from osimlite.fitting.shape import ScalableMarkers, ScaledPoseFit
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.mechanics.multibody.schema_frames import Placements
@@ -31,38 +31,53 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.markers import Marker as ModelMarker
 from osimlite.schema.model import Model
 
-SKIN = 0.01
-"""How far markers usually are from where a rigid segment has them (m): skin moves."""
-INDEPENDENT = 20.0
-"""As many frames as all are worth: skin moves alike in those of one movement."""
-FIRST, APART, ACROSS = 0.3, 0.1, 0.05
-"""How far the size of the first segment usually is from the model's, those of neighbouring segments
-and the factors of one segment from one another.
+SKIN_MOTION_M = 0.01
+"""Standard deviation of markers from their positions on rigid segments, m: skin moves."""
+INDEPENDENT_FRAMES = 20.0
+"""Number of independent frames that all frames are worth: skin moves alike within a movement."""
+FIRST_SIZE_DEVIATION = 0.3
+"""Standard deviation of the first segment's size from the size in the model."""
+NEIGHBOUR_DEVIATION = 0.1
+"""Standard deviation of the difference between the sizes of neighbouring segments."""
+AXIS_DEVIATION = 0.05
+"""Standard deviation of the factors of one segment from their mean."""
+MARKER_OFFSET_M = 0.01
+"""Scale of the prior of marker offsets on bones, m.
+
+Markers of clusters may be anywhere. Offsets therefore have a Cauchy distribution, which hardly
+pulls on distant markers.
 """
-OFFSET = 0.01
-"""How far a marker on a bone usually is from where the model has it (m). Those of clusters may be
-anywhere: offsets have the distribution of Cauchy, which does not pull at what is far away.
-"""
-SMALLEST, LARGEST = 0.4, 2.5
-"""Ends of the range of factors."""
-STEPS, LOOKS = 60, 3
-"""At most so many steps, and so often it is looked at which markers were taken for others."""
-NEARLY, ENOUGH = 1e-2, 1e-4
-"""By how much the last step changes factors and offsets (m) at most: before that, and at the end."""
+MIN_FACTOR = 0.4
+"""Smallest scale factor."""
+MAX_FACTOR = 2.5
+"""Largest scale factor."""
+MAX_STEPS = 60
+"""Largest number of Gauss-Newton steps in one search."""
+OUTLIER_ROUNDS = 3
+"""Largest number of searches for markers that were taken for others."""
+OUTLIER_STEP = 1e-2
+"""Largest change of a factor or offset (m) by the last step before outliers are excluded."""
+FINAL_STEP = 1e-4
+"""Largest change of a factor or offset (m) by the last step at the end."""
 
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """A model that was fitted to a person.
+    """Model that was fitted to a person.
 
-    Attributes: model: the scaled model, its markers where they are on the person. factors: of each
-        body along its axes, by name. uncertain: standard deviations of the factors, as far as the
-        assumptions about skin hold. offsets: of the markers that may move (3,), m, along the axes
-        of their bodies, beside the scaled model's. trials: what the chosen frames are from, by
-        frame. times: of the chosen frames (t,), s. markers: names of the m markers. measured: where
-        they were measured (t, m, 3), m. before: where they are in the best poses of the model as it
-        was (t, m, 3), m. after: likewise of the fitted one. notes: what was left out, and what to
-        look at.
+    Attributes:
+        model: the scaled model, with the markers where they are on the person.
+        factors: scale factors of each body along its axes, by name.
+        uncertain: standard deviations of the factors, as far as the assumptions about skin hold.
+        offsets: offsets of movable markers from the scaled model (3,), m, along the axes of their
+            bodies.
+        trials: name of the trial of each selected frame.
+        times: times of the selected frames (t,), s.
+        markers: names of the m markers.
+        measured: measured positions (t, m, 3), m.
+        before: positions in the best poses of the original model (t, m, 3), m.
+        after: positions in the best poses of the fitted model (t, m, 3), m.
+        notes: messages about data that were left out, and about doubtful factors.
     """
 
     model: Model
@@ -78,7 +93,14 @@ class Person:
     notes: tuple[str, ...] = ()
 
     def errors(self, places: Array) -> dict[str, float]:
-        """Root mean square of the distances (m) by trial, of places as in `before` or `after`."""
+        """Return root mean square distances by trial.
+
+        Args:
+            places: positions as in `before` or `after` (t, m, 3), m.
+
+        Returns:
+            Root mean square (m) by name of the trial.
+        """
         result = {}
         for trial in dict.fromkeys(self.trials):
             chosen = [name == trial for name in self.trials]
@@ -100,34 +122,40 @@ def fit(
     frames: int = 200,
     mass: float = -1.0,
 ) -> Person:
-    """Fit a model to a person: factors of its bodies and places of its markers, from movements.
+    """Fit scale factors of bodies and positions of markers to movements of a person.
 
-    Joint centres are found by how the segments move, so trials in which all joints move tell most.
-    A marker that is `fixed` in the model, or in `held`, stays where the scaled model has it; all
-    others may move.
+    The motion of the segments determines the joint centres, so trials in which all joints move are
+    the most informative. A marker that is `fixed` in the model, or in `held`, stays where the
+    scaled model has it; all others may move.
 
-    Args: model: the generic model, with markers named as those of the data; it stays as it is.
-        trials: movements, as .trc, .c3d or .sto files or arrays by name; a mapping gives them
-        names. static: the subject standing. weights: of markers by name; those left out weigh 1,
-        those of 0 do not count. held: markers that are known to be where the model has them; by
-        default those that are `fixed`. by_axis: whether a body may grow in one direction more than
-        in another. symmetric: whether both sides of the body have the same factors. frames: how
-        many are looked at, spread evenly over all trials. mass: what the subject weighs, kg; if it
-        is not positive that follows from the factors.
+    Args:
+        model: the generic model, with markers named as those of the data; it is not changed.
+        trials: movements, as .trc, .c3d or .sto files or arrays by name; the keys of a mapping name
+            the trials.
+        static: the standing subject.
+        weights: weights of markers by name; the others have weight 1, and weight 0 excludes.
+        held: markers that stay where the model has them; by default those that are `fixed`.
+        by_axis: whether the factors of a body may differ between its axes.
+        symmetric: whether both sides of the body have the same factors.
+        frames: number of frames, spread evenly over all trials.
+        mass: mass of the subject, kg; if it is not positive, the mass follows from the factors.
+
+    Returns:
+        The fitted model with factors, offsets and errors.
 
     Raises:
-        SettingError: nothing is given, or something names what is not there.
+        SettingError: there is no trial, or a name is unknown.
         OsimliteError: a file cannot be read, or has no marker of the model.
-        SimulationError: no pose fulfils the constraints.
-        UnsupportedError: the model has a joint or a constraint that cannot be computed.
+        SimulationError: no pose satisfies the constraints.
+        UnsupportedError: osimlite does not support a joint or constraint of the model.
     """
     mechanism = build_mechanism(model)
     stations = {
         name: place
-        for name, place in marker_stations(model, mechanism).items()
+        for name, place in find_marker_stations(model, mechanism).items()
         if place.body != GROUND
     }
-    chosen = ChosenFrames(_named(trials, static), list(stations), frames, weights or {})
+    chosen = SelectedFrames(_read_trials(trials, static), list(stations), frames, weights or {})
     moving = {marker.name for marker in model.components(ModelMarker) if not marker.fixed}
     if held is not None:
         unknown = [name for name in held if name not in stations]
@@ -141,19 +169,21 @@ def fit(
         body.name: names[body.parent] if body.parent != GROUND else "" for body in mechanism.bodies
     }
     marked = {names[stations[marker].body] for marker in chosen.markers}
-    segments = Segments.of(carriers, marked, by_axis=by_axis, symmetric=symmetric)
-    search = _Search(
-        Shape(model, chosen.markers, segments), chosen, [name in moving for name in chosen.markers]
+    segments = Segments.group_bodies(carriers, marked, by_axis=by_axis, symmetric=symmetric)
+    search = _PersonFit(
+        ScalableMarkers(model, chosen.markers, segments),
+        chosen,
+        [name in moving for name in chosen.markers],
     )
-    result = search.start(mechanism)
+    result = search.start_from_model(mechanism)
     before = result.places
-    for _ in range(LOOKS):
-        result = search.run(result, NEARLY)
-        if not chosen.left_out(result.places):
+    for _ in range(OUTLIER_ROUNDS):
+        result = search.run(result, OUTLIER_STEP)
+        if not chosen.exclude_outliers(result.places):
             break
-    result = search.run(result, ENOUGH)
+    result = search.run(result, FINAL_STEP)
     scaled = model.copy_deep()
-    factors = segments.factors(result.sizes)
+    factors = segments.expand_factors(result.sizes)
     scale_model(scaled, factors, mass)
     offsets = {
         name: by for name, by in zip(chosen.markers, result.offsets, strict=True) if name in moving
@@ -169,7 +199,7 @@ def fit(
     return Person(
         scaled,
         factors,
-        segments.factors(search.deviations(result)),
+        segments.expand_factors(search.compute_deviations(result)),
         offsets,
         tuple(chosen.trials),
         chosen.times,
@@ -177,72 +207,95 @@ def fit(
         chosen.measured,
         before,
         result.places,
-        (*chosen.notes, *_at_ends(factors)),
+        (*chosen.notes, *_report_extreme_factors(factors)),
     )
 
 
-def _named(
+def _read_trials(
     trials: Mapping[str, Markers] | Iterable[Markers], static: Markers | None
 ) -> dict[str, MarkerData]:
-    """All trials by name; the static one is called so."""
+    """Return the markers of all trials by name."""
     if isinstance(trials, Mapping):
-        result = {name: MarkerData.of(trial) for name, trial in trials.items()}
+        result = {name: MarkerData.from_source(trial) for name, trial in trials.items()}
     else:
-        read = [MarkerData.of(trial) for trial in trials]
+        read = [MarkerData.from_source(trial) for trial in trials]
         result = {
             trial.file or f"trial {number}": trial for number, trial in enumerate(read, start=1)
         }
     if static is not None:
-        result[STATIC] = MarkerData.of(static)
+        result[STATIC_TRIAL] = MarkerData.from_source(static)
     if not result:
         raise SettingError("there is nothing to fit; give at least one trial")
     return result
 
 
-def _at_ends(factors: Mapping[str, Sequence[float]]) -> Iterator[str]:
-    ends = [body for body, own in factors.items() if min(own) <= SMALLEST or max(own) >= LARGEST]
+def _report_extreme_factors(factors: Mapping[str, Sequence[float]]) -> Iterator[str]:
+    """Yield a message about factors at the end of their range."""
+    ends = [
+        body for body, own in factors.items() if min(own) <= MIN_FACTOR or max(own) >= MAX_FACTOR
+    ]
     if ends:
         yield f"{join_words(ends)}: factors at an end of what is allowed; look at the names and the units of the markers"
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
-    """Sizes (k,) and offsets (m, 3), m, their poses (t, n), places of the markers (t, m, 3), m, and the cost."""
+class _Estimate:
+    """Sizes and offsets with the poses that fit best.
+
+    Attributes:
+        sizes: parameters of the segments (k,).
+        offsets: offsets of the markers (m, 3), m.
+        posed: fit of poses with these parameters.
+        values: poses (t, n).
+        places: positions of the markers (t, m, 3), m.
+        cost: half the sum of weighted squares, and the negative log prior.
+    """
 
     sizes: Array
     offsets: Array
-    posed: Posed
+    posed: ScaledPoseFit
     values: Array
     places: Array
     cost: float
 
 
-class _Search:
-    """Looks for the sizes and offsets that are likeliest."""
+class _PersonFit:
+    """Maximum a posteriori estimate of sizes and offsets."""
 
-    def __init__(self, shape: Shape, chosen: ChosenFrames, free: Sequence[bool]) -> None:
+    def __init__(
+        self, shape: ScalableMarkers, chosen: SelectedFrames, free: Sequence[bool]
+    ) -> None:
         self._shape, self._chosen, self._free = shape, chosen, np.flatnonzero(free)
         self._sizes, self._moved = len(shape.segments.parts), 3 * len(self._free)
         frames = len(chosen.times)
-        self._unit = min(1.0, INDEPENDENT / frames) / SKIN**2
-        self._prior, self._wanted = shape.segments.expected(FIRST, APART, ACROSS)
+        self._unit = min(1.0, INDEPENDENT_FRAMES / frames) / SKIN_MOTION_M**2
+        self._prior, self._wanted = shape.segments.compute_prior(
+            FIRST_SIZE_DEVIATION, NEIGHBOUR_DEVIATION, AXIS_DEVIATION
+        )
 
-    def start(self, mechanism: Mechanism) -> _Found:
-        """The model as it is."""
-        starts = np.tile(first_pose(mechanism, 0.0, True), (len(self._chosen.times), 1))
-        return self._at(np.ones(self._sizes), np.zeros((len(self._chosen.markers), 3)), starts)
+    def start_from_model(self, mechanism: Mechanism) -> _Estimate:
+        """Return the estimate of the model as it is."""
+        starts = np.tile(compute_first_pose(mechanism, 0.0, True), (len(self._chosen.times), 1))
+        return self._evaluate(
+            np.ones(self._sizes), np.zeros((len(self._chosen.markers), 3)), starts
+        )
 
-    def run(self, known: _Found, enough: float) -> _Found:
-        """The likeliest, from what is known on, until a step changes no size and no offset (m) by more than enough."""
-        here, damping = self._at(known.sizes, known.offsets, known.values), 1e-6
-        for _ in range(STEPS):
-            matrix, slope = self._normal(here)
+    def run(self, known: _Estimate, enough: float) -> _Estimate:
+        """Return the most likely estimate.
+
+        Args:
+            known: estimate to start from.
+            enough: largest change of a size or offset (m) by the last step.
+        """
+        here, damping = self._evaluate(known.sizes, known.offsets, known.values), 1e-6
+        for _ in range(MAX_STEPS):
+            matrix, slope = self._compute_normal_equations(here)
             while True:
                 step = -np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), slope)
-                sizes = np.clip(here.sizes + step[: self._sizes], SMALLEST, LARGEST)
+                sizes = np.clip(here.sizes + step[: self._sizes], MIN_FACTOR, MAX_FACTOR)
                 offsets = here.offsets.copy()
                 offsets[self._free] += step[self._sizes :].reshape(-1, 3)
-                there = self._at(sizes, offsets, here.values)
+                there = self._evaluate(sizes, offsets, here.values)
                 if there.cost <= here.cost or np.abs(step).max() < enough:
                     break
                 damping = 10.0 * max(damping, 1e-9)
@@ -252,25 +305,38 @@ class _Search:
                 break
         return here
 
-    def deviations(self, found: _Found) -> Array:
-        """Standard deviations (k,) of the numbers."""
-        return np.sqrt(np.diag(np.linalg.inv(self._normal(found)[0])))[: self._sizes]
+    def compute_deviations(self, found: _Estimate) -> Array:
+        """Return the standard deviations (k,) of the sizes."""
+        return np.sqrt(np.diag(np.linalg.inv(self._compute_normal_equations(found)[0])))[
+            : self._sizes
+        ]
 
-    def _at(self, sizes: Array, offsets: Array, starts: Array) -> _Found:
-        posed = Posed(self._shape, sizes, offsets, self._chosen.weights)
-        values, places = posed.poses(self._chosen.measured, starts)
+    def _evaluate(self, sizes: Array, offsets: Array, starts: Array) -> _Estimate:
+        """Fit the poses for sizes and offsets, and compute the cost.
+
+        Args:
+            sizes: sizes (k,).
+            offsets: offsets of the markers (m, 3), m.
+            starts: initial poses (t, n).
+        """
+        posed = ScaledPoseFit(self._shape, sizes, offsets, self._chosen.weights)
+        values, places = posed.fit_poses(self._chosen.measured, starts)
         errors = places - self._chosen.measured
         squares = self._unit * float(np.nansum(self._chosen.weights[:, None] * errors**2))
         likely = self._prior @ sizes - self._wanted
-        far = float(np.log1p((offsets[self._free] ** 2).sum(axis=1) / OFFSET**2).sum())
-        return _Found(
+        far = float(np.log1p((offsets[self._free] ** 2).sum(axis=1) / MARKER_OFFSET_M**2).sum())
+        return _Estimate(
             sizes, offsets, posed, values, places, 0.5 * (squares + float(likely @ likely) + far)
         )
 
-    def _normal(self, here: _Found) -> tuple[Array, Array]:
-        """Matrix and right side of the normal equations in sizes and offsets, the poses eliminated."""
+    def _compute_normal_equations(self, here: _Estimate) -> tuple[Array, Array]:
+        """Return matrix and right-hand side of the normal equations for sizes and offsets.
+
+        The poses are eliminated: only the part of each residual's derivative that no change of the
+        pose can produce counts.
+        """
         values = here.values
-        columns, turned = self._shape.columns(values)
+        columns, turned = self._shape.compute_derivatives(values)
         errors = here.places - self._chosen.measured
         seen = np.asarray(np.isfinite(errors).all(axis=2))
         roots = np.sqrt(self._unit * self._chosen.weights)
@@ -284,10 +350,10 @@ class _Search:
         matrix[: self._sizes, : self._sizes] = self._prior.T @ self._prior
         slope[: self._sizes] = self._prior.T @ (self._prior @ here.sizes - self._wanted)
         far = here.offsets[self._free]
-        pull = np.repeat(1.0 / (OFFSET**2 + (far**2).sum(axis=1)), 3)
+        pull = np.repeat(1.0 / (MARKER_OFFSET_M**2 + (far**2).sum(axis=1)), 3)
         np.fill_diagonal(matrix[self._sizes :, self._sizes :], pull)
         slope[self._sizes :] = pull * far.ravel()
-        for frame, moves in enumerate(here.posed.freedoms(values)):
+        for frame, moves in enumerate(here.posed.compute_free_motions(values)):
             own = seen[frame]
             scaled = roots[own, None, None]
             rows = (scaled * by[frame, own]).reshape(-1, size)

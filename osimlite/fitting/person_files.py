@@ -1,4 +1,7 @@
-"""What a fit writes: the model, its markers, its factors, and a setup with which OpenSim's ScaleTool makes the same."""
+"""Files of a fitted person: model, markers, factors, and a setup for OpenSim's ScaleTool.
+
+With the setup, the ScaleTool makes the same model.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.fitting.measuring import Measured, scale_set
+from osimlite.fitting.measuring import ScaleFactors, create_scale_set
 from osimlite.fitting.person import Person
 from osimlite.io.document.printer import to_text
 from osimlite.mechanics.multibody.schema_frames import Placements
@@ -15,22 +18,29 @@ from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.markers import MarkerSet
 from osimlite.schema.tools.scale import GenericModelMaker, MarkerPlacer, ModelScaler, ScaleTool
 
-MARKERS, UNSCALED, FACTORS, SETUP = (
-    "markers.xml",
-    "markers_unscaled.xml",
-    "scale_set.xml",
-    "setup_scale.xml",
-)
+MARKERS = "markers.xml"
+"""File of the markers on the scaled model."""
+UNSCALED = "markers_unscaled.xml"
+"""File of the markers on the generic model, which the setup reads."""
+FACTORS = "scale_set.xml"
+"""File of the scale factors."""
+SETUP = "setup_scale.xml"
+"""File of the setup for OpenSim's ScaleTool."""
 
 
-def person_texts(person: Person, generic: Path, folder: Path, mass: float = -1.0) -> dict[str, str]:
-    """Names and texts of the files of a fitted model.
+def create_person_files(
+    person: Person, generic: Path, folder: Path, mass: float = -1.0
+) -> dict[str, str]:
+    """Return the files of a fitted model.
 
     Args:
-        person: what was fitted.
-        generic: the file of the model that was fitted.
-        folder: where the files are to be, from which the setup names that file.
-        mass: what the subject weighs, kg; if it is not positive that follows from the factors.
+        person: result of the fit.
+        generic: file of the generic model.
+        folder: folder of the files, from which the setup names the generic model.
+        mass: mass of the subject, kg; if it is not positive, the mass follows from the factors.
+
+    Returns:
+        Text of each file by its name.
     """
     model = person.model
     unscaled = [marker.copy_deep() for marker in model.marker_set.objects]
@@ -40,17 +50,19 @@ def person_texts(person: Person, generic: Path, folder: Path, mass: float = -1.0
         factors = person.factors.get(base.rsplit("/", 1)[1], [1.0, 1.0, 1.0])
         copy.location = tuple((np.array(marker.location) / factors).tolist())
     frames = [frame.name for frame in model.components(PhysicalFrame)]
-    result = Measured({name: person.factors.get(name, [1.0, 1.0, 1.0]) for name in frames}, {}, [])
+    result = ScaleFactors(
+        {name: person.factors.get(name, [1.0, 1.0, 1.0]) for name in frames}, {}, []
+    )
     file = f"{generic.stem}_fitted.osim"
     tool = ScaleTool(
         name=model.name,
         mass=mass,
         generic_model_maker=GenericModelMaker(
-            model_file=_way(generic, folder), marker_set_file=UNSCALED
+            model_file=_make_relative_path(generic, folder), marker_set_file=UNSCALED
         ),
         model_scaler=ModelScaler(
             scaling_order=("manualScale",),
-            scale_set=scale_set(frames, result),
+            scale_set=create_scale_set(frames, result),
             output_model_file=file,
         ),
         marker_placer=MarkerPlacer(apply=False),
@@ -59,14 +71,14 @@ def person_texts(person: Person, generic: Path, folder: Path, mass: float = -1.0
         file: model,
         MARKERS: model.marker_set,
         UNSCALED: MarkerSet(name="markers", objects=unscaled),
-        FACTORS: scale_set(frames, result),
+        FACTORS: create_scale_set(frames, result),
         SETUP: tool,
     }
     return {name: to_text(document, numbers="opensim") for name, document in documents.items()}
 
 
-def _way(file: Path, folder: Path) -> str:
-    """A file as it is named from a folder, or its whole path on another drive."""
+def _make_relative_path(file: Path, folder: Path) -> str:
+    """Return a path relative to a folder, or the absolute path on another drive."""
     try:
         return Path(os.path.relpath(file.absolute(), folder.absolute())).as_posix()
     except ValueError:

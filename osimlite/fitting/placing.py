@@ -1,4 +1,4 @@
-"""The markers of a model moved to where they were measured on the standing subject: OpenSim's MarkerPlacer."""
+"""OpenSim's MarkerPlacer: move markers of a model to their measured positions."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from osimlite.base.records import dataclass
 from osimlite.errors import SettingError
-from osimlite.fitting.fit_messages import told
+from osimlite.fitting.fit_messages import describe_fit
 from osimlite.fitting.fitted_motion import FittedMotion
-from osimlite.fitting.ik_tool import tasks_of
-from osimlite.fitting.inverse_kinematics import fitted
+from osimlite.fitting.ik_tool import collect_targets
+from osimlite.fitting.inverse_kinematics import fit_motion
 from osimlite.fitting.marker_data import MarkerData
-from osimlite.fitting.measuring import frames_between
+from osimlite.fitting.measuring import select_frames
 from osimlite.io.tables.old_storage import printed
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
@@ -25,17 +25,17 @@ from osimlite.simulation.states import StateLayout, in_model_order
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
-    """Markers that were placed."""
+class MarkerPlacement:
+    """Placed markers, and the pose of the model."""
 
     # of the model as the subject stood, with the errors of the markers before they were moved
     pose: FittedMotion
     removed: tuple[str, ...]  # markers of the model that the data do not have; it has them no more
     moved: dict[str, float]  # by how much each marker was moved in its frame, m
 
-    def told(self) -> Iterator[str]:
-        """What a user should know of the pose; the limits are those of OpenSim's checklist for a static trial."""
-        return told(self.pose, (0.01, 0.02), " of markers on bones")
+    def describe_pose(self) -> Iterator[str]:
+        """Yield messages about the pose, with OpenSim's limits for a static trial."""
+        return describe_fit(self.pose, (0.01, 0.02), " of markers on bones")
 
 
 def place_markers(
@@ -45,22 +45,23 @@ def place_markers(
     first: float,
     last: float,
     coordinates: StoTable | None = None,
-) -> Placed:
-    """Pose a model as a subject stood, and move its markers to where they were measured, but for those that are fixed.
+) -> MarkerPlacement:
+    """Fit the pose of a model to a standing subject, and move its markers.
 
-    A marker that was not seen in every frame of the time range does not count for the pose, as in
-    OpenSim; it is placed by the frames in which it was seen.
+    Each marker moves to its measured position; fixed markers stay. A marker that was not seen in
+    every frame of the range does not count for the pose, as in OpenSim; its position is the mean
+    over the frames in which it was seen.
 
     Args:
-        model: is changed: markers that the data do not have are removed.
+        model: the model, which is changed; markers without data are removed.
         data: measured markers of the standing subject.
-        tasks: what the pose is fitted to.
-        first: time from which the markers are averaged, s.
-        last: time up to which, s.
-        coordinates: values of coordinates for tasks that take them from a file.
+        tasks: weights and targets of the pose.
+        first: start of the range over which markers are averaged, s.
+        last: end of the range, s.
+        coordinates: values of coordinates for tasks that read them from a file.
 
     Raises:
-        SettingError: the time range holds no frame, or a task asks for what is not there.
+        SettingError: the range has no frames, or a task has an unknown name.
     """
     first, last = max(first, float(data.times[0])), min(last, float(data.times[-1]))
     within = (data.times >= first) & (data.times <= last)
@@ -77,7 +78,7 @@ def place_markers(
     mean = MarkerData(
         data.names, np.array((first,)), data.positions[within].mean(axis=0)[None], data.file
     )
-    averaged = data.positions[frames_between(data.times, first, last)]
+    averaged = data.positions[select_frames(data.times, first, last)]
     seen = np.asarray(np.isfinite(averaged).all(axis=2))
     chosen = np.where(seen[..., None], averaged, 0.0)
     with np.errstate(invalid="ignore"):
@@ -87,29 +88,34 @@ def place_markers(
     for marker in [marker for marker in markers if marker.name in removed]:
         model.remove(marker)
     mechanism = build_mechanism(model)
-    asked = tasks_of(model, mechanism, tasks, mean, coordinates)
-    pose = fitted(model, mechanism, mean, asked.weights, asked.goals, asked.wanted)
+    asked = collect_targets(model, mechanism, tasks, mean, coordinates)
+    pose = fit_motion(model, mechanism, mean, asked.weights, asked.goals, asked.wanted)
     state, moved = mechanism.at(pose.values[0]), dict[str, float]()
     for marker in model.components(Marker):
         if marker.fixed or marker.name not in target or not np.isfinite(target[marker.name]).all():
             continue
-        body, frame = mechanism.placement(_frame_of(model, marker))
+        body, frame = mechanism.placement(_find_frame_path(model, marker))
         there = np.linalg.inv(state.transform(body) @ frame) @ [*target[marker.name], 1.0]
         moved[marker.name] = float(np.linalg.norm(there[:3] - np.array(marker.location)))
         marker.location = tuple(there[:3].tolist())
-    return Placed(pose, removed, moved)
+    return MarkerPlacement(pose, removed, moved)
 
 
-def _frame_of(model: Model, marker: Marker) -> str:
-    """The path of the frame of a marker."""
+def _find_frame_path(model: Model, marker: Marker) -> str:
+    """Return the path of the frame of a marker."""
     tree = model.tree()
     return (
         tree.path_of(tree.target(marker, "socket_parent_frame", marker.socket_parent_frame)) or ""
     )
 
 
-def pose_text(model: Model, placed: Placed) -> str:
-    """The pose as OpenSim's placer writes it: all states of the model, in radians."""
+def format_pose(model: Model, placed: MarkerPlacement) -> str:
+    """Return the pose as OpenSim's placer writes it: all states of the model, in radians.
+
+    Args:
+        model: the model.
+        placed: its markers and pose.
+    """
     mechanism, motion = placed.pose.mechanism, placed.pose
     elements = force_elements(model, mechanism, skip_unsupported=True).elements
     layout = StateLayout(mechanism, range(len(mechanism.coordinates)), elements)

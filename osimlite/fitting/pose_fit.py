@@ -1,4 +1,4 @@
-"""A mechanism and what is measured of it, laid out for the kernel that finds the poses that fit best."""
+"""Fit of poses to measurements by the compiled kernel."""
 
 from __future__ import annotations
 
@@ -9,7 +9,13 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.errors import SimulationError
-from osimlite.fitting.pose_layout import FitLayout, Goal, Marker, Sensor, substituted
+from osimlite.fitting.pose_layout import (
+    CoordinateTarget,
+    FitLayout,
+    MarkerTarget,
+    SensorTarget,
+    separate_couplers,
+)
 from osimlite.mechanics.kernels import pose_record as fit
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.pose_fit import APART, STUCK, UNSEEN
@@ -24,8 +30,8 @@ from osimlite.simulation.engines.linking import Code
 from osimlite.simulation.system import System
 
 
-class Poses(NamedTuple):
-    """Poses that were found."""
+class FittedPoses(NamedTuple):
+    """Poses that fit measurements."""
 
     values: Array  # of all coordinates (t, n), rad and m
     places: Array  # of the markers in these poses (t, m, 3), m
@@ -40,35 +46,39 @@ class Poses(NamedTuple):
 
 
 class PoseFit:
-    """Finds poses that fit measurements, each from the one before.
+    """Fit of poses to measurements; each frame starts from the one before.
 
-    Locked coordinates stay at their defaults, clamped ones in their ranges; prescribed ones follow
-    their functions, and what a coupler gives is substituted.
+    Locked coordinates stay at their default values, clamped ones in their ranges. Prescribed
+    coordinates follow their functions. Coordinates that couplers determine are substituted.
 
     Args:
-        mechanism: whose poses.
-        markers: places that are measured.
-        sensors: rotations that are measured.
-        goals: coordinates that are to have values.
-        constraints: whether those of the mechanism hold.
-        code: what runs the kernels; the best that is installed if left out.
+        mechanism: the mechanism.
+        markers: points with measured positions.
+        sensors: frames with measured orientations.
+        goals: coordinates with target values.
+        constraints: whether the constraints of the mechanism hold.
+        code: compiler of the kernels; by default the best that is installed.
 
-    Attributes: markers: how many there are. sensors: likewise. measured: count of the numbers of
-        their places and rotations. order: places in the mechanism of the coordinates that are
-        found. width: count of the numbers of one frame: the markers' places, the rotations, the
-        goals, and what is held. found: count of those that the kernel finds: the values, the
-        markers' places, the sensors' turns, cost, steps, and an ending.
+    Attributes:
+        markers: number of markers.
+        sensors: number of sensors.
+        measured: count of the numbers that are measured in a frame.
+        order: indices in the mechanism of the coordinates to find.
+        width: count of the numbers of a frame: positions, orientations, targets, and values of
+            locked and prescribed coordinates.
+        found: count of the numbers in a result: values, marker positions, rotation vectors of the
+            sensors, cost, steps and status.
 
     Raises:
-        UnsupportedError: a joint, a function or a constraint that the kernels do not know.
+        UnsupportedError: the kernels do not support a joint, a function or a constraint.
     """
 
     def __init__(
         self,
         mechanism: Mechanism,
-        markers: Sequence[Marker],
-        sensors: Sequence[Sensor] = (),
-        goals: Sequence[Goal] = (),
+        markers: Sequence[MarkerTarget],
+        sensors: Sequence[SensorTarget] = (),
+        goals: Sequence[CoordinateTarget] = (),
         *,
         constraints: bool = True,
         code: Code | None = None,
@@ -89,7 +99,7 @@ class PoseFit:
             item for item in mechanism.constraints if not isinstance(item, Lock | Prescribed)
         ] * constraints
         fixed = {place for place in range(len(infos)) if place not in free or place in self._held}
-        self._couplers, others = substituted(acting, fixed)
+        self._couplers, others = separate_couplers(acting, fixed)
         # A goal of a coordinate that cannot move changes nothing.
         self._goals = [number for number, goal in enumerate(goals) if goal.coordinate not in fixed]
         unlocked = replace(mechanism, coordinates=tuple(infos), constraints=tuple(others))
@@ -109,25 +119,27 @@ class PoseFit:
             len(self.order) + 3 * (len(markers) + len(sensors)) + 3,
         )
 
-    def start(self, q: Array) -> None:
-        """Begin anew, at the values (n,) of all coordinates."""
+    def set_pose(self, q: Array) -> None:
+        """Start from the values (n,) of all coordinates."""
         self._history[0] = 0.0
-        self.system.start(q)
+        self.system.set_pose(q)
 
-    def fit(
+    def fit_frames(
         self, measured: Array, times: Sequence[float] | Array | None = None, q: Array | None = None
-    ) -> Poses:
-        """Fit frames (t, ...) of what is measured, from the pose that was found last on.
+    ) -> FittedPoses:
+        """Fit frames, starting from the latest pose.
 
-        Args: measured: of each frame the places of the markers, the rotations by rows, the values
-            of the goals; NaN where something was not seen. times: of the frames, s, for prescribed
-            coordinates; zeros if left out. q: values (n,) of all coordinates to begin anew with.
+        Args:
+            measured: for each frame (t, ...), positions of the markers, orientations by rows, and
+                target values; NaN where something was not measured.
+            times: times of the frames for prescribed coordinates, s; zero by default.
+            q: values (n,) of all coordinates to start from.
 
         Raises:
-            SimulationError: no pose fulfils the constraints.
+            SimulationError: no pose satisfies the constraints.
         """
         if q is not None:
-            self.start(q)
+            self.set_pose(q)
         count, free = len(measured), len(self.order)
         given = measured.reshape(count, -1)
         frames, result = np.empty((count, self.width)), np.empty((count, self.found))
@@ -135,11 +147,13 @@ class PoseFit:
         frames[:, self.measured : self.measured + len(self._goals)] = given[:, self.measured :][
             :, self._goals
         ]
-        self.fill_held(frames, np.zeros(count) if times is None else np.asarray(times, dtype=float))
-        self.bound(frames, result)(count)
+        self.fill_prescribed(
+            frames, np.zeros(count) if times is None else np.asarray(times, dtype=float)
+        )
+        self.bind_arrays(frames, result)(count)
         status = result[:, -1]
         if (status == APART).any():
-            raise self.apart(int(np.argmax(status == APART)))
+            raise self.create_constraint_error(int(np.argmax(status == APART)))
         values = np.tile(self.mechanism.values({}), (count, 1))
         values[:, self.order] = result[:, :free]
         vectors = result[:, free:-3].reshape(count, -1, 3)
@@ -147,15 +161,25 @@ class PoseFit:
             tuple(np.flatnonzero(status == what).tolist()) for what in (UNSEEN, STUCK)
         )
         places, turns = vectors[:, : self.markers], vectors[:, self.markers :]
-        return Poses(values, places, turns, result[:, -3], result[:, -2], unseen, unsettled)
+        return FittedPoses(values, places, turns, result[:, -3], result[:, -2], unseen, unsettled)
 
-    def bound(self, frames: Array, found: Array) -> Callable[[int], int]:
-        """What fits a number of frames of arrays that the caller keeps, as the kernel takes them."""
+    def bind_arrays(self, frames: Array, found: Array) -> Callable[[int], int]:
+        """Return a function that fits a number of frames in fixed arrays.
+
+        Args:
+            frames: frames (t, width), which the caller keeps alive.
+            found: results (t, found), which the caller keeps alive.
+        """
         shape = self.layout
-        return self.system.bound(shape.ints, shape.numbers, shape.work, frames, found)
+        return self.system.bind_arrays(shape.ints, shape.numbers, shape.work, frames, found)
 
-    def fill_held(self, frames: Array, moments: Array) -> None:
-        """Put the values of what is held at some times (t,), s, into rows (t, width) for the kernel."""
+    def fill_prescribed(self, frames: Array, moments: Array) -> None:
+        """Write the values of locked and prescribed coordinates into frames.
+
+        Args:
+            frames: frames (t, width), changed in place.
+            moments: times (t,), s.
+        """
         columns = frames[:, self.width - len(self._held) :]
         for column, (place, function) in enumerate(self._held.items()):
             if function is None:
@@ -165,12 +189,12 @@ class PoseFit:
                     function.evaluate(np.array((t,)))[0] for t in moments.tolist()
                 ]
 
-    def frame(self) -> Frame:
-        """What fits one frame at a time, from the pose that was found last on; there are no goals."""
-        return Frame(self)
+    def create_single_frame_fit(self) -> SingleFrameFit:
+        """Return a fit of single frames without target values."""
+        return SingleFrameFit(self)
 
-    def apart(self, frame: int) -> SimulationError:
-        """The error for a frame that no pose fits in which the constraints hold."""
+    def create_constraint_error(self, frame: int) -> SimulationError:
+        """Return the error for a frame in which no pose satisfies the constraints."""
         names = ", ".join(
             item.name for item in self.mechanism.constraints if not isinstance(item, Lock)
         )
@@ -181,40 +205,45 @@ class PoseFit:
 
 
 class _System(System):
-    """The mechanism without what is substituted."""
+    """Engine of the mechanism without substituted coordinates."""
 
     entries = ("evaluate", "fit_frames")
 
-    def start(self, q: Array) -> None:
-        """Put it into a pose."""
+    def set_pose(self, q: Array) -> None:
+        """Set the values of the coordinates."""
         self._y[: len(self.order)] = q[list(self.order)]
 
-    def bound(self, *arrays: Floats | Ints) -> Callable[[int], int]:
-        """What fits a number of frames, from the pose that it is in; the caller keeps the arrays."""
+    def bind_arrays(self, *arrays: Floats | Ints) -> Callable[[int], int]:
+        """Return a function that fits a number of frames; the caller keeps the arrays alive."""
         flat = [array.reshape(-1) for array in arrays]
         own = self.program.ints, self.numbers, self._w, self._y, self._f
         return self.program.code.bound("fit_frames", *own, *flat)
 
 
-class Frame:
-    """Fits one frame at a time without making arrays of its own, see :meth:`PoseFit.frame`."""
+class SingleFrameFit:
+    """Fit of one frame at a time that allocates nothing but the result."""
 
     def __init__(self, fit: PoseFit) -> None:
         self._fit, self._values = fit, fit.mechanism.values({}).copy()
         self._row, self._found = np.empty(fit.width), np.empty(fit.found)
-        self._run = fit.bound(self._row, self._found)
+        self._run = fit.bind_arrays(self._row, self._found)
         free, end = len(fit.order), len(fit.order) + 3 * fit.markers
         self._given, self._q = self._row[: fit.measured], self._found[:free]
         self.places: Array = self._found[free:end].reshape(-1, 3)
         self.turns: Array = self._found[end:-3].reshape(-1, 3)
 
     def __call__(self, measured: Array, time: float) -> Array:
-        """The values (n,) of all coordinates for places of markers and then rotations of sensors, at a time (s)."""
+        """Return the values (n,) of all coordinates that fit one frame.
+
+        Args:
+            measured: positions of the markers, then orientations of the sensors.
+            time: time, s.
+        """
         self._given[:] = measured
-        self._fit.fill_held(self._row[None], np.array((time,)))
+        self._fit.fill_prescribed(self._row[None], np.array((time,)))
         self._run(1)
         if self._found[-1] == APART:
-            raise self._fit.apart(0)
+            raise self._fit.create_constraint_error(0)
         values = self._values.copy()
         values[self._fit.order] = self._q
         return values

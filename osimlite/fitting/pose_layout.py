@@ -1,4 +1,4 @@
-"""What a fit of poses becomes: integers, numbers and room for the kernel."""
+"""Integers, numbers and workspace of the kernel that fits poses."""
 
 from __future__ import annotations
 
@@ -18,42 +18,45 @@ from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
 from osimlite.simulation.system import System
 
-SCAN = 2001
-"""In how many places a coupler is looked at to find where what depends on it is in its range."""
+SCAN_POINTS = 2001
+"""Number of points at which a coupler is evaluated to find an interval."""
 
 
 @dataclass(frozen=True)
-class Marker:
-    """A point of a body whose place is measured."""
+class MarkerTarget:
+    """Point of a body with a measured position."""
 
     station: StationPlacement  # body and point
     weight: float = 1.0  # how much its squared distance counts beside those of others
 
 
 @dataclass(frozen=True)
-class Sensor:
-    """A frame of a body whose rotation is measured, and how much the squared angle counts beside those of others."""
+class SensorTarget:
+    """Frame of a body with a measured orientation, and the weight of its squared angle."""
 
     frame: FramePlacement
     weight: float = 1.0
 
 
 @dataclass(frozen=True)
-class Goal:
-    """A coordinate, by its place in the mechanism, that is to have a value, and how much the square counts."""
+class CoordinateTarget:
+    """Coordinate, by its index, with a target value, and the weight of the squared difference."""
 
     coordinate: int
     weight: float = 1.0
 
 
-def substituted(
+def separate_couplers(
     constraints: Sequence[Constraint], fixed: set[int]
 ) -> tuple[list[Coupler], list[Constraint]]:
-    """Couplers whose coordinate each gives, in an order in which all that one goes by is known; and the rest.
+    """Separate couplers that determine a coordinate from other constraints.
 
     Args:
-        constraints: all.
-        fixed: coordinates whose values are given.
+        constraints: all constraints.
+        fixed: indices of coordinates whose values are known.
+
+    Returns:
+        Couplers, each after those that determine its arguments; and the other constraints.
     """
     couplers: list[Coupler] = []
     others: list[Constraint] = []
@@ -80,15 +83,25 @@ def substituted(
 
 
 class FitLayout:
-    """The integers, numbers and work of a fit."""
+    """Packed integers, numbers and workspace of a fit.
+
+    Args:
+        system: engine of the mechanism.
+        places: links and degrees of freedom by bodies and coordinates.
+        markers: points with measured positions.
+        sensors: frames with measured orientations.
+        goals: coordinates with target values.
+        held: indices of locked and prescribed coordinates.
+        couplers: couplers that determine a coordinate.
+    """
 
     def __init__(
         self,
         system: System,
         places: Places,
-        markers: Sequence[Marker],
-        sensors: Sequence[Sensor],
-        goals: Sequence[Goal],
+        markers: Sequence[MarkerTarget],
+        sensors: Sequence[SensorTarget],
+        goals: Sequence[CoordinateTarget],
         held: Sequence[int],
         couplers: Sequence[Coupler],
     ) -> None:
@@ -97,19 +110,25 @@ class FitLayout:
         if s[MODEL.CONSTRAINED]:
             equations = int(s[s[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS])
         ints, numbers = [0] * fit.FIT_HEAD, list[float]()
-        self._listed(
-            ints, fit.MARKERS, fit.MARKER_AT, list(self._markers(places, markers, numbers))
+        self._append_list(
+            ints,
+            fit.MARKERS,
+            fit.MARKER_AT,
+            list(self._list_marker_links(places, markers, numbers)),
         )
-        self._listed(
-            ints, fit.SENSORS, fit.SENSOR_AT, list(self._sensors(places, sensors, numbers))
+        self._append_list(
+            ints,
+            fit.SENSORS,
+            fit.SENSOR_AT,
+            list(self._list_sensor_links(places, sensors, numbers)),
         )
         numbers += [goal.weight for goal in goals]
-        self._listed(
+        self._append_list(
             ints, fit.GOALS, fit.GOAL_AT, [places.freedom(goal.coordinate) for goal in goals]
         )
-        self._listed(ints, fit.HELD, fit.HELD_AT, [places.freedom(place) for place in held])
+        self._append_list(ints, fit.HELD, fit.HELD_AT, [places.freedom(place) for place in held])
         ints[fit.RANGES_AT] = len(numbers)
-        for low, high in ranges(system.mechanism, system.order, couplers):
+        for low, high in compute_ranges(system.mechanism, system.order, couplers):
             numbers += low, high
         records = []
         for coupler in couplers:
@@ -118,8 +137,8 @@ class FitLayout:
             ints += [places.freedom(coupler.dependent), len(numbers), len(arguments), *arguments]
             numbers += [places.locked_value(place) for place in coupler.independent]
             numbers += function_table(coupler.function, f"the function of '{coupler.name}'")
-        self._listed(ints, fit.COUPLERS, fit.COUPLER_AT, records)
-        self._axes(ints, s, system.numbers, links)
+        self._append_list(ints, fit.COUPLERS, fit.COUPLER_AT, records)
+        self._append_axes(ints, s, system.numbers, links)
         ints[fit.RESOLVED_AT] = len(ints)
         known = dict.fromkeys(map(places.freedom, held), fit.GIVEN)
         known |= {places.freedom(item.dependent): fit.DEPENDENT for item in couplers}
@@ -153,27 +172,34 @@ class FitLayout:
         self.numbers, self.work = np.array(numbers, dtype=float), np.zeros(work)
 
     @staticmethod
-    def _listed(ints: list[int], count: int, place: int, items: Sequence[int]) -> None:
+    def _append_list(ints: list[int], count: int, place: int, items: Sequence[int]) -> None:
+        """Append items to the integers, and set their count and offset."""
         ints[count], ints[place] = len(items), len(ints)
         ints += items
 
     @staticmethod
-    def _markers(places: Places, markers: Sequence[Marker], numbers: list[float]) -> Iterator[int]:
+    def _list_marker_links(
+        places: Places, markers: Sequence[MarkerTarget], numbers: list[float]
+    ) -> Iterator[int]:
+        """Yield the link of each marker; append its point and weight to the numbers."""
         for marker in markers:
             link, point = places.station(marker.station.body, marker.station.location.tolist())
             numbers += [*point, marker.weight]
             yield link
 
     @staticmethod
-    def _sensors(places: Places, sensors: Sequence[Sensor], numbers: list[float]) -> Iterator[int]:
+    def _list_sensor_links(
+        places: Places, sensors: Sequence[SensorTarget], numbers: list[float]
+    ) -> Iterator[int]:
+        """Yield the link of each sensor; append its rotation and weight to the numbers."""
         for sensor in sensors:
             link, own = places.placement(sensor.frame.body)
             numbers += [*(own @ sensor.frame.transform)[:3, :3].ravel().tolist(), sensor.weight]
             yield link
 
     @staticmethod
-    def _axes(ints: list[int], model: Ints, numbers: Floats, links: int) -> None:
-        """The axes of each link, in the order in which they carry one another."""
+    def _append_axes(ints: list[int], model: Ints, numbers: Floats, links: int) -> None:
+        """Append the axes of each link, from the inner to the outer ones."""
         first, axes, balls = [0], list[tuple[int, int]](), list[int]()
         for link in range(links):
             record = model[model[MODEL.LINK_AT] + LINK.SIZE * link :]
@@ -191,16 +217,20 @@ class FitLayout:
             first.append(len(axes))
         ints[fit.AXES_AT] = len(ints)
         ints += [*first, *(number for axis in axes for number in axis)]
-        FitLayout._listed(ints, fit.BALLS, fit.BALL_AT, balls)
+        FitLayout._append_list(ints, fit.BALLS, fit.BALL_AT, balls)
 
 
-def ranges(
+def compute_ranges(
     mechanism: Mechanism, order: Sequence[int], couplers: Sequence[Coupler]
 ) -> Iterator[tuple[float, float]]:
-    """Ends between which each degree of freedom stays: those of its range if it is clamped.
+    """Yield the bounds of each degree of freedom: the range of a clamped coordinate, or none.
 
-    Where a clamped coordinate depends on one other, the other stays where the range allows it to
-    be.
+    If a clamped coordinate depends on a single other one, that one stays where the range allows it.
+
+    Args:
+        mechanism: the mechanism.
+        order: indices of the coordinates to find.
+        couplers: couplers that determine a coordinate.
     """
     ends = {
         place: info.range if info.clamped else (-np.inf, np.inf)
@@ -210,16 +240,24 @@ def ranges(
         low, high = ends[coupler.dependent]
         if len(coupler.independent) == 1 and (low > -np.inf or high < np.inf):
             (other,) = coupler.independent
-            ends[other] = _allowed(
+            ends[other] = _find_allowed_interval(
                 coupler, mechanism.coordinates[other].default_value, ends[other], low, high
             )
     yield from (ends[place] for place in order)
 
 
-def _allowed(
+def _find_allowed_interval(
     coupler: Coupler, start: float, ends: tuple[float, float], low: float, high: float
 ) -> tuple[float, float]:
-    """The interval around a place in which what a coupler gives is in a range, within ends."""
+    """Return the interval around a value in which a coupled coordinate is in its range.
+
+    Args:
+        coupler: the coupler, of one argument.
+        start: value of the argument around which to search.
+        ends: bounds of the argument.
+        low: lower bound of the coupled coordinate.
+        high: upper bound of the coupled coordinate.
+    """
 
     def is_inside(place: float) -> bool:
         value = coupler.function.evaluate(np.array((place,)))[0]
@@ -231,7 +269,7 @@ def _allowed(
     result = []
     for end, side in zip(ends, (-1.0, 1.0), strict=True):
         furthest = end if np.isfinite(end) else start + side * 2.0 * np.pi
-        scan = np.linspace(start, furthest, SCAN)
+        scan = np.linspace(start, furthest, SCAN_POINTS)
         outside = next((k for k, place in enumerate(scan.tolist()) if not is_inside(place)), None)
         if outside is None:
             result.append(end)

@@ -1,4 +1,4 @@
-"""OpenSim's ScaleTool: a generic model measured against a subject, scaled, and its markers placed."""
+"""OpenSim's ScaleTool: measure a generic model against a subject, scale it, place markers."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from osimlite.base.records import dataclass, field
 from osimlite.base.text import suggest_name
 from osimlite.errors import DocumentError, SettingError
 from osimlite.fitting.fit_messages import describe_unknown
-from osimlite.fitting.ik_tool import UNNAMED, coordinate_table
+from osimlite.fitting.ik_tool import NO_FILE, read_coordinate_table
 from osimlite.fitting.marker_data import MarkerData
-from osimlite.fitting.marker_data import Measured as Markers
-from osimlite.fitting.measuring import Measured, Measuring, scale_set
-from osimlite.fitting.placing import Placed, place_markers, pose_text
+from osimlite.fitting.marker_data import MarkerSource as Markers
+from osimlite.fitting.measuring import ScaleFactorFinder, ScaleFactors, create_scale_set
+from osimlite.fitting.placing import MarkerPlacement, format_pose, place_markers
 from osimlite.fitting.scaling import scale_model
 from osimlite.io.document.cache import read_anew
 from osimlite.io.document.printer import to_text
@@ -35,38 +35,42 @@ from osimlite.schema.tools.scale import (
     ScaleTool,
 )
 
-MEASUREMENTS, BY_HAND = "measurements", "manualScale"
-"""What a `scaling_order` may consist of."""
-Pairs = Mapping[str, tuple[Sequence[tuple[str, str]], Mapping[str, str]]]
+MEASUREMENTS = "measurements"
+"""Word of a `scaling_order` for factors from measurements."""
+MANUAL_SCALE = "manualScale"
+"""Word of a `scaling_order` for prescribed factors."""
+MeasurementPairs = Mapping[str, tuple[Sequence[tuple[str, str]], Mapping[str, str]]]
 """Measurements by name: pairs of markers, and by body the axes that they scale (``"XYZ"``)."""
 
 
 @dataclass(eq=False)
-class Scaled:
-    """A scaled model.
+class ScaledModel:
+    """Scaled model, with its factors and files.
 
-    Attributes: model: the model. measured: factors of the bodies, and what they come from. placed:
-        where the markers went, if they were placed. texts: names, from the folder of the setup
-        file, and texts of the files that the tool writes. unknown: what is said of parts of unknown
-        classes, which keep their size; "" if there are none.
+    Attributes:
+        model: the model.
+        measured: scale factors of the bodies, and their origin.
+        placed: new positions of the markers; None if they were not placed.
+        texts: texts of the files that the tool writes, by path from the folder of the setup.
+        unknown: message about parts of unknown classes, which keep their size; "" without any.
     """
 
     model: Model
-    measured: Measured | None = None
-    placed: Placed | None = None
+    measured: ScaleFactors | None = None
+    placed: MarkerPlacement | None = None
     texts: dict[str, str] = field(default_factory=dict)
     unknown: str = ""
 
 
 UNSCALED = "not scaled, but left in the size of the generic model"
-"""What becomes of parts of unknown classes."""
+"""Consequence for parts of unknown classes."""
 
 
 def scale(
     model: Model,
     static: Markers | None = None,
     *,
-    measurements: Pairs | Iterable[Measurement] = (),
+    measurements: MeasurementPairs | Iterable[Measurement] = (),
     factors: Mapping[str, float | Sequence[float]] | None = None,
     mass: float = -1.0,
     preserve_mass_distribution: bool = False,
@@ -74,25 +78,32 @@ def scale(
     tasks: Iterable[IKTask] = (),
     start: float = float("-inf"),
     end: float = float("inf"),
-) -> Scaled:
-    """Scale a model to a subject, as OpenSim's ScaleTool does; the model itself stays as it is.
+) -> ScaledModel:
+    """Scale a model to a subject, as OpenSim's ScaleTool does.
 
-    Args: model: the generic model, with markers named as those of the data. static: measured
-        markers of the standing subject: a file, or arrays by name. measurements: by name pairs of
-        markers, and by body the axes that the mean ratio of their distances scales, as ``{"thigh":
-        ([("RASI", "RKNE")], {"femur_r": "XYZ"})}``; or OpenSim's objects. Later ones overwrite.
-        factors: of bodies, one or one for each axis; they overwrite what is measured. mass: what
-        the subject weighs, kg; if it is not positive that follows from the factors.
-        preserve_mass_distribution: let the bodies keep their shares of the mass. place: whether to
-        pose the scaled model as the subject stood and move its markers to the measured places.
-        tasks: what that pose is fitted to; by default all markers, which weigh the same. start:
-        time from which markers are averaged, s. end: time up to which, s.
+    Args:
+        model: the generic model, with markers named as those of the data; it is not changed.
+        static: measured markers of the standing subject: a file, or arrays by name.
+        measurements: by name, pairs of markers, and by body the axes that the mean ratio of their
+            distances scales, as ``{"thigh": ([("RASI", "RKNE")], {"femur_r": "XYZ"})}``; or
+            OpenSim's objects. Later measurements overwrite earlier ones.
+        factors: one factor for each body, or one for each axis; they overwrite measurements.
+        mass: mass of the subject, kg; if it is not positive, the mass follows from the factors.
+        preserve_mass_distribution: whether the bodies keep their shares of the mass.
+        place: whether to fit the pose to the standing subject, and move the markers to their
+            measured positions.
+        tasks: weights and targets of that pose; by default all markers with equal weight.
+        start: start of the range over which markers are averaged, s.
+        end: end of the range, s.
 
-    Raises: SettingError: something names what is not there, a factor is not positive, or markers
-        are needed and not given.
+    Returns:
+        The scaled model with its factors.
+
+    Raises:
+        SettingError: a name is unknown, a factor is not positive, or measured markers are missing.
     """
     copy = model.copy_deep()
-    measuring = Measuring(copy)
+    measuring = ScaleFactorFinder(copy)
 
     def expect_body(name: str) -> None:
         if name not in measuring.frames:
@@ -101,17 +112,17 @@ def scale(
             )
 
     if isinstance(measurements, Mapping):
-        measurements = _measurements(measurements)
+        measurements = _create_measurements(measurements)
         for body in (body for item in measurements for body in item.body_scale_set.objects):
             expect_body(body.name)
-    data = None if static is None else MarkerData.of(static)
+    data = None if static is None else MarkerData.from_source(static)
     wanted = list(measurements)
     if (wanted or place) and data is None:
         raise SettingError(
             "the subject is to be measured, and there are no markers of it; give them"
         )
     if data is not None and wanted:
-        measuring.by_measurements(wanted, data, start, end)
+        measuring.apply_measurements(wanted, data, start, end)
     by_hand = []
     for name, given in (factors or {}).items():
         expect_body(name)
@@ -120,7 +131,7 @@ def scale(
             numbers = ", ".join(f"{number:g}" for number in three)
             raise SettingError(f"factors of '{name}' are positive numbers, not {numbers}")
         by_hand.append(Scale(segment=name, scales=tuple(map(float, three))))
-    measuring.by_hand(by_hand)
+    measuring.apply_factors(by_hand)
     results, mechanism = measuring.found, measuring.mechanism
     scale_model(
         copy,
@@ -129,13 +140,14 @@ def scale(
         preserve_mass_distribution=preserve_mass_distribution,
         mechanism=mechanism,
     )
-    result = Scaled(copy, measuring.found, unknown=describe_unknown(model, UNSCALED))
+    result = ScaledModel(copy, measuring.found, unknown=describe_unknown(model, UNSCALED))
     if place and data is not None:
         result.placed = place_markers(copy, data, tasks, start, end)
     return result
 
 
-def _measurements(pairs: Pairs) -> list[Measurement]:
+def _create_measurements(pairs: MeasurementPairs) -> list[Measurement]:
+    """Return OpenSim's objects for measurements."""
     for name, (_, on) in pairs.items():
         if not isinstance(on, Mapping):
             raise SettingError(
@@ -158,67 +170,67 @@ def _measurements(pairs: Pairs) -> list[Measurement]:
     ]
 
 
-def run_scale(tool: ScaleTool, folder: Path) -> Scaled:
-    """What the tool computes from the files that its setup names; nothing is written.
+def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
+    """Compute what a ScaleTool computes from the files of its setup; write nothing.
 
     Args:
         tool: the setup.
-        folder: that of the setup file, from which its paths go.
+        folder: folder of the setup, from which its paths start.
 
     Raises:
-        SettingError: it asks for what is not there.
+        SettingError: the setup has an unknown name or lacks a file.
         DocumentError: a file cannot be read.
     """
     maker, scaler, placer = tool.generic_model_maker, tool.model_scaler, tool.marker_placer
-    if maker.model_file in UNNAMED:
+    if maker.model_file in NO_FILE:
         raise SettingError(
             "the setup names no model; put its file into model_file of GenericModelMaker"
         )
-    result = Scaled(read_anew(folder / maker.model_file, Model))
+    result = ScaledModel(read_anew(folder / maker.model_file, Model))
     model = result.model
     if scaler.apply:
         result.unknown = describe_unknown(model, UNSCALED)
-    if maker.marker_set_file not in UNNAMED:
+    if maker.marker_set_file not in NO_FILE:
         add_markers(model, folder / maker.marker_set_file)
     model.name = tool.name
     if scaler.apply:
-        result.measured = _scaled(tool, model, folder)
+        result.measured = _scale_by_setup(tool, model, folder)
         frames = [frame.name for frame in model.components(PhysicalFrame)]
-        _put(result, scaler.output_model_file, model)
-        _put(result, scaler.output_scale_file, scale_set(frames, result.measured))
-    if placer.apply and placer.marker_file not in UNNAMED:
-        data = MarkerData.of(folder / placer.marker_file)
-        coordinates = coordinate_table(placer.coordinate_file, folder)
+        _add_text(result, scaler.output_model_file, model)
+        _add_text(result, scaler.output_scale_file, create_scale_set(frames, result.measured))
+    if placer.apply and placer.marker_file not in NO_FILE:
+        data = MarkerData.from_source(folder / placer.marker_file)
+        coordinates = read_coordinate_table(placer.coordinate_file, folder)
         first, last = both_of(placer.time_range)
         result.placed = place_markers(
             model, data, placer.ik_task_set.objects, first, last, coordinates
         )
-        _put(result, placer.output_model_file, model)
-        _put(result, placer.output_marker_file, model.marker_set)
-        if placer.output_motion_file not in UNNAMED:
-            result.texts[placer.output_motion_file] = pose_text(model, result.placed)
+        _add_text(result, placer.output_model_file, model)
+        _add_text(result, placer.output_marker_file, model.marker_set)
+        if placer.output_motion_file not in NO_FILE:
+            result.texts[placer.output_motion_file] = format_pose(model, result.placed)
     return result
 
 
-def _scaled(tool: ScaleTool, model: Model, folder: Path) -> Measured:
-    """Scale the model by what the tool measures and is given."""
-    scaler, measuring = tool.model_scaler, Measuring(model)
+def _scale_by_setup(tool: ScaleTool, model: Model, folder: Path) -> ScaleFactors:
+    """Scale a model by the measurements and factors of a setup."""
+    scaler, measuring = tool.model_scaler, ScaleFactorFinder(model)
     for word in scaler.scaling_order:
         if word == MEASUREMENTS and any(item.apply for item in scaler.measurement_set.objects):
-            if scaler.marker_file in UNNAMED:
+            if scaler.marker_file in NO_FILE:
                 raise SettingError(
                     "the model is scaled by measurements, and ModelScaler has no marker_file; name one"
                 )
-            data = MarkerData.of(folder / scaler.marker_file)
-            measuring.by_measurements(
+            data = MarkerData.from_source(folder / scaler.marker_file)
+            measuring.apply_measurements(
                 scaler.measurement_set.objects, data, *both_of(scaler.time_range)
             )
-        elif word == BY_HAND:
-            measuring.by_hand(scaler.scale_set.objects)
+        elif word == MANUAL_SCALE:
+            measuring.apply_factors(scaler.scale_set.objects)
         elif word != MEASUREMENTS:
-            near = suggest_name(word, (MEASUREMENTS, BY_HAND))
+            near = suggest_name(word, (MEASUREMENTS, MANUAL_SCALE))
             raise SettingError(
-                f"scaling_order has '{word}'; it consists of {MEASUREMENTS} and {BY_HAND}{near}"
+                f"scaling_order has '{word}'; it consists of {MEASUREMENTS} and {MANUAL_SCALE}{near}"
             )
     keeps = scaler.preserve_mass_distribution
     result, mechanism = measuring.found, measuring.mechanism
@@ -229,10 +241,14 @@ def _scaled(tool: ScaleTool, model: Model, folder: Path) -> Measured:
 
 
 def add_markers(model: Model, path: Path) -> None:
-    """Add the markers of a file to a model; those of a name that is there take its place.
+    """Add the markers of a file to a model; they replace markers of the same name.
+
+    Args:
+        model: the model, which is changed.
+        path: file of a MarkerSet.
 
     Raises:
-        DocumentError: the file holds no markers.
+        DocumentError: the file has no MarkerSet.
     """
     result = read_any(path)
     if not isinstance(result, MarkerSet):
@@ -245,6 +261,7 @@ def add_markers(model: Model, path: Path) -> None:
         model.marker_set.objects.append(marker.copy_deep())
 
 
-def _put(result: Scaled, name: str, document: Object) -> None:
-    if name not in UNNAMED:
+def _add_text(result: ScaledModel, name: str, document: Object) -> None:
+    """Add the text of a document, unless its file has no name."""
+    if name not in NO_FILE:
         result.texts[name] = to_text(document, numbers="opensim")

@@ -1,6 +1,6 @@
-"""A model made larger or smaller: every property as its class declares that it scales, then masses and fiber lengths.
+"""Scaling of a model: properties by the rules of their classes, then masses and fiber lengths.
 
-What scales by what is in the `facts` of the classes; the rules for inertias are those of OpenSim.
+The rules are in the `facts` of the classes. Inertias follow OpenSim's rules.
 """
 
 from __future__ import annotations
@@ -29,13 +29,14 @@ from osimlite.schema.model import Model
 from osimlite.schema.wrapping import WrapObject
 
 Factors = Mapping[str, Sequence[float]]
-"""Factors along the x, y and z axes of bodies, by their names; those left out stay as they are."""
+"""Factors along the x, y and z axes of bodies, by name; other bodies keep their size."""
 
-WEIGHTLESS = 2.0**-52
-"""OpenSim takes a body of no more mass (kg) for one without."""
-SAME = 2.0 ** (-52.0 * 7.0 / 8.0)
-"""How nearly factors are equal that OpenSim takes for one."""
+MASSLESS_KG = 2.0**-52
+"""Mass up to which OpenSim treats a body as massless, kg."""
+FACTOR_TOLERANCE = 2.0 ** (-52.0 * 7.0 / 8.0)
+"""Relative difference of factors that OpenSim treats as equal."""
 TRANSLATIONS = ("translation1", "translation2", "translation3")
+"""Names of the translation axes of a SpatialTransform."""
 
 
 def scale_model(
@@ -48,27 +49,32 @@ def scale_model(
 ) -> None:
     """Scale a model, as OpenSim's Model::scale does.
 
-    Offsets of frames, stations, path points, wrap surfaces, mass centres and translations of joints
-    go by the factors of the body that they are fixed to; optimal fiber, tendon slack and resting
-    lengths by how much longer the whole path is in the default pose. Forces, stiffnesses, ranges of
-    coordinates and contact geometry stay.
+    Frame offsets, stations, path points, wrap surfaces, mass centres and joint translations are
+    multiplied by the factors of the body to which they are fixed. Optimal fiber, tendon slack and
+    resting lengths are multiplied by the ratio of the path lengths in the default pose. Forces,
+    stiffnesses, ranges of coordinates and contact geometry stay.
 
-    Args: model: is changed. factors: of its bodies. mass: what all bodies together are to weigh,
-        kg; if it is not positive that follows from the factors. preserve_mass_distribution: let the
-        bodies keep their shares of the mass, instead of weighing more where they are larger.
-        mechanism: of the model as it is; made if left out.
+    Args:
+        model: the model, which is changed.
+        factors: factors of its bodies.
+        mass: total mass, kg; if it is not positive, the mass follows from the factors.
+        preserve_mass_distribution: whether the bodies keep their shares of the mass; otherwise
+            larger bodies are heavier.
+        mechanism: mechanism of the model before scaling; built by default.
 
-    Raises: ModelError: a coupler binds a translation to a body that is scaled in one direction more
-        than in another. OsimliteError: the paths of the model cannot be computed.
+    Raises:
+        ModelError: a coupler determines a translation of a body with different factors along its
+            axes.
+        OsimliteError: osimlite cannot compute the paths of the model.
     """
     mechanism = build_mechanism(model) if mechanism is None else mechanism
-    before = path_lengths(model, mechanism)
+    before = compute_path_lengths(model, mechanism)
     scaler = _Scaler(model, factors, mechanism)
     for component in scaler.tree.components:
         if not scaler.tree.is_internal(component):
-            scaler.scale(component)
+            scaler.scale_component(component)
     for body in model.components(Body):
-        own = scaler.of_base(body)
+        own = scaler.get_base_factors(body)
         if own is not None:
             scale_inertia(body, own, scales_mass=not preserve_mass_distribution)
     if mass > 0.0:
@@ -77,18 +83,26 @@ def scale_model(
             for body in model.components(Body):
                 body.mass *= mass / total
                 body.inertia = tuple(mass / total * item for item in body.inertia)  # type: ignore[assignment]
-    after = path_lengths(model) if before else {}
+    after = compute_path_lengths(model) if before else {}
     for path, length in before.items():
         if length > 0.0:
             owner = model[path]
-            for name, rule in scales(type(owner)).items():
+            for name, rule in get_scale_rules(type(owner)).items():
                 if rule == PATH:
                     setattr(owner, name, getattr(owner, name) * (after[path] / length))
 
 
-def path_lengths(model: Model, mechanism: Mechanism | None = None) -> dict[str, float]:
-    """Length of each path in the default pose, m, by the component paths of their owners that have a rule for it."""
-    owners = [item for item in model.components() if PATH in scales(type(item)).values()]
+def compute_path_lengths(model: Model, mechanism: Mechanism | None = None) -> dict[str, float]:
+    """Return the lengths of paths in the default pose, for components that scale with their path.
+
+    Args:
+        model: the model.
+        mechanism: its mechanism; built by default.
+
+    Returns:
+        Length (m) by path of the component.
+    """
+    owners = [item for item in model.components() if PATH in get_scale_rules(type(item)).values()]
     if not owners:
         return {}
     from osimlite.simulation.paths import paths
@@ -99,8 +113,15 @@ def path_lengths(model: Model, mechanism: Mechanism | None = None) -> dict[str, 
 
 
 @cache
-def scales(cls: type[Any]) -> dict[str, str]:
-    """What each property of a class is multiplied by when a model is scaled, see `Facts.scales`."""
+def get_scale_rules(cls: type[Any]) -> dict[str, str]:
+    """Return the rules by which properties of a class scale; see `Facts.scales`.
+
+    Args:
+        cls: class of the schema.
+
+    Returns:
+        Rule by name of the property.
+    """
     result: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         facts = vars(base).get("facts")
@@ -110,10 +131,15 @@ def scales(cls: type[Any]) -> dict[str, str]:
 
 
 def scale_inertia(body: Body, factors: Array, *, scales_mass: bool) -> None:
-    """Give a body the mass and the inertia that it has once it is scaled.
+    """Scale the mass and inertia of a body.
 
-    Where the factors differ, OpenSim takes the body for a cylinder along the axis of its least
+    If the factors differ, OpenSim treats the body as a cylinder along the axis of its smallest
     moment of inertia.
+
+    Args:
+        body: the body, which is changed.
+        factors: factors along its axes (3,).
+        scales_mass: whether the mass grows with the volume.
     """
     mass, volume = body.mass, abs(float(np.prod(factors)))
     xx, yy, zz, xy, xz, yz = body.inertia
@@ -122,9 +148,9 @@ def scale_inertia(body: Body, factors: Array, *, scales_mass: bool) -> None:
         body.mass *= volume
     denser = volume if scales_mass else 1.0
     x, y, z = factors.tolist()
-    if body.mass <= WEIGHTLESS:
+    if body.mass <= MASSLESS_KG:
         moments, products = np.zeros(3), np.zeros(3)
-    elif _same(x, y) and _same(y, z):
+    elif _is_equal_factor(x, y) and _is_equal_factor(y, z):
         moments, products = moments * denser * (x * x), products * denser * (x * x)
     else:
         axis = int(np.argmin(moments))
@@ -142,12 +168,13 @@ def scale_inertia(body: Body, factors: Array, *, scales_mass: bool) -> None:
     body.inertia = (*moments.tolist(), *products.tolist())
 
 
-def _same(one: float, two: float) -> bool:
-    return abs(one - two) <= SAME * max(abs(one), abs(two), 1.0)
+def _is_equal_factor(one: float, two: float) -> bool:
+    """Return whether OpenSim treats two factors as equal."""
+    return abs(one - two) <= FACTOR_TOLERANCE * max(abs(one), abs(two), 1.0)
 
 
 class _Scaler:
-    """Multiplies properties of components by the factors of the bodies that they are fixed to."""
+    """Scaling of components by the factors of the bodies to which they are fixed."""
 
     def __init__(self, model: Model, factors: Factors, mechanism: Mechanism) -> None:
         self.tree = model.tree()
@@ -158,43 +185,51 @@ class _Scaler:
             self.placements.resolve_frame(frame)
         self.mechanism = mechanism
 
-    def of_base(self, frame: PhysicalFrame) -> Array | None:
-        """The factors of the body (or ground) that a frame is fixed to, None if that stays as it is."""
+    def get_base_factors(self, frame: PhysicalFrame) -> Array | None:
+        """Return the factors of the body (or ground) to which a frame is fixed, or None."""
         base, _ = self.placements.resolve_frame(frame)
         return self.factors.get(base.rsplit("/", 1)[1])
 
-    def scale(self, component: Component) -> None:
-        """Scale the properties of a component for which its class has a rule."""
-        for name, rule in scales(type(component)).items():
+    def scale_component(self, component: Component) -> None:
+        """Scale the properties of a component that have a rule."""
+        for name, rule in get_scale_rules(type(component)).items():
             whose, _, which = rule.partition(" ")
             if whose == PATH:
                 continue
             if isinstance(component, CoordinateCouplerConstraint):
-                factors = self._of_coupler(component, whose)
+                factors = self._get_coupler_factors(component, whose)
             elif whose == OWN:
                 assert isinstance(component, PhysicalFrame)
-                factors = self.of_base(component)
+                factors = self.get_base_factors(component)
             elif whose == HOLDER:
-                factors = self.of_base(self._holder(component))
+                factors = self.get_base_factors(self._find_holder(component))
             else:
-                factors = self.of_base(self.placements.follow_socket(component, whose))
+                factors = self.get_base_factors(self.placements.follow_socket(component, whose))
             if factors is not None:
                 setattr(
                     component,
                     name,
-                    _scaled(getattr(component, name), _chosen(component, factors, which)),
+                    _multiply_value(
+                        getattr(component, name), _select_factors(component, factors, which)
+                    ),
                 )
 
-    def _holder(self, component: Component) -> PhysicalFrame:
-        """The frame in which a component is."""
+    def _find_holder(self, component: Component) -> PhysicalFrame:
+        """Return the frame that contains a component."""
         holder: Component | None = component
         while holder is not None and not isinstance(holder, PhysicalFrame):
             holder = self.tree.parent_of(holder)
         assert holder is not None
         return holder
 
-    def _of_coupler(self, coupler: CoordinateCouplerConstraint, name: str) -> Array | None:
-        """The factor of a coupler: that of the parent of the joint whose translation it gives; none of an angle."""
+    def _get_coupler_factors(self, coupler: CoordinateCouplerConstraint, name: str) -> Array | None:
+        """Return the factors for a coupler that determines a translation; None for a rotation.
+
+        They are those of the parent of the joint that the translation belongs to.
+
+        Raises:
+            ModelError: these factors differ between the axes.
+        """
         coordinate = self.tree.target(coupler, name, getattr(coupler, name))
         assert isinstance(coordinate, Coordinate)
         info = self.mechanism.coordinates[
@@ -203,7 +238,7 @@ class _Scaler:
         joint = self.tree.parent_of(coordinate)
         if info.motion_type != "translational" or not isinstance(joint, Joint):
             return None
-        factors = self.of_base(self.placements.follow_socket(joint, "socket_parent_frame"))
+        factors = self.get_base_factors(self.placements.follow_socket(joint, "socket_parent_frame"))
         if factors is not None and len(set(factors.tolist())) > 1:
             raise ModelError(
                 f"'{coupler.path}' gives a translation of the joint '{joint.path}', whose parent is scaled by "
@@ -212,8 +247,8 @@ class _Scaler:
         return factors
 
 
-def _chosen(component: Component, factors: Array, which: str) -> Array:
-    """The factors that a rule names, or all three."""
+def _select_factors(component: Component, factors: Array, which: str) -> Array:
+    """Return the factors that a rule names, or all three."""
     if which in ("x", "y", "z"):
         return factors["xyz".index(which)][None]
     if which == MEAN:
@@ -228,10 +263,10 @@ def _chosen(component: Component, factors: Array, which: str) -> Array:
     return np.array((lengths[2] if which == ALONG else 0.5 * (lengths[0] + lengths[1]),))
 
 
-def _scaled(value: Any, factors: Array) -> Any:
-    """A property multiplied by factors."""
+def _multiply_value(value: Any, factors: Array) -> Any:
+    """Return the value of a property multiplied by factors."""
     if isinstance(value, Function):
-        return _multiplied(value, float(factors[0]))
+        return _multiply_function(value, float(factors[0]))
     if isinstance(value, SpatialTransform):
         for name in TRANSLATIONS:
             axis = getattr(value, name)
@@ -241,19 +276,19 @@ def _scaled(value: Any, factors: Array) -> Any:
                 0.0,
             ):
                 continue
-            axis.function = _multiplied(axis.function, float(np.abs(axis.axis) @ factors))
+            axis.function = _multiply_function(axis.function, float(np.abs(axis.axis) @ factors))
         return value
     if isinstance(value, list):
         for shape in value:
-            shape.scale_factors = _scaled(shape.scale_factors, factors)
+            shape.scale_factors = _multiply_value(shape.scale_factors, factors)
         return value
     if isinstance(value, tuple):
         return tuple(float(number * factor) for number, factor in zip(value, factors, strict=False))
     return None if value is None else float(value * factors[0])
 
 
-def _multiplied(function: Function, factor: float) -> MultiplierFunction:
-    """A function times a factor."""
+def _multiply_function(function: Function, factor: float) -> MultiplierFunction:
+    """Return a function multiplied by a factor."""
     if isinstance(function, MultiplierFunction):
         function.scale *= factor
         return function

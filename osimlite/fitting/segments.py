@@ -1,4 +1,4 @@
-"""Segments of a person: which bodies of a model have scale factors of their own, and which share them."""
+"""Segments of a person: groups of bodies that share scale factors."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import numpy as np
 
 from osimlite.mechanics.multibody.spatial import Array
 
-SIDES = {"r": "l", "l": "r", "right": "left", "left": "right"}
-"""What is said of one side of the body, and of the other."""
-_SIDE = re.compile(r"right|left|(?<![a-z])[rl](?![a-z])", re.IGNORECASE)
+OPPOSITE_WORDS = {"r": "l", "l": "r", "right": "left", "left": "right"}
+"""Words for one side of the body, and for the other."""
+_SIDE_PATTERN = re.compile(r"right|left|(?<![a-z])[rl](?![a-z])", re.IGNORECASE)
+"""Words and letters for a side in a name."""
 
 
 class Segment(NamedTuple):
@@ -23,7 +24,7 @@ class Segment(NamedTuple):
 
 
 class Segments(NamedTuple):
-    """The scale factors of the bodies of a model, as few numbers (k,)."""
+    """Parameters (k,) that determine the scale factors of all bodies."""
 
     parts: tuple[Segment, ...]  # whose factor each number is
     # pairs of lists of numbers whose means are much the same: segments that hang on one another
@@ -32,22 +33,24 @@ class Segments(NamedTuple):
     sides: tuple[tuple[int, tuple[int, ...]], ...]
 
     @classmethod
-    def of(
+    def group_bodies(
         cls, carriers: Mapping[str, str], marked: Collection[str], *, by_axis: bool, symmetric: bool
     ) -> Segments:
-        """Those of bodies.
+        """Group the bodies of a model into segments.
 
-        A body without markers has the factors of the one with markers that it carries, as the talus
-        those of the foot, or else of the one that carries it, as the patella, the toes and the
-        hand.
+        A body without markers has the factors of the body with markers that it carries, as the
+        talus those of the foot, or else of the body that carries it, as the patella, the toes and
+        the hand.
 
-        Args: carriers: the body that carries each body, by name, carriers first; bodies on ground
-            have another name. marked: bodies with markers. by_axis: whether a body may grow in one
-            direction more than in another. symmetric: whether the two sides of the body have the
-            same factors.
+        Args:
+            carriers: parent of each body by name, parents first; bodies on ground have another
+                name.
+            marked: bodies with markers.
+            by_axis: whether the factors of a body may differ between its axes.
+            symmetric: whether both sides of the body have the same factors.
         """
         if symmetric:
-            marked = {*marked, *(other_side(body, carriers) for body in marked)}
+            marked = {*marked, *(get_opposite_name(body, carriers) for body in marked)}
         first = {body: body for body in carriers}
         for body, carrier in reversed(list(carriers.items())):
             if carrier in first and carrier not in marked and first[carrier] == carrier:
@@ -56,7 +59,9 @@ class Segments(NamedTuple):
             if first[body] not in marked and carrier in first:
                 first[body] = first[carrier]
         if symmetric:
-            first = {body: min(own, other_side(own, carriers)) for body, own in first.items()}
+            first = {
+                body: min(own, get_opposite_name(own, carriers)) for body, own in first.items()
+            }
         groups = {
             name: tuple(body for body in carriers if first[body] == name) for name in first.values()
         }
@@ -73,8 +78,15 @@ class Segments(NamedTuple):
         sides = tuple((k, own) for own in numbers.values() for k in own if len(own) > 1)
         return cls(tuple(parts), alike, sides)
 
-    def factors(self, sizes: Sequence[float] | Array) -> dict[str, list[float]]:
-        """The factors along the axes of each body, by its name, for numbers (k,)."""
+    def expand_factors(self, sizes: Sequence[float] | Array) -> dict[str, list[float]]:
+        """Return the factors of each body along its axes for parameters (k,).
+
+        Args:
+            sizes: parameters (k,).
+
+        Returns:
+            Factors by name of the body.
+        """
         result = {body: [1.0, 1.0, 1.0] for part in self.parts for body in part.bodies}
         for part, size in zip(self.parts, sizes, strict=True):
             for body in part.bodies:
@@ -82,35 +94,53 @@ class Segments(NamedTuple):
                     result[body][axis] = float(size)
         return result
 
-    def expected(self, first: float, apart: float, across: float) -> tuple[Array, Array]:
-        """Rows (r, k) and what their products with the numbers usually are (r,), with standard deviations of 1.
+    def compute_prior(self, first: float, apart: float, across: float) -> tuple[Array, Array]:
+        """Return the prior of the parameters as linear equations with standard deviation 1.
 
         Args:
-            first: how far the size of the first segment usually is from 1.
-            apart: how far the sizes of segments that hang on one another are apart.
-            across: how far the factors of one segment are from their mean.
+            first: standard deviation of the first segment's size from 1.
+            apart: standard deviation of the difference between neighbouring segments.
+            across: standard deviation of the factors of one segment from their mean.
+
+        Returns:
+            Matrix (r, k), and expected values of its product with the parameters (r,).
         """
         own = [k for k, part in enumerate(self.parts) if part.bodies == self.parts[0].bodies]
         rows = [
-            self._mean(own, first),
-            *((self._mean(one, apart) - self._mean(two, apart)) for one, two in self.alike),
+            self._create_mean_row(own, first),
+            *(
+                (self._create_mean_row(one, apart) - self._create_mean_row(two, apart))
+                for one, two in self.alike
+            ),
         ]
-        rows += [self._mean((k,), across) - self._mean(own, across) for k, own in self.sides]
+        rows += [
+            self._create_mean_row((k,), across) - self._create_mean_row(own, across)
+            for k, own in self.sides
+        ]
         wanted = np.zeros(len(rows))
         wanted[0] = 1.0 / first
         return np.array(rows), wanted
 
-    def _mean(self, numbers: Sequence[int], deviation: float) -> Array:
+    def _create_mean_row(self, numbers: Sequence[int], deviation: float) -> Array:
+        """Return a row that gives the mean of some parameters divided by a standard deviation."""
         row = np.zeros(len(self.parts))
         row[list(numbers)] = 1.0 / len(numbers) / deviation
         return row
 
 
-def other_side(name: str, names: Mapping[str, object]) -> str:
-    """The name of what is on the other side, if there is any: ``femur_l`` for ``femur_r``; or the same name."""
+def get_opposite_name(name: str, names: Mapping[str, object]) -> str:
+    """Return the name of the same part on the other side, as ``femur_l`` for ``femur_r``.
 
-    def swapped(found: re.Match[str]) -> str:
-        word = SIDES[found[0].lower()]
+    Args:
+        name: name of the part.
+        names: known names.
+
+    Returns:
+        The other name, or the same one if the other is unknown.
+    """
+
+    def swap_word(found: re.Match[str]) -> str:
+        word = OPPOSITE_WORDS[found[0].lower()]
         return (
             word.upper()
             if found[0].isupper()
@@ -119,5 +149,5 @@ def other_side(name: str, names: Mapping[str, object]) -> str:
             else word
         )
 
-    other = _SIDE.sub(swapped, name)
+    other = _SIDE_PATTERN.sub(swap_word, name)
     return other if other in names else name

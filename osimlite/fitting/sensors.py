@@ -1,6 +1,7 @@
-"""Orientation sensors on a model: the frames that stand for them, and where these are put, as OpenSim's IMUPlacer does.
+"""Orientation sensors on a model, placed as OpenSim's IMUPlacer does.
 
-A sensor has the name of a frame of the model. What is measured of it is how its axes lie in ground.
+A sensor has the name of a frame of the model. Its measurement is the orientation of that frame in
+ground.
 """
 
 from __future__ import annotations
@@ -22,13 +23,14 @@ from osimlite.schema.frames import Body, PhysicalFrame, PhysicalOffsetFrame
 from osimlite.schema.markers import IMU
 from osimlite.schema.model import Model
 
-ENDING = "_imu"
-"""What the name of a sensor has behind that of the frame that it is worn on."""
+SENSOR_SUFFIX = "_imu"
+"""Suffix of a sensor's name after the name of the frame on which it is worn."""
 AXES = "xyz"
+"""Names of the axes."""
 
 
 class PlacedSensors(NamedTuple):
-    """Sensors that were put onto a model."""
+    """Sensors that were placed on a model."""
 
     names: tuple[str, ...]  # of the sensors
     left_out: tuple[str, ...]  # names of those of the data for which the model has no frame
@@ -37,13 +39,21 @@ class PlacedSensors(NamedTuple):
     heading: float | None
 
 
-def sensor_frames(
+def find_sensor_frames(
     model: Model, mechanism: Mechanism, wanted: Iterable[str]
 ) -> dict[str, FramePlacement]:
-    """The frames of a model that have wanted names, in the model's order.
+    """Return the frames of a model with the names of sensors, in the model's order.
+
+    Args:
+        model: the model.
+        mechanism: mechanism of the model.
+        wanted: names of the sensors.
+
+    Returns:
+        Frames by name.
 
     Raises:
-        SettingError: there are none, or several of one name.
+        SettingError: no frame has such a name, or several have the same.
     """
     tree, wanted, result = model.tree(), list(wanted), dict[str, FramePlacement]()
     frames = [(frame.name, tree.path_of(frame) or "") for frame in model.components(PhysicalFrame)]
@@ -65,17 +75,25 @@ def sensor_frames(
 def place_sensors(
     model: Model, data: OrientationData, base: str = "", axis: str = ""
 ) -> PlacedSensors:
-    """Put sensors onto a model in the pose in which the subject stood, its default one.
+    """Place sensors on a model in its default pose, in which the subject stood.
 
-    The sensor of a frame is called as the frame with ``_imu`` behind. It becomes a frame there, in
-    the mass centre of a body, with an IMU; where there is such a frame already, that is turned.
+    The name of a sensor is the name of a frame with the suffix ``_imu``. The sensor becomes an
+    offset frame there, in the mass centre of a body, with an IMU; an existing frame of that name is
+    rotated.
 
-    Args: model: is changed. data: orientations of the sensors in ground, of which the first frame
-        counts. base: the sensor whose axis points where the model faces; if left out, the data are
-        not turned. axis: that axis: x, y or z, with a minus sign if it points back.
+    Args:
+        model: the model, which is changed.
+        data: orientations of the sensors in ground; only the first frame counts.
+        base: sensor whose axis points where the model faces; without it, the data are not rotated.
+        axis: that axis: x, y or z, with a minus sign if it points backwards.
 
-    Raises: SettingError: there is no such sensor or axis, the model has no frame of any sensor, or
-        one was not measured. SimulationError: the default pose cannot keep the constraints.
+    Returns:
+        Names of placed and unused sensors, and the heading.
+
+    Raises:
+        SettingError: the sensor or axis is unknown, the model has no frame of any sensor, or a
+            sensor was not measured.
+        SimulationError: the default pose cannot satisfy the constraints.
     """
     mechanism = build_mechanism(model)
     q, _ = mechanism.default_state()
@@ -87,14 +105,16 @@ def place_sensors(
             raise SettingError(
                 f"there is no sensor '{base}' in {data.source}{suggest_name(base, data.names)}"
             )
-        faced = _axis_of(measured[base], axis)
-        heading = _heading(_forwards(model, mechanism, state.rotations), faced)
+        faced = _get_axis_direction(measured[base], axis)
+        heading = _compute_heading(
+            _find_forward_direction(model, mechanism, state.rotations), faced
+        )
         turn = rotation_about_space((0.0, heading, 0.0))
         measured = {name: turn @ rotation for name, rotation in measured.items()}
     frames, placed = list(model.components(PhysicalFrame)), []
     for name, rotation in measured.items():
-        owner, ending, _ = name.rpartition(ENDING)
-        worn = _only_one(frames, owner, model) if ending else None
+        owner, ending, _ = name.rpartition(SENSOR_SUFFIX)
+        worn = _find_single_frame(frames, owner, model) if ending else None
         if worn is None:
             continue
         if not np.isfinite(rotation).all():
@@ -105,13 +125,13 @@ def place_sensors(
         inside = (state.transform(body) @ matrix)[:3, :3].T @ rotation
         placed.append((name, worn, tuple(angles_xyz(inside).tolist())))
     if not placed:
-        example = f", as '{frames[-1].name}{ENDING}' is" if frames else ""
+        example = f", as '{frames[-1].name}{SENSOR_SUFFIX}' is" if frames else ""
         raise SettingError(
-            f"no sensor of {data.source} ({join_words(data.names)}) is called as a frame of '{model.name}' with '{ENDING}' "
-            f"behind{example}"
+            f"no sensor of {data.source} ({join_words(data.names)}) is called as a frame of '{model.name}' "
+            f"with '{SENSOR_SUFFIX}' behind{example}"
         )
     for name, worn, angles in placed:
-        there = _only_one(
+        there = _find_single_frame(
             [frame for frame in frames if isinstance(frame, PhysicalOffsetFrame)], name, model
         )
         if isinstance(there, PhysicalOffsetFrame):
@@ -127,16 +147,22 @@ def place_sensors(
     return PlacedSensors(names, tuple(name for name in data.names if name not in names), heading)
 
 
-def _only_one(frames: Iterable[PhysicalFrame], name: str, model: Model) -> PhysicalFrame | None:
-    """The frame of a name, if there is one."""
+def _find_single_frame(
+    frames: Iterable[PhysicalFrame], name: str, model: Model
+) -> PhysicalFrame | None:
+    """Return the frame of a name, or None.
+
+    Raises:
+        SettingError: several frames have the name.
+    """
     result = [frame for frame in frames if frame.name == name]
     if len(result) > 1:
         raise SettingError(f"'{model.name}' has several frames '{name}'; a sensor is worn on one")
     return result[0] if result else None
 
 
-def _axis_of(rotation: Array, axis: str) -> Array:
-    """Where an axis of a sensor points (3,)."""
+def _get_axis_direction(rotation: Array, axis: str) -> Array:
+    """Return the direction of an axis of a sensor (3,)."""
     word = axis.lower()
     if word[-1] not in AXES:
         raise SettingError(f"the axis '{axis}' is none; give x, y, z, -x, -y or -z")
@@ -144,8 +170,8 @@ def _axis_of(rotation: Array, axis: str) -> Array:
     return -column if word[0] == "-" else column
 
 
-def _forwards(model: Model, mechanism: Mechanism, rotations: Array) -> Array:
-    """Where a model faces (3,): the x axis of the body of the first joint on ground."""
+def _find_forward_direction(model: Model, mechanism: Mechanism, rotations: Array) -> Array:
+    """Return the direction in which a model faces (3,): x of the first joint's body on ground."""
     tree = model.tree()
     for joint in model.joint_set.objects:
         ends = [
@@ -159,7 +185,14 @@ def _forwards(model: Model, mechanism: Mechanism, rotations: Array) -> Array:
     raise SettingError(f"no joint of '{model.name}' begins at ground; leave out base_imu_label")
 
 
-def _heading(forwards: Array, faced: Array) -> float:
-    """The angle about the vertical that OpenSim turns data by (rad): that between two directions, at most 180°."""
+def _compute_heading(forwards: Array, faced: Array) -> float:
+    """Return the angle about the vertical by which OpenSim rotates data, rad.
+
+    It is the angle between two directions, at most 180°.
+
+    Args:
+        forwards: direction in which the model faces (3,).
+        faced: direction of the sensor's axis (3,).
+    """
     angle = math.acos(min(1.0, max(-1.0, float(forwards @ faced))))
     return -angle if float(np.cross(forwards, faced)[1]) > 0.0 else angle

@@ -1,8 +1,7 @@
-"""Where the markers of a model are if its bodies are larger or smaller: at one pose, a linear function of the factors.
+"""Marker positions of a model as a function of scale factors: linear in the factors at one pose.
 
-All translations of a mechanism are multiplied by factors, and no rotation is. So what one factor
-does is the difference of two models, exactly, whatever the joints are; no joint has a formula for
-it.
+Scaling multiplies all translations of a mechanism by factors, and changes no rotation. The
+derivative by a factor is therefore exactly the difference of two models, for joints of any type.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from osimlite.fitting.pose_fit import PoseFit
-from osimlite.fitting.pose_layout import Marker, substituted
+from osimlite.fitting.pose_layout import MarkerTarget, separate_couplers
 from osimlite.fitting.scaling import scale_model
 from osimlite.fitting.segments import Segments
 from osimlite.mechanics.multibody import build_mechanism
@@ -25,17 +24,17 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.link_motion import moving
 from osimlite.simulation.system import System
 
-AT_END = 1e-9
-"""How near a clamped coordinate is to an end of its range that holds it (rad or m)."""
+RANGE_TOLERANCE = 1e-9
+"""Distance from the end of its range (rad or m) at which a clamped coordinate cannot move."""
 
 
-class Shape:
-    """A mechanism whose bodies have factors.
+class ScalableMarkers:
+    """Markers of a model whose bodies have scale factors.
 
     Args:
-        model: what is scaled.
-        names: of the m markers that count; none of them is on ground.
-        segments: whose k factors may change.
+        model: the model.
+        names: names of the m markers; none is on ground.
+        segments: segments with k parameters.
     """
 
     def __init__(self, model: Model, names: Sequence[str], segments: Segments) -> None:
@@ -44,81 +43,100 @@ class Shape:
             held.objects.clear()
         self._names, self.segments = list(names), segments
         ones = np.ones(len(segments.parts))
-        self._first = self._points(ones)
-        self._larger = [self._points(ones + unit) for unit in np.eye(len(ones))]
+        self._first = self._create_points(ones)
+        self._larger = [self._create_points(ones + unit) for unit in np.eye(len(ones))]
 
-    def scaled(self, sizes: Array) -> tuple[Mechanism, list[StationPlacement]]:
-        """The mechanism, and where its markers are fixed, for numbers (k,)."""
+    def scale_mechanism(self, sizes: Array) -> tuple[Mechanism, list[StationPlacement]]:
+        """Scale the mechanism.
+
+        Args:
+            sizes: parameters (k,).
+
+        Returns:
+            The mechanism, and the stations of its markers.
+        """
         model = self._bare.copy_deep()
-        scale_model(model, self.segments.factors(sizes))
+        scale_model(model, self.segments.expand_factors(sizes))
         mechanism, tree = build_mechanism(model), model.tree()
         places: dict[str, StationPlacement] = {}
         for marker in model.components(ModelMarker):
             places.setdefault(marker.name, mechanism.stations[tree.path_of(marker) or ""])
         return mechanism, [places[name] for name in self._names]
 
-    def _points(self, sizes: Array) -> _Points:
-        return _Points(*self.scaled(sizes))
+    def _create_points(self, sizes: Array) -> _MarkerPoints:
+        """Return the marker points for parameters (k,)."""
+        return _MarkerPoints(*self.scale_mechanism(sizes))
 
-    def columns(self, values: Array) -> tuple[Array, Array]:
-        """What the factors and the offsets of markers do to their places in poses (t, n) of all coordinates.
+    def compute_derivatives(self, values: Array) -> tuple[Array, Array]:
+        """Compute the derivatives of marker positions by factors and offsets.
 
-        Returns: Derivatives (t, m, 3, k) of the places by the factors, m; rotations (t, m, 3, 3) of
+        Args:
+            values: poses (t, n).
+
+        Returns:
+            Derivatives (t, m, 3, k) of the positions by the factors, m; rotations (t, m, 3, 3) of
             the markers' bodies.
         """
-        places, rotations = self._first.places(values)
+        places, rotations = self._first.compute_positions(values)
         return np.stack(
-            [larger.places(values)[0] - places for larger in self._larger], axis=-1
+            [larger.compute_positions(values)[0] - places for larger in self._larger], axis=-1
         ), rotations
 
 
-class Posed:
-    """A shape of one size: its poses that fit measured markers, and how its markers move there.
+class ScaledPoseFit:
+    """Fit of poses to markers for fixed parameters.
 
     Args:
-        shape: the bodies.
-        sizes: their numbers (k,).
-        offsets: of the markers, on top of where they are then (m, 3), m.
-        weights: of the markers (m,).
+        shape: markers of the model.
+        sizes: parameters (k,).
+        offsets: offsets of the markers from the scaled model (m, 3), m.
+        weights: weights of the markers (m,).
     """
 
-    def __init__(self, shape: Shape, sizes: Array, offsets: Array, weights: Array) -> None:
-        self.mechanism, stations = shape.scaled(sizes)
+    def __init__(
+        self, shape: ScalableMarkers, sizes: Array, offsets: Array, weights: Array
+    ) -> None:
+        self.mechanism, stations = shape.scale_mechanism(sizes)
         moved = [
             place._replace(location=place.location + by)
             for place, by in zip(stations, offsets, strict=True)
         ]
-        self._points = _Points(self.mechanism, moved)
+        self._points = _MarkerPoints(self.mechanism, moved)
         markers = [
-            Marker(place, weight) for place, weight in zip(moved, weights.tolist(), strict=True)
+            MarkerTarget(place, weight)
+            for place, weight in zip(moved, weights.tolist(), strict=True)
         ]
         self._fit = PoseFit(self.mechanism, markers)
 
-    def poses(self, measured: Array, starts: Array) -> tuple[Array, Array]:
-        """The best pose for each of some frames (t, m, 3), m, of which none follows another.
+    def fit_poses(self, measured: Array, starts: Array) -> tuple[Array, Array]:
+        """Fit the pose of each frame separately.
 
         Args:
-            measured: places of the markers; NaN where one was not seen.
-            starts: poses (t, n) to begin with.
+            measured: positions of the markers (t, m, 3), m; NaN where one was not seen.
+            starts: initial poses (t, n).
 
         Returns:
-            Values of all coordinates (t, n), and where the markers are then (t, m, 3), m.
+            Values of all coordinates (t, n), and marker positions (t, m, 3), m.
         """
         frames = [
-            self._fit.fit(frame[None], q=start)
+            self._fit.fit_frames(frame[None], q=start)
             for frame, start in zip(measured, starts, strict=True)
         ]
         return np.concatenate([frame.values for frame in frames]), np.concatenate(
             [frame.places for frame in frames]
         )
 
-    def freedoms(self, values: Array) -> list[Array]:
-        """For each of some poses (t, n) how the markers can move (m, 3, f), a column for each free direction."""
-        return self._points.freedoms(values)
+    def compute_free_motions(self, values: Array) -> list[Array]:
+        """Return, for each pose (t, n), the free motions of the markers.
+
+        Returns:
+            Velocities of the markers (m, 3, f) for each pose, a column for each free direction.
+        """
+        return self._points.compute_free_motions(values)
 
 
-class _Points:
-    """Points of the bodies of a mechanism at many poses, whatever constrains it."""
+class _MarkerPoints:
+    """Points of bodies of a mechanism in many poses, without regard to constraints."""
 
     def __init__(self, mechanism: Mechanism, stations: Sequence[StationPlacement]) -> None:
         self._mechanism, free = mechanism, mechanism.released()
@@ -132,7 +150,7 @@ class _Points:
         )
         self._turned = np.array([frame[:3, :3] for frame in frames])
         holds = [item for item in mechanism.constraints if not isinstance(item, Lock | Prescribed)]
-        self._couplers, _ = substituted(holds, set())
+        self._couplers, _ = separate_couplers(holds, set())
         self._holds = holds
         self._still = [
             k
@@ -140,43 +158,55 @@ class _Points:
             if info.locked or info.prescribed is not None
         ]
 
-    def places(self, values: Array) -> tuple[Array, Array]:
-        """Places (t, m, 3), m, and rotations (t, m, 3, 3) of their bodies; what depends on others follows them."""
+    def compute_positions(self, values: Array) -> tuple[Array, Array]:
+        """Return positions and rotations of the points; coupled coordinates follow the others.
+
+        Args:
+            values: poses (t, n).
+
+        Returns:
+            Positions (t, m, 3), m, and rotations (t, m, 3, 3) of their bodies.
+        """
         followed = values.copy()
         for coupler in self._couplers:
             others = list(coupler.independent)
             followed[:, coupler.dependent] = [
                 coupler.function.evaluate(row[others])[0] for row in followed
             ]
-        links = self._moving(followed, np.zeros_like(followed))
+        links = self._compute_link_motion(followed, np.zeros_like(followed))
         turned = links[..., :9].reshape(*links.shape[:2], 3, 3) @ self._turned
         return moving(links, self._own)[..., :3], turned
 
-    def freedoms(self, values: Array) -> list[Array]:
-        """As :meth:`Posed.freedoms`."""
+    def compute_free_motions(self, values: Array) -> list[Array]:
+        """Return the free motions; see :meth:`ScaledPoseFit.compute_free_motions`."""
         count, size = values.shape
-        each = [self._moving(values, np.tile(unit, (count, 1))) for unit in np.eye(size)]
+        each = [
+            self._compute_link_motion(values, np.tile(unit, (count, 1))) for unit in np.eye(size)
+        ]
         moves = np.stack([moving(links, self._own)[..., 3:] for links in each], axis=-1)
-        return [rates @ self._free(q) for rates, q in zip(moves, values, strict=True)]
+        return [
+            rates @ self._compute_free_speeds(q) for rates, q in zip(moves, values, strict=True)
+        ]
 
-    def _free(self, q: Array) -> Array:
-        """The speeds (n, f) that joints, constraints and ends of ranges allow in a pose."""
+    def _compute_free_speeds(self, q: Array) -> Array:
+        """Return the speeds (n, f) that joints, constraints and ends of ranges allow in a pose."""
         held = [
             k
             for k, (info, value) in enumerate(
                 zip(self._mechanism.coordinates, q.tolist(), strict=True)
             )
-            if info.clamped and not info.range[0] + AT_END < value < info.range[1] - AT_END
+            if info.clamped
+            and not info.range[0] + RANGE_TOLERANCE < value < info.range[1] - RANGE_TOLERANCE
         ]
         rows = [np.eye(len(q))[[*self._still, *held]]]
         if self._holds:
             state = self._mechanism.at(q)
             rows += [item.velocity_equations(state)[0] for item in self._holds]
         _, lengths, directions = np.linalg.svd(np.vstack(rows))
-        return np.asarray(directions[int((lengths > AT_END).sum()) :].T)
+        return np.asarray(directions[int((lengths > RANGE_TOLERANCE).sum()) :].T)
 
-    def _moving(self, values: Array, speeds: Array) -> Array:
-        """What the kernels find of the links of the markers (t, m, ...)."""
+    def _compute_link_motion(self, values: Array, speeds: Array) -> Array:
+        """Return the records of the markers' links (t, m, ...)."""
         order, still = list(self._system.order), np.zeros((len(values), 1))
         result = self._system.links_of(
             np.hstack((still, values[:, order], speeds[:, order])), self._carrying.tolist()

@@ -1,4 +1,4 @@
-"""Coordinates of a fitted pose that the measurements say nothing about."""
+"""Coordinates of a fitted pose that no measurement determines."""
 
 from __future__ import annotations
 
@@ -7,42 +7,45 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite.fitting.pose_layout import Goal, Marker, Sensor
+from osimlite.fitting.pose_layout import CoordinateTarget, MarkerTarget, SensorTarget
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.parts import GROUND
 from osimlite.mechanics.multibody.spatial import Array
 
-MOST_FRAMES = 5
-"""Frames in which the fit is examined; a coordinate is reported if all of them leave it open."""
-LEAST_LEVER = 1e-5
-"""Motions that move all measured points by less than this (m or rad, for 1 rad or m) are not measured."""
-LEAST_PART = 1e-3
-"""Part of such a motion (rad or m) that a coordinate has at least, if it is to be reported."""
+MAX_FRAMES = 5
+"""Number of frames in which the fit is examined.
+
+A coordinate is reported if it is undetermined in all of them.
+"""
+MIN_SINGULAR_VALUE = 1e-5
+"""Largest displacement (m or rad, for 1 rad or m) of measured points that counts as none."""
+MIN_COMPONENT = 1e-3
+"""Smallest component (rad or m) of an undetermined motion along a coordinate that is reported."""
 
 
 def find_undetermined(
     mechanism: Mechanism,
     values: Array,
     seen: NDArray[np.bool_],
-    markers: Sequence[Marker],
-    sensors: Sequence[Sensor],
-    goals: Sequence[Goal],
+    markers: Sequence[MarkerTarget],
+    sensors: Sequence[SensorTarget],
+    goals: Sequence[CoordinateTarget],
     *,
     constraints: bool,
 ) -> tuple[str, ...]:
-    """Return the names of coordinates that can move without moving anything that is measured.
+    """Return the names of coordinates that can move without moving any measured point or frame.
 
-    The null space of the Jacobian of all measured points and frames, of the constraints, and of
-    what is held or has a goal, is computed in a few frames by a singular value decomposition.
+    The null space of the Jacobian of measurements, constraints, and locked or targeted coordinates
+    is computed in a few frames by a singular value decomposition.
 
     Args:
-        mechanism: that was fitted.
-        values: of all coordinates in the fitted poses (t, n).
+        mechanism: the mechanism.
+        values: values of all coordinates in the fitted poses (t, n).
         seen: whether each marker was seen in each frame (t, m).
-        markers: m of them, with their weights.
-        sensors: frames whose rotation was measured.
-        goals: coordinates that were kept near values.
-        constraints: whether those of the model hold.
+        markers: m markers with their weights.
+        sensors: frames with measured orientations.
+        goals: coordinates with target values.
+        constraints: whether the constraints of the model hold.
 
     Returns:
         Names in the order of the mechanism.
@@ -55,7 +58,7 @@ def find_undetermined(
     ]
     held += [goal.coordinate for goal in goals if goal.weight > 0.0]
     open_everywhere = np.ones(count, dtype=bool)
-    frames = np.linspace(0, len(values) - 1, min(len(values), MOST_FRAMES)).astype(int)
+    frames = np.linspace(0, len(values) - 1, min(len(values), MAX_FRAMES)).astype(int)
     # `np.unique` would import `numpy.ma`, which takes ten milliseconds.
     for frame in sorted(set(frames.tolist())):
         state = mechanism.at(values[frame])
@@ -71,7 +74,7 @@ def find_undetermined(
         if constraints:
             rows += [item.acceleration_equations(state)[0] for item in mechanism.constraints]
         _, sizes, directions = np.linalg.svd(np.vstack(rows))
-        rank = int(np.sum(sizes > LEAST_LEVER))
-        open_everywhere &= np.linalg.norm(directions[rank:], axis=0) > LEAST_PART
+        rank = int(np.sum(sizes > MIN_SINGULAR_VALUE))
+        open_everywhere &= np.linalg.norm(directions[rank:], axis=0) > MIN_COMPONENT
     infos = zip(mechanism.coordinates, open_everywhere.tolist(), strict=True)
     return tuple(info.name for info, is_open in infos if is_open)

@@ -9,7 +9,7 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.base.text import suggest_name
-from osimlite.fitting.modifying.operators import processed
+from osimlite.fitting.modifying.operators import process_model
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -56,7 +56,7 @@ def build_inverse_problem(
         OsimliteError: the settings or their files are invalid.
     """
     asked = StudyContext(file, folder)
-    model = processed(tool.model, asked.folder)
+    model = process_model(tool.model, asked.folder)
     solver = MocoCasADiSolver(
         name="solver",
         multibody_dynamics_mode="implicit",

@@ -13,7 +13,7 @@ from osimlite.base.records import replace
 from osimlite.derivatives.functions import CasadiModel
 from osimlite.derivatives.symbols import casadi
 from osimlite.errors import SettingError
-from osimlite.fitting.modifying.operators import processed
+from osimlite.fitting.modifying.operators import process_model
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.bounds import (
@@ -229,7 +229,7 @@ class Problem(StudyContext):
         processor = self.phase.model
         if not processor.filepath.strip() and processor.model is None:
             raise self.invalid_error(processor, "a model or a filepath is required")
-        return processed(processor, self.folder)
+        return process_model(processor, self.folder)
 
     def _remove_motion(self) -> Motion | None:
         """Remove an enabled PositionMotion from the model and return its motion; None if there is none."""

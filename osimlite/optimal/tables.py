@@ -102,7 +102,7 @@ def read_table(path: Path) -> StoTable:
     """Read a table; a marker file gives three columns for each marker, as OpenSim flattens them, m."""
     if path.suffix.lower() != ".trc":
         return read_sto(path)
-    markers = MarkerData.of(path)
+    markers = MarkerData.from_source(path)
     labels = tuple(f"{name}_{k}" for name in markers.names for k in (1, 2, 3))
     return StoTable(
         "", markers.times, labels, markers.positions.reshape(len(markers.times), -1), file=str(path)

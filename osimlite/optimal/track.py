@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.base.records import replace
-from osimlite.fitting.modifying.operators import processed
+from osimlite.fitting.modifying.operators import process_model
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.optimal.ipopt import Progress
@@ -59,7 +59,7 @@ def build_track_problem(
         optim_constraint_tolerance=1e-2,
         optim_finite_difference_scheme="forward",
     )
-    study = make_study(tool, processed(tool.model, place), solver)
+    study = make_study(tool, process_model(tool.model, place), solver)
     phase = study.problem.phases
     # The names of states and where errors are told of are those of a problem that has no goals yet.
     bare = Problem(study, file, place)

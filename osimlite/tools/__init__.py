@@ -1,7 +1,7 @@
-"""OpenSim's tools: setup files are run, and what OpenSim would write is written.
+"""OpenSim's tools: carry out setup files, and write the files that OpenSim would write.
 
-A tool is one module with the name of its class in lower case (``inverse_dynamics_tool.py``,
-``imu_placer.py``), which is how it is found. It has a function ``run(job, outcome)``: what is to be
-done is a :class:`~osimlite.tools.job.Job`, what came out goes into an
-:class:`~osimlite.tools.outcome.Outcome`, and is written when all of it is there.
+Each tool is a function ``run_...(job, outcome)``, which :data:`osimlite.tools.registry.TOOLS` lists
+by OpenSim's class names. The :class:`~osimlite.tools.job.Job` has the setup. The tool puts its
+results into the :class:`~osimlite.tools.outcome.Outcome`, which writes all of them at the end or
+none.
 """

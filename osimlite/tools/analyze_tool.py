@@ -1,4 +1,4 @@
-"""OpenSim's AnalyzeTool: analyses along a motion that is already known."""
+"""OpenSim's AnalyzeTool: analyses along a motion that a file prescribes."""
 
 from __future__ import annotations
 
@@ -26,37 +26,43 @@ from osimlite.tools.dynamics_setup import (
     satisfy_constraints,
 )
 from osimlite.tools.job import Job
-from osimlite.tools.motion import BoolArray, Motion, Record
+from osimlite.tools.motion import BoolArray, Motion, SpeedRecord
 from osimlite.tools.outcome import Outcome
 
-SAME_TIME = 2.0**-45.5
-"""How much later or earlier a row of speeds may be than that of the coordinates, s."""
-MOST_SPANS = 5
-"""Spans of time without an equilibrium that a message names."""
+TIME_TOLERANCE_S = 2.0**-45.5
+"""Largest difference of the times of rows of speeds and of coordinates that count as equal, s."""
+MAX_NAMED_SPANS = 5
+"""Number of time spans without equilibrium that a message names."""
 
 
 def run_analyze_tool(job: Job, outcome: Outcome) -> None:
-    """Compute every analysis that is on along the rows of the motion between two times."""
+    """Compute every analysis that is on along the rows of a motion between two times.
+
+    Args:
+        job: setup, an AnalyzeTool.
+        outcome: collects the results.
+    """
     setup: AnalyzeTool = job.setup
     analyses = find_analyses(job)
     if not analyses:
-        raise job.error("none of its analyses is on; give it one")
-    states = job.path("states_file")
+        raise job.create_error("none of its analyses is on; give it one")
+    states = job.find_path("states_file")
     model = build_model(job)
     with build_simulation(job, model) as simulation:
         if states is None:
-            first, rows, record = _followed(job, outcome, simulation, model)
+            first, rows, record = _read_coordinate_motion(job, outcome, simulation, model)
         else:
             given = StateRows.read(job, states, simulation)
-            given.tell(outcome)
-            first, last = given.row(setup.initial_time), given.row(setup.final_time)
-            table, record = given.table, lambda: (given.table.times, given.speeds(simulation))
+            given.report_missing(outcome)
+            first, last = given.find_row(setup.initial_time), given.find_row(setup.final_time)
+            table, record = given.table, lambda: (given.table.times, given.read_speeds(simulation))
             rows = (
-                (float(table.times[k]), given.state(simulation, k)) for k in range(first, last + 1)
+                (float(table.times[k]), given.create_state(simulation, k))
+                for k in range(first, last + 1)
             )
         moments = list(rows)
         if not moments:
-            raise job.error(
+            raise job.create_error(
                 f"there is nothing from {setup.initial_time:g} s to {setup.final_time:g} s"
             )
         times, result = np.array([t for t, _ in moments]), np.array([y for _, y in moments])
@@ -79,20 +85,20 @@ def run_analyze_tool(job: Job, outcome: Outcome) -> None:
 def equilibrate_rows(
     outcome: Outcome, simulation: Simulation, times: Array, states: Array
 ) -> dict[str, BoolArray]:
-    """Equilibrate the muscles at every time, and report which have no equilibrium and when.
+    """Equilibrate the muscles at every time, and report muscles without equilibrium.
 
-    Like OpenSim's AnalyzeTool, this goes on where a muscle has no equilibrium. OpenSim leaves the
-    fibers of that muscle in any state then, and computes forces and accelerations from it; here its
-    states become NaN.
+    Like OpenSim's AnalyzeTool, this continues where a muscle has no equilibrium. OpenSim then
+    leaves the fibers of that muscle in an arbitrary state, and computes forces and accelerations
+    from it. Here the states of the muscle become NaN.
 
     Args:
-        outcome: that says so.
-        simulation: whose engine finds the equilibria.
-        times: (t,), s.
-        states: (t, y), changed in place.
+        outcome: collects the messages.
+        simulation: its engine computes the equilibria.
+        times: times (t,), s.
+        states: states (t, y), changed in place.
 
     Returns:
-        By path of each muscle that has no equilibrium at some time: whether it has none (t,).
+        By path of each muscle without equilibrium at some time: whether it has none (t,).
     """
     engine = simulation.engine
     assert isinstance(engine, System)
@@ -109,9 +115,9 @@ def equilibrate_rows(
         if element.states:
             place = simulation.state.first_of(element)
             states[missing, place : place + len(element.states)] = np.nan
-        outcome.tell(
+        outcome.add_message(
             "no equilibrium",
-            f"of {reasons[path]}: at {np.count_nonzero(missing)} of {len(times)} moments, {_spans(times, missing)}; "
+            f"of {reasons[path]}: at {np.count_nonzero(missing)} of {len(times)} moments, {_describe_spans(times, missing)}; "
             "what depends on its fibers or its force is NaN then",
         )
     outcome.summary["without_equilibrium"] = {
@@ -122,28 +128,41 @@ def equilibrate_rows(
     return unbalanced
 
 
-def _spans(times: Array, chosen: BoolArray) -> str:
-    """Return the spans of consecutive times that are chosen, in words."""
+def _describe_spans(times: Array, chosen: BoolArray) -> str:
+    """Return the spans of consecutive selected times, in words."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
     spans = [(times[first], times[last - 1]) for first, last in edges.reshape(-1, 2)]
     words = [f"at {a:g} s" if a == b else f"from {a:g} s to {b:g} s" for a, b in spans]
-    return join_words(words, most=MOST_SPANS)
+    return join_words(words, most=MAX_NAMED_SPANS)
 
 
-def _followed(
+def _read_coordinate_motion(
     job: Job, outcome: Outcome, simulation: Simulation, model: Model
-) -> tuple[int, Iterator[tuple[float, list[float]]], Callable[[], Record]]:
-    """The number of the first row, times and states from the coordinates of a setup, and the record of all speeds."""
+) -> tuple[int, Iterator[tuple[float, list[float]]], Callable[[], SpeedRecord]]:
+    """Read the coordinates of a setup, filter them, and satisfy the constraints.
+
+    Args:
+        job: the setup.
+        outcome: collects messages.
+        simulation: simulation of the model.
+        model: the model.
+
+    Returns:
+        Number of the first row; times with states; and a function that returns the times and speeds
+        of the whole file.
+    """
     setup: AnalyzeTool = job.setup
     mechanism = simulation.mechanism
-    recorded = RecordedMotion.read(mechanism, job.needed("coordinates_file"))
+    recorded = RecordedMotion.read(mechanism, job.require_path("coordinates_file"))
     infos = enumerate(mechanism.coordinates)
     if absent := {
         info.name: k for k, info in infos if info.name in recorded.missing and not info.locked
     }:
         # Not their default values: so OpenSim's analyses have it, unlike its inverse dynamics.
         recorded.values[:, [*absent.values()]] = 0.0
-        outcome.tell("not in the file", f"{join_words([*absent])}: 0 is taken, as in OpenSim")
+        outcome.add_message(
+            "not in the file", f"{join_words([*absent])}: 0 is taken, as in OpenSim"
+        )
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
         recorded = recorded.lowpassed(cutoff, continued=True)
@@ -151,12 +170,12 @@ def _followed(
     recorded = recorded.between(setup.initial_time, setup.final_time)
     # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints
     # change the values.
-    given = job.path("speeds_file")
+    given = job.find_path("speeds_file")
     others: dict[int, Array] = {}
     if given is None:
         speeds = recorded.rates[0]
     else:
-        own, speeds, others = _given(job, given, recorded, simulation)
+        own, speeds, others = _read_speeds(job, given, recorded, simulation)
     rows = zip(
         recorded.times.tolist(),
         *satisfy_constraints(recorded, speeds, simulation, model),
@@ -174,26 +193,36 @@ def _followed(
     return first, states(), lambda: (before.times, before.rates[0]) if given is None else own
 
 
-def _given(
+def _read_speeds(
     job: Job, path: Path, recorded: RecordedMotion, simulation: Simulation
-) -> tuple[Record, Array, dict[int, Array]]:
-    """Times and speeds of a file, and at those of a motion its speeds (t, n) and its auxiliary states (t,) by place.
+) -> tuple[SpeedRecord, Array, dict[int, Array]]:
+    """Read speeds and auxiliary states from the file of speeds, at the times of a motion.
 
     Speeds without a column have their default values.
 
+    Args:
+        job: the setup.
+        path: file of the speeds.
+        recorded: motion of the coordinates.
+        simulation: simulation of the model.
+
+    Returns:
+        Times and speeds of the file; speeds (t, n) at the times of the motion; auxiliary states
+        (t,) by index in the state.
+
     Raises:
-        DocumentError: the file has no speeds, or lacks a time.
+        DocumentError: the file has no speeds, or lacks a time of the motion.
     """
     table, infos = read_sto(path), recorded.mechanism.coordinates
     paths = [f"{info.path}/speed" for info in infos]
     columns = columns_of_states(table.columns, paths)
     if not columns:
-        raise job.error(f"'{path}' has no column with a speed of the model")
+        raise job.create_error(f"'{path}' has no column with a speed of the model")
     speeds = np.tile([float(info.default_speed) for info in infos], (len(table.times), 1))
-    rows = np.searchsorted(table.times, recorded.times - SAME_TIME)
+    rows = np.searchsorted(table.times, recorded.times - TIME_TOLERANCE_S)
     for row, time in zip(rows.tolist(), recorded.times.tolist(), strict=True):
-        if row == len(table.times) or abs(table.times[row] - time) > SAME_TIME:
-            raise job.error(
+        if row == len(table.times) or abs(table.times[row] - time) > TIME_TOLERANCE_S:
+            raise job.create_error(
                 f"'{path}' has no row at {time:.15g} s, at which there are coordinates; give it one"
             )
     for name, place in columns.items():

@@ -1,9 +1,9 @@
-"""Control that is computed window by window, so that a model follows a motion: what RRATool and CMCTool share.
+"""Control that follows a motion window by window, for RRATool and CMCTool.
 
-At the start of each window the tasks say which accelerations make up for the errors. Forces of the
-actuators that give these are found in the pose that is expected at its end, within what the
-actuators can do by then; and the controls that bring the actuators there. The model moves by them
-to the end of the window.
+At the start of each window the tasks give accelerations that correct the errors. The actuator
+forces for these accelerations are computed in the predicted pose at the end of the window, within
+the forces that the actuators can reach by then. Root finding gives the controls that lead to these
+forces. With them the model is integrated to the end of the window.
 """
 
 from __future__ import annotations
@@ -27,28 +27,38 @@ from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
 from osimlite.tools.job import Job
-from osimlite.tools.root_solver import roots
-from osimlite.tools.tracking import Desired, Sharing, Tasks
+from osimlite.tools.root_solver import find_roots
+from osimlite.tools.tracking import DesiredMotion, ForceDistribution, TrackingTasks
 
-WIDEST, LEAST_MUSCLE, GREATEST_MUSCLE = 10_000.0, 0.02, 1.0
-"""Controls of actuators without bounds, and what the bounds of muscles may not be above and below."""
+UNBOUNDED_CONTROL = 10_000.0
+"""Bound of the controls of actuators without bounds."""
+MIN_MUSCLE_BOUND = 0.02
+"""Smallest lower bound of a muscle's control."""
+MIN_MUSCLE_UPPER_BOUND = 1.0
+"""Smallest upper bound of a muscle's control."""
 TOLERANCE = 4e-3
-"""Of the controls."""
-FORCE_RANGE = 1.0
-"""N or N m; the control of an actuator that can change its force by less is the smallest."""
-ACCURACY, LONGEST = 5e-6, 1e-3
-"""Of the states of actuators that are foreseen, and their longest step, s."""
-FIRST_WINDOW, HELD, EARLY = 1e-8, 0.200, 0.030
-"""Windows (s): the first of actuators without states; in which states come to rest; and the first of muscles."""
-ASSEMBLED = 1e-10
-"""How far from the constraints a pose may be that is foreseen."""
-AT_REST = 0.01
-"""Control of muscles that come to rest."""
+"""Tolerance of the controls."""
+MIN_FORCE_RANGE = 1.0
+"""Smallest range of an actuator's force (N or N m); below it, the control is the lower bound."""
+PREDICTION_TOLERANCE = 5e-6
+"""Error of one step in the predicted states of actuators."""
+MAX_PREDICTION_STEP_S = 1e-3
+"""Longest step of the prediction, s."""
+FIRST_WINDOW_S = 1e-8
+"""First window of a model whose actuators have no states, s."""
+SETTLING_TIME_S = 0.200
+"""Time in which muscles settle in a fixed pose, s."""
+FIRST_MUSCLE_WINDOW_S = 0.030
+"""First window of a model with muscles, s."""
+ASSEMBLY_TOLERANCE = 1e-10
+"""Largest violation of the constraints in a predicted pose."""
+SETTLING_CONTROL = 0.01
+"""Control with which muscles settle before the motion."""
 
 
 @dataclass(eq=False)
-class Control:
-    """The control of an actuator: its nodes, and the bounds of each."""
+class ActuatorControl:
+    """Control of an actuator: nodes over time, and bounds."""
 
     name: str
     is_step: bool
@@ -60,8 +70,13 @@ class Control:
     bounds: tuple[list[ControlLinearNode], list[ControlLinearNode]] = ((), ())  # type: ignore[assignment]
 
     @classmethod
-    def of(cls, actuator: Any, given: ControlSet | None) -> Control:
-        """Of an actuator, and of what a document of bounds says of it."""
+    def create(cls, actuator: Any, given: ControlSet | None) -> ActuatorControl:
+        """Return the control of an actuator.
+
+        Args:
+            actuator: actuator of the model.
+            given: bounds from a document, by the name of the actuator; None without a document.
+        """
         own = (
             []
             if given is None
@@ -70,26 +85,27 @@ class Control:
         for name in (actuator.name + EXCITATION, actuator.name):
             found = next((item for item in own if item.name == name), None)
             if found is not None:
-                return cls._bounded(found)
+                return cls._create_from_bounds(found)
         low = (
-            max(actuator.min_control, -WIDEST)
+            max(actuator.min_control, -UNBOUNDED_CONTROL)
             if actuator.min_control == -inf
             else actuator.min_control
         )
         high = (
-            min(actuator.max_control, WIDEST)
+            min(actuator.max_control, UNBOUNDED_CONTROL)
             if actuator.max_control == inf
             else actuator.max_control
         )
         is_muscle = isinstance(actuator, Muscle)
         if is_muscle:
-            low, high = max(low, LEAST_MUSCLE), max(high, GREATEST_MUSCLE)
+            low, high = max(low, MIN_MUSCLE_BOUND), max(high, MIN_MUSCLE_UPPER_BOUND)
         return cls(
             actuator.name + EXCITATION, is_muscle, lambda t: low, lambda t: high, (low, high)
         )
 
     @classmethod
-    def _bounded(cls, found: ControlLinear) -> Control:
+    def _create_from_bounds(cls, found: ControlLinear) -> ActuatorControl:
+        """Return the control of an actuator with the bounds of a document."""
         default = found.default_min, found.default_max
         # As in OpenSim, upper bounds count only where there are lower ones.
         curves = [
@@ -97,17 +113,19 @@ class Control:
             for nodes in (found.min_nodes, found.max_nodes)
         ]
 
-        def bound(number: int) -> Callable[[float], float]:
+        def create_bound(number: int) -> Callable[[float], float]:
             curve = curves[number]
             if curve is None:
                 return lambda t: default[number]
             return lambda t: float(curve.evaluate(np.array([t]))[0])
 
         nodes = list(found.min_nodes), list(found.max_nodes)
-        return cls(found.name, found.use_steps, bound(0), bound(1), default, bounds=nodes)
+        return cls(
+            found.name, found.use_steps, create_bound(0), create_bound(1), default, bounds=nodes
+        )
 
-    def function(self) -> Function:
-        """Of time, through all nodes."""
+    def create_function(self) -> Function:
+        """Return the control as a function of time through all nodes."""
         if self.is_step:
             # A value holds up to its own time, that included.
             return PiecewiseConstant(
@@ -119,8 +137,14 @@ class Control:
             np.append(t[0], t), np.column_stack([np.append(v[0], v), np.append(0.0, slopes)])
         )
 
-    def within(self, start: float, end: float, value: float) -> Function:
-        """Of time, in a window at whose end it has a value; at its start it has the last one."""
+    def create_window_function(self, start: float, end: float, value: float) -> Function:
+        """Return the control as a function of time in one window.
+
+        Args:
+            start: start of the window, s; there the control has its last value.
+            end: end of the window, s.
+            value: control at the end.
+        """
         last = self.values[-1] if self.values else value
         if self.is_step:
             return PiecewiseConstant((start, nextafter(start, inf)), (last, value))
@@ -128,8 +152,8 @@ class Control:
         slope = (value - last) / (end - before) if self.times else 0.0
         return PiecewisePolynomial(np.array([before]), np.array([[last, slope]]))
 
-    def document(self) -> ControlLinear:
-        """As OpenSim writes it."""
+    def create_document(self) -> ControlLinear:
+        """Return the control as the object that OpenSim writes."""
         return ControlLinear(
             name=self.name,
             use_steps=self.is_step,
@@ -145,14 +169,14 @@ class Control:
 
 
 @dataclass(eq=False)
-class Followed:
-    """What came out.
+class TrackedMotion:
+    """Motion of a model that follows another motion.
 
     Attributes:
-        times: of the start and the ends of all steps (t,), s.
-        states: (t, y).
-        errors: start of each window (s) with the errors of the tasks.
-        failure: what ended the motion before its end; empty if nothing did.
+        times: start and the ends of all steps (t,), s.
+        states: states (t, y).
+        errors: errors of the tasks by the start of each window, s.
+        failure: reason why the motion ended early; empty if it did not.
     """
 
     times: list[float] = field(default_factory=list)
@@ -162,15 +186,15 @@ class Followed:
 
 
 class ComputedControl:
-    """The controls of a model that follows a motion.
+    """Controls of a model that follows a motion.
 
     Args:
         job: the setup.
-        simulation: of its model.
-        desired: the motion.
-        tasks: how closely it is followed.
-        sharing: which forces do it.
-        controls: of all actuators.
+        simulation: simulation of its model.
+        desired: motion to follow.
+        tasks: weights and gains of the coordinates.
+        sharing: distribution of forces over the actuators.
+        controls: controls of all actuators.
         window: length of a window, s.
     """
 
@@ -178,10 +202,10 @@ class ComputedControl:
         self,
         job: Job,
         simulation: Simulation,
-        desired: Desired,
-        tasks: Tasks,
-        sharing: Sharing,
-        controls: Sequence[Control],
+        desired: DesiredMotion,
+        tasks: TrackingTasks,
+        sharing: ForceDistribution,
+        controls: Sequence[ActuatorControl],
         window: float,
     ) -> None:
         self.simulation, self.desired, self.tasks, self.sharing = (
@@ -203,14 +227,23 @@ class ComputedControl:
         self.has_states = self.engine.state.size > self._first
 
     # ----------------------------------------------------------------------------------------------- windows
-    def follow(self, start: float, y: list[float], end: float, settings: Settings) -> Followed:
-        """Follow the motion from a state to a time; the state need not fulfil the constraints."""
-        result = Followed()
+    def follow_motion(
+        self, start: float, y: list[float], end: float, settings: Settings
+    ) -> TrackedMotion:
+        """Follow the motion from a state to a time.
+
+        Args:
+            start: initial time, s.
+            y: initial state, which may violate the constraints.
+            end: final time, s.
+            settings: tolerance and step sizes of the integrator.
+        """
+        result = TrackedMotion()
         if not self.has_states:
-            self.compute(start, start + FIRST_WINDOW, y, result)
+            self.compute_controls(start, start + FIRST_WINDOW_S, y, result)
             if result.failure:
                 return result
-        y = self._project(start, y)
+        y = self._project_state(start, y)
         result.times.append(start)
         result.states.append(list(y))
 
@@ -221,7 +254,7 @@ class ComputedControl:
         t, stepper = start, None
         while t < end:
             target = t + self.window
-            self.compute(t, target, y, result)
+            self.compute_controls(t, target, y, result)
             if result.failure:
                 return result
             stop = min(target, end)
@@ -241,8 +274,8 @@ class ComputedControl:
             t, y = stepper.time, stepper.state
         return result
 
-    def _project(self, t: float, y: Sequence[float]) -> list[float]:
-        """Return the nearest state (y,) that fulfils the constraints, first its values, then its speeds."""
+    def _project_state(self, t: float, y: Sequence[float]) -> list[float]:
+        """Return the nearest state (y,) that satisfies the constraints."""
         if not self.simulation.constraints:
             return list(y)
         state, mechanism = self.engine.state, self.simulation.mechanism
@@ -251,26 +284,43 @@ class ComputedControl:
         result: list[float] = state.pack(q.tolist(), u.tolist(), y[self._first :])
         return result
 
-    def compute(self, t: float, target: float, y: Sequence[float], result: Followed) -> Array:
-        """The controls (a,) of a window, which its motion is driven by from now on."""
+    def compute_controls(
+        self, t: float, target: float, y: Sequence[float], result: TrackedMotion
+    ) -> Array:
+        """Compute the controls of a window, and drive the model with them.
+
+        Args:
+            t: start of the window, s.
+            target: end of the window, s.
+            y: state at the start.
+            result: collects errors, and the reason of a failure.
+
+        Returns:
+            Controls (a,) at the end of the window.
+        """
         state = self.engine.state
         q, u = np.array(state.values(y)), np.array(state.speeds(y))
-        now, ahead = self.desired.at(np.array([t, target]))
+        now, ahead = self.desired.evaluate(np.array([t, target]))
         self._corrections = np.stack([q - now[0], u - now[1]])
-        errors = self.tasks.errors(now, q, u)
+        errors = self.tasks.compute_errors(now, q, u)
         result.errors[t] = errors[0]
-        wanted = self.tasks.accelerations(errors, ahead)
+        wanted = self.tasks.compute_accelerations(errors, ahead)
         low, high = (
             np.array([getattr(item, name)(t) for item in self.controls]) for name in ("low", "high")
         )
         z = np.array(y[self._first :])
         self._poses.clear()
-        least, most = self._forces(t, target, z, low), self._forces(t, target, z, high)
-        end = self._posed(target, z)
-        high = np.where(most - least < FORCE_RANGE, low, high)
+        least, most = (
+            self._predict_forces(t, target, z, low),
+            self._predict_forces(t, target, z, high),
+        )
+        end = self._predict_state(target, z)
+        high = np.where(most - least < MIN_FORCE_RANGE, low, high)
         q_end, u_end = np.array(state.values(end)), np.array(state.speeds(end))
         bounds = np.minimum(least, most), np.maximum(least, most)
-        forces, lacking = self.sharing.forces(target, q_end, u_end, wanted, errors[0], bounds)
+        forces, lacking = self.sharing.compute_forces(
+            target, q_end, u_end, wanted, errors[0], bounds
+        )
         if lacking:
             result.failure = (
                 f"the actuators cannot give the accelerations that the tasks need at {t:g} s: they lack {lacking} "
@@ -278,10 +328,12 @@ class ComputedControl:
             )
             return low
         if self.has_states:
-            values = roots(lambda x: self._forces(t, target, z, x) - forces, low, high, TOLERANCE)
+            values = find_roots(
+                lambda x: self._predict_forces(t, target, z, x) - forces, low, high, TOLERANCE
+            )
         else:
             values = forces / self.sharing.optimal
-        self._drive(t, target, values)
+        self._drive_window(t, target, values)
         for item, value in zip(self.controls, values.tolist(), strict=True):
             # What is computed again takes the place of what was computed before.
             if item.times and item.times[-1] == target:
@@ -290,71 +342,99 @@ class ComputedControl:
             item.values.append(value)
         return values
 
-    def _drive(self, t: float, target: float, values: Array) -> None:
+    def _drive_window(self, t: float, target: float, values: Array) -> None:
+        """Drive the model with controls of one window."""
         pairs = zip(self.controls, values.tolist(), strict=True)
-        self._drive_by([item.within(t, target, value) for item, value in pairs])
+        self._drive_functions(
+            [item.create_window_function(t, target, value) for item, value in pairs]
+        )
 
-    def _drive_by(self, functions: Sequence[Function]) -> None:
+    def _drive_functions(self, functions: Sequence[Function]) -> None:
+        """Drive the model with a function of time for each actuator."""
         controls = self.simulation.forces.controls
         self.engine.drive(controls.driven(dict(zip(self._paths, functions, strict=True))))
 
-    def drive_through(self) -> None:
-        """Have the model driven by all controls that were found, at every time."""
-        self._drive_by([item.function() for item in self.controls])
+    def drive_all_windows(self) -> None:
+        """Drive the model with the computed controls of all windows."""
+        self._drive_functions([item.create_function() for item in self.controls])
 
     # ----------------------------------------------------------------------------------------------- foresight
-    def _forces(self, t: float, target: float, z: Array, controls: Array) -> Array:
-        """Forces of the actuators (a,) at the end of a window with controls (a,) there, from auxiliary states z on."""
+    def _predict_forces(self, t: float, target: float, z: Array, controls: Array) -> Array:
+        """Predict the forces of the actuators at the end of a window.
+
+        Args:
+            t: start of the window, s.
+            target: end of the window, s.
+            z: auxiliary states at the start.
+            controls: controls (a,) at the end.
+
+        Returns:
+            Forces (a,), N or N m.
+        """
         if not self.has_states:
             return controls * self.sharing.optimal
-        moment = [target, *self._posed(target, self._aged(t, target, z, controls))]
+        moment = [
+            target,
+            *self._predict_state(target, self._predict_auxiliary_states(t, target, z, controls)),
+        ]
         return self.engine.looked(np.array([moment]), self._places, STAGE.FORCE)[0]
 
-    def _posed(self, t: float, z: Array) -> list[float]:
-        """The state (y,) on the way that is foreseen."""
+    def _predict_state(self, t: float, z: Array) -> list[float]:
+        """Return the predicted state (y,) at a time, with given auxiliary states."""
         if t not in self._poses:
-            self._foresee([t], z)
+            self._predict_poses([t], z)
         return [*self._poses[t], *z.tolist()]
 
-    def _foresee(self, times: Sequence[float], z: Array) -> None:
-        """Find the poses of some times that are not known yet: the splines of several take as long as those of one."""
+    def _predict_poses(self, times: Sequence[float], z: Array) -> None:
+        """Predict the poses at some times that are not in the cache.
+
+        Evaluating the splines at several times takes as long as at one.
+
+        Args:
+            times: times, s.
+            z: auxiliary states.
+        """
         unknown = [t for t in times if t not in self._poses]
         if not unknown:
             return
-        values, speeds = self.desired.poses(unknown)
+        values, speeds = self.desired.evaluate_poses(unknown)
         for t, *pose in zip(unknown, values, speeds, strict=True):
             q, u = np.add(pose, self._corrections)
             y: list[float] = self.engine.state.pack(q.tolist(), u.tolist(), z.tolist())
             if self.simulation.constraints:
-                y = self.engine.projected(t, y, ASSEMBLED) or y
+                y = self.engine.projected(t, y, ASSEMBLY_TOLERANCE) or y
             self._poses[t] = y[: self._first]
 
-    def _aged(
+    def _predict_auxiliary_states(
         self, t: float, target: float, z: Array, controls: Array, *, held: bool = False
     ) -> Array:
-        """Auxiliary states at the end of a window, by Merson's method on the poses that are foreseen.
+        """Integrate the auxiliary states over a window along predicted poses, by Merson's method.
 
         Args:
-            t, target: start and end of the window, s.
-            z: at its start.
-            controls: at its end.
-            held: whether the pose stays as it is at the start, while the muscles come to rest.
+            t: start of the window, s.
+            target: end of the window, s.
+            z: auxiliary states at the start.
+            controls: controls at the end.
+            held: whether the pose stays as at the start, while the muscles settle.
+
+        Returns:
+            Auxiliary states at the end.
         """
-        self._drive(t, target, controls)
+        self._drive_window(t, target, controls)
         count = len(z)
 
         def rate(time: float, z: Array) -> Array:
-            y = self._posed(t if held else time, z)
+            y = self._predict_state(t if held else time, z)
             status = self.engine.realize(time, y, STAGE.FORCE)
             if status:
                 raise self.engine.refusal(status, time, y)
             return np.array(self.engine.found()[self._first :])
 
-        step, time = min(LONGEST, target - t), t
+        step, time = min(MAX_PREDICTION_STEP_S, target - t), t
         while time < target:
             h = min(step, target - time)
             if not held:
-                self._foresee((time, time + h / 3, time + h / 2, time + h), z)
+                self._predict_poses((time, time + h / 3, time + h / 2, time + h), z)
             k1 = rate(time, z)
             k2 = rate(time + h / 3, z + h / 3 * k1)
             k3 = rate(time + h / 3, z + h / 6 * (k1 + k2))
@@ -363,38 +443,50 @@ class ComputedControl:
             new = z + h / 6 * (k1 + 4 * k4 + k5)
             off = h * np.abs(2 * k1 - 9 * k3 + 8 * k4 - k5) / 30
             error = float(np.sqrt(np.sum(off**2) / count))
-            if error <= ACCURACY or h < 1e-9:
+            if error <= PREDICTION_TOLERANCE or h < 1e-9:
                 time, z = (target if h == target - time else time + h), new
-            factor = 0.9 * (ACCURACY / error) ** 0.25 if error else 5.0
-            step = min(LONGEST, h * min(5.0, max(0.1, factor)))
+            factor = 0.9 * (PREDICTION_TOLERANCE / error) ** 0.25 if error else 5.0
+            step = min(MAX_PREDICTION_STEP_S, h * min(5.0, max(0.1, factor)))
         return z
 
-    def at_rest(self, start: float, y: list[float], result: Followed) -> tuple[float, list[float]]:
-        """When and in which state the motion of a model with muscles begins.
+    def settle_muscles(
+        self, start: float, y: list[float], result: TrackedMotion
+    ) -> tuple[float, list[float]]:
+        """Let muscles settle before the motion, and return its initial time and state.
 
-        They come to rest twice at a small control, then at that of the first window; the motion
-        begins at its end.
+        They settle twice at a small control, then at the control of the first window. The motion
+        begins at the end of that window.
+
+        Args:
+            start: start of the motion to follow, s.
+            y: initial state.
+            result: collects errors, and the reason of a failure.
+
+        Returns:
+            Time in s, and state (y,).
         """
         self._corrections[:] = 0.0
         self._poses.clear()
         z = np.array(y[self._first :])
-        small = np.full(len(self.controls), AT_REST)
+        small = np.full(len(self.controls), SETTLING_CONTROL)
         for _ in range(2):
-            z = self._aged(start, start + HELD, z, small, held=True)
-        target = start + EARLY
+            z = self._predict_auxiliary_states(start, start + SETTLING_TIME_S, z, small, held=True)
+        target = start + FIRST_MUSCLE_WINDOW_S
         for last in (False, True):
             for item in self.controls:
                 item.times.clear()
                 item.values.clear()
-            values = self.compute(start, target, [*y[: self._first], *z.tolist()], result)
+            values = self.compute_controls(start, target, [*y[: self._first], *z.tolist()], result)
             for item in self.controls:
                 item.times.clear()
                 item.values.clear()
             if result.failure:
                 return start, y
             if not last:
-                z = self._aged(start, start + HELD, z, values, held=True)
-        y = self._posed(target, self._aged(start, target, z, values))
+                z = self._predict_auxiliary_states(
+                    start, start + SETTLING_TIME_S, z, values, held=True
+                )
+        y = self._predict_state(target, self._predict_auxiliary_states(start, target, z, values))
         for item, value in zip(self.controls, values.tolist(), strict=True):
             item.times, item.values = [target], [value]
         return target, y

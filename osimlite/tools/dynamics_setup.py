@@ -1,4 +1,4 @@
-"""What the tools that take a model through time share: the model, states of a file, analyses along the rows."""
+"""Steps that the tools of dynamics share: model, simulation, states and analyses of a setup."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from osimlite.simulation.run import Simulation
 from osimlite.simulation.static_optimization import StaticOptimization
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import Job
-from osimlite.tools.motion import Motion, Tables
+from osimlite.tools.motion import AnalysisTables, Motion
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.registry import ANALYSES, import_function
 
-Analyses = list[tuple[Any, Callable[[Any, Motion, Tables], None]]]
+Analyses = list[tuple[Any, Callable[[Any, Motion, AnalysisTables], None]]]
 """Analyses of a setup, each with the function that computes and writes it."""
 
 
@@ -45,7 +45,7 @@ def find_analyses(job: Job) -> Analyses:
         if item.on:
             tag = type(item).__name__
             if tag not in ANALYSES:
-                raise job.unable(
+                raise job.create_unsupported_error(
                     f"the analysis '{item.name}' is a {tag}, which osimlite cannot compute yet; "
                     "switch it off with <on>false</on>"
                 )
@@ -74,12 +74,15 @@ def compute_analyses(
         if item.step_interval > 1:
             selected = numbers % item.step_interval == 0
             selected[[0, -1]] = True
-            part = motion.select(selected)
-        write(item, part, Tables(job, outcome, item.name, part.times, describe_gaps(part)))
+            part = motion.select_times(selected)
+        write(item, part, AnalysisTables(job, outcome, item.name, part.times, describe_gaps(part)))
 
 
 def describe_gaps(motion: Motion) -> str:
-    """Return what the header of a table says of numbers that are missing for want of an equilibrium; "" for nothing."""
+    """Return the note in the header of a table about missing numbers; "" if none is missing.
+
+    Numbers are missing where fiber and tendon of a muscle have no equilibrium.
+    """
     if not motion.unbalanced:
         return ""
     names = join_words([path.rpartition("/")[2] for path in motion.unbalanced])
@@ -87,17 +90,17 @@ def describe_gaps(motion: Motion) -> str:
 
 
 def build_model(job: Job) -> Model:
-    """The model of a setup with the forces and controllers that the setup gives it.
+    """Return the model of a setup with the forces and controllers that the setup adds.
 
     Raises:
-        NotRunnable: one of the controllers adds actuators that follow the states of the setup.
+        NotRunnable: the model has a CorrectionController that is enabled.
     """
     setup: AbstractTool = job.setup
-    paths = [path for name in setup.force_set_files if (path := job.place(name)) is not None]
-    model = job.model()
+    paths = [path for name in setup.force_set_files if (path := job.resolve_name(name)) is not None]
+    model = job.read_model()
     add_forces(model, paths, replace=setup.replace_force_set)
     for controller in setup.controller_set.objects:
-        own = _from_here(job, controller.copy_deep())
+        own = _resolve_files(job, controller.copy_deep())
         actuators = list(model.components(Actuator))
         # Older setups name all actuators by one word, which they cannot spell out without the
         # model.
@@ -107,29 +110,46 @@ def build_model(job: Job) -> Model:
         model.controller_set.objects.append(own)
     for controller in model.components(CorrectionController):
         if controller.enabled:
-            raise job.unable(
+            raise job.create_unsupported_error(
                 f"'{controller.name}', a CorrectionController, cannot be computed yet; say <enabled>false</enabled>"
             )
     return model
 
 
-def _from_here(job: Job, item: Object) -> Any:
-    """An object of the setup whose files are looked for from the folder of the setup, wherever the model is."""
+def _resolve_files(job: Job, item: Object) -> Any:
+    """Make the paths in an object of the setup absolute, starting from the folder of the setup.
+
+    The model that the object joins may be in another folder.
+
+    Args:
+        job: the setup.
+        item: object of the setup, which is changed.
+
+    Returns:
+        The object.
+    """
     for part in item.walk():
         for spec in file_specs(type(part), "file"):
-            path = job.place(str(getattr(part, spec.name) or ""))
+            path = job.resolve_name(str(getattr(part, spec.name) or ""))
             if path is not None:
                 part.assign(spec.name, str(path.absolute()))
     return item
 
 
 def build_simulation(job: Job, model: Model) -> Simulation:
-    """What computes the model of a setup under its loads, with OpenSim's mistakes: its numbers are asked for."""
+    """Return the simulation of a model under the loads of a setup, with OpenSim's known errors.
+
+    The results of tools are to have OpenSim's numbers.
+
+    Args:
+        job: the setup.
+        model: its model.
+    """
     return Simulation(
         model,
         "compiled",
-        external_loads=job.path("external_loads_file"),
-        folder=job.needed("model_file").parent,
+        external_loads=job.find_path("external_loads_file"),
+        folder=job.require_path("model_file").parent,
         opensim_derivatives=True,
         simbody_early_return=True,
     )
@@ -138,12 +158,19 @@ def build_simulation(job: Job, model: Model) -> Simulation:
 def build_static_optimization(
     job: Job, model: Model, mechanism: Mechanism, **choices: Any
 ) -> StaticOptimization:
-    """What shares the forces of a motion among the actuators of the model of a setup under its loads, as OpenSim."""
+    """Return the static optimization of a model under the loads of a setup, as in OpenSim.
+
+    Args:
+        job: the setup.
+        model: its model.
+        mechanism: mechanism of the model.
+        choices: options of :class:`StaticOptimization`.
+    """
     return StaticOptimization(
         model,
         mechanism,
-        external_loads=job.path("external_loads_file"),
-        folder=job.needed("model_file").parent,
+        external_loads=job.find_path("external_loads_file"),
+        folder=job.require_path("model_file").parent,
         early_return=True,
         **choices,
     )
@@ -152,7 +179,19 @@ def build_static_optimization(
 def satisfy_constraints(
     recorded: RecordedMotion, speeds: Array, simulation: Simulation, model: Model
 ) -> tuple[Array, Array]:
-    """Values and speeds (t, n) of a motion that fulfil the constraints: the speeds those alone that are prescribed."""
+    """Return values and speeds of a motion that satisfy the constraints.
+
+    Speeds change only in models without constraints in the constraint set, as in OpenSim.
+
+    Args:
+        recorded: the motion.
+        speeds: generalized speeds (t, n).
+        simulation: simulation of the model.
+        model: the model.
+
+    Returns:
+        Values (t, n) and speeds (t, n).
+    """
     if not simulation.constraints:
         return recorded.values, speeds
     recorded = recorded.assembled()
@@ -164,7 +203,7 @@ def satisfy_constraints(
 
 
 class StateRows(NamedTuple):
-    """States of a file."""
+    """States of a model in a file."""
 
     table: StoTable  # the file
     columns: dict[str, int]  # places of the columns by the paths of the states
@@ -172,7 +211,12 @@ class StateRows(NamedTuple):
 
     @classmethod
     def read(cls, job: Job, path: Path, simulation: Simulation) -> StateRows:
-        """States of the model of a simulation.
+        """Read states of the model of a simulation.
+
+        Args:
+            job: the setup.
+            path: file of the states.
+            simulation: simulation of the model.
 
         Raises:
             DocumentError: the file has no states of the model, or no rows, or is in degrees.
@@ -180,21 +224,28 @@ class StateRows(NamedTuple):
         table = read_sto(path)
         columns = columns_of_states(table.columns, simulation.paths)
         if table.in_degrees:
-            raise job.error(
+            raise job.create_error(
                 f"'{path}' is in degrees, which OpenSim refuses for states; give it in radians"
             )
         if not columns or not len(table.times):
-            raise job.error(
+            raise job.create_error(
                 f"'{path}' has no {'rows' if columns else 'column with a state of the model'}"
             )
         return cls(table, columns, tuple(path for path in simulation.paths if path not in columns))
 
-    def row(self, time: float) -> int:
-        """The number of the row at or before a time, s; the first if there is none."""
+    def find_row(self, time: float) -> int:
+        """Return the number of the last row up to a time in s; 0 before the first row."""
         return max(0, int(np.searchsorted(self.table.times, time, side="right")) - 1)
 
-    def state(self, simulation: Simulation, row: int) -> list[float]:
-        """The state of a row in the order of the engine; what has no column is as in the default state."""
+    def create_state(self, simulation: Simulation, row: int) -> list[float]:
+        """Return the state of a row in the order of the engine.
+
+        Missing columns have default values.
+
+        Args:
+            simulation: simulation of the model.
+            row: number of the row.
+        """
         given = {path: float(self.table.rows[row, place]) for path, place in self.columns.items()}
         own = [path for path in simulation.state.paths if path in given]
         moving = {path: value for path, value in given.items() if path not in own}
@@ -207,32 +258,38 @@ class StateRows(NamedTuple):
             y[first + simulation.state.paths.index(path)] = given[path]
         return y
 
-    def speeds(self, simulation: Simulation) -> Array:
-        """The generalized speeds of all rows (t, n); what has no column is 0."""
+    def read_speeds(self, simulation: Simulation) -> Array:
+        """Return the generalized speeds of all rows (t, n); missing columns are 0."""
         result = np.zeros((len(self.table.times), len(simulation.mechanism.coordinates)))
         for index, info in enumerate(simulation.mechanism.coordinates):
             if (column := self.columns.get(f"{info.path}/speed")) is not None:
                 result[:, index] = self.table.rows[:, column]
         return result
 
-    def tell(self, outcome: Outcome) -> None:
-        """Say which states were not in the file."""
+    def report_missing(self, outcome: Outcome) -> None:
+        """Add a message about states without a column."""
         if self.missing:
-            outcome.tell(
+            outcome.add_message(
                 "not in the file", f"{join_words(self.missing)}: the default values are taken"
             )
 
 
 def report_rows(job: Job, outcome: Outcome, motion: Motion) -> None:
-    """Say how many rows there are, and keep what a report shows of them."""
+    """Add a message about the number of rows, and the motion for a report.
+
+    Args:
+        job: the setup.
+        outcome: collects the message.
+        motion: all rows.
+    """
     times = motion.times
-    outcome.evidence = Evidence.of(
+    outcome.evidence = Evidence.from_values(
         motion.model,
-        job.needed("model_file"),
+        job.require_path("model_file"),
         motion.mechanism,
         times,
         motion.values,
-        loads=job.path("external_loads_file"),
+        loads=job.find_path("external_loads_file"),
     )
-    outcome.tell("rows", f"{len(times)}, from {times[0]:g} s to {times[-1]:g} s")
+    outcome.add_message("rows", f"{len(times)}, from {times[0]:g} s to {times[-1]:g} s")
     outcome.summary["rows"] = len(times)

@@ -1,4 +1,4 @@
-"""What a report shows of a run beside its tables."""
+"""Motion of a run and measured data, from which a report is drawn."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from osimlite.schema.model import Model
 from osimlite.schema.prescribed import ExternalLoads
 from osimlite.simulation.elements.external_loads import loads_table
 
-ON_GROUND = 20.0
-"""A foot that is pushed up by more stands, N."""
-BRIEF = 0.1
-"""What stands, or does not, for less than this (s) is noise of the force plate."""
+STANCE_FORCE_N = 20.0
+"""Vertical force above which a foot stands on the ground, N."""
+MIN_PHASE_S = 0.1
+"""Duration below which a stance or a swing is noise of the force plate, s."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """The motion of a run, and what was measured."""
+    """Motion of a run, and the measurements behind it."""
 
     model: Model  # what moves
     file: Path  # of the model
@@ -49,7 +49,7 @@ class Evidence:
     controls: StoTable | None = None
 
     @classmethod
-    def of(
+    def from_values(
         cls,
         model: Model,
         file: Path,
@@ -58,53 +58,70 @@ class Evidence:
         values: Array,
         **more: Any,
     ) -> Evidence:
-        """Of values in the order of a mechanism's coordinates."""
+        """Return the evidence of values in the order of a mechanism's coordinates.
+
+        Args:
+            model: the model.
+            file: file of the model.
+            mechanism: mechanism of the model.
+            times: times (t,), s.
+            values: values (t, n), rad and m.
+            more: other fields of the class.
+        """
         infos = mechanism.coordinates
         turning = [info.motion_type == "rotational" for info in infos]
         return cls(model, file, times, [info.name for info in infos], values, turning, **more)
 
 
 class Steps(NamedTuple):
-    """When a foot touches the ground, and leaves it (s)."""
+    """Times at which a foot touches the ground and leaves it, s."""
 
     strikes: tuple[float, ...]
     offs: tuple[float, ...]
 
     @property
     def cycles(self) -> list[tuple[float, float]]:
-        """From each strike to the next."""
+        """Gait cycles: from each strike to the next, s."""
         return list(pairwise(self.strikes))
 
 
-def steps_of(loads: Path, up: int) -> dict[str, Steps]:
-    """The steps of the right ("r") and the left foot ("l"), by the vertical force on bodies with such endings.
+def find_steps(loads: Path, up: int) -> dict[str, Steps]:
+    """Find the steps of the right ("r") and the left foot ("l") from vertical forces on bodies.
+
+    The name of a body says its side, as in ``calcn_r``.
 
     Args:
-        loads: a file of ExternalLoads.
-        up: which axis of ground points up.
+        loads: file of ExternalLoads.
+        up: axis of ground that points up (0, 1, 2).
+
+    Returns:
+        Steps by side.
 
     Raises:
-        OsimliteError: it, or its data, cannot be read.
+        OsimliteError: osimlite cannot read the file or its data.
     """
     document = read_object(loads, ExternalLoads)
     table = loads_table(document, loads.parent, str(loads))
     result: dict[str, Array] = {}
     for force in document.objects:
         side, label = (
-            side_of(str(force.applied_to_body))[1],
+            split_side(str(force.applied_to_body))[1],
             f"{(force.force_identifier or '').strip()}{'xyz'[up]}",
         )
         if side and label in table.columns:
             result[side] = result.get(side, 0.0) + table[label]
-    return {side: _steps(table.times, column > ON_GROUND) for side, column in result.items()}
+    return {
+        side: _detect_steps(table.times, column > STANCE_FORCE_N) for side, column in result.items()
+    }
 
 
-def _steps(times: Array, stands: Any) -> Steps:
+def _detect_steps(times: Array, stands: Any) -> Steps:
+    """Return strikes and toe-offs; merge phases that are shorter than `MIN_PHASE_S`."""
     changes = [0, *(np.flatnonzero(np.diff(stands)) + 1).tolist(), len(stands)]
     spans = [(first, last) for first, last in pairwise(changes) if last > first]
     kept: list[list[int]] = []
     for first, last in spans:
-        is_brief = times[min(last, len(times) - 1)] - times[first] < BRIEF
+        is_brief = times[min(last, len(times) - 1)] - times[first] < MIN_PHASE_S
         if kept and (is_brief or stands[kept[-1][0]] == stands[first]):
             kept[-1][1] = last
         else:
@@ -114,8 +131,12 @@ def _steps(times: Array, stands: Any) -> Steps:
     return Steps(strikes, offs)
 
 
-def side_of(name: str) -> tuple[str, str]:
-    """A name without its side, and the side: "r", "l" or ""."""
+def split_side(name: str) -> tuple[str, str]:
+    """Split a name into its stem and its side.
+
+    Returns:
+        Name without the side, and the side: "r", "l" or "".
+    """
     name = name.strip()
     for side in "rl":
         if name.endswith(f"_{side}"):
@@ -125,18 +146,27 @@ def side_of(name: str) -> tuple[str, str]:
     return name, ""
 
 
-def root_of(mechanism: Mechanism) -> tuple[int, ...]:
-    """The coordinates of the joint by which a model moves in ground: none if several do, or if it is just a hinge."""
+def find_root_coordinates(mechanism: Mechanism) -> tuple[int, ...]:
+    """Find the coordinates by which a model moves in ground.
+
+    Returns:
+        Indices of the coordinates; none if several joints connect the model to ground, or if the
+        only one has fewer than three coordinates.
+    """
     roots = [body.mobilizer.coordinates for body in mechanism.bodies if body.parent == GROUND]
     moving = [own for own in roots if own]
     return moving[0] if len(moving) == 1 and len(moving[0]) >= 3 else ()
 
 
-def quietly_steps(evidence: Evidence) -> dict[str, Steps]:
-    """The steps of a motion with measured loads; none where these cannot be read."""
+def try_find_steps(evidence: Evidence) -> dict[str, Steps]:
+    """Find the steps of a motion with measured loads.
+
+    Returns:
+        Steps by side; none if osimlite cannot read the loads.
+    """
     if evidence.loads is None:
         return {}
     try:
-        return steps_of(evidence.loads, int(np.argmax(np.abs(evidence.model.gravity))))
+        return find_steps(evidence.loads, int(np.argmax(np.abs(evidence.model.gravity))))
     except OsimliteError:
         return {}

@@ -1,4 +1,4 @@
-"""OpenSim's tools of fitting: ScaleTool, InverseKinematicsTool, IMUPlacer and IMUInverseKinematicsTool."""
+"""OpenSim's tools of fitting: scaling, inverse kinematics, and sensors."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.base.text import join_words
-from osimlite.fitting.fit_messages import IGNORED, describe_unknown, told
-from osimlite.fitting.ik_tool import motion_table, run_inverse_kinematics
+from osimlite.fitting.fit_messages import NO_EFFECT, describe_fit, describe_unknown
+from osimlite.fitting.ik_tool import create_motion_table, run_inverse_kinematics
 from osimlite.fitting.inverse_kinematics import inverse_kinematics
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.orientation_data import OrientationData
-from osimlite.fitting.scale_tool import run_scale
+from osimlite.fitting.scale_tool import compute_scaled_model
 from osimlite.fitting.sensors import place_sensors
 from osimlite.io.document.printer import to_text
 from osimlite.io.tables.old_storage import UNITS
@@ -27,21 +27,28 @@ from osimlite.schema.tools.inverse_kinematics import (
 )
 from osimlite.schema.tools.sensors import IMUPlacer
 from osimlite.tools.evidence import Evidence
-from osimlite.tools.job import NONE, Job
+from osimlite.tools.job import NO_FILE, Job
 from osimlite.tools.outcome import Outcome
 
 
 def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
-    """Fit every frame to its minimum; write coordinates, and errors and places of the markers where asked for."""
+    """Fit every frame; write coordinates and, if requested, errors and positions of the markers.
+
+    Args:
+        job: setup, an InverseKinematicsTool.
+        outcome: collects the results.
+    """
     setup: InverseKinematicsTool = job.setup
-    coordinates = job.path("coordinate_file")
+    coordinates = job.find_path("coordinate_file")
     table = None if coordinates is None else read_sto(coordinates)
-    data = MarkerData.of(job.needed("marker_file"))
-    model = job.model()
+    data = MarkerData.from_source(job.require_path("marker_file"))
+    model = job.read_model()
     motion = run_inverse_kinematics(setup, model, data, table)
     times = motion.times
-    if setup.output_motion_file.strip() not in NONE:
-        outcome.table(job.result(setup.output_motion_file), motion_table(motion), f"\n{UNITS}")
+    if setup.output_motion_file.strip() not in NO_FILE:
+        outcome.add_table(
+            job.get_output_path(setup.output_motion_file), create_motion_table(motion), f"\n{UNITS}"
+        )
     if setup.report_errors:
         # Of the markers that are seen; like OpenSim, the mean is over all markers, seen or not.
         squares = np.nan_to_num(motion.marker_errors**2)
@@ -50,16 +57,16 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
             [totals, np.sqrt(totals / squares.shape[1]), np.sqrt(squares.max(axis=1))]
         )
         labels = ("total_squared_error", "marker_error_RMS", "marker_error_max")
-        path = job.in_results(f"{setup.name}_ik_marker_errors.sto")
-        outcome.table(path, StoTable("Model Marker Errors from IK", times, labels, rows))
+        path = job.get_results_path(f"{setup.name}_ik_marker_errors.sto")
+        outcome.add_table(path, StoTable("Model Marker Errors from IK", times, labels, rows))
     if setup.report_marker_locations:
         columns = tuple(f"{name}_t{axis}" for name in motion.markers for axis in "xyz")
-        path = job.in_results(f"{setup.name}_ik_model_marker_locations.sto")
+        path = job.get_results_path(f"{setup.name}_ik_model_marker_locations.sto")
         places = motion.places.reshape(len(times), -1)
-        outcome.table(path, StoTable("Model Marker Locations from IK", times, columns, places))
-    outcome.evidence = Evidence.of(
+        outcome.add_table(path, StoTable("Model Marker Locations from IK", times, columns, places))
+    outcome.evidence = Evidence.from_values(
         model,
-        job.needed("model_file"),
+        job.require_path("model_file"),
         motion.mechanism,
         times,
         motion.values,
@@ -67,11 +74,11 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         measured=motion.measured,
         places=motion.places,
     )
-    if words := describe_unknown(model, IGNORED):
-        outcome.warn("unknown classes", words)
+    if words := describe_unknown(model, NO_EFFECT):
+        outcome.add_warning("unknown classes", words)
     outcome.summary |= motion.summary
-    for words in told(motion):
-        outcome.tell("markers", words)
+    for words in describe_fit(motion):
+        outcome.add_message("markers", words)
     asked = [
         task.name
         for task in setup.ik_task_set.objects
@@ -83,61 +90,80 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     ):
         if names:
             outcome.summary[what.replace(" ", "_")] = names
-            outcome.tell(what, join_words(names))
+            outcome.add_message(what, join_words(names))
 
 
 def run_scale_tool(job: Job, outcome: Outcome) -> None:
-    """Scale the model and place its markers; write models, factors and the pose that the setup names."""
-    result = run_scale(job.setup, job.file.parent)
+    """Scale the model and place its markers; write the files that the setup names.
+
+    Args:
+        job: setup, a ScaleTool.
+        outcome: collects the results.
+    """
+    result = compute_scaled_model(job.setup, job.file.parent)
     for name, text in result.texts.items():
-        outcome.text(job.result(name), text)
+        outcome.add_text(job.get_output_path(name), text)
     if result.unknown:
-        outcome.warn("unknown classes", result.unknown)
+        outcome.add_warning("unknown classes", result.unknown)
     if result.measured is not None:
         outcome.summary["ratios"] = dict(result.measured.ratios)
         for name, ratio in result.measured.ratios.items():
-            outcome.tell(name, f"{ratio:.6g}")
+            outcome.add_message(name, f"{ratio:.6g}")
         for note in result.measured.notes:
-            outcome.tell("left out", note)
+            outcome.add_message("left out", note)
     if result.placed is not None:
         outcome.summary |= result.placed.pose.summary
-        for words in result.placed.told():
-            outcome.tell("markers", words)
+        for words in result.placed.describe_pose():
+            outcome.add_message("markers", words)
 
 
 def run_imu_placer(job: Job, outcome: Outcome) -> None:
-    """Place the sensors, and write the model with them."""
+    """Place the sensors on the model, and write it.
+
+    Args:
+        job: setup, an IMUPlacer.
+        outcome: collects the results.
+    """
     setup: IMUPlacer = job.setup
-    model = job.model()
-    data = OrientationData.of(job.needed("orientation_file_for_calibration"))
-    data = data.turned(setup.sensor_to_opensim_rotations)
+    model = job.read_model()
+    data = OrientationData.from_source(job.require_path("orientation_file_for_calibration"))
+    data = data.rotate_ground(setup.sensor_to_opensim_rotations)
     placed = place_sensors(model, data, setup.base_imu_label, setup.base_heading_axis)
-    if setup.output_model_file.strip() not in NONE:
-        outcome.text(job.result(setup.output_model_file), to_text(model, numbers="opensim"))
+    if setup.output_model_file.strip() not in NO_FILE:
+        outcome.add_text(
+            job.get_output_path(setup.output_model_file), to_text(model, numbers="opensim")
+        )
     outcome.summary |= placed._asdict()
-    outcome.tell("placed", join_words(placed.names, most=100))
+    outcome.add_message("placed", join_words(placed.names, most=100))
     if placed.left_out:
-        outcome.tell(
+        outcome.add_message(
             "left out", f"{join_words(placed.left_out)}: the model has no frame of these names"
         )
     if placed.heading is not None:
-        outcome.tell(
+        outcome.add_message(
             "heading", f"turned by {math.degrees(placed.heading):.6g} degrees about the vertical"
         )
 
 
-ERRORS, DEGREES = "OrientationErrors", {"inDegrees": "yes"}
-"""What OpenSim calls the table of errors, and the header of one in degrees."""
+ORIENTATION_ERRORS = "OrientationErrors"
+"""OpenSim's name of the table of orientation errors."""
+DEGREES_HEADER = {"inDegrees": "yes"}
+"""Header of a table in degrees."""
 
 
 def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
-    """Fit every frame to its minimum; write coordinates, and angles of the sensors from their data where asked for."""
+    """Fit every frame to orientations; write coordinates and, if requested, orientation errors.
+
+    Args:
+        job: setup, an IMUInverseKinematicsTool.
+        outcome: collects the results.
+    """
     setup: IMUInverseKinematicsTool = job.setup
-    model, file = job.model(), job.needed("orientations_file")
+    model, file = job.read_model(), job.require_path("orientations_file")
     data = (
-        OrientationData.of(file)
-        .between(*both_of(setup.time_range))
-        .turned(setup.sensor_to_opensim_rotations)
+        OrientationData.from_source(file)
+        .select_times(*both_of(setup.time_range))
+        .rotate_ground(setup.sensor_to_opensim_rotations)
     )
     frames = {frame.name for frame in model.components(PhysicalFrame)} & {*data.names}
     weights = {
@@ -147,34 +173,40 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     }
     motion = inverse_kinematics(model, orientations=data, weights=weights)
     asked, folder = (
-        "" if name.strip() in NONE else name.strip()
+        "" if name.strip() in NO_FILE else name.strip()
         for name in (setup.output_motion_file, setup.results_directory)
     )
     beside, _, name = asked.replace("\\", "/").rpartition("/")
     name = name or f"ik_{file.stem}"
     tables = {
         name if "." in name else f"{name}.mot": replace(
-            motion_table(motion), header=DEGREES | {"name": name}
+            create_motion_table(motion), header=DEGREES_HEADER | {"name": name}
         )
     }
     if setup.report_errors:
         # A sensor that was not measured has no error, which OpenSim writes as 0.
         errors = np.nan_to_num(motion.orientation_errors)
-        table = StoTable(ERRORS, motion.times, motion.sensors, errors, header={"name": ERRORS})
+        table = StoTable(
+            ORIENTATION_ERRORS,
+            motion.times,
+            motion.sensors,
+            errors,
+            header={"name": ORIENTATION_ERRORS},
+        )
         tables[f"{name}_orientationErrors.sto"] = table
     for place, table in tables.items():
         if folder or job.output is not None:
-            outcome.new_table(job.in_results(place), table)
+            outcome.add_typed_table(job.get_results_path(place), table)
         elif asked:
-            outcome.new_table(job.result(str(Path(beside) / place)), table)
+            outcome.add_typed_table(job.get_output_path(str(Path(beside) / place)), table)
     if not outcome.tables:
-        outcome.tell(
+        outcome.add_message(
             "nothing written",
             "the setup names neither a results_directory nor an output_motion_file",
         )
-    outcome.evidence = Evidence.of(
+    outcome.evidence = Evidence.from_values(
         model,
-        job.needed("model_file"),
+        job.require_path("model_file"),
         motion.mechanism,
         motion.times,
         motion.values,
@@ -182,7 +214,9 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         angles=motion.orientation_errors,
     )
     outcome.summary |= motion.summary
-    for words in told(motion):
-        outcome.tell("sensors", words)
+    for words in describe_fit(motion):
+        outcome.add_message("sensors", words)
     if silent := [name for name in data.names if name not in frames]:
-        outcome.tell("left out", f"{join_words(silent)}: the model has no frame of these names")
+        outcome.add_message(
+            "left out", f"{join_words(silent)}: the model has no frame of these names"
+        )

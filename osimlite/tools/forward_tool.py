@@ -1,4 +1,4 @@
-"""OpenSim's ForwardTool: the motion of a model from a state on."""
+"""OpenSim's ForwardTool: integration of the motion of a model from an initial state."""
 
 from __future__ import annotations
 
@@ -24,61 +24,76 @@ from osimlite.tools.outcome import Outcome
 
 
 def run_forward_tool(job: Job, outcome: Outcome) -> None:
-    """Follow the motion with OpenSim's steps; write states and controls at the end of each, and the analyses."""
+    """Integrate with OpenSim's steps; write states, controls and analyses at the end of each.
+
+    Args:
+        job: setup, a ForwardTool.
+        outcome: collects the results.
+    """
     setup: ForwardTool = job.setup
     analyses = find_analyses(job)
     bounds = setup.minimum_integrator_step_size, setup.maximum_integrator_step_size
     if not 0.0 < setup.integrator_error_tolerance < 1.0:
-        raise job.error(
+        raise job.create_error(
             f"integrator_error_tolerance is {setup.integrator_error_tolerance:g}, with which OpenSim does not end; "
             "give one between 0 and 1, such as 1e-5"
         )
     if not 0.0 <= bounds[0] <= bounds[1] or bounds[1] == 0.0:
-        raise job.error(
+        raise job.create_error(
             f"steps from {bounds[0]:g} s to {bounds[1]:g} s are none; give a longest that is longer"
         )
     model = build_model(job)
     with build_simulation(job, model) as simulation:
-        start, y = _start(job, outcome, simulation)
+        start, y = _compute_start(job, outcome, simulation)
         if not start < setup.final_time:
-            raise job.error(
+            raise job.create_error(
                 f"the final_time {setup.final_time:g} s does not come after the start at {start:g} s"
             )
         if setup.final_time - start > MOST_STEPS * bounds[1]:
-            raise job.error(
+            raise job.create_error(
                 f"the final_time {setup.final_time:g} s is too far away for steps of {bounds[1]:g} s"
             )
         settings = Settings(setup.integrator_error_tolerance, step_bounds=bounds)
         times, states, failure = simulation.every_step(start, y, setup.final_time, settings)
         outcome.done = failure is None
         if failure is not None:
-            outcome.tell("ended early", failure.message)
+            outcome.add_message("ended early", failure.message)
         steps = list(zip(times, states, strict=True))
         motion = Motion(model, simulation, np.array(times), np.array(states), steps)
-        _write(job, outcome, motion)
+        _write_tables(job, outcome, motion)
         compute_analyses(job, outcome, analyses, motion)
     report_rows(job, outcome, motion)
 
 
-def _start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[float, list[float]]:
-    """When and how the motion begins: with the row of the states at or before the initial time, at its time."""
+def _compute_start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[float, list[float]]:
+    """Return the initial time and state: the last row of the states file up to the initial time.
+
+    Args:
+        job: the setup.
+        outcome: collects messages.
+        simulation: simulation of the model.
+
+    Returns:
+        Time in s, and state (y,).
+    """
     setup: ForwardTool = job.setup
-    start, path = setup.initial_time, job.path("states_file")
+    start, path = setup.initial_time, job.find_path("states_file")
     if path is None:
         y = simulation.initial_state({}, {})
     else:
         given = StateRows.read(job, path, simulation)
-        given.tell(outcome)
-        row = given.row(start)
-        start, y = float(given.table.times[row]), given.state(simulation, row)
+        given.report_missing(outcome)
+        row = given.find_row(start)
+        start, y = float(given.table.times[row]), given.create_state(simulation, row)
         if start != setup.initial_time:
-            outcome.tell("start", f"{start:g} s, the time of the states that are taken")
+            outcome.add_message("start", f"{start:g} s, the time of the states that are taken")
     if setup.solve_for_equilibrium_for_auxiliary_states:
         y = simulation.engine.equilibrated(start, y)
     return start, y
 
 
-def _write(job: Job, outcome: Outcome, motion: Motion) -> None:
+def _write_tables(job: Job, outcome: Outcome, motion: Motion) -> None:
+    """Add the tables of states and controls."""
     setup: ForwardTool = job.setup
     simulation, times, precision = motion.simulation, motion.times, setup.output_precision
     turned = [
@@ -91,7 +106,7 @@ def _write(job: Job, outcome: Outcome, motion: Motion) -> None:
     name = setup.name
 
     def add(ending: str, table: StoTable, description: str = "") -> None:
-        outcome.table(job.in_results(f"{name}_{ending}"), table, description, precision)
+        outcome.add_table(job.get_results_path(f"{name}_{ending}"), table, description, precision)
 
     paths = tuple(simulation.paths)
     add("states.sto", StoTable(name, times, paths, rows))
@@ -105,5 +120,7 @@ range {times[0]:f} {times[-1]:f}"""
     add("states_degrees.mot", StoTable(name, times, paths, rows * turning, in_degrees=True), simm)
     labels = tuple(path.rpartition("/")[2] for path in simulation.forces.controls.names)
     # Of a model without actuators OpenSim writes a table without rows.
-    result = motion.looked(motion.system.places_of_controls) if labels else np.empty((0, 0))
+    result = (
+        motion.evaluate_kernels(motion.system.places_of_controls) if labels else np.empty((0, 0))
+    )
     add("controls.sto", StoTable("controls", times[: len(result)], labels, result))

@@ -1,4 +1,4 @@
-"""OpenSim's InverseDynamicsTool: the generalized forces of a measured motion, and the loads at joints."""
+"""OpenSim's InverseDynamicsTool: generalized forces of a measured motion, and loads at joints."""
 
 from __future__ import annotations
 
@@ -21,24 +21,29 @@ from osimlite.schema.model import Model
 from osimlite.schema.tools.dynamics import InverseDynamicsTool
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.recorded_motion import RecordedMotion, exclude_forces
-from osimlite.tools.evidence import Evidence, root_of
+from osimlite.tools.evidence import Evidence, find_root_coordinates
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
 
 
 def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
-    """Compute the generalized forces."""
+    """Compute generalized forces and, if requested, loads at joints.
+
+    Args:
+        job: setup, an InverseDynamicsTool.
+        outcome: collects the results.
+    """
     setup: InverseDynamicsTool = job.setup
-    model = job.model()
+    model = job.read_model()
     joints = _find_reported_joints(job, model, outcome)
     recorded = RecordedMotion.read(
-        build_mechanism(model, opensim_derivatives=True), job.needed("coordinates_file")
+        build_mechanism(model, opensim_derivatives=True), job.require_path("coordinates_file")
     )
     by_path = [
         info.name for info in recorded.mechanism.coordinates if info.name in recorded.named_by_path
     ]
     if by_path:
-        outcome.warn(
+        outcome.add_warning(
             "columns",
             f"'{setup.coordinates_file}' names {join_words(by_path)} by paths, which are understood here; OpenSim's "
             "inverse dynamics takes the default values of these coordinates instead: its moments are other ones",
@@ -49,20 +54,20 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
         recorded = recorded.lowpassed(cutoff, continued=True)
     recorded = recorded.between(*both_of(setup.time_range))
     exclude_forces(model, map(str, setup.forces_to_exclude))
-    loads = job.path("external_loads_file")
+    loads = job.find_path("external_loads_file")
     forces = force_elements(model, recorded.mechanism, external_loads=loads, folder=None)
     table = recorded.inverse_dynamics(forces)
-    outcome.table(job.in_results(setup.output_gen_force_file), table)
+    outcome.add_table(job.get_results_path(setup.output_gen_force_file), table)
     if joints:
         result = np.empty_like(table.rows)
         result[
             :, [place for body in recorded.mechanism.bodies for place in body.mobilizer.coordinates]
         ] = table.rows
         at_joints = compute_joint_loads(model, joints, recorded, result)
-        outcome.table(job.in_results(setup.output_body_forces_file), at_joints)
-    outcome.evidence = Evidence.of(
+        outcome.add_table(job.get_results_path(setup.output_body_forces_file), at_joints)
+    outcome.evidence = Evidence.from_values(
         model,
-        job.needed("model_file"),
+        job.require_path("model_file"),
         recorded.mechanism,
         recorded.times,
         recorded.values,
@@ -70,17 +75,22 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     )
     row, column = np.unravel_index(int(np.abs(table.rows).argmax()), table.rows.shape)
     most = f"{table.columns[column]}, {table.rows[row, column]:.6g} at {table.times[row]:g} s"
-    outcome.tell("largest", most)
+    outcome.add_message("largest", most)
     _report_residuals(outcome, recorded.mechanism, table)
 
 
 def _report_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -> None:
-    """Say what the joint to ground has to push, which nothing does in life: J. Hicks et al., J Biomech Eng 137, 2015.
+    """Add messages about the residual forces and moments at the joint to ground.
 
-    Their advice is 5 % of the measured force at most, and moments of 1 % of that times the height
-    of the mass centre.
+    J. Hicks et al., J Biomech Eng 137, 2015, advise at most 5 % of the measured force, and moments
+    of at most 1 % of that force times the height of the mass centre.
+
+    Args:
+        outcome: collects the messages.
+        mechanism: mechanism of the model.
+        table: generalized forces.
     """
-    names = [mechanism.coordinates[place].name for place in root_of(mechanism)]
+    names = [mechanism.coordinates[place].name for place in find_root_coordinates(mechanism)]
     weight = mechanism.total_mass * float(np.linalg.norm(mechanism.gravity))
     for what, unit in (("force", "N"), ("moment", "N m")):
         own = [
@@ -95,14 +105,14 @@ def _report_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -
                 if what == "force" and weight
                 else ""
             )
-            outcome.tell(
+            outcome.add_message(
                 f"residual {what}s",
                 f"{rms:.4g} {unit} (root mean square), at most {most:.4g} {unit}{part}",
             )
 
 
 def _find_reported_joints(job: Job, model: Model, outcome: Outcome) -> list[Joint]:
-    """The joints whose loads are asked for; OpenSim warns of those that are not there."""
+    """Return the requested joints, and report unknown names, for which OpenSim warns."""
     known = {joint.name: joint for joint in model.joint_set.objects}
     result: list[Joint] = []
     for name in map(str, job.setup.joints_to_report_body_forces):
@@ -113,27 +123,30 @@ def _find_reported_joints(job: Job, model: Model, outcome: Outcome) -> list[Join
             result.append(known[name])
         else:
             message = f"there is no joint '{name}'{suggest_name(name, known)}: its loads are left out, as in OpenSim"
-            outcome.tell("joints_to_report_body_forces", message)
+            outcome.add_message("joints_to_report_body_forces", message)
     return result
 
 
 SIGNIFICANT_REAL = 2.0**-45.5
-"""Simbody's SignificantReal: forces of this size are none."""
+"""Simbody's SignificantReal: smaller forces count as zero."""
 
 
 def compute_joint_loads(
     model: Model, joints: Sequence[Joint], recorded: RecordedMotion, forces: Array
 ) -> StoTable:
-    """Force (N) and torque (N m) on the child of each joint at its frame, in ground, that do what its forces do.
+    """Return forces and torques on the children of joints that equal the generalized forces.
 
-    Where either does some of it, that counts which does more with less; the other one does the
-    rest, and each is the shortest that does.
+    Where both a force and a torque can do part of the work, the one that does more with less
+    counts, and the other does the rest. Each is the shortest vector that does its part.
 
     Args:
-        model: whose joints.
-        joints: those that are asked for.
+        model: the model.
+        joints: requested joints.
         recorded: the motion.
         forces: generalized forces (t, n) in the order of the mechanism.
+
+    Returns:
+        Force (N) and torque (N m) at the child frame of each joint, in ground.
     """
     mechanism, placements = recorded.mechanism, Placements(model.tree())
     carried = {body.path: index for index, body in enumerate(mechanism.bodies)}
@@ -165,15 +178,21 @@ def compute_joint_loads(
 
 
 _Hinge = tuple[list[int], Mechanism]
-"""Coordinates, and the mechanism of one body that they move in ground."""
+"""Indices of coordinates, and a mechanism with one body that they move in ground."""
 
 
 def _split_mobilizer(
     mechanism: Mechanism, body: int, *, apart: bool
 ) -> tuple[int, Array, list[_Hinge]]:
-    """What the mobilizer of a body does: the body that carries it, where in that, and the hinges one after another.
+    """Split the mobilizer of a body into hinges, one after another.
 
-    If `apart`, each of its motions is a hinge of its own.
+    Args:
+        mechanism: mechanism of the model.
+        body: index of the body.
+        apart: whether each motion of the mobilizer is a hinge of its own.
+
+    Returns:
+        Index of the parent body; orientation of the mobilizer in that body (3, 3); and the hinges.
     """
     mobilizer = mechanism.bodies[body].mobilizer
     groups = [[motion] for motion in mobilizer.motions] if apart else [[*mobilizer.motions]]
@@ -200,7 +219,15 @@ def _split_mobilizer(
 def _compute_joint_load(
     state: Kinematics, parent: int, inner: Array, hinges: Sequence[_Hinge], forces: Array
 ) -> Array:
-    """Force and torque (2, 3) in ground for the generalized forces (n,) at hinges one after another."""
+    """Return force and torque (2, 3) in ground for the generalized forces (n,) of some hinges.
+
+    Args:
+        state: kinematics of the mechanism.
+        parent: index of the parent body.
+        inner: orientation of the first hinge in the parent body (3, 3).
+        hinges: hinges from the parent to the child.
+        forces: generalized forces (n,).
+    """
     rotation, load = state.rotations[parent] @ inner, np.zeros((2, 3))
     for places, hinge in hinges:
         across = hinge.at(state.q[places])
@@ -210,7 +237,12 @@ def _compute_joint_load(
 
 
 def _compute_hinge_load(hinge: Array, wanted: Array) -> Array:
-    """Force and torque (2, 3) for the generalized forces (k,) of a hinge whose motion has the Jacobian (k, 6)."""
+    """Return force and torque (2, 3) for the generalized forces of one hinge.
+
+    Args:
+        hinge: Jacobian of the hinge's motion (k, 6), rotations first.
+        wanted: generalized forces (k,).
+    """
     turning, moving = hinge[:, :3], hinge[:, 3:]
     force, torque = _solve_shortest(moving, wanted), _solve_shortest(turning, wanted)
     by_force, by_torque = moving @ force, turning @ torque
@@ -224,4 +256,5 @@ def _compute_hinge_load(hinge: Array, wanted: Array) -> Array:
 
 
 def _solve_shortest(rows: Array, values: Array) -> Array:
+    """Return the shortest least-squares solution."""
     return np.asarray(np.linalg.lstsq(rows, values, rcond=1e-13)[0], dtype=np.float64)

@@ -1,4 +1,4 @@
-"""What a tool is told to do: its setup, and where its files are."""
+"""A setup that a tool carries out, and the paths of its files."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.model import Model
 
-NONE = frozenset(("", "Unassigned"))
-"""What stands for no file."""
+NO_FILE = frozenset(("", "Unassigned"))
+"""Values of a file property that name no file."""
 
 
 class NotRunnable(UnsupportedError):
-    """A document, or a part of it, is not what can be run."""
+    """Error for a document, or a part of one, that osimlite cannot run."""
 
     exit_code = 2
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """A setup that is run."""
+    """Setup of a tool, with the paths of its inputs and results."""
 
     setup: Any  # what the document says
     file: Path  # the document
@@ -34,69 +34,88 @@ class Job:
     refine: float | str | None = None
     simulates: bool = False  # whether what optimal control finds is simulated, too
 
-    def error(self, message: str) -> DocumentError:
-        """An error of the setup."""
+    def create_error(self, message: str) -> DocumentError:
+        """Return an error about the setup."""
         return DocumentError(message, file=str(self.file))
 
-    def unable(self, message: str) -> NotRunnable:
-        """An error of what the setup asks for and nobody computes here."""
+    def create_unsupported_error(self, message: str) -> NotRunnable:
+        """Return an error about something in the setup that osimlite does not support."""
         return NotRunnable(message, file=str(self.file))
 
-    def path(self, tag: str) -> Path | None:
-        """The file that a property names; None if it names none.
+    def find_path(self, tag: str) -> Path | None:
+        """Return the path of the file that a property of the setup names; None if it names none.
 
-        It is looked for from the folder of the setup, then from that in which the program runs.
-        OpenSim looks for the models of some tools in the second only, and crashes without.
+        A relative path starts from the folder of the setup, then from the current folder. For some
+        tools OpenSim looks for models in the current folder only, and crashes otherwise.
         """
-        return self.place(str(getattr(self.setup, tag)))
+        return self.resolve_name(str(getattr(self.setup, tag)))
 
-    def place(self, name: str) -> Path | None:
-        """Where a file is that the setup names, as for :meth:`path`."""
+    def resolve_name(self, name: str) -> Path | None:
+        """Return the path of a file by its name in the setup; None if the name is empty.
+
+        Args:
+            name: path as in the setup; see :meth:`find_path` for the folders.
+        """
         name = name.strip()
-        if name in NONE:
+        if name in NO_FILE:
             return None
         there, here = self.file.parent / name, Path(name)
         return here if not os.path.exists(there) and os.path.exists(here) else there
 
-    def needed(self, *tags: str) -> Path:
-        """The file that one of some properties names.
+    def require_path(self, *tags: str) -> Path:
+        """Return the path of the file that the first non-empty of some properties names.
+
+        Args:
+            tags: names of properties of the setup.
 
         Raises:
-            DocumentError: none does.
+            DocumentError: all of them are empty.
         """
         for tag in tags:
-            if (path := self.path(tag)) is not None:
+            if (path := self.find_path(tag)) is not None:
                 return path
-        raise self.error(f"it names no {' or '.join(tags)}; give it one")
+        raise self.create_error(f"it names no {' or '.join(tags)}; give it one")
 
-    def model(self) -> Model:
-        """The model that the setup names, read anew.
+    def read_model(self) -> Model:
+        """Read the model that the setup names, without the cache.
 
         Raises:
-            DocumentError: it names none, or that cannot be read.
+            DocumentError: the setup names no model, or osimlite cannot read it.
         """
-        return read_anew(self.needed("model_file"), Model)
+        return read_anew(self.require_path("model_file"), Model)
 
-    def read(self, path: Path, cls: type) -> Any:
-        """An object of a class that another document holds; what it says that means nothing is ignored, as in OpenSim.
+    def read_object(self, path: Path, cls: type) -> Any:
+        """Read the object of a document; ignore unknown properties, as OpenSim does.
+
+        Args:
+            path: file of the document.
+            cls: class of the object.
+
+        Returns:
+            The object.
 
         Raises:
-            DocumentError: the file is missing or holds something else.
+            DocumentError: the file is missing or holds another class.
         """
         return read_document(Source.of_file(path), of=cls).top
 
-    def result(self, name: str) -> Path:
-        """Where a file of results goes that the setup names by itself: its `results_directory` does not count."""
-        return self._put(Path(name), self.file.parent)
+    def get_output_path(self, name: str) -> Path:
+        """Return the path of a result that a property of the setup names.
 
-    def in_results(self, name: str) -> Path:
-        """Where a file of results goes: into the `results_directory`, of which OpenSim makes the last part only.
+        The `results_directory` of the setup has no effect on it.
+        """
+        return self._join_output(Path(name), self.file.parent)
 
-        Folders in its name do not count, and without an ending it is a .sto.
+    def get_results_path(self, name: str) -> Path:
+        """Return the path of a result in the `results_directory` of the setup.
+
+        OpenSim creates only the last folder of that path. Folders in the name are dropped, and a
+        name without suffix gets `.sto`.
         """
         folder, last = self.setup.results_directory.strip(), Path(name).name
         own = Path(last if "." in last else f"{last}.sto")
-        return self._put(own, self.file.parent / ("" if folder in NONE else folder))
+        return self._join_output(own, self.file.parent / ("" if folder in NO_FILE else folder))
 
-    def _put(self, name: Path, folder: Path) -> Path:
+    def _join_output(self, name: Path, folder: Path) -> Path:
+        """Return a path in the requested output folder, or else in a default folder."""
         return folder / name if self.output is None else self.output / name.name

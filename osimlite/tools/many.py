@@ -1,4 +1,4 @@
-"""Many setups in one go: side by side, each after those that make what it names, with a note of what is done."""
+"""Runs of many setups, in parallel and in the order of their inputs, with a journal."""
 
 from __future__ import annotations
 
@@ -21,23 +21,32 @@ from osimlite.errors import OsimliteError
 from osimlite.io.document.cache import top_at
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Set
-from osimlite.tools.named_files import named_files
+from osimlite.tools.named_files import find_named_files
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.patterns import find_files
-from osimlite.tools.running import run, runnable
+from osimlite.tools.running import list_runnable, run
 
 JOURNAL = ".osimlite-run.jsonl"
-"""Where it is noted which setups are done, until all are: in the folder of the results, or where the program runs."""
+"""File in which finished runs are noted until all are finished, in the output or current folder."""
 
-STATUSES = DONE, NO, FAILED, WAITED = "done", "no", "failed", "not run"
-"""How a setup ends: well, with the answer of its tool being no, with an error, or not at all since another failed."""
+DONE = "done"
+"""Status of a setup whose tool succeeded."""
+NO = "no"
+"""Status of a setup whose tool ran and reported a failure of its own, such as no solution."""
+FAILED = "failed"
+"""Status of a setup that ended with an error."""
+WAITED = "not run"
+"""Status of a setup that was not run because a setup that it needs failed."""
+STATUSES = DONE, NO, FAILED, WAITED
+"""All statuses of a setup."""
 
-SAVE_SECONDS = 1.0
+SAVE_INTERVAL_S = 1.0
+"""Shortest time between two writes of the journal, s."""
 
 
 @dataclass
-class Trial:
-    """What became of a setup."""
+class RunRecord:
+    """Record of the run of one setup."""
 
     setup: str  # the file
     status: str  # see `DONE` and the others
@@ -52,19 +61,23 @@ class Trial:
     was_done: bool = False  # whether that was before this run
 
 
-class Interrupted(OsimliteError):
-    """Stopped by the keyboard; what was done is noted."""
+class RunInterruption(OsimliteError):
+    """Error for a stop by the keyboard; finished runs are in the journal."""
 
     exit_code = 130
 
 
-def found(words: Iterable[str | Path]) -> list[Path]:
-    """Files of setups from names and patterns such as ``subjects/*/setup_ik.xml``, in order, none twice.
+def find_setups(words: Iterable[str | Path]) -> list[Path]:
+    """Return setup files by names and patterns such as ``subjects/*/setup_ik.xml``.
 
-    A pattern finds no models and no sets, such as the loads or the markers that setups read.
+    Patterns skip models and sets, such as the loads or the markers that setups read. No file is
+    returned twice.
+
+    Args:
+        words: names and patterns.
 
     Raises:
-        OsimliteError: a pattern matches nothing, or a folder is named.
+        OsimliteError: a pattern matches nothing, or a word names a folder.
     """
     files: dict[Path, None] = {}
     for word in map(str, words):
@@ -97,52 +110,57 @@ def run_many(
     kept: dict[str | Path, Outcome] | None = None,
     overwrite: bool = False,
     write_outside: bool = False,
-) -> list[Trial]:
-    """Run setups; one that fails stops none but those that need what it makes.
+) -> list[RunRecord]:
+    """Run setups; a failure stops only the setups that need its results.
 
-    What they write does not depend on how many work at it.
+    The results do not depend on the number of workers.
 
-    Args: setups: the files. output: a folder for all results, with one in it for each setup, named
-        after the setup's place among them; one that names what another makes is given that from
-        there. workers: processes of this machine; by default all is done in this one; None for one
-        for each core. cluster: address of a Dask scheduler whose workers do it instead; they see
-        the same files. resume: leave out what an earlier run has done, if its inputs and its
-        results are still there unchanged. progress: called with how many are done, and of how many.
-        kept: is given what came out of each setup; with one worker, in this process, only.
-        overwrite: whether any file may be replaced; without it only results of the same kind are.
-        write_outside: whether setups may name results outside of their project and the current
-        folder.
+    Args:
+        setups: setup files.
+        output: folder for all results, with a folder in it for each setup; a setup that names a
+            result of another one reads it from there.
+        workers: number of processes; 1 runs all setups in this process, None starts one for each
+            core.
+        cluster: address of a Dask scheduler whose workers run the setups; they must see the same
+            files.
+        resume: skip setups that an earlier run has finished, if their inputs and results are
+            unchanged.
+        progress: function that receives the number of finished setups and of all setups.
+        kept: receives the outcome of each setup; needs one worker in this process.
+        overwrite: whether to replace any file; by default only results of the same kind are
+            replaced.
+        write_outside: whether setups may name results outside their project and the current folder.
 
     Returns:
-        What became of each, in their order.
+        A record for each setup, in the same order.
 
     Raises:
-        Interrupted: by the keyboard; the rest can be done with `resume`.
+        RunInterruption: the keyboard stopped the run; `resume` continues it.
         OsimliteError: the cluster cannot be reached.
     """
     journal = _Journal(output or Path(), resume, is_kept=len(setups) > 1)
-    places = places_of(setups, output)
-    work = _Work(setups, journal, progress)
-    do = partial(_one, places, work.needs, kept, overwrite, write_outside)
+    places = assign_folders(setups, output)
+    work = _Schedule(setups, journal, progress)
+    do = partial(_run_one, places, work.needs, kept, overwrite, write_outside)
     try:
         if cluster is None and workers == 1:
-            for setup in work.ready():
-                work.note(do(setup))
+            for setup in work.yield_ready():
+                work.record_run(do(setup))
         else:
-            work.share(do, workers, cluster)
+            work.run_parallel(do, workers, cluster)
     except KeyboardInterrupt:
         journal.save()
         message = f"interrupted after {len(work.trials)} of {format_count(len(setups), 'setup')}"
-        raise Interrupted(f"{message}; go on with --resume") from None
+        raise RunInterruption(f"{message}; go on with --resume") from None
     trials = [work.trials[setup] for setup in setups]
-    _tell_clashes(trials)
-    journal.end(trials)
+    _report_clashes(trials)
+    journal.finish(trials)
     return trials
 
 
-def _tell_clashes(trials: Sequence[Trial]) -> None:
-    """Results over which another setup has written are no results, and whose they are now depends on chance."""
-    owners: dict[str, Trial] = {}
+def _report_clashes(trials: Sequence[RunRecord]) -> None:
+    """Mark runs as failed that wrote the same file; which one wrote last depends on chance."""
+    owners: dict[str, RunRecord] = {}
     for trial in trials:
         for file in map(os.path.realpath, trial.files):
             other = owners.setdefault(file, trial)
@@ -152,8 +170,16 @@ def _tell_clashes(trials: Sequence[Trial]) -> None:
                     one.message = f"'{another.setup}' writes '{file}' too; give each a place of its own, or -o FOLDER"
 
 
-def places_of(setups: Sequence[Path], output: Path | None) -> dict[Path, Path | None]:
-    """A folder for the results of each setup; none if these go where the setup says."""
+def assign_folders(setups: Sequence[Path], output: Path | None) -> dict[Path, Path | None]:
+    """Assign a folder for its results to each setup.
+
+    Args:
+        setups: setup files.
+        output: folder for all results, or None.
+
+    Returns:
+        Folder by setup; None if the setup names the folder itself.
+    """
     if output is None or len(setups) == 1:
         return dict.fromkeys(setups, output)
     paths = [os.path.abspath(setup) for setup in setups]
@@ -167,21 +193,24 @@ def places_of(setups: Sequence[Path], output: Path | None) -> dict[Path, Path | 
 def find_substitutes(
     setup: Path, needs: Sequence[Path], places: Mapping[Path, Path | None]
 ) -> dict[str, str]:
-    """Return where files that a setup names are now, if others have made them and put them elsewhere.
+    """Return the present paths of inputs that other setups wrote into other folders.
 
     Args:
-        setup: that names the files.
-        needs: setups that make them.
-        places: by setup, the folder of its results; None if these are where the setup says.
+        setup: setup that names the inputs.
+        needs: setups that write them.
+        places: folder of the results by setup; None if the setup names the folder itself.
+
+    Returns:
+        Present path of each input by its absolute path in the setup.
     """
     result = {}
-    named = {os.path.realpath(name) for name in named_files(str(setup), "file")}
+    named = {os.path.realpath(name) for name in find_named_files(str(setup), "file")}
     for maker in needs:
         folder = places[maker]
         if folder is None:
             continue
         for path in named & {
-            os.path.realpath(name) for name in named_files(str(maker), "output-file")
+            os.path.realpath(name) for name in find_named_files(str(maker), "output-file")
         }:
             new = folder / os.path.basename(path)
             if new.is_file():
@@ -189,18 +218,18 @@ def find_substitutes(
     return result
 
 
-def _one(
+def _run_one(
     places: dict[Path, Path | None],
     needs: dict[Path, list[Path]],
     kept: dict[str | Path, Outcome] | None,
     overwrite: bool,
     write_outside: bool,
     setup: Path,
-) -> Trial:
-    """Run one setup; every error of its own is part of the answer."""
+) -> RunRecord:
+    """Run one setup; its errors become part of the record."""
     started = time.perf_counter()
     try:
-        digest = digest_of(setup)
+        digest = compute_digest(setup)
         substitutes = find_substitutes(setup, needs[setup], places)
         outcome = run(
             setup,
@@ -210,14 +239,16 @@ def _one(
             substitutes=substitutes,
         )
     except OsimliteError as error:
-        return Trial(str(setup), FAILED, message=str(error), seconds=time.perf_counter() - started)
+        return RunRecord(
+            str(setup), FAILED, message=str(error), seconds=time.perf_counter() - started
+        )
     if kept is not None:
         kept[setup] = outcome
-    return Trial(
+    return RunRecord(
         str(setup),
         DONE if outcome.done else NO,
         outcome.told,
-        _plain(outcome.summary),
+        _to_json_values(outcome.summary),
         files=[str(file) for file in outcome.files],
         warnings=[str(finding) for finding in outcome.warnings],
         seconds=time.perf_counter() - started,
@@ -225,14 +256,15 @@ def _one(
     )
 
 
-def _plain(summary: dict[str, Any]) -> dict[str, Any]:
+def _to_json_values(summary: dict[str, Any]) -> dict[str, Any]:
+    """Return a summary with values that JSON has."""
     return json.loads(json.dumps(summary, default=float))
 
 
-def digest_of(setup: Path) -> str:
-    """Of the contents of a setup and of all files that it names."""
+def compute_digest(setup: Path) -> str:
+    """Return a digest of the contents of a setup and of all files that it names."""
     made = blake2b(digest_size=16)
-    for path in dict.fromkeys((str(setup), *named_files(str(setup), "file"))):
+    for path in dict.fromkeys((str(setup), *find_named_files(str(setup), "file"))):
         made.update(path.encode("utf-8", "surrogateescape"))
         try:
             made.update(read_file(path))
@@ -242,39 +274,40 @@ def digest_of(setup: Path) -> str:
 
 
 class _Journal:
-    """What is noted of the setups that are done; of one alone nothing."""
+    """Journal of finished runs; a run of one setup has none."""
 
     def __init__(self, folder: Path, resume: bool, *, is_kept: bool) -> None:
-        self.path, self.noted = folder / JOURNAL, dict[str, Trial]()
+        self.path, self.noted = folder / JOURNAL, dict[str, RunRecord]()
         self._saved, self._is_kept = time.monotonic(), is_kept
         lines: list[bytes] = []
         # Without a readable journal the work is done again.
         with suppress(OsimliteError):
             lines = read_file(self.path).splitlines() if resume else []
         for line in lines:
-            if (trial := read_trial(line)) is not None:
+            if (trial := read_record(line)) is not None:
                 self.noted[trial.setup] = trial
 
-    def done(self, setup: Path) -> Trial | None:
-        """What is noted of a setup, if all is still as it was."""
+    def find_finished(self, setup: Path) -> RunRecord | None:
+        """Return the record of a finished run; None if its inputs or results have changed."""
         trial = self.noted.get(str(setup))
-        if trial is None or trial.status not in (DONE, NO) or trial.digest != digest_of(setup):
+        if trial is None or trial.status not in (DONE, NO) or trial.digest != compute_digest(setup):
             return None
         if not all(map(os.path.isfile, trial.files)):
             return None
         trial.was_done = True
         return trial
 
-    def note(self, trial: Trial) -> None:
+    def record_run(self, trial: RunRecord) -> None:
+        """Add a record, and save the journal from time to time."""
         self.noted[trial.setup] = trial
-        if time.monotonic() - self._saved > SAVE_SECONDS:
+        if time.monotonic() - self._saved > SAVE_INTERVAL_S:
             # Where nothing can be noted, as beside setups that may only be read, the work goes on
             # all the same.
             with suppress(OsimliteError):
                 self.save()
 
     def save(self) -> None:
-        """Write it, if there is anything to write."""
+        """Write the journal, unless it is empty."""
         self._saved = time.monotonic()
         if self._is_kept and self.noted and self.path.parent.is_dir():
             lines = (
@@ -282,8 +315,8 @@ class _Journal:
             )
             write_into(self.path.parent, self.path.name, "".join(f"{line}\n" for line in lines))
 
-    def end(self, trials: Sequence[Trial]) -> None:
-        """Nothing is left to do, or something that failed may be done later."""
+    def finish(self, trials: Sequence[RunRecord]) -> None:
+        """Delete the journal if all runs are finished; otherwise save it for `resume`."""
         with suppress(OsimliteError, OSError):
             if all(trial.status in (DONE, NO) for trial in trials):
                 self.path.unlink(missing_ok=True)
@@ -291,8 +324,8 @@ class _Journal:
                 self.save()
 
 
-def read_trial(line: bytes) -> Trial | None:
-    """Return the trial of one line of a journal; None if the line is damaged, so that it is done again."""
+def read_record(line: bytes) -> RunRecord | None:
+    """Return the record in one line of a journal; None if the line is damaged."""
     try:
         match json.loads(line):
             case {
@@ -312,14 +345,14 @@ def read_trial(line: bytes) -> Trial | None:
                 # Tables of many trials are sorted by this number.
                 error = values["summary"].get("rms_marker_error", 0.0)
                 if isinstance(error, int | float) and all(isinstance(word, str) for word in words):
-                    return Trial(**{**values, "told": pairs})
+                    return RunRecord(**{**values, "told": pairs})
     except (ValueError, TypeError, RecursionError):
         pass
     return None
 
 
-class _Work:
-    """Which setups can be run, and what became of others."""
+class _Schedule:
+    """Order of the runs, and their records."""
 
     def __init__(
         self,
@@ -328,12 +361,12 @@ class _Work:
         progress: Callable[[int, int], object] | None,
     ) -> None:
         self.setups, self.journal, self.progress = setups, journal, progress
-        self.trials: dict[Path, Trial] = {}
-        self.needs = _needs(setups)
+        self.trials: dict[Path, RunRecord] = {}
+        self.needs = _find_needs(setups)
         self._given: set[Path] = set()
 
-    def ready(self) -> Iterator[Path]:
-        """Setups that can be run now; those that cannot be run any more are noted."""
+    def yield_ready(self) -> Iterator[Path]:
+        """Yield setups whose inputs exist; record setups whose inputs cannot be made."""
         moved = True
         while moved:
             moved = False
@@ -348,20 +381,31 @@ class _Work:
                 ]
                 if broken:
                     message = f"it needs what {join_words(broken)} should have made"
-                    self.note(Trial(str(setup), WAITED, message=message))
-                elif (trial := self.journal.done(setup)) is not None:
-                    self.note(trial)
+                    self.record_run(RunRecord(str(setup), WAITED, message=message))
+                elif (trial := self.journal.find_finished(setup)) is not None:
+                    self.record_run(trial)
                 else:
                     yield setup
 
-    def note(self, trial: Trial) -> None:
+    def record_run(self, trial: RunRecord) -> None:
+        """Note a record, and report progress."""
         self.trials[Path(trial.setup)] = trial
-        self.journal.note(trial)
+        self.journal.record_run(trial)
         if self.progress is not None:
             self.progress(len(self.trials), len(self.setups))
 
-    def share(self, do: Callable[[Path], Trial], workers: int | None, cluster: str | None) -> None:
-        """Run setups side by side. Those that were under way when a process ended are run again, each alone."""
+    def run_parallel(
+        self, do: Callable[[Path], RunRecord], workers: int | None, cluster: str | None
+    ) -> None:
+        """Run setups in several processes.
+
+        Setups that were running when a process died are run again, each alone.
+
+        Args:
+            do: runs one setup.
+            workers: number of processes; None for one for each core.
+            cluster: address of a Dask scheduler, or None.
+        """
         from osimlite.base.pools import WorkerLostError, open_process_pool
 
         alone: list[Path] = []
@@ -372,7 +416,7 @@ class _Work:
                     while len(self.trials) < len(self.setups):
                         while (
                             len(under_way) < 2 * pool.workers
-                            and (setup := next(self.ready(), None)) is not None
+                            and (setup := next(self.yield_ready(), None)) is not None
                         ):
                             under_way.append(setup)
                             pool.submit(setup, setup)
@@ -380,7 +424,7 @@ class _Work:
                             break
                         setup, trial = pool.result()
                         under_way.remove(setup)
-                        self.note(trial)
+                        self.record_run(trial)
             except WorkerLostError:
                 alone = under_way
             while alone:
@@ -388,31 +432,32 @@ class _Work:
                 try:
                     with open_process_pool(do, workers=1) as pool:
                         pool.submit(setup, setup)
-                        self.note(pool.result()[1])
+                        self.record_run(pool.result()[1])
                 except WorkerLostError:
-                    self.note(
-                        Trial(
+                    self.record_run(
+                        RunRecord(
                             str(setup), FAILED, message="the process that ran it has ended, twice"
                         )
                     )
 
 
-def _needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
-    """Which other setups make what a setup names, by the names of files in them; never two each other's.
+def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
+    """Return, for each setup, the other setups that write its inputs.
 
-    Of those that cannot be run here, another program may have made it.
+    Setups that need each other are run in the given order. Setups of unsupported tools count as
+    finished: another program may have run them.
     """
     makers: dict[str, Path] = {}
-    tools = runnable()
+    tools = list_runnable()
     for setup in setups:
         if type(top_at(str(setup))).__name__ not in tools:
             continue
         makers.update(
-            (os.path.realpath(name), setup) for name in named_files(str(setup), "output-file")
+            (os.path.realpath(name), setup) for name in find_named_files(str(setup), "output-file")
         )
     needs: dict[Path, list[Path]] = {}
     for setup in setups:
-        names = {os.path.realpath(name) for name in named_files(str(setup), "file")}
+        names = {os.path.realpath(name) for name in find_named_files(str(setup), "file")}
         needs[setup] = list(
             {makers[name]: None for name in sorted(names & makers.keys()) if makers[name] != setup}
         )

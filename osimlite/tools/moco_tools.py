@@ -1,4 +1,4 @@
-"""OpenSim's MocoStudy, MocoTrack and MocoInverse: optimal control problems, solved and reported."""
+"""OpenSim's MocoStudy, MocoTrack and MocoInverse: optimal control problems."""
 
 from __future__ import annotations
 
@@ -20,10 +20,14 @@ if TYPE_CHECKING:
 
 
 def run_moco_study(job: Job, outcome: Outcome) -> None:
-    """Solve the problem, and write the solution, whether ``write_solution`` asks for it or not.
+    """Solve the problem; write the solution, regardless of ``write_solution``.
 
-    A motion that goes on as a MocoPeriodicityGoal says is written with what follows it, too, as a
+    If a MocoPeriodicityGoal makes the motion periodic, its continuation is written as well, as a
     stride.
+
+    Args:
+        job: setup, a MocoStudy.
+        outcome: collects the results.
     """
     # CasADi is loaded with it.
     from osimlite.optimal.problem import Problem
@@ -35,20 +39,29 @@ def run_moco_study(job: Job, outcome: Outcome) -> None:
     problem = Problem(study, job.file)
     solution = solve_program(Program(problem), None, tell, job.refine)
     name = study.name or "MocoStudy"
-    outcome.new_table(job.in_results(f"{name}_solution.sto"), solution.trajectory.table())
+    outcome.add_typed_table(
+        job.get_results_path(f"{name}_solution.sto"), solution.trajectory.table()
+    )
     if solution.stride is not None:
-        outcome.new_table(job.in_results(f"{name}_stride.sto"), solution.stride.table())
+        outcome.add_typed_table(job.get_results_path(f"{name}_stride.sto"), solution.stride.table())
     report_solution(job, problem, solution, outcome)
 
 
 def make_progress_callback(outcome: Outcome) -> Callable[[Progress], None] | None:
-    """What tells of each iteration, if somebody listens."""
+    """Return a function that reports each iteration; None if nothing listens."""
     says = outcome.progress
     return None if says is None else (lambda progress: says(str(progress)))
 
 
 def report_solution(job: Job, problem: Problem, solution: MocoSolution, outcome: Outcome) -> None:
-    """Say what came out of a search, and what a report_solution shows of it."""
+    """Add the results of a solver to an outcome, with the motion for a report.
+
+    Args:
+        job: the setup.
+        problem: the optimal control problem.
+        solution: its solution.
+        outcome: collects the results.
+    """
     outcome.done, outcome.title = solution.success, job.setup.name
     outcome.summary |= {
         "objective": solution.objective,
@@ -58,29 +71,31 @@ def report_solution(job: Job, problem: Problem, solution: MocoSolution, outcome:
         "duration": solution.duration,
         "rounds": [each._asdict() for each in solution.rounds],
     }
-    outcome.tell(
+    outcome.add_message(
         "status",
         f"{solution.status} after {solution.iterations} iterations in {solution.duration:.3g} s",
     )
     for each in solution.rounds:
-        outcome.tell("mesh", str(each))
+        outcome.add_message("mesh", str(each))
     for goal, value in solution.terms.items():
-        outcome.tell(goal, f"{value:.8g}")
-    outcome.tell("objective", f"{solution.objective:.8g}")
+        outcome.add_message(goal, f"{value:.8g}")
+    outcome.add_message("objective", f"{solution.objective:.8g}")
     for violation in solution.violations[: 1 if solution.success else 5]:
-        outcome.tell("largest violation" if solution.success else "not fulfilled", str(violation))
+        outcome.add_message(
+            "largest violation" if solution.success else "not fulfilled", str(violation)
+        )
     outcome.evidence = _collect_evidence(job, problem, solution)
     if job.simulates:
         from osimlite.optimal.simulation_check import check_by_simulation
 
         try:
-            outcome.tell("simulated", str(check_by_simulation(problem, solution.trajectory)))
+            outcome.add_message("simulated", str(check_by_simulation(problem, solution.trajectory)))
         except OsimliteError as error:
-            outcome.tell("not simulated", error.message)
+            outcome.add_message("not simulated", error.message)
 
 
 def _collect_evidence(job: Job, problem: Problem, solution: MocoSolution) -> Evidence:
-    """The motion with its controls, and what follows it if that is known."""
+    """Return the motion with its controls; of a periodic motion the whole stride."""
     trajectory = solution.stride or solution.trajectory
     mechanism, columns = build_mechanism(problem.model), trajectory.columns
     values, speeds = (
@@ -88,7 +103,7 @@ def _collect_evidence(job: Job, problem: Problem, solution: MocoSolution) -> Evi
         for what in ("value", "speed")
     )
     named = problem.phase.model.filepath.strip()
-    return Evidence.of(
+    return Evidence.from_values(
         problem.model,
         problem.locate_file(named) if named else job.file,
         mechanism,
@@ -105,7 +120,12 @@ def _collect_evidence(job: Job, problem: Problem, solution: MocoSolution) -> Evi
 
 
 def run_moco_track(job: Job, outcome: Outcome) -> None:
-    """Find the motion, and write it beside the setup."""
+    """Track measured states; write the solution, and the tracked tables.
+
+    Args:
+        job: setup, a MocoTrack.
+        outcome: collects the results.
+    """
     # CasADi is loaded with it.
     from osimlite.optimal.program import Program
     from osimlite.optimal.solution import solve_program
@@ -116,23 +136,33 @@ def run_moco_track(job: Job, outcome: Outcome) -> None:
     name = job.setup.name or "MocoTrack"
     for goal, what in (("state_tracking", "states"), ("marker_tracking", "markers")):
         if goal in problem.tables:
-            outcome.new_table(job.result(f"{name}_tracked_{what}.sto"), problem.tables[goal])
-    outcome.new_table(job.result(f"{name}_solution.sto"), solution.trajectory.table())
+            outcome.add_typed_table(
+                job.get_output_path(f"{name}_tracked_{what}.sto"), problem.tables[goal]
+            )
+    outcome.add_typed_table(
+        job.get_output_path(f"{name}_solution.sto"), solution.trajectory.table()
+    )
     report_solution(job, problem, solution, outcome)
 
 
 def run_moco_inverse(job: Job, outcome: Outcome) -> None:
-    """Find what the muscles do, and write it beside the setup."""
+    """Find muscle excitations for a prescribed motion; write the solution.
+
+    Args:
+        job: setup, a MocoInverse.
+        outcome: collects the results.
+    """
     # CasADi is loaded with it.
     from osimlite.optimal.inverse import build_inverse_problem, solve_inverse_problem
 
     if job.setup.output_paths:
-        raise job.unable(
+        raise job.create_unsupported_error(
             "output_paths is given, and outputs of the solution are not computed here; leave it empty"
         )
     problem = build_inverse_problem(job.setup, job.file)
     solution = solve_inverse_problem(problem, make_progress_callback(outcome), job.refine)
-    outcome.new_table(
-        job.result(f"{job.setup.name or 'MocoInverse'}_solution.sto"), solution.trajectory.table()
+    outcome.add_typed_table(
+        job.get_output_path(f"{job.setup.name or 'MocoInverse'}_solution.sto"),
+        solution.trajectory.table(),
     )
     report_solution(job, problem, solution, outcome)

@@ -1,4 +1,4 @@
-"""A motion under analysis: states of a model over time, and what is computed of them."""
+"""Motion of a model over time, and quantities that analyses compute from it."""
 
 from __future__ import annotations
 
@@ -28,15 +28,16 @@ from osimlite.simulation.system import System
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
 
-Record = tuple[Array, Array]
-"""Times (r,) and generalized speeds (r, n)."""
+SpeedRecord = tuple[Array, Array]
+"""Times (r,) in s and generalized speeds (r, n) of a measured motion."""
 
 BoolArray = NDArray[np.bool_]
+"""Array of truth values."""
 
 PATH_RECORDS = {"length": "length", "rate": "rate", "speed": "rate"}
-"""Records of a muscle that follow from its path alone, whatever its fibers do."""
-LEAST_TIMES = 6
-"""That splines of fifth degree go through."""
+"""Records of a muscle that depend on its path alone, with the quantity of the path."""
+MIN_TIMES = 6
+"""Number of samples that a spline of degree five needs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,7 @@ class Motion:
     states: Array  # (t, y), in the order of the simulation's engine
     # the start and the ends of all steps, if the motion was integrated
     steps: Sequence[Moment] = ()
-    record: Callable[[], Record] | None = (
+    record: Callable[[], SpeedRecord] | None = (
         None  # gives what was measured, of which the motion is a part
     )
     # By path of each muscle without an equilibrium at some times: whether it has none (t,). Its
@@ -60,36 +61,42 @@ class Motion:
     left_out: frozenset[str] = frozenset()  # paths of muscles of the model that were switched off
 
     @cached_property
-    def _found(self) -> dict[str, Any]:
+    def _cache(self) -> dict[str, Any]:
+        """Values of :meth:`compute_once` by their names."""
         return {}
 
-    def once(self, name: str, find: Callable[[], Any]) -> Any:
-        """What several analyses need, found by the first of them."""
-        if name not in self._found:
-            self._found[name] = find()
-        return self._found[name]
+    def compute_once(self, name: str, find: Callable[[], Any]) -> Any:
+        """Return a value that several analyses need; compute it at the first request.
+
+        Args:
+            name: key of the value.
+            find: function that computes it.
+        """
+        if name not in self._cache:
+            self._cache[name] = find()
+        return self._cache[name]
 
     @property
     def mechanism(self) -> Any:
-        """The mechanism of the model."""
+        """Mechanism of the model."""
         return self.simulation.mechanism
 
     @property
     def system(self) -> System:
-        """What the kernels find of the forces at a state."""
+        """Engine of the simulation, which evaluates the kernels at a state."""
         assert isinstance(self.simulation.engine, System)
         return self.simulation.engine
 
     @cached_property
     def table(self) -> Array:
-        """Each time with its state (t, 1 + y)."""
+        """Times and states as one array (t, 1 + y)."""
         return np.column_stack([self.times, self.states])
 
-    def select(self, rows: BoolArray) -> Motion:
+    def select_times(self, rows: BoolArray) -> Motion:
         """Return the motion at some of its times.
 
         Args:
-            rows: whether each time is among them (t,).
+            rows: whether to include each time (t,).
         """
         unbalanced = {
             path: missing[rows] for path, missing in self.unbalanced.items() if missing[rows].any()
@@ -100,26 +107,34 @@ class Motion:
 
     @cached_property
     def balanced(self) -> BoolArray:
-        """Return for each time (t,) whether every muscle that needs an equilibrium has one."""
+        """Mask of the times (t,) at which every muscle that needs an equilibrium has one."""
         return ~np.any([np.zeros(len(self.times), dtype=bool), *self.unbalanced.values()], axis=0)
 
     @cached_property
     def parts(self) -> list[tuple[BoolArray, Motion]]:
-        """Times (t,) at which the same muscles lack an equilibrium, and the motion then, without these muscles."""
+        """Parts of the motion in which the same muscles lack an equilibrium.
+
+        Each part is a mask of its times (t,) and the motion at these times, with these muscles off.
+        """
         if not self.unbalanced:
             return [(np.ones(len(self.times), dtype=bool), self)]
         names, missing = [*self.unbalanced], np.column_stack([*self.unbalanced.values()])
         result = []
         for pattern in np.unique(missing, axis=0):
             rows = (missing == pattern).all(axis=1)
-            part = self.select(rows)
+            part = self.select_times(rows)
             if pattern.any():
                 part = self._switch_off_muscles(part, frozenset(np.array(names)[pattern].tolist()))
             result.append((rows, part))
         return result
 
     def _switch_off_muscles(self, part: Motion, muscles: frozenset[str]) -> Motion:
-        """Return a part of the motion with a model in which some muscles are switched off."""
+        """Return a part of the motion with a model in which some muscles are switched off.
+
+        Args:
+            part: the motion at some times.
+            muscles: paths of the muscles.
+        """
         assert self.simulate is not None
         model = self.model.copy_deep()
         tree = model.tree()
@@ -133,23 +148,29 @@ class Motion:
         )
 
     def compute_balanced(self, compute: Callable[[Motion], Array]) -> Array:
-        """Return rows (t, ...) of what needs the forces of all muscles; NaN where one lacks an equilibrium.
+        """Compute rows that depend on the forces of all muscles.
 
         Args:
-            compute: gives the rows of a motion.
+            compute: returns the rows of a motion.
+
+        Returns:
+            Rows (t, ...); NaN at times at which a muscle lacks an equilibrium.
         """
         if not self.unbalanced:
             return compute(self)
-        part = compute(self.select(self.balanced))
+        part = compute(self.select_times(self.balanced))
         result = np.full((len(self.times), *part.shape[1:]), np.nan)
         result[self.balanced] = part
         return result
 
     def compute_by_parts(self, compute: Callable[[Motion], Array]) -> Array:
-        """Return rows (t, ...) of what does not need the forces of muscles without equilibrium.
+        """Compute rows that do not depend on the forces of muscles without equilibrium.
 
         Args:
-            compute: gives the rows of a motion; `left_out` of that names muscles that are off.
+            compute: returns the rows of a motion, whose `left_out` names the muscles that are off.
+
+        Returns:
+            Rows (t, ...).
         """
         rows = [(chosen, compute(part)) for chosen, part in self.parts]
         result = np.full((len(self.times), *rows[0][1].shape[1:]), np.nan)
@@ -159,16 +180,17 @@ class Motion:
 
     @property
     def moments(self) -> Iterator[tuple[float, list[float]]]:
-        """Each time with its state."""
+        """Pairs of a time in s and its state (y,)."""
         return zip(self.times.tolist(), self.states.tolist(), strict=True)
 
     @cached_property
     def _histories(self) -> tuple[Array, Array]:
+        """Values and speeds of all coordinates, each (t, n)."""
         return self.simulation.state.histories(self.states.tolist())
 
     @property
     def values(self) -> Array:
-        """Of all coordinates in the mechanism's order (t, n), rad and m."""
+        """Values of all coordinates (t, n) in the order of the mechanism, rad and m."""
         return self._histories[0]
 
     @property
@@ -178,7 +200,7 @@ class Motion:
 
     @cached_property
     def histories(self) -> dict[str, Array]:
-        """All states (t,) by their paths, in OpenSim's order."""
+        """Columns (t,) of all states by their paths, in OpenSim's order."""
         columns = self.simulation.state.auxiliary_histories(self.states)
         for index, info in enumerate(self.mechanism.coordinates):
             columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = (
@@ -187,32 +209,62 @@ class Motion:
             )
         return {path: columns[path] for path in self.simulation.paths}
 
-    def looked(self, places: Sequence[int], stage: int = STAGE.FORCE) -> Array:
-        """What the kernels find at every time (t, m), NaN where a muscle lacks an equilibrium; see `System.looked`."""
+    def evaluate_kernels(self, places: Sequence[int], stage: int = STAGE.FORCE) -> Array:
+        """Evaluate entries of the work vector of the kernels at every time; see `System.looked`.
+
+        Args:
+            places: offsets of m entries in the work vector.
+            stage: stage up to which to realize each state.
+
+        Returns:
+            Entries (t, m); NaN at times at which a muscle lacks an equilibrium.
+        """
         return self.compute_balanced(
             lambda motion: motion.system.looked(motion.table, places, stage)
         )
 
-    def known(self, paths: Sequence[str], *names: str) -> dict[str, Array]:
-        """What is known of force elements of some paths at every time (t, m), by the names of their kinds.
+    def read_records(self, paths: Sequence[str], *names: str) -> dict[str, Array]:
+        """Return quantities that force elements record, at every time.
 
-        At times when a muscle lacks an equilibrium only what follows from its path is known of it.
+        Args:
+            paths: paths of m force elements.
+            names: names of the quantities, for example ``"tension"``.
+
+        Returns:
+            Values (t, m) by name. For a muscle without equilibrium only quantities of its path are
+            known; the others are NaN.
         """
-        result = self.compute_by_parts(lambda motion: motion._records(paths, names))
+        result = self.compute_by_parts(lambda motion: motion._collect_records(paths, names))
         if self.unbalanced:
             self._add_path_records(result, paths, names)
         return {name: result[:, :, k] for k, name in enumerate(names)}
 
-    def _records(self, paths: Sequence[str], names: Sequence[str]) -> Array:
-        """Records (t, p, m) of force elements; NaN of those that are left out."""
+    def _collect_records(self, paths: Sequence[str], names: Sequence[str]) -> Array:
+        """Return records of force elements; NaN for muscles that are switched off.
+
+        Args:
+            paths: paths of p force elements.
+            names: names of m quantities.
+
+        Returns:
+            Records (t, p, m).
+        """
         result = np.full((len(self.times), len(paths), len(names)), np.nan)
         there = [k for k, path in enumerate(paths) if path not in self.left_out]
         places = [place for k in there for place in self.system.places_of(paths[k], names)]
-        result[:, there] = self.looked(places).reshape(len(self.times), len(there), len(names))
+        result[:, there] = self.evaluate_kernels(places).reshape(
+            len(self.times), len(there), len(names)
+        )
         return result
 
     def _add_path_records(self, result: Array, paths: Sequence[str], names: Sequence[str]) -> None:
-        """Fill in lengths and speeds of the paths of muscles without equilibrium."""
+        """Fill in path lengths and lengthening speeds of muscles without equilibrium.
+
+        Args:
+            result: records (t, p, m), changed in place.
+            paths: paths of p force elements.
+            names: names of m quantities.
+        """
         wanted = [k for k, name in enumerate(names) if name in PATH_RECORDS]
         chosen = [k for k, path in enumerate(paths) if path in self.unbalanced]
         if not (wanted and chosen):
@@ -229,45 +281,58 @@ class Motion:
 
     @cached_property
     def accelerations(self) -> Array:
-        """Derivatives of the speeds (t, n), by all that acts on the model; NaN where a muscle lacks an equilibrium."""
+        """Derivatives of the speeds (t, n) under all forces; NaN without an equilibrium."""
         order, result = list(self.simulation.state.order), np.zeros_like(self.values)
         first = self.system.room + len(order)
-        result[:, order] = self.looked(range(first, first + len(order)), STAGE.ACCELERATION)
+        result[:, order] = self.evaluate_kernels(
+            range(first, first + len(order)), STAGE.ACCELERATION
+        )
         return result
 
     @cached_property
-    def wanted(self) -> Array:
-        """Derivatives of the speeds (t, n) that were measured, by natural splines of fifth degree through all of them.
+    def measured_accelerations(self) -> Array:
+        """Derivatives of the measured speeds (t, n), from natural splines of degree five.
 
         Raises:
-            SettingError: fewer than six times were measured.
+            SettingError: the motion has fewer than six samples.
         """
         assert self.record is not None
         times, speeds = self.record()
-        if len(times) < LEAST_TIMES:
-            message = f"the motion has {format_count(len(times), 'time')}; accelerations need at least {LEAST_TIMES}"
+        if len(times) < MIN_TIMES:
+            message = f"the motion has {format_count(len(times), 'time')}; accelerations need at least {MIN_TIMES}"
             raise SettingError(message)
-        (result,) = derivatives_of_samples(times, speeds, self.times, (1,), LEAST_TIMES // 2)
+        (result,) = derivatives_of_samples(times, speeds, self.times, (1,), MIN_TIMES // 2)
         return result
 
     @cached_property
     def links(self) -> LinkMotion:
-        """Where the bodies are and how they move at every time."""
+        """Positions, velocities and accelerations of the bodies at every time."""
         system = System(self.mechanism.released(), Forces(()))
         moments = np.column_stack([self.times, system.state.rows(self.values, self.speeds)])
         return LinkMotion.of(system, moments, self.accelerations[:, list(system.order)])
 
-    def frame(self, asked: str, kind: str, *places: str) -> str | None:
-        """The path of a frame of a class that is found by its path from the model, or from other places there."""
+    def find_frame_path(self, asked: str, kind: str, *places: str) -> str | None:
+        """Return the path of a frame that a name or relative path denotes, or None.
+
+        Args:
+            asked: name or path as in a setup.
+            kind: class of the frame.
+            places: paths of components below which to search after the model itself.
+        """
         tree = self.model.tree()
         result = (tree.walk(asked, place, kind).target for place in ("", *places))
         return next((tree.path_of(item) for item in result if item is not None), None)
 
-    def chosen(self, wanted: Sequence[Any], names: Sequence[str], what: str) -> list[int]:
-        """Places of the names that an analysis asks for; "all" stands for all of them.
+    def find_indices(self, wanted: Sequence[Any], names: Sequence[str], what: str) -> list[int]:
+        """Return the indices of the names that an analysis requests; "all" requests all of them.
+
+        Args:
+            wanted: requested names.
+            names: all names.
+            what: description of the names for the message.
 
         Raises:
-            SettingError: there is none of a name.
+            SettingError: a requested name is unknown.
         """
         asked = [str(name) for name in wanted]
         if "all" in asked:
@@ -279,8 +344,8 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class Tables:
-    """Where the tables of an analysis go."""
+class AnalysisTables:
+    """Writer of the tables of one analysis."""
 
     job: Job  # the setup
     outcome: Outcome  # that has them written
@@ -288,7 +353,7 @@ class Tables:
     times: Array  # of all rows (t,), s
     note: str = ""  # what the header says of rows that are no numbers
 
-    def add(
+    def add_table(
         self,
         suffix: str,
         title: str,
@@ -299,40 +364,46 @@ class Tables:
         description: str = "",
         of: str = "",
     ) -> None:
-        """Have a table written, with the precision of the setup.
+        """Add a table in the format of OpenSim's Storage, with the precision of the setup.
 
         Args:
             suffix: end of the file's name.
             title: first line of the file.
-            columns: labels (m,).
-            rows: (t, m).
+            columns: labels of m columns.
+            rows: values (t, m).
             in_degrees: whether rotational values are in degrees.
-            description: what the header says besides.
-            of: what stands before the suffix in the file's name, if not the analysis alone.
+            description: text that the header contains as well.
+            of: part of the file's name before the suffix, besides the name of the analysis.
         """
         if self.note and np.isnan(rows).any():
             description = f"\n{self.note}{description}"
         table = StoTable(title, self.times, tuple(columns), rows, in_degrees)
-        self.outcome.table(
-            self._path(f"{of}_{suffix}"), table, description, self.job.setup.output_precision
+        self.outcome.add_table(
+            self._create_path(f"{of}_{suffix}"), table, description, self.job.setup.output_precision
         )
 
-    def add_newer(self, suffix: str, columns: Sequence[str], rows: Array, kind: str) -> None:
-        """Have a table written in the newer form of OpenSim's storage files, which is not named after the analysis.
+    def add_typed_table(self, suffix: str, columns: Sequence[str], rows: Array, kind: str) -> None:
+        """Add a table in the format of OpenSim's TimeSeriesTable, named after the tool alone.
 
         Args:
             suffix: end of the file's name.
             columns: a label for each value.
-            rows: (t, m), where a value of a kind may take several columns.
-            kind: of the values.
+            rows: values (t, m); a value may take several columns.
+            kind: type of the values, for example ``"Vec3"``.
         """
         labels = tuple(f"{column}{end}" for column in columns for end in suffixes(kind))
-        path = self.job.in_results(f"{self.job.setup.name}_{suffix}")
-        self.outcome.new_table(path, StoTable("", self.times, labels, rows, kind=kind))
+        path = self.job.get_results_path(f"{self.job.setup.name}_{suffix}")
+        self.outcome.add_typed_table(path, StoTable("", self.times, labels, rows, kind=kind))
 
     def add_text(self, suffix: str, content: str) -> None:
-        """Have a text written, whose file's name ends so."""
-        self.outcome.text(self._path(f"_{suffix}"), content)
+        """Add a text in a file of the analysis.
 
-    def _path(self, ending: str) -> Path:
-        return self.job.in_results(f"{self.job.setup.name}_{self.name}{ending}")
+        Args:
+            suffix: end of the file's name.
+            content: the text.
+        """
+        self.outcome.add_text(self._create_path(f"_{suffix}"), content)
+
+    def _create_path(self, ending: str) -> Path:
+        """Return the path of a file of the analysis."""
+        return self.job.get_results_path(f"{self.job.setup.name}_{self.name}{ending}")

@@ -1,4 +1,4 @@
-"""What OpenSim's classes of muscles say of their fibers and tendons, from what the laws of the muscles record."""
+"""Quantities of fibers and tendons that MuscleAnalysis writes, from the records of muscle laws."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from osimlite.schema.old_muscles import (
 )
 from osimlite.simulation.elements.muscle import SPRING
 
-KNOWN = (
+LAW_RECORDS = (
     "tension",
     "fiber_length",
     "cos_pennation",
@@ -33,9 +33,9 @@ KNOWN = (
     "rate",
     "fiber_velocity",
 )
-"""What all laws record, and is needed here."""
+"""Records of muscle laws from which the quantities are computed."""
 
-OF_DYNAMICS = (
+DYNAMIC_QUANTITIES = (
     "FiberVelocity",
     "NormFiberVelocity",
     "PennationAngularVelocity",
@@ -44,18 +44,20 @@ OF_DYNAMICS = (
     "TendonPower",
     "MuscleActuatorPower",
 )
-"""Tables without numbers for a model without mass, whose dynamics OpenSim does not compute."""
+"""Quantities that are NaN for a model without mass, whose dynamics OpenSim does not compute."""
 
-Tables = dict[str, Array]
-"""Rows (t, m) for m muscles, by the ends of the names of MuscleAnalysis' files."""
+MuscleTables = dict[str, Array]
+"""Rows (t, m) for m muscles, by the suffixes of MuscleAnalysis' files."""
 
 
-def quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> Tables:
-    """The tables of some muscles of one class, as by its base class; some classes change some of them.
+def compute_quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> MuscleTables:
+    """Compute the tables of some muscles of one class.
+
+    The formulas are those of OpenSim's base class; `CORRECTIONS` has those of other classes.
 
     Args:
-        known: rows (t, m) of `KNOWN`, and of SPRING if the law has it.
-        muscles: m of them.
+        known: rows (t, m) of `LAW_RECORDS`, and of SPRING if the law records it.
+        muscles: m muscles.
     """
     length, cos, speed = known["fiber_length"], known["cos_pennation"], known["fiber_velocity"]
     active, passive, tension = (
@@ -91,26 +93,34 @@ def quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> Tables:
         "TendonPower": -tension * (known["rate"] - along),
         "MuscleActuatorPower": -tension * known["rate"],
     }
-    return result | CHECKED[type(muscles[0])](result, muscles)
+    return result | CORRECTIONS[type(muscles[0])](result, muscles)
 
 
-def _thelen(found: Tables, muscles: Sequence[Any]) -> Tables:
-    """Fibers at their least length that would shorten bear nothing together, though there is a passive force."""
+def _correct_thelen(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
+    """Correct Thelen2003Muscle: fibers at rest at their minimum length have no force.
+
+    That holds although there is a passive force.
+    """
     still = (found["FiberVelocity"] == 0.0) & (found["ActiveFiberForce"] == 0.0)
     return {"FiberForce": np.where(still, 0.0, found["FiberForce"])}
 
 
-def _millard(found: Tables, muscles: Sequence[Any]) -> Tables:
-    return _still(found, [muscle.ignore_tendon_compliance for muscle in muscles])
+def _correct_millard(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
+    """Correct Millard2012EquilibriumMuscle."""
+    return _correct_tendon_power(found, [muscle.ignore_tendon_compliance for muscle in muscles])
 
 
-def _still(found: Tables, is_rigid: Sequence[bool]) -> Tables:
-    """The tendon of some has no velocity."""
+def _correct_tendon_power(found: MuscleTables, is_rigid: Sequence[bool]) -> MuscleTables:
+    """Set the tendon power of muscles with a rigid tendon to zero."""
     return {"TendonPower": np.where(is_rigid, 0.0, found["TendonPower"])}
 
 
-def _accelerated(found: Tables, muscles: Sequence[Any]) -> Tables:
-    """What damps the fibers is part of their force, and the power of the mass at their end of the passive one."""
+def _correct_acceleration_muscle(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
+    """Correct Millard2012AccelerationMuscle.
+
+    The fiber force includes the damping. The passive power includes the power of the mass at the
+    end of the fibers.
+    """
     damping = [
         muscle.fiber_damping * muscle.max_isometric_force / muscle.optimal_fiber_length
         for muscle in muscles
@@ -123,19 +133,22 @@ def _accelerated(found: Tables, muscles: Sequence[Any]) -> Tables:
     }
 
 
-def _degroote(found: Tables, muscles: Sequence[Any]) -> Tables:
-    """Fibers that point the other way have the angle of those that do not, which turns as if they did."""
+def _correct_degroote(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
+    """Correct DeGrooteFregly2016Muscle: pennation angles beyond 90° count as their supplement.
+
+    The angular velocity has the sign of the uncorrected angle.
+    """
     angle = np.minimum(found["PennationAngle"], np.pi - found["PennationAngle"])
     modes = [getattr(muscle, "tendon_compliance_dynamics_mode", "implicit") for muscle in muscles]
     rigid = [
         muscle.ignore_tendon_compliance or mode == "implicit"
         for muscle, mode in zip(muscles, modes, strict=True)
     ]
-    return {"PennationAngle": angle} | _still(found, rigid)
+    return {"PennationAngle": angle} | _correct_tendon_power(found, rigid)
 
 
-def _rigid(found: Tables, muscles: Sequence[Any]) -> Tables:
-    """The tendon has its slack length, also where the path is shorter."""
+def _correct_rigid_tendon(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
+    """Correct RigidTendonMuscle: the tendon has its slack length, even if the path is shorter."""
     slack = np.array([muscle.tendon_slack_length for muscle in muscles])
     nothing = np.zeros_like(found["Length"])
     return {
@@ -145,8 +158,8 @@ def _rigid(found: Tables, muscles: Sequence[Any]) -> Tables:
     }
 
 
-def _old(found: Tables, muscles: Sequence[Any]) -> Tables:
-    """Nobody computes these."""
+def _correct_deprecated(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
+    """Correct deprecated classes: OpenSim does not compute these quantities."""
     names = (
         "FiberForce",
         "PennationAngularVelocity",
@@ -158,14 +171,14 @@ def _old(found: Tables, muscles: Sequence[Any]) -> Tables:
     return dict.fromkeys(names, np.full_like(found["Length"], np.nan))
 
 
-CHECKED: dict[type[Muscle], Callable[[Tables, Sequence[Any]], Tables]] = {
-    Millard2012AccelerationMuscle: _accelerated,
-    Millard2012EquilibriumMuscle: _millard,
-    Thelen2003Muscle: _thelen,
-    DeGrooteFregly2016Muscle: _degroote,
-    MeyerFregly2016Muscle: _degroote,
-    RigidTendonMuscle: _rigid,
-    Thelen2003Muscle_Deprecated: _old,
-    Schutte1993Muscle_Deprecated: _old,
+CORRECTIONS: dict[type[Muscle], Callable[[MuscleTables, Sequence[Any]], MuscleTables]] = {
+    Millard2012AccelerationMuscle: _correct_acceleration_muscle,
+    Millard2012EquilibriumMuscle: _correct_millard,
+    Thelen2003Muscle: _correct_thelen,
+    DeGrooteFregly2016Muscle: _correct_degroote,
+    MeyerFregly2016Muscle: _correct_degroote,
+    RigidTendonMuscle: _correct_rigid_tendon,
+    Thelen2003Muscle_Deprecated: _correct_deprecated,
+    Schutte1993Muscle_Deprecated: _correct_deprecated,
 }
-"""The classes whose results were held to OpenSim's, and what is otherwise in each."""
+"""Corrections by class; these classes are compared with OpenSim in the tests."""

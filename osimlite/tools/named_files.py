@@ -1,4 +1,4 @@
-"""Return the files that a setup names, with those that the documents named in it name."""
+"""Files that a setup names, directly or through the documents that it names."""
 
 from __future__ import annotations
 
@@ -15,30 +15,33 @@ from osimlite.lint.engine import subject_of
 from osimlite.lint.setup import Setup
 
 MAX_DOCUMENTS = 500
-"""Documents that one setup may name, directly or through others. Real setups name about ten."""
+"""Largest number of documents that one setup may name, directly or through others.
+
+Real setups name about ten.
+"""
 
 
 @while_unchanged(64)
 def read_subject(path: str) -> Checked:
-    """Return a document as the linter sees it, read once as long as its file does not change.
+    """Return a document as the linter reads it; cached until its file changes.
 
-    Only what it names may be asked of it: what the linter finds depends on other files too.
+    Use only the names of files in it: findings depend on other files too.
     """
     return subject_of(path, Config())
 
 
-def named_files(setup: str, rule: str) -> Iterator[str]:
-    """Yield files that a setup, and the documents that it names, name by a rule of names.
+def find_named_files(setup: str, rule: str) -> Iterator[str]:
+    """Yield the files that a setup names, directly or through the documents that it names.
 
-    Each document is read once, however often and by whomever it is named: setups that name each
-    other would otherwise be read again along every path between them.
+    Each document is read once. Otherwise setups that name each other would be read again along
+    every path between them.
 
     Args:
         setup: path of the document.
         rule: ``file`` for inputs, ``output-file`` for results.
 
     Raises:
-        DocumentError: more than `MAX_DOCUMENTS` documents are named.
+        DocumentError: the setup names more than `MAX_DOCUMENTS` documents.
     """
     visited = {os.path.realpath(setup)}
     waiting = deque([setup])
@@ -62,12 +65,16 @@ def named_files(setup: str, rule: str) -> Iterator[str]:
             real = os.path.realpath(item.path)
             if item.path.lower().endswith(".xml") and real not in visited and os.path.isfile(real):
                 visited.add(real)
-                expect_few(visited, setup)
+                limit_documents(visited, setup)
                 waiting.append(item.path)
 
 
-def expect_few(documents: set[str], setup: str) -> None:
-    """Refuse more documents than a setup may name.
+def limit_documents(documents: set[str], setup: str) -> None:
+    """Raise an error if a setup names too many documents.
+
+    Args:
+        documents: paths of the documents.
+        setup: path of the setup.
 
     Raises:
         DocumentError: there are more than `MAX_DOCUMENTS`.
@@ -77,9 +84,14 @@ def expect_few(documents: set[str], setup: str) -> None:
         raise DocumentError(message, file=setup)
 
 
-def inputs_among(paths: Iterable[Path], setup: Path) -> list[Path]:
-    """Return those of some files that are a setup or one of its inputs, by whatever name or link."""
+def find_inputs(paths: Iterable[Path], setup: Path) -> list[Path]:
+    """Return the paths, out of some paths, that lead to a setup or to one of its inputs.
+
+    Args:
+        paths: files to compare, by any name or link.
+        setup: path of the setup.
+    """
     there = [path for path in paths if os.path.isfile(path)]
-    names = (str(setup), *named_files(str(setup), "file")) if there else ()
+    names = (str(setup), *find_named_files(str(setup), "file")) if there else ()
     inputs = [name for name in dict.fromkeys(names) if os.path.isfile(name)]
     return [path for path in there if any(os.path.samefile(path, name) for name in inputs)]

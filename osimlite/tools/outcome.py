@@ -1,4 +1,4 @@
-"""What came out of a tool: tables and documents that are still to be written, and what is said of them."""
+"""Results of a tool: tables and documents to write, and messages about them."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ from osimlite.io.tables.old_storage import PRECISION, printed
 from osimlite.io.tables.storage import StoTable, adapter_lines
 from osimlite.lint.diagnostic import Finding
 from osimlite.tools.evidence import Evidence
-from osimlite.tools.named_files import inputs_among
+from osimlite.tools.named_files import find_inputs
 
-MOST_DIGITS = 1074
-"""Behind the point of a number, of which the last is no zero."""
-DYNAMICS = "Inverse Dynamics Generalized Forces"
-"""The name of the table that inverse dynamics gives."""
+MAX_PRECISION = 1074
+"""Digits after the decimal point of the smallest number of double precision."""
+DYNAMICS_TITLE = "Inverse Dynamics Generalized Forces"
+"""Title of the table that inverse dynamics writes."""
 
 
-def _endless(what: str, time: float) -> SimulationError:
+def _create_number_error(what: str, time: float) -> SimulationError:
+    """Return the error for a result that is infinite or not a number."""
     return SimulationError(
         f"{what} at {time:g} s; look for a number in the data that is far too large"
     )
@@ -34,7 +35,7 @@ def _endless(what: str, time: float) -> SimulationError:
 
 @dataclass(eq=False)
 class Outcome:
-    """What came out of a setup."""
+    """Results of a setup: tables, files, messages and a summary."""
 
     tables: dict[str, StoTable] = field(default_factory=dict)  # by the names of their files
     summary: dict[str, Any] = field(default_factory=dict)  # numbers that say how it went
@@ -52,21 +53,21 @@ class Outcome:
     done: bool = True
     _texts: dict[Path, Iterable[str]] = field(default_factory=dict)
 
-    def table(
+    def add_table(
         self, path: Path, table: StoTable, description: str = "", precision: int = PRECISION
     ) -> None:
-        """Have a table written as OpenSim prints it.
+        """Add a table to write in the format of OpenSim's Storage.
 
         Args:
-            path: of the file.
-            table: what is printed.
-            description: what the header says besides.
-            precision: digits behind the point; OpenSim takes a negative number for none.
+            path: file of the table.
+            table: names, times and rows.
+            description: text that the header contains as well.
+            precision: digits after the decimal point; a negative number means none, as in OpenSim.
 
         Raises:
-            SettingError: they are more than any number has.
+            SettingError: the precision is larger than any number needs.
         """
-        if precision > MOST_DIGITS:
+        if precision > MAX_PRECISION:
             raise SettingError(
                 f"output_precision is {precision}; give the digits behind the point, {PRECISION} or 16"
             )
@@ -75,8 +76,13 @@ class Outcome:
         self.tables[path.name] = replace(table, file=str(path))
         self._texts[path] = printed(table, description, max(precision, 0))
 
-    def new_table(self, path: Path, table: StoTable) -> None:
-        """Have a table written in the newer form of OpenSim's storage files, with its own header."""
+    def add_typed_table(self, path: Path, table: StoTable) -> None:
+        """Add a table to write in the format of OpenSim's TimeSeriesTable.
+
+        Args:
+            path: file of the table.
+            table: names, times, rows and header.
+        """
         if (missing := self._note_missing(path, table)) and "NaN" not in "".join(
             map(str, table.header.values())
         ):
@@ -84,72 +90,88 @@ class Outcome:
         self.tables[path.name] = replace(table, file=str(path))
         self._texts[path] = adapter_lines(table)
 
-    def text(self, path: Path, content: str) -> None:
-        """Have a text written."""
+    def add_text(self, path: Path, content: str) -> None:
+        """Add a text to write."""
         self._texts[path] = (content,)
 
-    def tell(self, name: str, words: str) -> None:
-        """Say something of what came out."""
+    def add_message(self, name: str, words: str) -> None:
+        """Add a message about the results.
+
+        Args:
+            name: what the message is about, one to three words.
+            words: the message.
+        """
         self.told.append((name, words))
 
-    def warn(self, name: str, words: str) -> None:
-        """Say something of what came out that makes it doubtful, also on standard error."""
-        self.tell(name, words)
+    def add_warning(self, name: str, words: str) -> None:
+        """Add a message that makes the results doubtful, and print it on standard error.
+
+        Args:
+            name: what the message is about, one to three words.
+            words: the message.
+        """
+        self.add_message(name, words)
         warn_caller(words)
 
     def _note_missing(self, path: Path, table: StoTable) -> str:
-        """Return what a table says of the values that it lacks, and tell the user; "" if it lacks none.
+        """Return a note about missing values of a table, and add a message; "" if none is missing.
 
-        No file has NaN as if it were a result: muscles without an equilibrium and markers that were
-        not seen leave it, and both the file and the summary name the columns.
+        NaN stands for missing values, such as those of unseen markers and of muscles without
+        equilibrium. The file and the summary both name the columns.
         """
         missing = np.isnan(table.rows).any(axis=0) if table.rows.size else np.zeros(0, dtype=bool)
         if not missing.any():
             return ""
         names = join_words([f"'{table.columns[place]}'" for place in np.flatnonzero(missing)])
         if not any("NaN" in words for _, words in self.told):
-            self.tell("not a number", f"{path.name} has NaN where there is no value: {names}")
+            self.add_message(
+                "not a number", f"{path.name} has NaN where there is no value: {names}"
+            )
         return f"NaN stands where there is no value: {names}"
 
     def _require_numbers(self) -> None:
-        """Refuse motions that are no numbers, and infinite numbers. Unseen markers and some muscles have none."""
+        """Raise an error for a motion with NaN, or a table with infinite numbers.
+
+        NaN is allowed in other tables, for unseen markers and for some muscles.
+        """
         motion = self.evidence
         if motion is not None and not np.isfinite(motion.values).all():
             row, place = np.argwhere(~np.isfinite(motion.values))[0]
-            raise _endless(
+            raise _create_number_error(
                 f"'{motion.coordinates[place]}' is {motion.values[row, place]}", motion.times[row]
             )
         for table in self.tables.values():
-            odd = ~np.isfinite(table.rows) if table.name == DYNAMICS else np.isinf(table.rows)
+            odd = ~np.isfinite(table.rows) if table.name == DYNAMICS_TITLE else np.isinf(table.rows)
             if odd.any():
                 row, place = np.argwhere(odd)[0]
-                raise _endless(
+                raise _create_number_error(
                     f"'{table.columns[place]}' is {table.rows[row, place]}", table.times[row]
                 )
 
-    def _require_inputs_kept(self, setup: Path) -> None:
-        """Refuse to write over what the results come from. A model may take the place of the one it was made of."""
+    def _protect_inputs(self, setup: Path) -> None:
+        """Raise an error if a result would replace an input; a model may replace its source."""
         kept = [
             path
             for path in self._texts
             if path.name in self.tables or path.suffix.lower() != ".osim"
         ]
-        for path in inputs_among(kept, setup):
+        for path in find_inputs(kept, setup):
             message = f"a result would replace '{path}', which it is computed from; give it another name or place"
             raise DocumentError(message, file=str(setup))
 
     def write(self, setup: Path, writer: ResultWriter) -> None:
-        """Write what is still to be written, all files whole or none of them.
+        """Write all results, or none of them.
 
         Args:
-            setup: that all comes from.
+            setup: path of the setup.
             writer: decides which files may be written.
 
-        Raises: OsimliteError: a file cannot be written or is one of the setup's own, or results are
-            no numbers any more; then nothing is written.
+        Raises:
+            OsimliteError: a file cannot be written or is an input of the setup, or results are not
+                finite; then nothing is written.
         """
         self._require_numbers()
-        self._require_inputs_kept(setup)
+        self._protect_inputs(setup)
         with ExitStack() as all_or_none:
             # All names are checked before the first folder is made.
             for path in self._texts:

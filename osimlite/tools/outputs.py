@@ -1,7 +1,7 @@
-"""Outputs of components along a motion, as OpenSim defines them: one function for each, by class and name.
+"""Outputs of components along a motion, as OpenSim defines them.
 
-A number, a vector or a spatial vector (angular part first) for each time: (t, 1), (t, 3) or (t, 6),
-along the axes of ground.
+An output is a number (t, 1), a vector (t, 3) or a spatial vector (t, 6), angular part first, along
+the axes of ground.
 """
 
 from __future__ import annotations
@@ -26,33 +26,46 @@ from osimlite.schema.muscles import Millard2012AccelerationMuscle, Muscle, PathA
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.simulation.elements.muscle import SPRING
 from osimlite.tools.motion import Motion
-from osimlite.tools.muscle_quantities import CHECKED, KNOWN, quantities
+from osimlite.tools.muscle_quantities import CORRECTIONS, LAW_RECORDS, compute_quantities
 from osimlite.tools.reaction_forces import JointWrenches
 
 Reader = Callable[[Motion, Any, str], Array]
-"""The rows (t, k) of an output of a component along a motion; the path of the component is the last argument."""
+"""Function that computes an output (t, k) from the motion, the component and its path."""
 
 
-def reader_of(motion: Motion, component: Component, name: str) -> Reader | None:
-    """What computes an output of a component; None if nothing here does."""
+def find_reader(motion: Motion, component: Component, name: str) -> Reader | None:
+    """Return the function that computes an output; None if osimlite does not support the output.
+
+    Args:
+        motion: the motion.
+        component: component of its model.
+        name: name of the output.
+    """
     for cls in type(component).__mro__:
         found = READERS.get(cls, {}).get(name)
         if found is not None:
             return found
     path = motion.model.tree().path_of(component) or ""
-    known = name not in LAWS or (
-        isinstance(component, Muscle) and motion.system.knows(path, LAWS[name])
+    known = name not in LAW_OUTPUTS or (
+        isinstance(component, Muscle) and motion.system.knows(path, LAW_OUTPUTS[name])
     )
-    known &= name not in OTHERWISE.get(type(component), ())
-    if isinstance(component, Muscle) and type(component) in CHECKED and name in MUSCLES and known:
-        return lambda motion, muscle, path: _of_muscle(motion, muscle, path, MUSCLES[name])
+    known &= name not in UNSUPPORTED_OUTPUTS.get(type(component), ())
+    if (
+        isinstance(component, Muscle)
+        and type(component) in CORRECTIONS
+        and name in MUSCLE_OUTPUTS
+        and known
+    ):
+        return lambda motion, muscle, path: _read_muscle_output(
+            motion, muscle, path, MUSCLE_OUTPUTS[name]
+        )
     if f"{path}/{name}" in motion.histories:
         return lambda motion, _, path: motion.histories[f"{path}/{name}"][:, None]
     return None
 
 
-def _linked(part: str) -> Reader:
-    """Where a frame is and how it moves."""
+def _create_frame_reader(part: str) -> Reader:
+    """Return a reader of the position, velocity or acceleration of a frame."""
 
     def read(motion: Motion, frame: Frame, path: str) -> Array:
         body, placed = motion.mechanism.placement(path)
@@ -70,8 +83,12 @@ def _linked(part: str) -> Reader:
     return read
 
 
-def _station(which: int) -> Reader:
-    """Place, velocity or acceleration of a point fixed in a frame."""
+def _create_station_reader(which: int) -> Reader:
+    """Return a reader of a point that is fixed in a frame.
+
+    Args:
+        which: 0 for the position, 1 for the velocity, 2 for the acceleration.
+    """
 
     def read(motion: Motion, station: Station | PathPoint, path: str) -> Array:
         tree = motion.model.tree()
@@ -87,8 +104,13 @@ def _station(which: int) -> Reader:
     return read
 
 
-def _momentum(about_origin: bool, part: slice) -> Reader:
-    """Angular and linear momentum of a body."""
+def _create_momentum_reader(about_origin: bool, part: slice) -> Reader:
+    """Return a reader of the momentum of a body.
+
+    Args:
+        about_origin: whether the angular momentum is about the body's origin, not its mass centre.
+        part: components to return, angular part first.
+    """
 
     def read(motion: Motion, body: Body, path: str) -> Array:
         place, _ = motion.mechanism.placement(path)
@@ -106,25 +128,26 @@ def _momentum(about_origin: bool, part: slice) -> Reader:
     return read
 
 
-def _of_system(name: str) -> Reader:
-    """What is said of all bodies."""
+def _create_system_reader(name: str) -> Reader:
+    """Return a reader of a quantity of all bodies together."""
 
     def read(motion: Motion, model: Model, path: str) -> Array:
         mechanism, rows = motion.mechanism, []
         for q, u, udot in zip(motion.values, motion.speeds, motion.accelerations, strict=True):
-            rows.append(np.atleast_1d(SYSTEM[name](mechanism, q, u, udot)))
+            rows.append(np.atleast_1d(SYSTEM_OUTPUTS[name](mechanism, q, u, udot)))
         return np.array(rows)
 
     return read
 
 
-def _central(mechanism: Any, q: Array, u: Array) -> Array:
-    """Momentum of all bodies about their mass centre."""
+def _compute_central_momentum(mechanism: Any, q: Array, u: Array) -> Array:
+    """Return the momentum of all bodies about their mass centre (6,), angular part first."""
     linear, angular = mechanism.momentum(q, u)
     return np.concatenate((angular - np.cross(mechanism.center_of_mass(q), linear), linear))
 
 
-def _com_acceleration(mechanism: Any, q: Array, u: Array, udot: Array) -> Array:
+def _compute_com_acceleration(mechanism: Any, q: Array, u: Array, udot: Array) -> Array:
+    """Return the acceleration of the mass centre of all bodies (3,), m/s²."""
     accelerations, rows = mechanism.at(q, u).accelerations(udot), []
     state = mechanism.at(q, u)
     for index, body in enumerate(mechanism.bodies):
@@ -137,19 +160,22 @@ def _com_acceleration(mechanism: Any, q: Array, u: Array, udot: Array) -> Array:
     return np.asarray(np.sum(rows, axis=0) / (mechanism.total_mass or 1.0))
 
 
-SYSTEM: dict[str, Callable[..., Any]] = {
+SYSTEM_OUTPUTS: dict[str, Callable[..., Any]] = {
     "com_position": lambda mechanism, q, u, udot: mechanism.center_of_mass(q),
     "com_velocity": lambda mechanism, q, u, udot: mechanism.center_of_mass_velocity(q, u),
-    "com_acceleration": _com_acceleration,
+    "com_acceleration": _compute_com_acceleration,
     "kinetic_energy": lambda mechanism, q, u, udot: mechanism.kinetic_energy(q, u),
-    "momentum": lambda mechanism, q, u, udot: _central(mechanism, q, u),
-    "angular_momentum": lambda mechanism, q, u, udot: _central(mechanism, q, u)[:3],
-    "linear_momentum": lambda mechanism, q, u, udot: _central(mechanism, q, u)[3:],
+    "momentum": lambda mechanism, q, u, udot: _compute_central_momentum(mechanism, q, u),
+    "angular_momentum": lambda mechanism, q, u, udot: _compute_central_momentum(mechanism, q, u)[
+        :3
+    ],
+    "linear_momentum": lambda mechanism, q, u, udot: _compute_central_momentum(mechanism, q, u)[3:],
 }
+"""Functions of mechanism, q, u and u̇ for outputs of the model, by name."""
 
 
-def _potential_energy(motion: Motion, model: Model, path: str) -> Array:
-    """Of gravity and of all forces."""
+def _read_potential_energy(motion: Motion, model: Model, path: str) -> Array:
+    """Return the potential energy of gravity and of all forces, J."""
     return motion.compute_balanced(
         lambda part: np.array(
             [sum(part.system.energies(t, y)[1:]) for t, y in part.moments]
@@ -157,8 +183,8 @@ def _potential_energy(motion: Motion, model: Model, path: str) -> Array:
     )
 
 
-def _stored(motion: Motion, force: Force, path: str) -> Array:
-    """The potential energy of a force."""
+def _read_force_energy(motion: Motion, force: Force, path: str) -> Array:
+    """Return the potential energy of a force, J."""
 
     def compute(part: Motion) -> Array:
         if path in part.left_out:
@@ -168,48 +194,51 @@ def _stored(motion: Motion, force: Force, path: str) -> Array:
     return motion.compute_by_parts(compute)
 
 
-def _known(name: str) -> Reader:
-    """What the law of a force records."""
-    return lambda motion, force, path: motion.known([path], name)[name]
+def _create_record_reader(name: str) -> Reader:
+    """Return a reader of a quantity that the law of a force records."""
+    return lambda motion, force, path: motion.read_records([path], name)[name]
 
 
-def _of_path(name: str) -> Reader:
-    """Length (m) or lengthening speed of the path of an actuator."""
+def _create_path_reader(name: str) -> Reader:
+    """Return a reader of the length (m) or lengthening speed (m/s) of an actuator's path."""
 
     def read(motion: Motion, geometry: GeometryPath, path: str) -> Array:
-        return motion.known([path.rpartition("/")[0]], name)[name]
+        return motion.read_records([path.rpartition("/")[0]], name)[name]
 
     return read
 
 
-def _power(motion: Motion, actuator: ScalarActuator, path: str) -> Array:
+def _read_power(motion: Motion, actuator: ScalarActuator, path: str) -> Array:
+    """Return the power of an actuator, W; a tension does work against the lengthening speed."""
     sense = -1.0 if isinstance(actuator, PathActuator) else 1.0
-    known = motion.known([path], "actuation", "speed")
+    known = motion.read_records([path], "actuation", "speed")
     return sense * known["actuation"] * known["speed"]
 
 
-def _excitation(motion: Motion, muscle: Muscle, path: str) -> Array:
+def _read_excitation(motion: Motion, muscle: Muscle, path: str) -> Array:
+    """Return the excitation of a muscle; NaN while the muscle is off."""
+
     def compute(part: Motion) -> Array:
         names = part.simulation.forces.controls.names
         if path not in names:
             return np.full((len(part.times), 1), np.nan)
-        return part.looked([part.system.places_of_controls[names.index(path)]])
+        return part.evaluate_kernels([part.system.places_of_controls[names.index(path)]])
 
     return motion.compute_by_parts(compute)
 
 
-def _reaction(side: str) -> Reader:
-    """Moment and force on a side of a joint at the joint's frame there."""
+def _create_reaction_reader(side: str) -> Reader:
+    """Return a reader of moment and force on one side of a joint, at the joint's frame there."""
 
     def read(motion: Motion, joint: Joint, path: str) -> Array:
-        force, moment, _ = JointWrenches.along(motion).of(joint, side)
+        force, moment, _ = JointWrenches.compute_along(motion).get_reaction(joint, side)
         return np.hstack((moment, force))
 
     return read
 
 
-def _joint_power(motion: Motion, joint: Joint, path: str) -> Array:
-    """That of what prescribes coordinates."""
+def _read_joint_power(motion: Motion, joint: Joint, path: str) -> Array:
+    """Return the power of a joint, which is zero without prescribed coordinates."""
     tree = motion.model.tree()
     if any(
         info.prescribed is not None and info.path.startswith(f"{path}/")
@@ -221,14 +250,23 @@ def _joint_power(motion: Motion, joint: Joint, path: str) -> Array:
     return np.zeros((len(motion.times), 1))
 
 
-def _of_muscle(
+def _read_muscle_output(
     motion: Motion, muscle: Any, path: str, of: Callable[[dict[str, Array]], Array]
 ) -> Array:
-    """What is made of the tables of MuscleAnalysis, and of what the law records."""
-    extra = [name for name in dict.fromkeys(LAWS.values()) if motion.system.knows(path, name)]
-    known = motion.known([path], *KNOWN, *extra)
+    """Return an output of a muscle from the quantities of MuscleAnalysis and of its law.
+
+    Args:
+        motion: the motion.
+        muscle: the muscle.
+        path: path of the muscle.
+        of: computes the output (t, 1) from these quantities.
+    """
+    extra = [
+        name for name in dict.fromkeys(LAW_OUTPUTS.values()) if motion.system.knows(path, name)
+    ]
+    known = motion.read_records([path], *LAW_RECORDS, *extra)
     with np.errstate(invalid="ignore", divide="ignore"):
-        found = known | quantities(known, [muscle])
+        found = known | compute_quantities(known, [muscle])
         turning = (
             found["FiberLength"]
             * np.sin(found["PennationAngle"])
@@ -239,21 +277,34 @@ def _of_muscle(
         return of(found)
 
 
-MUSCLES: dict[str, Callable[[dict[str, Array]], Array]] = {
+MUSCLE_OUTPUTS: dict[str, Callable[[dict[str, Array]], Array]] = {
     # What MuscleAnalysis has tables of, whose names are the same in other letters.
     **{
         name: itemgetter("".join(map(str.capitalize, name.split("_"))))
         for name in (
-            "active_fiber_force", "active_fiber_force_along_tendon", "fiber_active_power", "fiber_force",
-            "fiber_length", "fiber_passive_power", "fiber_velocity", "normalized_fiber_length", "passive_fiber_force",
-            "passive_fiber_force_along_tendon", "pennation_angle", "pennation_angular_velocity", "tendon_force",
-            "tendon_length", "tendon_power",
+            "active_fiber_force",
+            "active_fiber_force_along_tendon",
+            "fiber_active_power",
+            "fiber_force",
+            "fiber_length",
+            "fiber_passive_power",
+            "fiber_velocity",
+            "normalized_fiber_length",
+            "passive_fiber_force",
+            "passive_fiber_force_along_tendon",
+            "pennation_angle",
+            "pennation_angular_velocity",
+            "tendon_force",
+            "tendon_length",
+            "tendon_power",
         )
     },
     "active_force_length_multiplier": itemgetter("active_force_length"),
     "cos_pennation_angle": lambda found: np.cos(found["PennationAngle"]),
     "fiber_force_along_tendon": lambda found: found["FiberForce"] * np.cos(found["PennationAngle"]),
-    "fiber_length_along_tendon": lambda found: found["FiberLength"] * np.cos(found["PennationAngle"]),
+    "fiber_length_along_tendon": lambda found: (
+        found["FiberLength"] * np.cos(found["PennationAngle"])
+    ),
     "fiber_velocity_along_tendon": itemgetter("along"),
     "force_velocity_multiplier": itemgetter("force_velocity"),
     "muscle_power": itemgetter("MuscleActuatorPower"),
@@ -263,12 +314,14 @@ MUSCLES: dict[str, Callable[[dict[str, Array]], Array]] = {
         (found["PassiveFiberForce"] - found[SPRING]) * np.cos(found["PennationAngle"])
     ),
     "passive_fiber_elastic_force": itemgetter(SPRING),
-    "passive_fiber_elastic_force_along_tendon": lambda found: found[SPRING] * np.cos(found["PennationAngle"]),
+    "passive_fiber_elastic_force_along_tendon": lambda found: (
+        found[SPRING] * np.cos(found["PennationAngle"])
+    ),
     "tendon_strain": lambda found: found["TendonLength"] / found["slack"] - 1.0,
     "tendon_velocity": lambda found: found["rate"] - found["along"],
-}  # fmt: skip
-"""The outputs of muscles whose classes were held to OpenSim's."""
-LAWS = {
+}
+"""Outputs of muscles whose classes are compared with OpenSim in the tests."""
+LAW_OUTPUTS = {
     "active_force_length_multiplier": "active_force_length",
     "force_velocity_multiplier": "force_velocity",
     "passive_fiber_damping_force": SPRING,
@@ -276,47 +329,78 @@ LAWS = {
     "passive_fiber_elastic_force": SPRING,
     "passive_fiber_elastic_force_along_tendon": SPRING,
 }
-"""What the law of a muscle must record for some of them."""
+"""Record of a muscle's law that an output needs, by output."""
 
-OTHERWISE: dict[type[Component], tuple[str, ...]] = {
+UNSUPPORTED_OUTPUTS: dict[type[Component], tuple[str, ...]] = {
     Millard2012AccelerationMuscle: ("fiber_force_along_tendon", "tendon_force"),
 }
-"""Those that a class computes in another way, which is not known here: with a mass, the tendon's is without damping."""
+"""Outputs that a class computes in a way that osimlite does not support.
+
+With a mass at the fiber, the tendon force of OpenSim is without damping.
+"""
 
 READERS: dict[type[Component], dict[str, Reader]] = {
-    Model: {name: _of_system(name) for name in SYSTEM} | {"potential_energy": _potential_energy},
-    Force: {"potential_energy": _stored},
+    Model: {name: _create_system_reader(name) for name in SYSTEM_OUTPUTS}
+    | {"potential_energy": _read_potential_energy},
+    Force: {"potential_energy": _read_force_energy},
     Coordinate: {
-        "acceleration": lambda motion, coordinate, path: _coordinate(motion, motion.accelerations, path),
-        "speed": lambda motion, coordinate, path: _coordinate(motion, motion.speeds, path),
-        "value": lambda motion, coordinate, path: _coordinate(motion, motion.values, path),
+        "acceleration": lambda motion, coordinate, path: _select_coordinate(
+            motion, motion.accelerations, path
+        ),
+        "speed": lambda motion, coordinate, path: _select_coordinate(motion, motion.speeds, path),
+        "value": lambda motion, coordinate, path: _select_coordinate(motion, motion.values, path),
     },
     Frame: {
-        name: _linked(name)
+        name: _create_frame_reader(name)
         for name in (
-            "position", "angular_velocity", "linear_velocity", "velocity",
-            "angular_acceleration", "linear_acceleration", "acceleration",
+            "position",
+            "angular_velocity",
+            "linear_velocity",
+            "velocity",
+            "angular_acceleration",
+            "linear_acceleration",
+            "acceleration",
         )
     },
     Body: {
-        f"{what}_about_{where}": _momentum(where == "origin", part)
+        f"{what}_about_{where}": _create_momentum_reader(where == "origin", part)
         for where in ("mass_center", "origin")
         for what, part in (
-            ("angular_momentum", slice(0, 3)), ("linear_momentum", slice(3, 6)), ("momentum", slice(0, 6)),
+            ("angular_momentum", slice(0, 3)),
+            ("linear_momentum", slice(3, 6)),
+            ("momentum", slice(0, 6)),
         )
     },
-    Station: {"location": _station(0), "velocity": _station(1), "acceleration": _station(2)},
-    PathPoint: {"location": _station(0), "velocity": _station(1), "acceleration": _station(2)},
-    ScalarActuator: {"actuation": _known("actuation"), "speed": _known("speed"), "power": _power},
-    PathActuator: {"tension": _known("tension")},
-    Muscle: {"activation": _known("activation"), "excitation": _excitation},
-    GeometryPath: {"length": _of_path("length"), "lengthening_speed": _of_path("rate")},
-    Joint: {
-        "power": _joint_power, "reaction_on_child": _reaction("child"), "reaction_on_parent": _reaction("parent"),
+    Station: {
+        "location": _create_station_reader(0),
+        "velocity": _create_station_reader(1),
+        "acceleration": _create_station_reader(2),
     },
-}  # fmt: skip
-"""By class: OpenSim's names of its outputs. Those of bases hold, too."""
+    PathPoint: {
+        "location": _create_station_reader(0),
+        "velocity": _create_station_reader(1),
+        "acceleration": _create_station_reader(2),
+    },
+    ScalarActuator: {
+        "actuation": _create_record_reader("actuation"),
+        "speed": _create_record_reader("speed"),
+        "power": _read_power,
+    },
+    PathActuator: {"tension": _create_record_reader("tension")},
+    Muscle: {"activation": _create_record_reader("activation"), "excitation": _read_excitation},
+    GeometryPath: {
+        "length": _create_path_reader("length"),
+        "lengthening_speed": _create_path_reader("rate"),
+    },
+    Joint: {
+        "power": _read_joint_power,
+        "reaction_on_child": _create_reaction_reader("child"),
+        "reaction_on_parent": _create_reaction_reader("parent"),
+    },
+}
+"""Readers by class and OpenSim's name of the output; those of base classes hold as well."""
 
 
-def _coordinate(motion: Motion, rows: Array, path: str) -> Array:
+def _select_coordinate(motion: Motion, rows: Array, path: str) -> Array:
+    """Return the column (t, 1) of a coordinate."""
     return rows[:, [motion.mechanism.coordinate_index(path)]]

@@ -11,18 +11,18 @@ from glob import has_magic
 from osimlite.errors import OsimliteError
 
 MAX_ENTRIES = 1_000_000
-"""Entries of folders that one pattern looks at."""
+"""Number of folder entries that the search for one pattern may read."""
 
 
 def find_files(pattern: str) -> list[str]:
-    """Return the files that match a pattern, sorted, each once.
+    """Return the files that match a pattern, sorted and without repetition.
 
-    ``*``, ``?`` and ``[...]`` match within a name, ``**`` any number of folders. Names that begin
-    with a dot match only where the pattern has the dot. Links to folders are followed, but every
-    folder is visited once: two links to ``.`` would otherwise have 2^40 paths below them.
+    ``*``, ``?`` and ``[...]`` match within a name, ``**`` matches any number of folders. Names that
+    begin with a dot match only if the pattern has the dot. The search follows links to folders, but
+    visits every folder once: two links to ``.`` would otherwise have 2^40 paths below them.
 
     Raises:
-        OsimliteError: the pattern looks at more than `MAX_ENTRIES` entries.
+        OsimliteError: the search would read more than `MAX_ENTRIES` entries.
     """
     drive, rest = os.path.splitdrive(pattern)
     rooted = rest.startswith(("/", os.sep))
@@ -30,20 +30,25 @@ def find_files(pattern: str) -> list[str]:
     search = _Search(pattern)
     places = [drive + os.sep if rooted else drive]
     for part in parts:
-        places = list(dict.fromkeys(search.step(places, part)))
+        places = list(dict.fromkeys(search.match_part(places, part)))
     return sorted(filter(os.path.isfile, places))
 
 
 class _Search:
-    """One search for files, which looks at a bounded number of entries."""
+    """Search for files that reads a limited number of entries."""
 
     def __init__(self, pattern: str) -> None:
         self.pattern, self.left = pattern, MAX_ENTRIES
 
-    def step(self, places: Iterable[str], part: str) -> Iterator[str]:
-        """Yield the paths that one part of a pattern leads to from some places."""
+    def match_part(self, places: Iterable[str], part: str) -> Iterator[str]:
+        """Yield the paths that match one part of a pattern.
+
+        Args:
+            places: folders in which to match.
+            part: name or pattern between two slashes.
+        """
         if part == "**":
-            yield from self._folders_below(places)
+            yield from self._walk_folders(places)
             return
         for place in places:
             if not has_magic(part):
@@ -51,12 +56,13 @@ class _Search:
                 if os.path.lexists(path):
                     yield path
                 continue
-            for entry in self._entries(place):
+            for entry in self._list_entries(place):
                 is_shown = not entry.name.startswith(".") or part.startswith(".")
                 if is_shown and fnmatch(entry.name, part):
                     yield os.path.join(place, entry.name)
 
-    def _folders_below(self, places: Iterable[str]) -> Iterator[str]:
+    def _walk_folders(self, places: Iterable[str]) -> Iterator[str]:
+        """Yield some folders and all folders below them, each once."""
         visited: set[str] = set()
         # Folders behind links come last, so that a folder is known by its own name.
         waiting, behind_links = deque(places), deque[str]()
@@ -67,12 +73,13 @@ class _Search:
                 continue
             visited.add(real)
             yield folder
-            for entry in self._entries(folder):
+            for entry in self._list_entries(folder):
                 if not entry.name.startswith(".") and entry.is_dir():
                     queue = behind_links if entry.is_symlink() else waiting
                     queue.append(os.path.join(folder, entry.name))
 
-    def _entries(self, folder: str) -> list[os.DirEntry[str]]:
+    def _list_entries(self, folder: str) -> list[os.DirEntry[str]]:
+        """Return the sorted entries of a folder; none if it cannot be read."""
         try:
             with os.scandir(folder or ".") as entries:
                 found = sorted(entries, key=lambda entry: entry.name)

@@ -35,18 +35,18 @@ from osimlite.tools.motion import Motion
 
 @dataclass(frozen=True, eq=False)
 class ConstraintForces:
-    """The forces of the constraints of a mechanism at one state."""
+    """Forces of the constraints of a mechanism at one state."""
 
     state: Kinematics  # at which they are, with the accelerations that they lead to
     # of the constraints, one number (m,) for each of the equations of each
     multipliers: list[tuple[Constraint, Array]]
 
     @classmethod
-    def along(cls, motion: Motion) -> Iterator[ConstraintForces]:
-        """Those at every time of a motion.
+    def compute_along(cls, motion: Motion) -> Iterator[ConstraintForces]:
+        """Yield the constraint forces at every time of a motion.
 
-        With Gᵀ λ the bodies accelerate as they do. Of multipliers λ that do the same, as where
-        constraints repeat each other, they are the shortest, as in Simbody.
+        The multipliers λ are those for which Gᵀ λ gives the accelerations of the motion. If several
+        λ do so, for example with redundant constraints, the shortest is taken, as in Simbody.
         """
         mechanism, system = motion.mechanism, motion.system
         order = list(system.order)
@@ -68,8 +68,16 @@ class ConstraintForces:
             parts = np.split(result, np.cumsum([len(block) for block in blocks])[:-1])
             yield cls(state, list(zip(kept, parts, strict=True)))
 
-    def on_bodies(self, constraint: Constraint, multipliers: Array) -> Array:
-        """Moment (N m) and force (N) on each body of a constraint (k, 6), about the body's origin, in ground."""
+    def compute_wrenches(self, constraint: Constraint, multipliers: Array) -> Array:
+        """Compute the wrenches of a constraint on its bodies.
+
+        Args:
+            constraint: constraint between bodies.
+            multipliers: its multipliers (m,).
+
+        Returns:
+            Moment (N m) and force (N) on each body (k, 6), about the body's origin, in ground.
+        """
         mechanism, state = self.state.mechanism, self.state
         bodies = [body for body in constraint.bodies if body != GROUND]
         held: Any = constraint
@@ -101,7 +109,11 @@ class ConstraintForces:
 
 @lru_cache
 def _build_separate_bodies(mechanism: Mechanism, constraint: Any) -> Program:
-    """A constraint between bodies whose velocities are speeds of their own, each body a link without a joint."""
+    """Return a program for a constraint between free bodies, each a link without a joint.
+
+    The six components of each body's velocity are speeds of their own, so that multipliers times
+    the rows of the constraint are wrenches.
+    """
     count = len(mechanism.bodies)
     links = [Link(GROUND, []) for _ in range(count)]
     places = Places(mechanism, {}, [Placement(number, np.eye(4)) for number in range(count)])
@@ -111,13 +123,19 @@ def _build_separate_bodies(mechanism: Mechanism, constraint: Any) -> Program:
 
 
 def compute_constraint_records(motion: Motion) -> tuple[list[str], Array]:
-    """Labels and numbers (t, m) that OpenSim's constraints record of the forces on their bodies and mobilizers.
+    """Compute the forces that OpenSim's constraints report for their bodies and mobilizers.
 
-    Forces come before moments, along the axes of the body that carries all those of a constraint.
-    All have the opposite sign of what pushes, as the multipliers of Simbody have.
+    Forces come before moments, along the axes of the body that carries all bodies of a constraint.
+    The sign is that of Simbody's multipliers, opposite to the forces that act.
+
+    Args:
+        motion: the motion.
+
+    Returns:
+        Labels of m columns, and rows (t, m).
     """
     if motion.unbalanced and motion.balanced.any():
-        columns, part = compute_constraint_records(motion.select(motion.balanced))
+        columns, part = compute_constraint_records(motion.select_times(motion.balanced))
         result = np.full((len(motion.times), len(columns)), np.nan)
         result[motion.balanced] = part
         return columns, result
@@ -125,7 +143,7 @@ def compute_constraint_records(motion: Motion) -> tuple[list[str], Array]:
     names = {tree.path_of(item): item.name for item in motion.model.components(schema.Constraint)}
     labels: list[str] = []
     rows = []
-    for moment, forces in enumerate(ConstraintForces.along(motion)):
+    for moment, forces in enumerate(ConstraintForces.compute_along(motion)):
         row: list[Array] = []
         for constraint, multipliers in forces.multipliers:
             # Not those that hold coordinates, or close loops of joints.
@@ -133,7 +151,9 @@ def compute_constraint_records(motion: Motion) -> tuple[list[str], Array]:
             if name is None:
                 continue
             if constraint.bodies:
-                wrenches = forces.on_bodies(constraint, multipliers).reshape(-1, 2, 3)[:, ::-1]
+                wrenches = forces.compute_wrenches(constraint, multipliers).reshape(-1, 2, 3)[
+                    :, ::-1
+                ]
                 row.append(
                     (
                         wrenches
@@ -159,11 +179,12 @@ def compute_constraint_records(motion: Motion) -> tuple[list[str], Array]:
 
 
 def _get_body_name(mechanism: Mechanism, body: int) -> str:
+    """Return the name of a body, or "ground"."""
     return "ground" if body == GROUND else mechanism.bodies[body].name
 
 
 def _find_mobilities(mechanism: Mechanism, constraint: Constraint) -> list[int]:
-    """Places of all coordinates of the joints that a coupler speaks of, its dependent coordinate last."""
+    """Return the indices of all coordinates of the joints of a coupler, the dependent one last."""
     assert isinstance(constraint, Coupler)
     owners = {
         place: body.mobilizer.coordinates
@@ -175,14 +196,19 @@ def _find_mobilities(mechanism: Mechanism, constraint: Constraint) -> list[int]:
 
 
 class JointWrenches:
-    """What the joints carry along a motion, by the Newton-Euler equations of the bodies beyond them."""
+    """Wrenches at the joints along a motion, from the Newton-Euler equations."""
 
     @classmethod
-    def along(cls, motion: Motion, controls: Controls | None = None) -> JointWrenches:
-        """Those of a motion, which are found once if nothing else drives the actuators."""
+    def compute_along(cls, motion: Motion, controls: Controls | None = None) -> JointWrenches:
+        """Return the wrenches of a motion; cached unless other controls drive the actuators.
+
+        Args:
+            motion: the motion.
+            controls: controls that replace those of the simulation; None keeps them.
+        """
         if controls is not None:
             return cls(motion, controls)
-        return motion.once("joint wrenches", lambda: cls(motion, None))
+        return motion.compute_once("joint wrenches", lambda: cls(motion, None))
 
     def __init__(self, motion: Motion, controls: Controls | None) -> None:
         self.mechanism = motion.mechanism
@@ -192,31 +218,36 @@ class JointWrenches:
         system = System(self.mechanism, motion.simulation.forces, apart=True)
         if controls is not None:
             system.drive(controls)
-        balanced = motion.select(motion.balanced) if motion.unbalanced else motion
+        balanced = motion.select_times(motion.balanced) if motion.unbalanced else motion
         self.moved = LinkMotion.of(
             system, balanced.table, balanced.accelerations[:, list(system.order)]
         )
         if self.mechanism.constrained:
             for links, forces in zip(
-                self.moved.links, ConstraintForces.along(balanced), strict=True
+                self.moved.links, ConstraintForces.compute_along(balanced), strict=True
             ):
-                self._push(links, forces)
+                self._add_constraint_forces(links, forces)
         if motion.unbalanced:
-            self.moved = LinkMotion(system, self._spread(motion))
+            self.moved = LinkMotion(system, self._add_unbalanced_times(motion))
 
-    def _spread(self, motion: Motion) -> Array:
-        """Return the links at all times (t, l, n): without wrenches where a muscle lacks an equilibrium."""
+    def _add_unbalanced_times(self, motion: Motion) -> Array:
+        """Return the links at all times (t, l, n), with NaN wrenches at unbalanced times."""
         still = System(self.mechanism.released(), Forces(()), apart=True)
         moments = np.column_stack([motion.times, still.state.rows(motion.values, motion.speeds)])
         links = still.links_in_motion(moments, motion.accelerations[:, list(still.order)])
         links[motion.balanced] = self.moved.links
         return links
 
-    def _push(self, links: Array, forces: ConstraintForces) -> None:
-        """Let constraints push bodies (l, n), and all that carry them."""
+    def _add_constraint_forces(self, links: Array, forces: ConstraintForces) -> None:
+        """Add constraint forces to the wrenches of bodies and of all bodies that carry them.
+
+        Args:
+            links: records of the links (l, n), changed in place.
+            forces: constraint forces at the same time.
+        """
         for constraint, multipliers in forces.multipliers:
             for body, wrench in zip(
-                constraint.bodies, forces.on_bodies(constraint, multipliers), strict=True
+                constraint.bodies, forces.compute_wrenches(constraint, multipliers), strict=True
             ):
                 force, here = wrench[3:], forces.state.origins[body]
                 while body != GROUND:
@@ -225,8 +256,17 @@ class JointWrenches:
                     links[body, LINK_WORK.WRENCH : LINK_WORK.WRENCH + 6] += about
                     body = self.mechanism.bodies[body].parent
 
-    def of(self, joint: Joint, side: str) -> tuple[Array, Array, Array]:
-        """Force, moment, and the origin of the joint's frame at which they act (t, 3), in ground."""
+    def get_reaction(self, joint: Joint, side: str) -> tuple[Array, Array, Array]:
+        """Return the reaction of a joint on one of its bodies.
+
+        Args:
+            joint: the joint.
+            side: ``"child"`` or ``"parent"``.
+
+        Returns:
+            Force (N), moment (N m), and the origin of the joint's frame at which they act (m), each
+            (t, 3) in ground.
+        """
         outer = self.carried[joint.path]
         body, link = self.mechanism.bodies[outer], self.moved.links[:, outer]
         mobilizer = body.mobilizer

@@ -1,4 +1,4 @@
-"""A report of trials as one page: the motion with its markers, angles, moments, residuals, errors of the fit."""
+"""Report of trials on one HTML page: motion, angles, moments, residuals and errors of the fit."""
 
 from __future__ import annotations
 
@@ -15,13 +15,19 @@ from osimlite.base.files import write_atomically
 from osimlite.base.records import replace
 from osimlite.base.text import join_words
 from osimlite.errors import OsimliteError
-from osimlite.fitting.fitted_motion import ADVICE
+from osimlite.fitting.fitted_motion import MARKER_ERROR_LIMITS_M
 from osimlite.io.document.cache import top_at
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.tools.evidence import Evidence, Steps, quietly_steps, root_of, side_of
-from osimlite.tools.outcome import DYNAMICS, Outcome
+from osimlite.tools.evidence import (
+    Evidence,
+    Steps,
+    find_root_coordinates,
+    split_side,
+    try_find_steps,
+)
+from osimlite.tools.outcome import DYNAMICS_TITLE, Outcome
 from osimlite.tools.trials.check import check_trial
 from osimlite.tools.trials.folder import SETUPS
 from osimlite.view.lettering import plain_lettering
@@ -31,14 +37,15 @@ from osimlite.view.recording import MeasuredMarkers, Recording, computed_forces
 from osimlite.view.shown import Shown
 
 SIDES = {"r": (COLORS[0], "right"), "l": (COLORS[1], "left"), "": ("#444444", "")}
-"""Colour and name of the lines of each side."""
+"""Color and name of the curves of each side."""
 PERCENT = np.linspace(0.0, 100.0, 101)
-STILL = 1e-4
-"""An angle that changes by less (rad) does not move."""
-WORST = 12
-"""So many markers are shown by name."""
-NOT_PUSHED = "HalfSpace", "ground"
-"""What stands still, of both that a contact pushes."""
+"""Points of the gait cycle at which curves are drawn, %."""
+MIN_ANGLE_CHANGE_RAD = 1e-4
+"""Smallest range of an angle that is drawn, rad."""
+MAX_NAMED_MARKERS = 12
+"""Number of markers whose errors are shown by name."""
+STATIC_FRAMES = "HalfSpace", "ground"
+"""Frames of contact forces on the immobile side of a contact."""
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1d2733; background: #fff; max-width: 1120px; margin: 0 auto;
   padding: 0 20px 60px }
@@ -55,36 +62,39 @@ td { overflow-wrap: anywhere }
 ul.note { color: #5a6675; margin: 0 0 10px; padding-left: 20px; overflow-wrap: anywhere }
 img { max-width: 100%; height: auto; display: block }
 """
+"""Style sheet of the page."""
 
 
-PLAIN = "body{grid-template-columns:1fr!important}aside{display:none!important}"
-"""The page of a motion without its lists at the sides."""
+NO_SIDEBAR_STYLE = "body{grid-template-columns:1fr!important}aside{display:none!important}"
+"""Style that hides the lists at the sides of the viewer."""
 
 
-class Trial(NamedTuple):
-    """What is shown of a trial."""
+class TrialOutcomes(NamedTuple):
+    """Outcomes of the setups of one trial."""
 
     name: str  # what it is called
     outcomes: Sequence[Outcome]  # of the setups that belong to it
 
     @property
     def evidence(self) -> Evidence | None:
-        """That with markers first."""
+        """Motion of the trial, preferably one with measured markers; None without any."""
         result = [outcome.evidence for outcome in self.outcomes if outcome.evidence is not None]
         return min(result, key=lambda item: item.measured is None, default=None)
 
     @property
     def steps(self) -> dict[str, Steps]:
-        """By the loads of any of its setups."""
+        """Steps of the feet, from the measured loads of any setup."""
         result = (
-            quietly_steps(outcome.evidence)
+            try_find_steps(outcome.evidence)
             for outcome in self.outcomes
             if outcome.evidence is not None
         )
         return next((steps for steps in result if steps), {})
 
 
-class _Line(NamedTuple):
+class _Curve(NamedTuple):
+    """Curve of a quantity over time."""
+
     times: Array
     column: Array
     side: str
@@ -94,25 +104,28 @@ class _Line(NamedTuple):
 
 
 def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
-    """Write a report of what runs gave, as one page (HTML) that needs nothing else.
+    """Write a report of runs as one HTML page that needs no other file.
 
-    Setups of one folder are one trial, which has its name (a study of Moco alone has its own);
-    several trials, and the left and right side, are drawn over each other. With measured loads
-    curves go over the gait cycle, from each strike of a foot to its next.
+    The setups of one folder are one trial, named after the folder; a single Moco study is named
+    after itself. Trials, and the left and the right side, are drawn over each other. With measured
+    loads, curves cover the gait cycle, from each strike of a foot to its next.
 
     Args:
-        outcomes: of the runs by their setups.
-        path: the file to write.
+        outcomes: outcomes by their setups.
+        path: file to write.
+
+    Returns:
+        Path of the file.
 
     Raises:
-        OsimliteError: none has a motion, or the file cannot be written.
+        OsimliteError: no outcome has a motion, or the file cannot be written.
         MissingDependency: matplotlib is not installed.
     """
     trials = collect_trials(outcomes)
     if all(trial.evidence is None for trial in trials):
         raise OsimliteError("there is nothing to report: none of the setups has a motion")
     with plain_lettering():
-        parts = "".join([*_parts(trials), *_verdicts(outcomes)])
+        parts = "".join([*_render_trials(trials), *_render_verdicts(outcomes)])
     title = html.escape(join_words([trial.name for trial in trials]))
     page = (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" '
@@ -123,17 +136,18 @@ def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
     return Path(path)
 
 
-def collect_trials(outcomes: Mapping[str | Path, Outcome]) -> list[Trial]:
-    """Group the outcomes of tools by the folder of their trial."""
+def collect_trials(outcomes: Mapping[str | Path, Outcome]) -> list[TrialOutcomes]:
+    """Group outcomes by the folders of their setups."""
     by_folder: dict[Path, list[Outcome]] = {}
     for setup, outcome in outcomes.items():
         by_folder.setdefault(Path(setup).resolve().parent, []).append(outcome)
     titles = [outcome.title for outcome in outcomes.values()]
     alone = titles[0] if len(titles) == 1 else ""
-    return [Trial(alone or folder.name, group) for folder, group in by_folder.items()]
+    return [TrialOutcomes(alone or folder.name, group) for folder, group in by_folder.items()]
 
 
-def _parts(trials: Sequence[Trial]) -> Iterator[str]:
+def _render_trials(trials: Sequence[TrialOutcomes]) -> Iterator[str]:
+    """Yield the HTML of messages, viewers and figures of all trials."""
     for trial in trials:
         rows = [(name, words) for outcome in trial.outcomes for name, words in outcome.told]
         facts = "".join(
@@ -143,20 +157,20 @@ def _parts(trials: Sequence[Trial]) -> Iterator[str]:
         heading = f"<h2>{html.escape(trial.name)}</h2>" if len(trials) > 1 else ""
         yield f"{heading}<table>{facts}</table>"
         if trial.evidence is not None:
-            yield _viewer(trial.evidence)
+            yield _render_viewer(trial.evidence)
     shown = [trial for trial in trials if trial.evidence is not None]
-    yield from _section("Joint angles", collect_angles(shown))
-    yield from _section("Joint moments", collect_moments(shown))
-    yield from _section("Controls", collect_controls(shown))
-    yield from _section("Contact forces", collect_contacts(shown))
+    yield from _render_section("Joint angles", collect_angles(shown))
+    yield from _render_section("Joint moments", collect_moments(shown))
+    yield from _render_section("Controls", collect_controls(shown))
+    yield from _render_section("Contact forces", collect_contacts(shown))
     for trial in shown:
         name = f": {trial.name}" if len(shown) > 1 else ""
-        yield from _residuals(trial, name)
-        yield from _errors(trial, name)
+        yield from _render_residuals(trial, name)
+        yield from _render_errors(trial, name)
 
 
-def _verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
-    """What the results are worth by published limits."""
+def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
+    """Yield the HTML of the results' quality by published limits."""
     written = [file for outcome in outcomes.values() for file in outcome.files]
     setups = [setup for setup in outcomes if type(top_at(str(setup))).__name__ in SETUPS]
     try:
@@ -180,7 +194,8 @@ def _verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
     )
 
 
-def _viewer(evidence: Evidence) -> str:
+def _render_viewer(evidence: Evidence) -> str:
+    """Return the HTML of a viewer with the motion."""
     mechanism = build_mechanism(evidence.model)
     measured = None
     if evidence.measured is not None:
@@ -189,18 +204,22 @@ def _viewer(evidence: Evidence) -> str:
         names = [evidence.markers[place] for place in known]
         stations = [(own[name].body, np.asarray(own[name].location)) for name in names]
         measured = MeasuredMarkers(names, stations, evidence.measured[:, known])
-    motion = _motion(evidence, mechanism, measured)
+    motion = _create_recording(evidence, mechanism, measured)
     shown = Shown.of(evidence.model, mechanism, file=evidence.file, motion=motion)
     # Nobody mends the model here.
-    page = replace(shown, findings=()).page_text().replace("</style>", f"{PLAIN}</style>", 1)
+    page = (
+        replace(shown, findings=())
+        .page_text()
+        .replace("</style>", f"{NO_SIDEBAR_STYLE}</style>", 1)
+    )
     note = "Green: as measured; pink: of the model." if measured else ""
     return f'<iframe srcdoc="{html.escape(page)}" title="the motion"></iframe><p class="note">{note}</p>'
 
 
-def _motion(
+def _create_recording(
     evidence: Evidence, mechanism: Mechanism, measured: MeasuredMarkers | None = None
 ) -> Recording:
-    """With the forces of its contacts, if it has speeds."""
+    """Return the motion for the viewer, with contact forces if the speeds are known."""
     speeds, forces = evidence.speeds, dict[str, Array]()
     if speeds is None:
         speeds = np.zeros_like(evidence.values)
@@ -220,19 +239,26 @@ def _motion(
     )
 
 
-def collect_angles(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
-    """Lines by coordinate without its side, angles in degrees."""
-    panels: dict[str, list[_Line]] = {}
+def collect_angles(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]:
+    """Return the curves of joint angles in degrees by coordinate, without its side.
+
+    Args:
+        trials: trials that have a motion.
+
+    Returns:
+        Curves by the title of their panel.
+    """
+    panels: dict[str, list[_Curve]] = {}
     for number, trial in enumerate(trials):
         evidence = trial.evidence
         assert evidence is not None
         for index, name in enumerate(evidence.coordinates):
             column = evidence.values[:, index]
-            if not evidence.turning[index] or np.ptp(column) < STILL:
+            if not evidence.turning[index] or np.ptp(column) < MIN_ANGLE_CHANGE_RAD:
                 continue
-            stem, side = side_of(name)
+            stem, side = split_side(name)
             panels.setdefault(f"{stem} (deg)", []).append(
-                _Line(
+                _Curve(
                     evidence.times,
                     np.degrees(column),
                     side,
@@ -244,77 +270,100 @@ def collect_angles(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
     return panels
 
 
-def collect_moments(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
-    """Lines of generalized forces, those at the root left out."""
-    panels: dict[str, list[_Line]] = {}
+def collect_moments(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]:
+    """Return the curves of generalized forces, without those at the root.
+
+    Args:
+        trials: trials that have a motion.
+
+    Returns:
+        Curves by the title of their panel.
+    """
+    panels: dict[str, list[_Curve]] = {}
     for number, trial in enumerate(trials):
         for outcome in trial.outcomes:
-            root = _root(outcome.evidence)
-            for table in _dynamics(outcome):
+            root = _find_root_names(outcome.evidence)
+            for table in _select_dynamics_tables(outcome):
                 for label in table.columns:
                     name, _, kind = label.rpartition("_")
                     if name in root or kind not in ("moment", "force"):
                         continue
-                    stem, side = side_of(name)
+                    stem, side = split_side(name)
                     unit = "N m" if kind == "moment" else "N"
-                    line = _Line(
+                    line = _Curve(
                         table.times, table[label], side, STYLES[number % 3], trial.name, trial.steps
                     )
                     panels.setdefault(f"{stem} ({unit})", []).append(line)
     return panels
 
 
-def collect_controls(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
-    """Lines by control without its side."""
-    panels: dict[str, list[_Line]] = {}
+def collect_controls(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]:
+    """Return the curves of controls by name, without the side.
+
+    Args:
+        trials: trials that have a motion.
+
+    Returns:
+        Curves by the title of their panel.
+    """
+    panels: dict[str, list[_Curve]] = {}
     for number, trial in enumerate(trials):
         evidence = trial.evidence
         if evidence is None or evidence.controls is None:
             continue
         for label in evidence.controls.columns:
-            stem, side = side_of(label.rpartition("/")[2])
+            stem, side = split_side(label.rpartition("/")[2])
             column, times = evidence.controls[label], evidence.controls.times
             known = np.isfinite(column)
-            line = _Line(times[known], column[known], side, STYLES[number % 3], trial.name, {})
+            line = _Curve(times[known], column[known], side, STYLES[number % 3], trial.name, {})
             panels.setdefault(stem, []).append(line)
     return panels
 
 
-def collect_contacts(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
-    """Lines by axis of what pushes each side."""
-    panels: dict[str, list[_Line]] = {}
+def collect_contacts(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]:
+    """Return the curves of contact forces on each side by axis.
+
+    Args:
+        trials: trials that have a motion.
+
+    Returns:
+        Curves by the title of their panel.
+    """
+    panels: dict[str, list[_Curve]] = {}
     for number, trial in enumerate(trials):
         evidence = trial.evidence
         if evidence is None or evidence.speeds is None:
             continue
         sums: dict[str, Array] = {}
-        for force in contact_forces(_motion(evidence, build_mechanism(evidence.model))):
-            if force.frame not in NOT_PUSHED:
-                side = side_of(force.element)[1]
+        for force in contact_forces(_create_recording(evidence, build_mechanism(evidence.model))):
+            if force.frame not in STATIC_FRAMES:
+                side = split_side(force.element)[1]
                 sums[side] = sums.get(side, 0.0) + force.vectors
         for axis, name in enumerate("xyz"):
             for side, vectors in sums.items():
                 if np.ptp(vectors[:, axis]) > 0.0:
-                    line = _Line(
+                    line = _Curve(
                         evidence.times, vectors[:, axis], side, STYLES[number % 3], trial.name, {}
                     )
                     panels.setdefault(f"along {name} (N)", []).append(line)
     return panels
 
 
-def _dynamics(outcome: Outcome) -> list[Any]:
-    return [table for table in outcome.tables.values() if table.name == DYNAMICS]
+def _select_dynamics_tables(outcome: Outcome) -> list[Any]:
+    """Return the tables of inverse dynamics."""
+    return [table for table in outcome.tables.values() if table.name == DYNAMICS_TITLE]
 
 
-def _root(evidence: Evidence | None) -> set[str]:
-    """The coordinates of the joint between the model and ground."""
+def _find_root_names(evidence: Evidence | None) -> set[str]:
+    """Return the names of the coordinates of the joint between the model and ground."""
     if evidence is None:
         return set()
     mechanism = build_mechanism(evidence.model)
-    return {mechanism.coordinates[place].name for place in root_of(mechanism)}
+    return {mechanism.coordinates[place].name for place in find_root_coordinates(mechanism)}
 
 
-def _section(title: str, panels: Mapping[str, list[_Line]]) -> Iterator[str]:
+def _render_section(title: str, panels: Mapping[str, list[_Curve]]) -> Iterator[str]:
+    """Yield the HTML of a figure with one panel for each quantity."""
     if not panels:
         return
     lines = [line for group in panels.values() for line in group]
@@ -328,12 +377,12 @@ def _section(title: str, panels: Mapping[str, list[_Line]]) -> Iterator[str]:
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for panel, (label, group) in zip(axes, panels.items(), strict=False):
         for line in group:
-            _draw(panel, line, cyclic=cyclic)
+            _draw_curve(panel, line, cyclic=cyclic)
         panel.set_title(label.replace("_", " "), fontsize=10, loc="left")
-        _tidy(panel, "gait cycle (%)" if cyclic else "time (s)")
+        _style_axes(panel, "gait cycle (%)" if cyclic else "time (s)")
     for panel in axes[len(panels) :]:
         panel.set_visible(False)
-    _legend(figure, lines)
+    _add_legend(figure, lines)
     if cyclic:
         note = "Over the gait cycle, from each strike of the foot on its side to the next: thin each, thick their mean."
         if any(not line.side for line in lines):
@@ -345,10 +394,11 @@ def _section(title: str, panels: Mapping[str, list[_Line]]) -> Iterator[str]:
             if any(line.steps for line in lines)
             else "."
         )
-    yield f'<h2>{title}</h2><p class="note">{note}</p>{_image(figure)}'
+    yield f'<h2>{title}</h2><p class="note">{note}</p>{_render_image(figure)}'
 
 
-def _draw(panel: Any, line: _Line, *, cyclic: bool) -> None:
+def _draw_curve(panel: Any, line: _Curve, *, cyclic: bool) -> None:
+    """Draw a curve over time, or each gait cycle and their mean."""
     color, _ = SIDES[line.side]
     if not cyclic:
         panel.plot(line.times, line.column, color=color, ls=line.style, lw=1.5)
@@ -370,10 +420,11 @@ def _draw(panel: Any, line: _Line, *, cyclic: bool) -> None:
         panel.plot(PERCENT, np.mean(cycles, axis=0), color=color, ls=line.style, lw=2.0)
 
 
-def _residuals(trial: Trial, name: str) -> Iterator[str]:
+def _render_residuals(trial: TrialOutcomes, name: str) -> Iterator[str]:
+    """Yield the HTML of figures of residual forces and moments."""
     for outcome in trial.outcomes:
-        root = _root(outcome.evidence)
-        for table in _dynamics(outcome):
+        root = _find_root_names(outcome.evidence)
+        for table in _select_dynamics_tables(outcome):
             kinds = {
                 unit: [
                     label
@@ -396,39 +447,52 @@ def _residuals(trial: Trial, name: str) -> Iterator[str]:
                     )
                 panel.set_ylabel(unit)
                 panel.legend(frameon=False, fontsize=8)
-                _tidy(panel, "time (s)")
+                _style_axes(panel, "time (s)")
             note = "What the joint to ground has to push, though nothing does in life."
-            yield f'<h2>Residuals{html.escape(name)}</h2><p class="note">{note}</p>{_image(figure)}'
+            yield f'<h2>Residuals{html.escape(name)}</h2><p class="note">{note}</p>{_render_image(figure)}'
 
 
-def _errors(trial: Trial, name: str) -> Iterator[str]:
+def _render_errors(trial: TrialOutcomes, name: str) -> Iterator[str]:
+    """Yield the HTML of figures of marker and sensor errors."""
     evidence = trial.evidence
     if evidence is None:
         return
     if evidence.measured is not None and evidence.places is not None and evidence.markers:
         errors = 100.0 * np.linalg.norm(evidence.places - evidence.measured, axis=2)
-        figure = _errors_over(
+        figure = _draw_errors(
             evidence.times,
             evidence.markers,
             errors,
             "marker",
             "cm",
-            [100.0 * end for end in ADVICE],
+            [100.0 * end for end in MARKER_ERROR_LIMITS_M],
         )
         note = "Dashed: what OpenSim advises at most, 2 cm for the root mean square and 4 cm for the largest."
-        yield f'<h2>Marker errors{html.escape(name)}</h2><p class="note">{note}</p>{_image(figure)}'
+        yield f'<h2>Marker errors{html.escape(name)}</h2><p class="note">{note}</p>{_render_image(figure)}'
     if evidence.angles is not None and evidence.sensors:
-        figure = _errors_over(
+        figure = _draw_errors(
             evidence.times, evidence.sensors, np.degrees(evidence.angles), "sensor", "deg", ()
         )
         note = "Angles from the measured orientations."
-        yield f'<h2>Sensor errors{html.escape(name)}</h2><p class="note">{note}</p>{_image(figure)}'
+        yield f'<h2>Sensor errors{html.escape(name)}</h2><p class="note">{note}</p>{_render_image(figure)}'
 
 
-def _errors_over(
+def _draw_errors(
     times: Array, names: Sequence[str], errors: Array, noun: str, unit: str, limits: Sequence[float]
 ) -> Any:
-    """Errors (t, m) over time, with limits of the root mean square and the largest, and the worst by name."""
+    """Draw errors over time, and the worst markers or sensors by name.
+
+    Args:
+        times: times (t,), s.
+        names: names of m markers or sensors.
+        errors: errors (t, m); NaN where one was not measured.
+        noun: what the names are.
+        unit: unit of the errors.
+        limits: limits of the root mean square and of the largest error.
+
+    Returns:
+        The figure.
+    """
     seen = np.isfinite(errors)
     filled = np.where(seen, errors, 0.0)
     rms = np.sqrt((filled**2).sum(axis=1) / np.maximum(seen.sum(axis=1), 1))
@@ -441,17 +505,18 @@ def _errors_over(
     over.set_ylabel(f"{noun} error ({unit})")
     over.set_ylim(bottom=0.0)
     over.legend(frameon=False, fontsize=8)
-    _tidy(over, "time (s)")
+    _style_axes(over, "time (s)")
     each = np.sqrt((filled**2).sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
-    worst = np.argsort(-each)[:WORST][::-1]
+    worst = np.argsort(-each)[:MAX_NAMED_MARKERS][::-1]
     beside.barh([names[place] for place in worst], each[worst], color=COLORS[0], height=0.7)
     beside.tick_params(axis="y", labelsize=8)
     beside.set_title(f"worst {noun}s", fontsize=10, loc="left")
-    _tidy(beside, f"root mean square ({unit})")
+    _style_axes(beside, f"root mean square ({unit})")
     return figure
 
 
-def _legend(figure: Any, lines: Sequence[_Line]) -> None:
+def _add_legend(figure: Any, lines: Sequence[_Curve]) -> None:
+    """Add a legend of sides and trials to a figure."""
     from matplotlib.lines import Line2D
 
     sides = [
@@ -471,7 +536,8 @@ def _legend(figure: Any, lines: Sequence[_Line]) -> None:
         )
 
 
-def _tidy(panel: Any, label: str) -> None:
+def _style_axes(panel: Any, label: str) -> None:
+    """Set grid, ticks and label of a panel."""
     panel.grid(True, color="0.92", lw=0.8)
     panel.set_axisbelow(True)
     panel.spines[["top", "right"]].set_visible(False)
@@ -480,7 +546,8 @@ def _tidy(panel: Any, label: str) -> None:
     panel.set_xlabel(label, fontsize=8)
 
 
-def _image(figure: Any) -> str:
+def _render_image(figure: Any) -> str:
+    """Return the HTML of a figure as an embedded image."""
     out = io.BytesIO()
     figure.savefig(out, format="svg")
     return (

@@ -1,8 +1,8 @@
-"""OpenSim's RootSolver: zeros of functions that do not depend on one another, all at once.
+"""OpenSim's RootSolver: roots of independent functions, all at once.
 
-Each is bracketed, and found by inverse quadratic interpolation or bisection (R. P. Brent,
-Algorithms for Minimization without Derivatives, 1973, chapter 4). What OpenSim calls a zero is as
-far from one as its tolerance lets it be: so its steps are taken here.
+Brent's method brackets each root, and takes steps of inverse quadratic interpolation or bisection
+(R. P. Brent, Algorithms for Minimization without Derivatives, 1973, chapter 4). The result differs
+from the exact root by up to the tolerance, so the steps here are those of OpenSim.
 """
 
 from __future__ import annotations
@@ -14,10 +14,23 @@ import numpy as np
 from osimlite.mechanics.multibody.spatial import Array
 
 ROUNDING = 2.0 * float(np.finfo(float).eps)
+"""Relative rounding error of a double, times two."""
 
 
-def roots(function: Callable[[Array], Array], low: Array, high: Array, tolerance: float) -> Array:
-    """Zeros (n,) of n functions, each of its own argument, between two arguments; an end where there is none."""
+def find_roots(
+    function: Callable[[Array], Array], low: Array, high: Array, tolerance: float
+) -> Array:
+    """Return roots (n,) of n functions, each of its own argument.
+
+    Args:
+        function: n values of n arguments.
+        low: lower bounds of the arguments (n,).
+        high: upper bounds of the arguments (n,).
+        tolerance: tolerance of the arguments.
+
+    Returns:
+        Roots (n,); one of the bounds for a function without a root between them.
+    """
     a, b = low.astype(float), high.astype(float)
     fa, fb = function(a), function(b)
     c, fc = a.copy(), fa.copy()
@@ -39,7 +52,7 @@ def roots(function: Callable[[Array], Array], low: Array, high: Array, tolerance
                 open_[i] = False
                 continue
             if abs(before) >= near and abs(fa[i]) > abs(fb[i]):
-                new = _interpolated(a[i], b[i], c[i], fa[i], fb[i], fc[i], before, near, new)
+                new = _interpolate_step(a[i], b[i], c[i], fa[i], fb[i], fc[i], before, near, new)
             if abs(new) < near:
                 new = near if new > 0.0 else -near
             a[i], fa[i] = b[i], fb[i]
@@ -50,7 +63,7 @@ def roots(function: Callable[[Array], Array], low: Array, high: Array, tolerance
         fb = function(b)
 
 
-def _interpolated(
+def _interpolate_step(
     a: float,
     b: float,
     c: float,
@@ -61,7 +74,10 @@ def _interpolated(
     near: float,
     half: float,
 ) -> float:
-    """The step to where a line or a parabola through what is known is zero, if it is short enough; else a half."""
+    """Return a step of linear or inverse quadratic interpolation, or half the bracket.
+
+    The interpolated step is taken only if it is short enough.
+    """
     width = c - b
     if a == c:
         ratio = fb / fa

@@ -1,4 +1,4 @@
-"""Running a setup: it is checked, its tool is found and run, and what came out is written."""
+"""Running of a setup: check it, carry out its tool, and write the results."""
 
 from __future__ import annotations
 
@@ -25,25 +25,26 @@ from osimlite.schema.base import Object
 from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import file_specs
 from osimlite.tools.job import Job, NotRunnable
-from osimlite.tools.named_files import expect_few, read_subject
+from osimlite.tools.named_files import limit_documents, read_subject
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.registry import TOOLS, import_function
 
 IGNORED = ("OSIM101",)
-"""Errors that OpenSim runs a setup with: properties that it does not know, such as those of other versions."""
+"""Errors with which OpenSim runs a setup: unknown properties, such as those of other versions."""
 DEFAULTED = ("OSIM201", "OSIM202")
-"""Errors of values that OpenSim cannot read; it runs a setup with those of which it keeps the default."""
+"""Errors about unreadable values; OpenSim runs the setup if it uses the default instead."""
 
 STUDY = ".omoco"
+"""Suffix of Moco studies."""
 NO_OPTION = " there, or take it out of the model"
-"""What is said in place of advice on an option that `run` does not have."""
+"""Text that replaces advice about an option that `run` does not have."""
 
 
 class FaultySetup(DocumentError):
-    """A setup, or what it names, has errors.
+    """Error for a setup, or a file that it names, with findings of severity error.
 
     Attributes:
-        report: all that was found.
+        report: all findings.
     """
 
     def __init__(self, report: Report) -> None:
@@ -70,27 +71,34 @@ def run(
     write_outside: bool = False,
     substitutes: Mapping[str, str] | None = None,
 ) -> Outcome:
-    """Run the setup of a tool as OpenSim would, and write the files that it would write.
+    """Run the setup of a tool as OpenSim would, and write the files that OpenSim would write.
 
-    Args: setup: the file. output: a folder for all results, in place of where the setup puts them.
-        check: whether the setup and all that it names but the model are checked first. tell: is
-        told, before anything is computed, what is misspelt although the tool runs with it, such as
-        a marker or a sensor that is left out then, or the units of a table. progress: is told, line
-        by line, how far a long search has come. refine: of optimal control, split intervals of the
-        mesh until the error of none is above this; see :func:`osimlite.moco.solve`. simulates: of
-        optimal control, whether the model is also simulated with the controls that were found, and
-        it is told how far that is from what was found. overwrite: whether any file may be replaced;
-        without it only results of the same kind are. write_outside: whether the setup may name
-        results outside of its project and the current folder. substitutes: by absolute path of an
-        input that the setup names, the path of the file that is read instead.
+    Args:
+        setup: path of the setup file.
+        output: folder for all results, instead of the folders that the setup names.
+        check: whether to check the setup and all files that it names, apart from the model, first.
+        tell: function that receives findings with a suggestion before the tool starts, for example
+            about a marker that the tool ignores because of its spelling, or about the units of a
+            table.
+        progress: function that receives lines about the progress of a long search.
+        refine: for optimal control, split mesh intervals until no error is above this value; see
+            :func:`osimlite.moco.solve`.
+        simulates: for optimal control, whether to simulate the model with the controls of the
+            solution, and report how far the simulation is from the solution.
+        overwrite: whether to replace any file; by default only results of the same kind are
+            replaced.
+        write_outside: whether the setup may name results outside its project and the current
+            folder.
+        substitutes: by absolute path of an input of the setup, the path of the file to read
+            instead.
 
-    Returns: The tables that were written, as they were before they were rounded to the digits of
-        the files, and a summary.
+    Returns:
+        The written tables, before rounding to the digits of the files, and a summary.
 
     Raises:
         FaultySetup: the check found errors.
-        UnsupportedError: the document is not of a tool that can be run.
-        OsimliteError: it could not be carried out; nothing is written then.
+        UnsupportedError: osimlite has no tool for the class of the document.
+        OsimliteError: the tool failed; then it has written nothing.
     """
     if not isinstance(setup, str | os.PathLike):
         raise OsimliteError(f"the file of a setup is wanted here, not a {type(setup).__name__}")
@@ -99,7 +107,8 @@ def run(
     tag = type(top).__name__
     if tag not in TOOLS:
         raise NotRunnable(
-            f"setups of {tag} cannot be run; those of {join_words(runnable())} can", file=str(file)
+            f"setups of {tag} cannot be run; those of {join_words(list_runnable())} can",
+            file=str(file),
         )
     if refine is not None and not tag.startswith("Moco"):
         raise SettingError(f"a {tag} has no mesh to refine; leave out --refine")
@@ -107,13 +116,13 @@ def run(
     replaced = substitute_inputs(top, file.parent, substitutes or {})
     if check:
         away: dict[str, None] = {}
-        report = merged(_reports(str(file), away))
+        report = merged(_check_documents(str(file), away))
         if errors := [
             e for e in report.errors if not (_is_run_by_opensim(e) or _is_about_any(e, replaced))
         ]:
             raise FaultySetup(Report(errors, report.texts))
         if away:
-            outcome.tell("taken from here", f"{join_words(away)}, not beside the setup")
+            outcome.add_message("taken from here", f"{join_words(away)}, not beside the setup")
         outcome.warnings = sorted(
             report.errors + report.warnings, key=lambda found: found.suggestion is None
         )
@@ -144,12 +153,12 @@ def substitute_inputs(top: Object, folder: Path, substitutes: Mapping[str, str])
     """Replace the names of some input files in a document.
 
     Args:
-        top: the document, which is changed.
-        folder: that its paths go from.
-        substitutes: by absolute path of an input, that of the file in its place.
+        top: object of the document, which is changed.
+        folder: folder from which the paths in the document start.
+        substitutes: by absolute path of an input, the path of its replacement.
 
     Returns:
-        The names that were replaced, as the document had them.
+        The replaced names, as they stood in the document.
     """
     replaced: list[str] = []
 
@@ -171,31 +180,33 @@ def substitute_inputs(top: Object, folder: Path, substitutes: Mapping[str, str])
 
 
 def _is_about_any(error: Finding, names: Sequence[str]) -> bool:
-    """Return whether an error is about an input that is replaced, and so does not matter."""
+    """Return whether an error is about a replaced input, and therefore does not matter."""
     own = os.path.basename(error.file or "")
     return any(f"'{name}'" in error.message or own == os.path.basename(name) for name in names)
 
 
 def _is_run_by_opensim(error: Finding) -> bool:
-    """Return whether OpenSim runs a setup in spite of an error, with a property at its default.
+    """Return whether OpenSim runs a setup despite an error, with the default of the property.
 
-    A study of Moco, which is searched for long, should have none of these.
+    Moco studies run for a long time, so they must have no such error.
     """
     if Path(error.file or "").suffix == STUDY:
         return False
     return error.code in IGNORED or (error.code in DEFAULTED and KEEPS_DEFAULT in error.message)
 
 
-def runnable() -> list[str]:
-    """The names of the classes whose setups can be run."""
+def list_runnable() -> list[str]:
+    """Return the names of the classes whose setups osimlite can run."""
     return [tag for tag in MODULES if tag in TOOLS]
 
 
-def _reports(setup: str, away: dict[str, None]) -> Iterator[Report]:
-    """Yield what is wrong with a document and with those and the tables that it names, each once, but not models.
+def _check_documents(setup: str, away: dict[str, None]) -> Iterator[Report]:
+    """Yield reports on a document and on documents and tables that it names, without models.
 
-    Files that are in the current folder, and not in that of the document that names them, are noted
-    in `away`.
+    Args:
+        setup: path of the document.
+        away: receives the files that are in the current folder, but not in the folder of the
+            document that names them.
     """
     waiting, visited = deque([setup]), {os.path.realpath(setup)}
     while waiting:
@@ -215,7 +226,7 @@ def _reports(setup: str, away: dict[str, None]) -> Iterator[Report]:
             real = os.path.realpath(path)
             if real not in visited and (is_table(path) or path.lower().endswith(".xml")):
                 visited.add(real)
-                expect_few(visited, setup)
+                limit_documents(visited, setup)
                 named.append(path)
         # What a document names is reported before what its neighbours name.
         waiting.extendleft(reversed(named))

@@ -1,4 +1,4 @@
-"""What RRA and CMC follow: a measured motion as splines, tasks, and the actuator forces that do them."""
+"""Problem of RRA and CMC: motion to follow, tasks, and distribution of forces over actuators."""
 
 from __future__ import annotations
 
@@ -25,32 +25,35 @@ from osimlite.tools.dynamics_setup import build_static_optimization, satisfy_con
 from osimlite.tools.job import Job, NotRunnable
 from osimlite.tools.outcome import Outcome
 
-PADDING, ORDER = 60, 50
-"""Rows that OpenSim adds at both ends of the motion, and the order of its filter."""
-SOFTNESS = 0.1
-"""Of the `limit` of a task: how far from it the weight of the forces begins to fall."""
-CLOSE = 1e-9
-"""Part of the accelerations that forces give, which may be missing of what they are to give together."""
-LEAST_SHARE = 1e-6
-"""The forces count by no less, so that one answer is the best."""
-WEAK = 1e-9
-"""Part of its greatest force that a muscle can give at least, if it is to be asked for any."""
-AGREEMENT = 1e-6
-"""How far (rad or m) a desired motion may be from a lock before this is worth a message."""
-RANK = 1e-10
-"""Of the largest eigenvalue: what is below is none."""
+PADDING_ROWS = 60
+"""Number of rows that OpenSim adds at each end of the motion."""
+FILTER_ORDER = 50
+"""Order of OpenSim's filter."""
+LIMIT_WIDTH = 0.1
+"""Fraction of a task's `limit` over which the weight of the forces falls."""
+ACCELERATION_TOLERANCE = 1e-9
+"""Largest missing part of the accelerations, relative to the accelerations of all forces."""
+MIN_FORCE_WEIGHT = 1e-6
+"""Smallest weight of the forces; a positive one makes the solution unique."""
+MIN_STRENGTH = 1e-9
+"""Smallest strength, relative to the greatest force, of a muscle that takes part."""
+LOCK_TOLERANCE = 1e-6
+"""Difference (rad or m) between a lock and a desired motion above which a message is due."""
+RANK_TOLERANCE = 1e-10
+"""Smallest eigenvalue, relative to the largest, that counts as positive."""
 
 
 @dataclass(frozen=True, eq=False)
-class Desired:
-    """A motion that is followed, as OpenSim has it: splines of fifth degree through values, speeds and their rates.
+class DesiredMotion:
+    """Motion to follow, as in OpenSim: splines of degree five.
 
     Attributes:
-        start, end: of what was measured, s.
-        times: of the padded and filtered rows (t,), s.
-        values: of all coordinates (t, n), rad and m, where the constraints hold.
-        speeds: (t, n).
-        accelerations: (t, n).
+        start: first measured time, s.
+        end: last measured time, s.
+        times: times of the padded and filtered rows (t,), s.
+        values: values of all coordinates (t, n), rad and m, which satisfy the constraints.
+        speeds: generalized speeds (t, n).
+        accelerations: derivatives of the speeds (t, n).
     """
 
     start: float
@@ -61,32 +64,45 @@ class Desired:
     accelerations: Array
 
     @classmethod
-    def of(cls, job: Job, outcome: Outcome, simulation: Simulation, model: Model) -> Desired:
-        """The motion that a setup names.
+    def read(
+        cls, job: Job, outcome: Outcome, simulation: Simulation, model: Model
+    ) -> DesiredMotion:
+        """Read, pad and filter the motion that a setup names.
+
+        Args:
+            job: the setup.
+            outcome: collects messages.
+            simulation: simulation of the model.
+            model: the model.
 
         Raises:
-            OsimliteError: it cannot be read or followed.
+            OsimliteError: osimlite cannot read or follow the motion.
         """
         setup: RRATool | CMCTool = job.setup
-        if job.path("desired_points_file") is not None:
-            raise job.unable(
+        if job.find_path("desired_points_file") is not None:
+            raise job.create_unsupported_error(
                 "desired_points_file is given, and points cannot be followed yet; leave it empty"
             )
         mechanism = simulation.mechanism
-        recorded = RecordedMotion.read(mechanism, job.needed("desired_kinematics_file"))
+        recorded = RecordedMotion.read(mechanism, job.require_path("desired_kinematics_file"))
         if recorded.missing:
             places = [
                 k for k, info in enumerate(mechanism.coordinates) if info.name in recorded.missing
             ]
             recorded.values[:, places] = 0.0
-            outcome.tell(
+            outcome.add_message(
                 "not in the file", f"{join_words(recorded.missing)}: 0 is taken, as in OpenSim"
             )
         start, end = float(recorded.times[0]), float(recorded.times[-1])
-        times, values = continued(recorded.times, PADDING), continued(recorded.values, PADDING)
+        times, values = (
+            continued(recorded.times, PADDING_ROWS),
+            continued(recorded.values, PADDING_ROWS),
+        )
         if setup.lowpass_cutoff_frequency >= 0.0:
-            times, values = lowpassed_by_sinc(times, values, setup.lowpass_cutoff_frequency, ORDER)
-        _follow_locks(outcome, mechanism, recorded, values)
+            times, values = lowpassed_by_sinc(
+                times, values, setup.lowpass_cutoff_frequency, FILTER_ORDER
+            )
+        _apply_locks(outcome, mechanism, recorded, values)
         padded = replace(recorded, times=times, values=values)
         # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints
         # change the values.
@@ -101,63 +117,69 @@ class Desired:
 
     @cached_property
     def _curves(self) -> tuple[SampledCurves, SampledCurves]:
+        """Splines through the values, and through speeds and accelerations."""
         size = self.values.shape[1]
         return SampledCurves(self.times, self.values), SampledCurves(
             self.times, np.hstack([self.speeds, self.accelerations]).reshape(-1, 2 * size)
         )
 
-    def poses(self, times: Sequence[float]) -> tuple[Array, Array]:
-        """Values (k, n) and their rates (k, n) at some times, s."""
+    def evaluate_poses(self, times: Sequence[float]) -> tuple[Array, Array]:
+        """Evaluate the coordinates at some times.
+
+        Args:
+            times: k times, s.
+
+        Returns:
+            Values (k, n) and their rates (k, n).
+        """
         q, rates = self._curves[0].derivatives(times, (0, 1))
         return q, rates
 
-    def pose(self, t: float) -> tuple[Array, Array]:
-        """Values (n,) and their rates (n,) at a time, s."""
-        q, rates = self.poses([t])
-        return q[0], rates[0]
-
-    def at(self, times: Array | float) -> Array:
-        """Values, their rates, speeds and accelerations (k, 4, n) at some times (k,), s."""
+    def evaluate(self, times: Array | float) -> Array:
+        """Return values, rates, speeds and accelerations (k, 4, n) at some times (k,) in s."""
         moments = np.atleast_1d(times)
         q, rates = self._curves[0].derivatives(moments, (0, 1))
         (others,) = self._curves[1].derivatives(moments, (0,))
         return np.stack([q, rates, *np.split(others, 2, axis=1)], axis=1)
 
 
-def _follow_locks(
+def _apply_locks(
     outcome: Outcome, mechanism: Mechanism, recorded: RecordedMotion, values: Array
 ) -> None:
-    """Let locks win over a desired motion, as in OpenSim; say where they differ.
+    """Replace the desired motion of locked coordinates, as in OpenSim, and report differences.
 
     Args:
-        outcome: that says so.
-        mechanism: whose coordinates move.
-        recorded: the motion of the file.
-        values: of the padded rows (t, n), changed in place.
+        outcome: collects the messages.
+        mechanism: mechanism of the model.
+        recorded: motion of the file.
+        values: values of the padded rows (t, n), changed in place.
     """
     for place, info in enumerate(mechanism.coordinates):
         if not info.locked:
             continue
         values[:, place] = info.default_value
         apart = float(np.abs(info.default_value - recorded.values[:, place]).max())
-        if info.name not in recorded.missing and apart > AGREEMENT:
+        if info.name not in recorded.missing and apart > LOCK_TOLERANCE:
             unit = "rad" if info.motion_type == "rotational" else "m"
-            outcome.tell(
+            outcome.add_message(
                 info.name,
                 f"locked at {info.default_value:g} {unit}; the desired motion is up to {apart:.3g} {unit} away from "
                 "that: as in OpenSim, the lock wins, and a task of this coordinate has nothing to do",
             )
 
 
-class Task(NamedTuple):
-    """A coordinate that is followed.
+class TrackingTask(NamedTuple):
+    """Coordinate that follows a desired coordinate.
 
     Attributes:
-        name: of the task.
-        coordinate: number of the coordinate that is to follow.
-        wanted: number of that whose motion it follows.
-        weight, kp, kv, ka: how closely.
-        limit: deviation beyond which forces do not count; 0 for none.
+        name: name of the task.
+        coordinate: index of the coordinate that follows.
+        wanted: index of the coordinate whose desired motion it follows.
+        weight: weight of the task.
+        kp: gain of the position error, 1/s².
+        kv: gain of the speed error, 1/s.
+        ka: factor of the desired acceleration.
+        limit: error above which forces do not count; 0 for no limit.
     """
 
     name: str
@@ -171,29 +193,33 @@ class Task(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Tasks:
-    """All tasks that are active."""
+class TrackingTasks:
+    """All active tasks."""
 
-    tasks: tuple[Task, ...]
+    tasks: tuple[TrackingTask, ...]
 
     @classmethod
-    def of(cls, job: Job, mechanism: Mechanism) -> Tasks:
-        """The tasks of a setup.
+    def read(cls, job: Job, mechanism: Mechanism) -> TrackingTasks:
+        """Read the tasks of a setup.
+
+        Args:
+            job: the setup.
+            mechanism: mechanism of the model.
 
         Raises:
-            NotRunnable: one is of another class than CMC_Joint.
-            DocumentError: there are none, or one names no coordinate.
+            NotRunnable: a task is of another class than CMC_Joint.
+            DocumentError: no task is active, or one names no coordinate.
         """
-        path = job.needed("task_set_file")
+        path = job.require_path("task_set_file")
         result = []
         names = mechanism.coordinate_names
-        for item in job.read(path, CMC_TaskSet).objects:
+        for item in job.read_object(path, CMC_TaskSet).objects:
             if type(item) is not CMC_Joint:
                 message = f"the task '{item.name}' is a {type(item).__name__}, which cannot be followed yet"
                 raise NotRunnable(message, file=str(path))
             for tag in ("active", "weight", "kp", "kv", "ka"):
                 if not getattr(item, tag):
-                    raise job.error(
+                    raise job.create_error(
                         f"the task '{item.name}' of '{path}' has an empty '{tag}'; give it a value"
                     )
             # As in OpenSim, `on` means nothing.
@@ -202,59 +228,79 @@ class Tasks:
             for name in (item.name, str(item.coordinate)):
                 if name not in names:
                     near = suggest_name(name, names)
-                    raise job.error(
+                    raise job.create_error(
                         f"the task '{item.name}' of '{path}' follows no coordinate: '{name}'{near}"
                     )
             weight, kp, kv, ka = (
                 float(getattr(item, tag)[0]) for tag in ("weight", "kp", "kv", "ka")
             )
             own, wanted = names.index(str(item.coordinate)), names.index(item.name)
-            result.append(Task(item.name, own, wanted, weight, kp, kv, ka, item.limit))
+            result.append(TrackingTask(item.name, own, wanted, weight, kp, kv, ka, item.limit))
         if not result:
-            raise job.error(f"no task of '{path}' is active; set the first of its 'active' to true")
+            raise job.create_error(
+                f"no task of '{path}' is active; set the first of its 'active' to true"
+            )
         return cls(tuple(result))
 
     @property
     def coordinates(self) -> list[int]:
-        """Numbers of the coordinates that follow."""
+        """Indices of the coordinates that follow."""
         return [task.coordinate for task in self.tasks]
 
     @property
     def weights(self) -> Array:
-        """Of all tasks."""
+        """Weights of all tasks."""
         return np.array([task.weight for task in self.tasks])
 
-    def errors(self, wanted: Array, q: Array, u: Array) -> tuple[Array, Array]:
-        """How far values and speeds are behind what is wanted (4, n)."""
+    def compute_errors(self, wanted: Array, q: Array, u: Array) -> tuple[Array, Array]:
+        """Compute how far values and speeds are behind the desired motion.
+
+        Args:
+            wanted: values, rates, speeds and accelerations of the desired motion (4, n).
+            q: values (n,).
+            u: speeds (n,).
+
+        Returns:
+            Errors of the values and of the speeds, each (k,) for k tasks.
+        """
         own, other = self.coordinates, [task.wanted for task in self.tasks]
         return wanted[0, other] - q[own], wanted[2, other] - u[own]
 
-    def accelerations(self, errors: tuple[Array, Array], ahead: Array) -> Array:
-        """Those that make up for errors, given what is wanted (4, n) at the end of the window."""
+    def compute_accelerations(self, errors: tuple[Array, Array], ahead: Array) -> Array:
+        """Compute the accelerations (k,) that correct errors: ka u̇ + kv ėrr + kp err.
+
+        Args:
+            errors: errors of values and speeds.
+            ahead: desired motion (4, n) at the end of the window.
+        """
         kp, kv, ka = np.array([(task.kp, task.kv, task.ka) for task in self.tasks]).T
         ends: Array = ka * ahead[3, [task.wanted for task in self.tasks]]
         return ends + kv * errors[1] + kp * errors[0]
 
-    def force_weight(self, errors: Array) -> float:
-        """How much the forces count while errors come near to the limits of their tasks."""
+    def compute_force_weight(self, errors: Array) -> float:
+        """Return the weight of the forces, which falls as errors approach the limits of tasks."""
         result = 1.0
         for task, error in zip(self.tasks, np.abs(errors).tolist(), strict=True):
             if task.limit:
-                distance = (error - task.limit) / (SOFTNESS * task.limit)
+                distance = (error - task.limit) / (LIMIT_WIDTH * task.limit)
                 result = min(result, 1.0 - 1.0 / (1.0 + math.exp(-max(distance, -700.0))))
         return result
 
 
-class Sharing:
-    """Which forces of the actuators give the accelerations of the tasks.
+class ForceDistribution:
+    """Distribution of the tasks' accelerations over the forces of actuators.
 
-    Args: job: the setup. model: of it. mechanism: of the model. tasks: what is followed. exact:
-        whether accelerations must be met exactly, so that only the forces count; else both do,
-        squared.
+    Args:
+        job: the setup.
+        model: its model.
+        mechanism: mechanism of the model.
+        tasks: tasks to fulfil.
+        exact: whether the accelerations are constraints and the squared forces the objective;
+            otherwise the squares of both are minimized.
     """
 
     def __init__(
-        self, job: Job, model: Model, mechanism: Mechanism, tasks: Tasks, exact: bool
+        self, job: Job, model: Model, mechanism: Mechanism, tasks: TrackingTasks, exact: bool
     ) -> None:
         self.tasks, self.exact, self.mechanism = tasks, exact, mechanism
         self._unit = build_static_optimization(job, model, mechanism, muscles="isometric")
@@ -263,18 +309,26 @@ class Sharing:
         self.optimal = self._unit.optimal_forces
         if not self.optimal.all():
             lame = [name for name, force in zip(self.names, self.optimal, strict=True) if not force]
-            raise job.error(
+            raise job.create_error(
                 f"{join_words(lame)} can have no force: the optimal force is 0; give another"
             )
 
-    def accelerations(self, t: float, q: Array, u: Array) -> tuple[Array, Array, Array]:
-        """Of all coordinates: without forces of actuators (n,), by each force (n, a) and by each
-        generalized force (n, n) of 1 N or N m.
+    def compute_responses(self, t: float, q: Array, u: Array) -> tuple[Array, Array, Array]:
+        """Compute the accelerations of all coordinates at a state.
+
+        Args:
+            t: time, s.
+            q: values (n,).
+            u: speeds (n,).
+
+        Returns:
+            Accelerations without actuator forces (n,), by each actuator force (n, a), and by each
+            generalized force (n, n) of 1 N or N m.
         """
         times, values, speeds = np.array([t]), q[None], u[None]
         return self._unit.responses(times, values, speeds)
 
-    def forces(
+    def compute_forces(
         self,
         t: float,
         q: Array,
@@ -283,24 +337,38 @@ class Sharing:
         errors: Array,
         bounds: tuple[Array, Array],
     ) -> tuple[Array, str]:
-        """Forces (a,) within bounds that give the tasks' wanted accelerations, and what is lacking, if anything."""
-        still, each, lightness = self.accelerations(t, q, u)
+        """Compute actuator forces within bounds that give the requested accelerations of the tasks.
+
+        Args:
+            t: time, s.
+            q: values (n,).
+            u: speeds (n,).
+            wanted: requested accelerations (k,).
+            errors: errors of the tasks (k,).
+            bounds: lower and upper bounds of the forces (a,).
+
+        Returns:
+            Forces (a,), and the missing accelerations in words; "" if none is missing.
+        """
+        still, each, lightness = self.compute_responses(t, q, u)
         own = self.tasks.coordinates
         columns, rest = each[own], wanted - still[own]
         if self.exact:
-            return self._least(t, q, u, columns, rest, lightness[np.ix_(own, own)], bounds)
+            return self._compute_exact_forces(
+                t, q, u, columns, rest, lightness[np.ix_(own, own)], bounds
+            )
         weights = np.sqrt(self.tasks.weights)
-        share = math.sqrt(self.tasks.force_weight(errors))
+        share = math.sqrt(self.tasks.compute_force_weight(errors))
         # What is left of the accelerations is an unknown too, whose square is to be small as those
         # of the others.
-        size, scale = len(own), self.optimal / max(share, LEAST_SHARE)
+        size, scale = len(own), self.optimal / max(share, MIN_FORCE_WEIGHT)
         given = np.hstack([weights[:, None] * columns * scale, np.eye(size)])
         free = np.full(size, np.inf)
         ends = np.hstack([np.sort(np.array(bounds) / scale, axis=0), [-free, free]])
         found, _, _ = least_effort(given.T[None], (weights * rest)[None], 2.0, ends)
         return found[0, : len(scale)] * scale, ""
 
-    def _least(
+    def _compute_exact_forces(
         self,
         t: float,
         q: Array,
@@ -310,31 +378,55 @@ class Sharing:
         lightness: Array,
         bounds: tuple[Array, Array],
     ) -> tuple[Array, str]:
+        """Compute the smallest forces that give the accelerations exactly.
+
+        Args:
+            t: time, s.
+            q: values (n,).
+            u: speeds (n,).
+            columns: accelerations of the tasks by each force (k, a).
+            rest: accelerations that the forces must give (k,).
+            lightness: accelerations of the tasks by each generalized force (k, k).
+            bounds: lower and upper bounds of the forces (a,).
+
+        Returns:
+            Forces (a,), and the missing accelerations in words; "" if none is missing.
+        """
         assert self._strong is not None
         strengths = self._strong.strengths(np.array([t]), q[None], u[None])
         # The forces of muscles whose fibers can give none count without end: they are as small as
         # they can be.
-        able = np.abs(strengths) > WEAK * np.abs(self.optimal)
+        able = np.abs(strengths) > MIN_STRENGTH * np.abs(self.optimal)
         forces = np.clip(0.0, *bounds)
         # A locked coordinate has no acceleration that forces could change.
         infos = [self.mechanism.coordinates[k] for k in self.tasks.coordinates]
-        counted = (self.tasks.weights != 0.0) & ~np.array([info.locked for info in infos])
-        each, left = columns[counted][:, able], (rest - columns[:, ~able] @ forces[~able])[counted]
+        has_target = (self.tasks.weights != 0.0) & ~np.array([info.locked for info in infos])
+        each, left = (
+            columns[has_target][:, able],
+            (rest - columns[:, ~able] @ forces[~able])[has_target],
+        )
         scale = strengths[able]
         scaled = np.sort(np.array(bounds)[:, able] / scale, axis=0)
         # Accelerations of feet and of the pelvis differ by orders of magnitude, and every force
         # moves all of them: as equations of the generalized forces that the tasks take, the least
         # of reserves counts, beside full muscles.
-        mass = np.linalg.pinv(lightness[np.ix_(counted, counted)], RANK, hermitian=True)
+        mass = np.linalg.pinv(
+            lightness[np.ix_(has_target, has_target)], RANK_TOLERANCE, hermitian=True
+        )
         rows = np.ascontiguousarray((mass @ (each * scale)).T)
         result, _, solved = least_effort(rows[None], (mass @ left)[None], 2.0, scaled)
         forces[able] = result[0] * scale
         lacking = left - each @ forces[able]
-        if solved[0] and (np.abs(lacking) <= CLOSE * (np.abs(each) @ np.abs(forces[able]))).all():
+        if (
+            solved[0]
+            and (
+                np.abs(lacking) <= ACCELERATION_TOLERANCE * (np.abs(each) @ np.abs(forces[able]))
+            ).all()
+        ):
             return forces, ""
         names = [
             task.name if info.prescribed is None else f"{task.name} (which is prescribed)"
-            for task, info, counts in zip(self.tasks.tasks, infos, counted, strict=True)
+            for task, info, counts in zip(self.tasks.tasks, infos, has_target, strict=True)
             if counts
         ]
         off = np.abs(lacking)
@@ -344,11 +436,11 @@ class Sharing:
         return forces, join_words(worst, most=3)
 
 
-def require_no_controllers(job: Job, model: Model) -> None:
-    """Refuse controllers of the model, which would add to the controls that are computed.
+def refuse_controllers(job: Job, model: Model) -> None:
+    """Raise an error for enabled controllers, which would add to the computed controls.
 
     Raises:
-        SettingError: one is enabled.
+        SettingError: a controller of the model is enabled.
     """
     for controller in model.controller_set.objects:
         if getattr(controller, "enabled", True):

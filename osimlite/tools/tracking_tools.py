@@ -1,4 +1,4 @@
-"""OpenSim's RRATool and CMCTool: a model follows a measured motion by forces or excitations that are computed."""
+"""OpenSim's RRATool and CMCTool: a model follows a measured motion."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from osimlite.schema.tools.analyses import Actuation, Kinematics
 from osimlite.schema.tools.tracking import CMCTool, RRATool
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.run import Simulation
-from osimlite.tools.computed_control import ComputedControl, Control, Followed
+from osimlite.tools.computed_control import ActuatorControl, ComputedControl, TrackedMotion
 from osimlite.tools.dynamics_setup import (
     build_model,
     build_simulation,
@@ -32,58 +32,79 @@ from osimlite.tools.dynamics_setup import (
 from osimlite.tools.job import Job
 from osimlite.tools.motion import Motion
 from osimlite.tools.outcome import Outcome
-from osimlite.tools.tracking import Desired, Sharing, Tasks, require_no_controllers
+from osimlite.tools.tracking import (
+    DesiredMotion,
+    ForceDistribution,
+    TrackingTasks,
+    refuse_controllers,
+)
 
-RRA_WINDOW = 1e-3
-"""For which controls are computed, s."""
-FARTHEST = 0.1
-"""A mass centre is moved by no more than this, m."""
+RRA_WINDOW_S = 1e-3
+"""Length of the windows of RRATool, s."""
+MAX_SHIFT_M = 0.1
+"""Largest shift of a mass centre along an axis, m."""
 
 
 def run_rra_tool(job: Job, outcome: Outcome) -> None:
-    """Move the mass centre if that is asked for, then follow the motion, and write what residuals are left."""
+    """Move the mass centre if requested, follow the motion, and write the average residuals.
+
+    Args:
+        job: setup, an RRATool.
+        outcome: collects the results.
+    """
     setup: RRATool = job.setup
-    model, whole = build_model(job), job.model()
+    model, whole = build_model(job), job.read_model()
     with build_simulation(job, model) as simulation:
-        desired = Desired.of(job, outcome, simulation, model)
+        desired = DesiredMotion.read(job, outcome, simulation, model)
     if setup.adjust_com_to_reduce_residuals:
         _move_mass_center(job, outcome, model, whole, desired)
-        outcome.text(_get_model_output(job, setup.output_model_file.strip()), to_text(whole))
-    motion = _track_motion(job, outcome, model, desired, RRA_WINDOW, exact=False)
+        outcome.add_text(_get_model_output(job, setup.output_model_file.strip()), to_text(whole))
+    motion = _track_motion(job, outcome, model, desired, RRA_WINDOW_S, exact=False)
     if motion is None:
         return
     forces = outcome.tables[f"{setup.name}_Actuation_force.sto"]
     averages = _average_residual_columns(forces.times, forces.columns, forces.rows)
     outcome.summary["average_residuals"] = dict(zip(RESIDUALS, averages, strict=True))
     if words := _describe_residuals(averages):
-        outcome.tell("average residuals", words)
+        outcome.add_message("average residuals", words)
     lines = "".join(
         f"{name} average = {value:g}\n" for name, value in zip(RESIDUALS, averages, strict=True)
     )
-    outcome.text(job.in_results(f"{setup.name}_avgResiduals.txt"), f"Average Residuals:\n\n{lines}")
+    outcome.add_text(
+        job.get_results_path(f"{setup.name}_avgResiduals.txt"), f"Average Residuals:\n\n{lines}"
+    )
 
 
 def _move_mass_center(
-    job: Job, outcome: Outcome, model: Model, whole: Model, desired: Desired
+    job: Job, outcome: Outcome, model: Model, whole: Model, desired: DesiredMotion
 ) -> None:
-    """Move the mass centre of a body in two models so that the moments about the horizontal axes average to nothing.
+    """Move the mass centre of a body so that average moments about the horizontal axes vanish.
 
-    The masses that would take the vertical force away are only told, as OpenSim does.
+    As in OpenSim, the masses that would remove the vertical residual are reported, but not changed.
+
+    Args:
+        job: the setup.
+        outcome: collects messages.
+        model: model with the forces of the setup, which is changed.
+        whole: model as in its file, which is changed.
+        desired: motion to follow.
     """
     setup: RRATool = job.setup
     name = str(setup.adjusted_com_body)
     bodies = {body.name: body for body in model.components(Body)}
     if name not in bodies:
-        raise job.error(
+        raise job.create_error(
             f"adjusted_com_body is '{name}', which is no body of the model{suggest_name(name, bodies)}"
         )
     body, gravity = bodies[name], model.gravity
     weight = abs(gravity[1]) * body.mass
     if weight < 2.0**-45.5:
-        outcome.tell("mass center", f"'{name}' has no weight: it stays where it is, as in OpenSim")
+        outcome.add_message(
+            "mass center", f"'{name}' has no weight: it stays where it is, as in OpenSim"
+        )
         return
     before = _compute_average_residuals(job, model, desired)
-    dx, dz = np.clip([before[5] / weight, -before[3] / weight], -FARTHEST, FARTHEST).tolist()
+    dx, dz = np.clip([before[5] / weight, -before[3] / weight], -MAX_SHIFT_M, MAX_SHIFT_M).tolist()
     x, y, z = body.mass_center
     for each in (model, whole):
         next(item for item in each.components(Body) if item.name == name).mass_center = (
@@ -94,8 +115,10 @@ def _move_mass_center(
     total = sum(item.mass for item in bodies.values())
     change = before[1] / gravity[1]
     outcome.summary |= {"mass_center_moved": [-dx, 0.0, -dz], "mass_change": change}
-    outcome.tell("mass center", f"of {name} moved by {-dx:.4g} m along x and {-dz:.4g} m along z")
-    outcome.tell(
+    outcome.add_message(
+        "mass center", f"of {name} moved by {-dx:.4g} m along x and {-dz:.4g} m along z"
+    )
+    outcome.add_message(
         "mass",
         f"{total:.6g} kg, and {change:+.4g} kg would take the vertical residual away; OpenSim leaves that to you",
     )
@@ -103,11 +126,11 @@ def _move_mass_center(
         ("before", before),
         ("after", _compute_average_residuals(job, model, desired)),
     ):
-        outcome.tell(f"residuals {when}", _describe_residuals(averages))
+        outcome.add_message(f"residuals {when}", _describe_residuals(averages))
 
 
-def _compute_average_residuals(job: Job, model: Model, desired: Desired) -> list[float]:
-    """Averages of the residuals that the motion takes as it was measured, in the time of the setup."""
+def _compute_average_residuals(job: Job, model: Model, desired: DesiredMotion) -> list[float]:
+    """Return the average residuals of the desired motion between the times of the setup."""
     setup: RRATool = job.setup
     mechanism: Mechanism = build_mechanism(model, opensim_derivatives=True)
     sharing = build_static_optimization(job, model, mechanism, muscles="isometric")
@@ -126,39 +149,47 @@ def _compute_average_residuals(job: Job, model: Model, desired: Desired) -> list
 
 
 def run_cmc_tool(job: Job, outcome: Outcome) -> None:
-    """Follow the motion window by window, and write controls, states and forces."""
+    """Follow the motion window by window; write controls, states and forces.
+
+    Args:
+        job: setup, a CMCTool.
+        outcome: collects the results.
+    """
     setup: CMCTool = job.setup
     if setup.actuators_to_exclude:
-        raise job.unable(
+        raise job.create_unsupported_error(
             "actuators_to_exclude is given, and all actuators are controlled here; leave it empty"
         )
     model = build_model(job)
     with build_simulation(job, model) as simulation:
-        desired = Desired.of(job, outcome, simulation, model)
+        desired = DesiredMotion.read(job, outcome, simulation, model)
     _track_motion(
         job, outcome, model, desired, setup.cmc_time_window, setup.use_fast_optimization_target
     )
 
 
 RESIDUALS = "FX", "FY", "FZ", "MX", "MY", "MZ"
-"""What OpenSim's tools take for residual forces and moments of the pelvis."""
+"""Names of the actuators that OpenSim takes for residual forces and moments of the pelvis."""
 
 
 def _track_motion(
-    job: Job, outcome: Outcome, model: Model, desired: Desired, window: float, exact: bool
+    job: Job, outcome: Outcome, model: Model, desired: DesiredMotion, window: float, exact: bool
 ) -> Motion | None:
-    """Have a model follow a motion, and write what OpenSim writes of it; None if it does not begin.
+    """Let a model follow a motion, and add the files that OpenSim writes.
 
     Args:
         job: the setup.
-        outcome: that has the files written.
-        model: with the forces of the setup.
-        desired: the motion.
-        window: for which controls are computed, s.
+        outcome: collects the results.
+        model: model with the forces of the setup.
+        desired: motion to follow.
+        window: length of the windows in which controls are computed, s.
         exact: whether the accelerations must be met exactly.
+
+    Returns:
+        The motion; None if it does not begin.
     """
     setup: RRATool | CMCTool = job.setup
-    require_no_controllers(job, model)
+    refuse_controllers(job, model)
     analyses = find_analyses(job)
     have = {type(item) for item, _ in analyses}
     for cls in (Actuation, Kinematics):
@@ -170,29 +201,29 @@ def _track_motion(
     analyses = find_analyses(job)
     start, end = max(setup.initial_time, desired.start), min(setup.final_time, desired.end)
     if not start < end - window:
-        raise job.error(
+        raise job.create_error(
             f"there is no window of {window:g} s from {start:g} s to {end:g} s; give a later final_time"
         )
     with build_simulation(job, model) as simulation:
-        tasks = Tasks.of(job, simulation.mechanism)
-        sharing = Sharing(job, model, simulation.mechanism, tasks, exact)
+        tasks = TrackingTasks.read(job, simulation.mechanism)
+        sharing = ForceDistribution(job, model, simulation.mechanism, tasks, exact)
         controls = _create_controls(job, sharing, model)
         tracker = ComputedControl(job, simulation, desired, tasks, sharing, controls, window)
-        y, followed = _compute_first_state(job, simulation, desired, start), Followed()
+        y, followed = _compute_first_state(job, simulation, desired, start), TrackedMotion()
         if tracker.has_states:
-            start, y = tracker.at_rest(start, y, followed)
+            start, y = tracker.settle_muscles(start, y, followed)
         if not followed.failure:
             bounds = setup.minimum_integrator_step_size, setup.maximum_integrator_step_size
             settings = Settings(setup.integrator_error_tolerance, step_bounds=bounds)
             before = followed.errors
-            followed = tracker.follow(start, y, end - window, settings)
+            followed = tracker.follow_motion(start, y, end - window, settings)
             followed.errors = before | followed.errors
         if followed.failure:
             outcome.done = False
-            outcome.tell("ended early", followed.failure)
+            outcome.add_message("ended early", followed.failure)
         if len(followed.times) < 2:
             return None
-        tracker.drive_through()
+        tracker.drive_all_windows()
         moments = list(zip(followed.times, followed.states, strict=True))
         motion = Motion(
             model, simulation, np.array(followed.times), np.array(followed.states), moments
@@ -203,38 +234,40 @@ def _track_motion(
     return motion
 
 
-def _create_controls(job: Job, sharing: Sharing, model: Model) -> list[Control]:
-    path = job.path("constraints_file")
-    given = None if path is None else job.read(path, ControlSet)
+def _create_controls(job: Job, sharing: ForceDistribution, model: Model) -> list[ActuatorControl]:
+    """Return a control for each actuator, with the bounds of the setup."""
+    path = job.find_path("constraints_file")
+    given = None if path is None else job.read_object(path, ControlSet)
     actuators = {item.name: item for item in model.force_set.objects}
-    return [Control.of(actuators[name], given) for name in sharing.names]
+    return [ActuatorControl.create(actuators[name], given) for name in sharing.names]
 
 
 def _compute_first_state(
-    job: Job, simulation: Simulation, desired: Desired, start: float
+    job: Job, simulation: Simulation, desired: DesiredMotion, start: float
 ) -> list[float]:
-    """Return the state (y,) of the desired motion at a time; fibers are where they were in the default pose.
+    """Return the state (y,) of the desired motion at a time, with fibers as in the default pose.
 
-    Like OpenSim's, it need not fulfil the constraints: only the integration that begins with it
-    projects it. The controls of the first window are computed before, for the desired speeds:
-    without an error of speeds to make up for.
+    As in OpenSim, the state need not satisfy the constraints: the integrator projects it. The
+    controls of the first window are computed before that, for the desired speeds, so that there is
+    no speed error to correct.
     """
     in_equilibrium = (
         isinstance(job.setup, RRATool) or job.setup.solve_for_equilibrium_for_auxiliary_states
     )
     default = simulation.initial_state({}, {}, equilibrate=in_equilibrium)
-    (wanted,) = desired.at(start)
+    (wanted,) = desired.evaluate(start)
     q, u = wanted[0], wanted[2]
     return simulation.state.pack(q.tolist(), u.tolist(), default[2 * len(simulation.state.order) :])
 
 
 def _write_tables(
-    job: Job, outcome: Outcome, tracker: ComputedControl, motion: Motion, followed: Followed
+    job: Job, outcome: Outcome, tracker: ComputedControl, motion: Motion, followed: TrackedMotion
 ) -> None:
+    """Add the tables of states, controls and errors, and the document of the controls."""
     name, precision = job.setup.name, job.setup.output_precision
 
     def add(ending: str, table: StoTable) -> None:
-        outcome.table(job.in_results(f"{name}_{ending}.sto"), table, precision=precision)
+        outcome.add_table(job.get_results_path(f"{name}_{ending}.sto"), table, precision=precision)
 
     paths = tuple(motion.simulation.paths)
     add(
@@ -243,7 +276,12 @@ def _write_tables(
     labels = tuple(path.rpartition("/")[2] for path in motion.simulation.forces.controls.names)
     add(
         "controls",
-        StoTable("controls", motion.times, labels, motion.looked(motion.system.places_of_controls)),
+        StoTable(
+            "controls",
+            motion.times,
+            labels,
+            motion.evaluate_kernels(motion.system.places_of_controls),
+        ),
     )
     columns = tuple(task.name for task in tracker.tasks.tasks)
     errors = StoTable(
@@ -254,12 +292,15 @@ def _write_tables(
     )
     add("pErr", errors)
     controls = ControlSet(
-        name=motion.model.name, objects=[item.document() for item in tracker.controls]
+        name=motion.model.name, objects=[item.create_document() for item in tracker.controls]
     )
-    outcome.text(job.in_results(f"{name}_controls.xml"), to_text(controls, numbers="opensim"))
+    outcome.add_text(
+        job.get_results_path(f"{name}_controls.xml"), to_text(controls, numbers="opensim")
+    )
 
 
-def _report_errors(job: Job, outcome: Outcome, motion: Motion, followed: Followed) -> None:
+def _report_errors(job: Job, outcome: Outcome, motion: Motion, followed: TrackedMotion) -> None:
+    """Add messages about the largest errors of angles and translations."""
     report_rows(job, outcome, motion)
     errors = np.abs([*followed.errors.values()])
     infos = motion.mechanism.coordinates
@@ -273,13 +314,13 @@ def _report_errors(job: Job, outcome: Outcome, motion: Motion, followed: Followe
             worst = int(np.argmax(errors[:, chosen].max(axis=0)))
             largest = factor * float(errors[:, chosen].max())
             outcome.summary[f"worst_{what}"] = largest
-            outcome.tell(
+            outcome.add_message(
                 f"worst {what}", f"{largest:.3g} {unit} off, {table.columns[chosen[worst]]}"
             )
 
 
 def _average_residual_columns(times: Array, columns: tuple[str, ...], rows: Array) -> list[float]:
-    """Averages over time of the columns that OpenSim takes for residuals, 0 where there is none."""
+    """Return time averages of the residual columns, 0 for those that are missing."""
     if len(times) < 2:
         return [0.0] * len(RESIDUALS)
     areas = np.trapezoid(rows, times, axis=0) / (times[-1] - times[0])
@@ -287,12 +328,12 @@ def _average_residual_columns(times: Array, columns: tuple[str, ...], rows: Arra
 
 
 def _describe_residuals(averages: list[float]) -> str:
-    """Averages in words."""
+    """Return average residuals in words."""
     return ", ".join(
         f"{name} {value:.4g}" for name, value in zip(RESIDUALS, averages, strict=True) if value
     )
 
 
 def _get_model_output(job: Job, name: str) -> Path:
-    """Where a changed model goes."""
-    return job.result(name or "adjusted_model.osim")
+    """Return the path of the changed model."""
+    return job.get_output_path(name or "adjusted_model.osim")

@@ -104,7 +104,7 @@ def test_markers_that_do_not_count_and_units_that_cannot_be_right_are_told(lab: 
         and "in the data, not of the model: threee\n" in out
     )
     assert "units" not in out
-    data = MarkerData.of(trial)
+    data = MarkerData.from_source(trial)
     write_trc(
         trial,
         data.times.tolist(),

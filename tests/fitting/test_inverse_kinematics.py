@@ -238,7 +238,7 @@ def test_markers_of_a_table(tmp_path: Path) -> None:
     path = tmp_path / "markers.sto"
     columns = [f"{name}{end}" for name in MARKERS for end in ("_tx", "_ty", "_tz")]
     write_sto(path, "markers", [0.0, 0.1, 0.2, 0.3], columns, places.reshape(4, -1).tolist())
-    assert MarkerData.of(path).names == MARKERS
+    assert MarkerData.from_source(path).names == MARKERS
     assert osimlite.inverse_kinematics(free_body(), path).values == pytest.approx(
         motion(4), abs=1e-8
     )
@@ -257,7 +257,7 @@ def test_c3d_files_need_a_package_of_their_own(
 def test_c3d_files_are_read() -> None:
     """In their unit, with their rate; what was not seen is NaN."""
     pytest.importorskip("ezc3d")
-    data = MarkerData.of(TRIALS / "two_markers.c3d")
+    data = MarkerData.from_source(TRIALS / "two_markers.c3d")
     frames = np.arange(5.0)
     one = np.stack((0.1 * frames, 0.2 - 0.01 * frames, -0.3 + 0.001 * frames), axis=1)
     two = np.stack((-0.1 * frames, 0.5 + 0.01 * frames, 0.002 * frames), axis=1)

@@ -10,13 +10,13 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError, SettingError
-from osimlite.fitting.inverse_kinematics import marker_stations
+from osimlite.fitting.inverse_kinematics import find_marker_stations
 from osimlite.fitting.person import fit
-from osimlite.fitting.person_files import SETUP, person_texts
-from osimlite.fitting.scale_tool import run_scale
+from osimlite.fitting.person_files import SETUP, create_person_files
+from osimlite.fitting.scale_tool import compute_scaled_model
 from osimlite.fitting.scaling import scale_model
-from osimlite.fitting.segments import Segments, other_side
-from osimlite.fitting.shape import Shape
+from osimlite.fitting.segments import Segments, get_opposite_name
+from osimlite.fitting.shape import ScalableMarkers
 from osimlite.io.document.reader import read_any
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.tools.scale import ScaleTool
@@ -62,7 +62,7 @@ def person(
             marker.location = tuple((np.array(marker.location) + offsets[marker.name]).tolist())
     mechanism = osimlite.mechanism(model)
     moments, rate = np.arange(frames) / frames, rng.uniform(1.0, 6.0, len(mechanism.coordinates))
-    stations = marker_stations(model, mechanism)
+    stations = find_marker_stations(model, mechanism)
     result: dict[str, list[Any]] = {name: [] for name in stations}
     for t in moments:
         q = 0.5 * np.sin(rate * (t + 0.2))
@@ -132,14 +132,14 @@ def test_factors_move_markers_as_the_difference_of_two_models_says() -> None:
         )
     names = [f"on {body.name}" for body in bodies]
     carriers = {body.name: "" for body in bodies}
-    segments = Segments.of(carriers, carriers, by_axis=True, symmetric=False)
-    shape, rng = Shape(model, names, segments), np.random.default_rng(3)
+    segments = Segments.group_bodies(carriers, carriers, by_axis=True, symmetric=False)
+    shape, rng = ScalableMarkers(model, names, segments), np.random.default_rng(3)
     sizes = rng.uniform(0.7, 1.4, len(segments.parts))
     ones = np.ones_like(sizes)
-    mechanism, stations = shape.scaled(sizes)
-    first, places = shape.scaled(ones)
+    mechanism, stations = shape.scale_mechanism(sizes)
+    first, places = shape.scale_mechanism(ones)
     values = rng.uniform(-0.5, 0.5, (4, len(mechanism.coordinates)))
-    columns, _ = shape.columns(values)
+    columns, _ = shape.compute_derivatives(values)
     for q, own in zip(values, columns, strict=True):
         there = [mechanism.at(q).point(*place) for place in stations]
         here = [first.at(q).point(*place) for place in places]
@@ -161,7 +161,7 @@ def test_bodies_without_markers_go_with_others() -> None:
         "femur_l": "pelvis",
     }
     marked = {"pelvis", "femur_r", "tibia_r", "calcn_r", "femur_l"}
-    parts = Segments.of(carriers, marked, by_axis=False, symmetric=True).parts
+    parts = Segments.group_bodies(carriers, marked, by_axis=False, symmetric=True).parts
     groups = [
         {"pelvis"},
         {"femur_r", "femur_l", "patella_r"},
@@ -169,7 +169,7 @@ def test_bodies_without_markers_go_with_others() -> None:
         {"talus_r", "calcn_r", "toes_r"},
     ]
     assert [set(part.bodies) for part in parts] == groups
-    assert len(Segments.of(carriers, marked, by_axis=True, symmetric=False).parts) == 15
+    assert len(Segments.group_bodies(carriers, marked, by_axis=True, symmetric=False).parts) == 15
 
 
 @pytest.mark.parametrize(
@@ -184,8 +184,11 @@ def test_bodies_without_markers_go_with_others() -> None:
 def test_names_of_sides(one: str, other: str) -> None:
     """As models have them."""
     names = {one: 0, other: 1, "torso": 2, "rotor": 3}
-    assert (other_side(one, names), other_side(other, names)) == (other, one)
-    assert other_side("torso", names) == "torso" and other_side("rotor", names) == "rotor"
+    assert (get_opposite_name(one, names), get_opposite_name(other, names)) == (other, one)
+    assert (
+        get_opposite_name("torso", names) == "torso"
+        and get_opposite_name("rotor", names) == "rotor"
+    )
 
 
 def test_the_setup_makes_the_same_model(tmp_path: Path) -> None:
@@ -194,13 +197,13 @@ def test_the_setup_makes_the_same_model(tmp_path: Path) -> None:
     model = marked()
     osimlite.write(model, tmp_path / "generic.osim")
     result = fit(model, {"moving": data}, held=HELD, mass=70.0)
-    texts = person_texts(result, tmp_path / "generic.osim", tmp_path / "subject", 70.0)
+    texts = create_person_files(result, tmp_path / "generic.osim", tmp_path / "subject", 70.0)
     (tmp_path / "subject").mkdir()
     for name, text in texts.items():
         (tmp_path / "subject" / name).write_text(text)
     setup = read_any(tmp_path / "subject" / SETUP)
     assert isinstance(setup, ScaleTool)
-    made = run_scale(setup, tmp_path / "subject").model
+    made = compute_scaled_model(setup, tmp_path / "subject").model
     assert_same(
         osimlite.read_text(osimlite.to_text(made)),
         osimlite.read(tmp_path / "subject" / "generic_fitted.osim"),

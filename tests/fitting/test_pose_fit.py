@@ -15,7 +15,7 @@ import osimlite
 from osimlite import Body, FreeJoint, Model, PhysicalOffsetFrame, PinJoint
 from osimlite.errors import SimulationError
 from osimlite.fitting.pose_fit import PoseFit
-from osimlite.fitting.pose_layout import Goal, Marker, Sensor
+from osimlite.fitting.pose_layout import CoordinateTarget, MarkerTarget, SensorTarget
 from osimlite.mechanics.kernels import pose_cost, pose_record
 from osimlite.mechanics.kernels.pose_fit import weigh
 from osimlite.mechanics.multibody import functions as f
@@ -29,22 +29,24 @@ ROUND = "ConstantCurvatureJoint"
 """Its functions of several coordinates are bent, which Newton's matrix leaves out."""
 
 
-def markers_of(mechanism: Mechanism, rng: np.random.Generator, each: int = 3) -> list[Marker]:
+def markers_of(mechanism: Mechanism, rng: np.random.Generator, each: int = 3) -> list[MarkerTarget]:
     """Some markers on every body."""
     return [
-        Marker(StationPlacement(body, rng.uniform(-0.3, 0.3, 3)), float(rng.uniform(0.2, 5.0)))
+        MarkerTarget(
+            StationPlacement(body, rng.uniform(-0.3, 0.3, 3)), float(rng.uniform(0.2, 5.0))
+        )
         for body in range(len(mechanism.bodies))
         for _ in range(each)
     ]
 
 
-def places_at(mechanism: Mechanism, markers: list[Marker], q: Any) -> Any:
+def places_at(mechanism: Mechanism, markers: list[MarkerTarget], q: Any) -> Any:
     """Where the markers are (m, 3)."""
     state = mechanism.at(q)
     return np.array([state.point(*marker.station) for marker in markers])
 
 
-def cost_of(mechanism: Mechanism, markers: list[Marker], measured: Any, q: Any) -> float:
+def cost_of(mechanism: Mechanism, markers: list[MarkerTarget], measured: Any, q: Any) -> float:
     """What OpenSim minimises."""
     weights = np.array([marker.weight for marker in markers]) * np.isfinite(measured).all(axis=1)
     squares = np.sum((places_at(mechanism, markers, q) - np.nan_to_num(measured)) ** 2, axis=1)
@@ -84,7 +86,7 @@ def test_the_derivatives_are_those_of_the_cost(case: Case, seed: int) -> None:
     if not mechanism.coordinates:
         return
     markers = markers_of(mechanism, rng, 2)
-    fit = PoseFit(mechanism, markers, goals=[Goal(0, 0.3)], code=PYTHON)
+    fit = PoseFit(mechanism, markers, goals=[CoordinateTarget(0, 0.3)], code=PYTHON)
     measured = places_at(mechanism, markers, case.q) + rng.normal(0.0, 0.1, (len(markers), 3))
     measured[-1, 1] = np.nan
     frame = [*measured.ravel(), 0.2]
@@ -101,10 +103,10 @@ def test_the_derivatives_are_those_of_the_cost(case: Case, seed: int) -> None:
             assert second[number] == pytest.approx((ahead[1] - behind[1]) / 2e-5, abs=2e-8)
 
 
-def sensors_of(mechanism: Mechanism, rng: np.random.Generator) -> list[Sensor]:
+def sensors_of(mechanism: Mechanism, rng: np.random.Generator) -> list[SensorTarget]:
     """A sensor on every body and one in ground."""
     return [
-        Sensor(
+        SensorTarget(
             FramePlacement(body, make_transform(rotation_xyz(rng.uniform(-3.0, 3.0, 3)))),
             float(rng.uniform(0.2, 5.0)),
         )
@@ -112,7 +114,7 @@ def sensors_of(mechanism: Mechanism, rng: np.random.Generator) -> list[Sensor]:
     ]
 
 
-def orientations_at(mechanism: Mechanism, sensors: list[Sensor], q: Any) -> Any:
+def orientations_at(mechanism: Mechanism, sensors: list[SensorTarget], q: Any) -> Any:
     """How the sensors are turned (k, 3, 3)."""
     state = mechanism.at(q)
     return np.array(
@@ -177,7 +179,7 @@ def test_a_pose_is_a_minimum_where_the_constraints_hold(case: Case, seed: int, k
     measured = places_at(mechanism, markers, start) + rng.normal(0.0, 0.02, (len(markers), 3))
     fit = PoseFit(mechanism, markers)
     try:
-        poses = fit.fit(measured.reshape(1, -1), q=start)
+        poses = fit.fit_frames(measured.reshape(1, -1), q=start)
     except SimulationError:
         assert kind not in ("", "coupler")
         return
@@ -221,7 +223,7 @@ def test_python_and_machine_code_find_the_same_poses() -> None:
     motion = [places_at(case, markers, 0.3 * np.sin(0.1 * t + np.arange(6))) for t in range(4)]
     frames = np.array(motion).reshape(4, -1) + rng.normal(0.0, 0.01, (4, 3 * len(markers)))
     result = [
-        PoseFit(case, markers, code=code).fit(frames, q=np.zeros(6)).values
+        PoseFit(case, markers, code=code).fit_frames(frames, q=np.zeros(6)).values
         for code in (COMPILED, PYTHON)
     ]
     assert result[0] == pytest.approx(result[1], abs=1e-10)
@@ -256,16 +258,21 @@ def _pendulum(**changes: Any) -> Mechanism:
     return replace(mechanism, coordinates=infos)
 
 
-ARM = [Marker(StationPlacement(1, np.array(point))) for point in ((1.0, 0.0, 0.0), (0.5, 0.5, 0.0))]
+ARM = [
+    MarkerTarget(StationPlacement(1, np.array(point)))
+    for point in ((1.0, 0.0, 0.0), (0.5, 0.5, 0.0))
+]
 
 
 def test_a_clamped_coordinate_stays_in_its_range() -> None:
     """And the other one is where it is best beside that."""
     free, clamped = _pendulum(), _pendulum(clamped=True, range=(-0.5, 0.25))
-    markers = [*ARM, Marker(StationPlacement(0, np.array((1.0, 0.0, 0.0))))]
+    markers = [*ARM, MarkerTarget(StationPlacement(0, np.array((1.0, 0.0, 0.0))))]
     measured = places_at(free, markers, np.array((0.3, 0.9))).reshape(1, -1)
-    assert PoseFit(free, markers).fit(measured).values[0] == pytest.approx((0.3, 0.9), abs=1e-9)
-    poses = PoseFit(clamped, markers).fit(measured)
+    assert PoseFit(free, markers).fit_frames(measured).values[0] == pytest.approx(
+        (0.3, 0.9), abs=1e-9
+    )
+    poses = PoseFit(clamped, markers).fit_frames(measured)
     assert poses.values[0, 1] == 0.25 and 0.3 < poses.values[0, 0] < 0.9
     ahead, here, behind = (
         cost_of(free, markers, measured.reshape(-1, 3), poses.values[0] + (step, 0.0))
@@ -279,15 +286,17 @@ def test_a_range_of_what_depends_bounds_what_it_depends_on() -> None:
     mechanism = _pendulum(clamped=True, range=(-0.4, 0.4))
     mechanism = replace(mechanism, constraints=(Coupler(1, (0,), f.Linear(2.0, 0.1)),))
     measured = places_at(_pendulum(), ARM, np.array((0.5, 1.1))).reshape(1, -1)
-    assert PoseFit(mechanism, ARM).fit(measured).values[0] == pytest.approx((0.15, 0.4), abs=1e-9)
+    assert PoseFit(mechanism, ARM).fit_frames(measured).values[0] == pytest.approx(
+        (0.15, 0.4), abs=1e-9
+    )
 
 
 def test_locked_and_prescribed_coordinates_are_held() -> None:
     """At the default, and at the function of time."""
     measured = places_at(_pendulum(), ARM, np.array((0.3, 0.9))).reshape(1, -1)
-    locked = PoseFit(_pendulum(locked=True, default_value=0.7), ARM).fit(measured)
+    locked = PoseFit(_pendulum(locked=True, default_value=0.7), ARM).fit_frames(measured)
     assert locked.values[0, 1] == 0.7
-    driven = PoseFit(_pendulum(prescribed=f.Linear(1.0, 0.2)), ARM).fit(
+    driven = PoseFit(_pendulum(prescribed=f.Linear(1.0, 0.2)), ARM).fit_frames(
         np.repeat(measured, 2, 0), [0.0, 0.5]
     )
     assert driven.values[:, 1] == pytest.approx((0.2, 0.7), abs=1e-12)
@@ -297,13 +306,13 @@ def test_goals_pull_coordinates() -> None:
     """A goal of a locked coordinate does nothing; NaN is no goal."""
     mechanism = _pendulum()
     measured = places_at(mechanism, ARM, np.array((0.3, 0.9))).reshape(-1)
-    fit = PoseFit(mechanism, ARM, goals=[Goal(1, 1e6)])
-    values = fit.fit(np.array([[*measured, 0.1], [*measured, np.nan]])).values
+    fit = PoseFit(mechanism, ARM, goals=[CoordinateTarget(1, 1e6)])
+    values = fit.fit_frames(np.array([[*measured, 0.1], [*measured, np.nan]])).values
     assert values[0, 1] == pytest.approx(0.1, abs=1e-5) and values[1] == pytest.approx(
         (0.3, 0.9), abs=1e-9
     )
-    held = PoseFit(_pendulum(locked=True, default_value=0.7), ARM, goals=[Goal(1, 1e6)])
-    assert held.fit(np.array([[*measured, 0.1]])).values[0, 1] == 0.7
+    held = PoseFit(_pendulum(locked=True, default_value=0.7), ARM, goals=[CoordinateTarget(1, 1e6)])
+    assert held.fit_frames(np.array([[*measured, 0.1]])).values[0, 1] == 0.7
 
 
 def test_what_is_not_seen_leaves_the_pose_as_it_was() -> None:
@@ -316,7 +325,7 @@ def test_what_is_not_seen_leaves_the_pose_as_it_was() -> None:
     frames[1] = np.nan
     frames[2, 3:] = np.nan
     frames[2, :3] += 0.01
-    poses = PoseFit(mechanism, markers).fit(frames, q=np.zeros(6))
+    poses = PoseFit(mechanism, markers).fit_frames(frames, q=np.zeros(6))
     assert poses.unseen == (1,)
     assert poses.values[[0, 1, 3]] == pytest.approx(np.tile(pose, (3, 1)), abs=1e-8)
     assert poses.places[2, 0] == pytest.approx(frames[2, :3], abs=1e-7)
@@ -325,7 +334,7 @@ def test_what_is_not_seen_leaves_the_pose_as_it_was() -> None:
 
 def test_nothing_seen_from_the_beginning_is_the_start() -> None:
     """All frames are empty."""
-    poses = PoseFit(_free_body(), markers_of(_free_body(), np.random.default_rng(0))).fit(
+    poses = PoseFit(_free_body(), markers_of(_free_body(), np.random.default_rng(0))).fit_frames(
         np.full((3, 9), np.nan), q=np.arange(6.0)
     )
     assert poses.unseen == (0, 1, 2) and (poses.values == np.arange(6.0)).all()
@@ -338,8 +347,8 @@ def test_sensors_turn_bodies(far: float) -> None:
     frame = make_transform(rotation_xyz(np.array((0.2, 0.5, -0.3))), (0.1, 0.0, 0.0))
     pose = np.array((0.4 + far, 0.3, 0.2, 0.0, 0.0, 0.0))
     wanted = mechanism.at(pose).rotations[0] @ frame[:3, :3]
-    fit = PoseFit(mechanism, [], [Sensor(FramePlacement(0, frame))])
-    poses = fit.fit(wanted.reshape(1, -1), q=np.zeros(6))
+    fit = PoseFit(mechanism, [], [SensorTarget(FramePlacement(0, frame))])
+    poses = fit.fit_frames(wanted.reshape(1, -1), q=np.zeros(6))
     assert poses.costs[0] == pytest.approx(0.0, abs=1e-16)
     assert mechanism.at(poses.values[0]).rotations[0] @ frame[:3, :3] == pytest.approx(
         wanted, abs=1e-8
@@ -355,13 +364,13 @@ def test_a_sensor_that_is_half_a_turn_off_is_found(
 ) -> None:
     """A cost without a slope is none: whichever way round, the whole half turn counts."""
     mechanism = _free_body()
-    sensor = Sensor(FramePlacement(0, np.eye(4)))
+    sensor = SensorTarget(FramePlacement(0, np.eye(4)))
     wanted = Rotation.from_rotvec((np.pi - short) * np.array(axis)).as_matrix()
     value, _, _ = derivatives(
         PoseFit(mechanism, [], [sensor], code=PYTHON), wanted.ravel(), np.zeros(6)
     )
     assert value == pytest.approx(0.5 * (np.pi - short) ** 2, rel=1e-12)
-    poses = PoseFit(mechanism, [], [sensor]).fit(wanted.reshape(1, -1), q=np.zeros(6))
+    poses = PoseFit(mechanism, [], [sensor]).fit_frames(wanted.reshape(1, -1), q=np.zeros(6))
     assert orientations_at(mechanism, [sensor], poses.values[0])[0] == pytest.approx(
         wanted, abs=1e-8
     )
@@ -372,14 +381,14 @@ def test_markers_and_sensors_count_as_shares() -> None:
     mechanism, rng = _free_body(), np.random.default_rng(5)
     markers, sensors = (
         markers_of(mechanism, rng),
-        [Sensor(FramePlacement(0, np.eye(4)), 3.0) for _ in range(3)],
+        [SensorTarget(FramePlacement(0, np.eye(4)), 3.0) for _ in range(3)],
     )
     q = np.array((0.3, 0.2, -0.1, 0.4, 0.5, 0.6))
     measured = places_at(mechanism, markers, q) + rng.normal(0.0, 0.02, (3, 3))
     noise = Rotation.from_rotvec(rng.normal(0.0, 0.1, (3, 3))).as_matrix()
     rotations = noise @ orientations_at(mechanism, sensors, q)
     rotations[1] = np.nan
-    poses = PoseFit(mechanism, markers, sensors).fit(
+    poses = PoseFit(mechanism, markers, sensors).fit_frames(
         np.concatenate([measured.ravel(), rotations.ravel()])[None], q=q
     )
     result = poses.values[0]
@@ -406,7 +415,7 @@ def test_a_jump_is_followed() -> None:
         ]
     )
     frames = np.array([places_at(mechanism, markers, q) for q in poses]).reshape(3, -1)
-    assert PoseFit(mechanism, markers).fit(frames, q=np.zeros(6)).values == pytest.approx(
+    assert PoseFit(mechanism, markers).fit_frames(frames, q=np.zeros(6)).values == pytest.approx(
         poses, abs=1e-8
     )
 
@@ -424,10 +433,12 @@ def test_the_first_pose_has_no_whole_turns(goal: bool) -> None:
     )
     mechanism, rng = osimlite.mechanism(model), np.random.default_rng(0)
     markers = markers_of(mechanism, rng)
-    fit = PoseFit(mechanism, markers, goals=[Goal(0, 1e-4)] if goal else [])
+    fit = PoseFit(mechanism, markers, goals=[CoordinateTarget(0, 1e-4)] if goal else [])
     for _ in range(60):
         q = rng.uniform(-3.0, 3.0, 3)
-        poses = fit.fit(np.array([[*places_at(mechanism, markers, q).ravel(), 0.0]]), q=np.zeros(3))
+        poses = fit.fit_frames(
+            np.array([[*places_at(mechanism, markers, q).ravel(), 0.0]]), q=np.zeros(3)
+        )
         assert (
             np.abs(poses.values).max() <= np.pi + (0.05 if goal else 1e-8) and not poses.unsettled
         )
@@ -443,5 +454,5 @@ def test_a_subject_may_face_anywhere() -> None:
     fit = PoseFit(mechanism, markers)
     for heading in np.linspace(-3.0, 3.0, 25):
         q = np.array((0.1, heading, -0.2, 2.0, 1.0, -1.0))
-        poses = fit.fit(places_at(mechanism, markers, q).reshape(1, -1), q=np.zeros(6))
+        poses = fit.fit_frames(places_at(mechanism, markers, q).reshape(1, -1), q=np.zeros(6))
         assert poses.costs[0] < 1e-18, heading

@@ -12,9 +12,9 @@ import pytest
 
 import osimlite
 from osimlite.errors import ModelError, SettingError
-from osimlite.fitting.measuring import frames_between
-from osimlite.fitting.scale_tool import run_scale
-from osimlite.fitting.scaling import scale_model, scales
+from osimlite.fitting.measuring import select_frames
+from osimlite.fitting.scale_tool import compute_scaled_model
+from osimlite.fitting.scaling import get_scale_rules, scale_model
 from osimlite.io.tables.storage import read_sto
 from osimlite.schema.base import Object
 from osimlite.schema.facts import HOLDER, OWN, PATH
@@ -63,7 +63,7 @@ def test_every_rule_is_about_a_property_that_is_there() -> None:
     count = 0
     for name, module in MODULES.items():
         cls = getattr(import_module(module), name)
-        for property_name, rule in scales(cls).items():
+        for property_name, rule in get_scale_rules(cls).items():
             whose = rule.split()[0]
             assert property_name in cls.model_fields, name
             assert whose in (OWN, HOLDER, PATH) or whose in cls.model_fields, name
@@ -94,7 +94,7 @@ def setup(shared: Path, tmp_path: Path) -> Path:
 def test_a_gait_model_is_scaled_as_opensim_scales_it(setup: Path) -> None:
     """Model and factors by meaning, and a pose of the subject that is no worse than OpenSim's."""
     tool: Any = osimlite.read_document(setup / "their_scale.xml")
-    result = run_scale(tool, setup)
+    result = compute_scaled_model(tool, setup)
     ours = osimlite.read_text(result.texts[tool.model_scaler.output_model_file])
     assert_same(ours, osimlite.read(setup / "their_subject01_scaledOnly.osim"))
     theirs: Any = osimlite.read_document(setup / "their_subject01_scaleSet_applied.xml")
@@ -118,7 +118,7 @@ def test_a_gait_model_is_scaled_as_opensim_scales_it(setup: Path) -> None:
         read_sto(setup / "their_subject01_static_output.mot"),
     )
     assert pose.columns == known.columns and pose.rows == pytest.approx(known.rows, abs=0.02)
-    assert next(iter(result.placed.told())).endswith(
+    assert next(iter(result.placed.describe_pose())).endswith(
         "OpenSim advises less than 1 and 2 cm of markers on bones"
     )
     assert len(result.placed.moved) > 30 and max(result.placed.moved.values()) < 0.2
@@ -213,7 +213,7 @@ def test_what_cannot_be_scaled_is_told() -> None:
     notes = osimlite.scale(model, gap, measurements=LENGTH).measured
     assert notes is not None and "were not seen in every frame" in notes.notes[0]
     with pytest.raises(SettingError, match="before it begins"):
-        frames_between(np.arange(3.0), 2.0, 1.0)
+        select_frames(np.arange(3.0), 2.0, 1.0)
     slider = osimlite.Model(name="slider")
     body = osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
     slider.add(body)
@@ -241,5 +241,5 @@ def test_frames_of_a_range_are_those_of_opensim(
     first: float, last: float, frames: tuple[int, int]
 ) -> None:
     """The last one not after the beginning to the first one not before the end."""
-    result = frames_between(np.arange(4.0), first, last)
+    result = select_frames(np.arange(4.0), first, last)
     assert (result.start, result.stop) == frames

@@ -83,10 +83,10 @@ def test_quaternions_and_matrices_are_the_same_rotations() -> None:
         turned(0.0, 0.0, 0.5) @ turned(0.0, 0.4, 0.0) @ turned(0.3, 0.0, 0.0)
     )
     for values in (given, matrices):
-        data = OrientationData.of({"thigh_imu": values}, times=np.arange(30) / 10)
+        data = OrientationData.from_source({"thigh_imu": values}, times=np.arange(30) / 10)
         assert data.values[:, 0] == pytest.approx(matrices)
-        assert data.between(0.95, 2.0).times == pytest.approx(np.arange(10, 21) / 10)
-    assert np.isnan(OrientationData.of({"one": np.zeros(4)}).values).all()
+        assert data.select_times(0.95, 2.0).times == pytest.approx(np.arange(10, 21) / 10)
+    assert np.isnan(OrientationData.from_source({"one": np.zeros(4)}).values).all()
 
 
 def test_sensors_are_worn_in_the_centres_of_mass(lab: Path) -> None:
@@ -109,12 +109,12 @@ def test_sensors_are_worn_in_the_centres_of_mass(lab: Path) -> None:
 def test_a_sensor_that_is_there_is_turned() -> None:
     model: Any = leg()
     place_sensors(
-        model, OrientationData.of({"shank_imu": turned(0.1, 0.2, 0.3), "shank": np.eye(3)})
+        model, OrientationData.from_source({"shank_imu": turned(0.1, 0.2, 0.3), "shank": np.eye(3)})
     )
     frame = model["/bodyset/shank/shank_imu"]
     frame.translation = (1.0, 2.0, 3.0)
     placed = place_sensors(
-        model, OrientationData.of({"shank_imu": turned(0.3, 0.2, 0.1), "shank": np.eye(3)})
+        model, OrientationData.from_source({"shank_imu": turned(0.3, 0.2, 0.1), "shank": np.eye(3)})
     )
     assert placed == (("shank_imu",), ("shank",), None)
     assert frame.orientation == pytest.approx((0.3, 0.2, 0.1)) and frame.translation == (
@@ -149,22 +149,22 @@ def test_what_is_wrong_with_sensors_is_told(lab: Path) -> None:
         ),
     ):
         with pytest.raises(SettingError, match=said):
-            place_sensors(leg(), OrientationData.of(data), *words)
+            place_sensors(leg(), OrientationData.from_source(data), *words)
     with pytest.raises(SettingError, match="quaternions of 4 numbers or matrices"):
-        OrientationData.of({"thigh_imu": np.zeros((5, 3))})
+        OrientationData.from_source({"thigh_imu": np.zeros((5, 3))})
     with pytest.raises(SettingError, match="as many as all others"):
-        OrientationData.of({"one": np.zeros((5, 4)), "two": np.zeros((4, 4))})
+        OrientationData.from_source({"one": np.zeros((5, 4)), "two": np.zeros((4, 4))})
     with pytest.raises(OsimliteError, match="no frame of"):
-        OrientationData.of(lab / "standing.sto").between(1.0, 2.0)
+        OrientationData.from_source(lab / "standing.sto").select_times(1.0, 2.0)
     write_sto(lab / "motion.sto", "m", [0.0], ["a"], [[1.0]])
     with pytest.raises(DocumentError, match="must say DataType=Quaternion"):
-        OrientationData.of(lab / "motion.sto")
+        OrientationData.from_source(lab / "motion.sto")
     twins: Any = leg()
     twins["/bodyset/thigh"].components.append(
         osimlite.PhysicalOffsetFrame(name="shank", socket_parent="..")
     )
     with pytest.raises(SettingError, match="several frames 'shank'"):
-        place_sensors(twins, OrientationData.of({"shank_imu": eye}))
+        place_sensors(twins, OrientationData.from_source({"shank_imu": eye}))
 
 
 def worn() -> osimlite.Model:
@@ -172,7 +172,7 @@ def worn() -> osimlite.Model:
     model = leg()
     place_sensors(
         model,
-        OrientationData.of(
+        OrientationData.from_source(
             {"thigh_imu": turned(0.1, 0.5, 0.2), "shank_imu": turned(0.0, 0.5, 0.0)}
         ),
     )
@@ -319,7 +319,9 @@ def test_frames_with_many_sensors_missing_reach_their_best_pose(
     model = osimlite.read(tmp_path / "model.osim")
     place_sensors(
         model,
-        OrientationData.of({f"{body.name}_imu": np.eye(3) for body in model.body_set.objects}),
+        OrientationData.from_source(
+            {f"{body.name}_imu": np.eye(3) for body in model.body_set.objects}
+        ),
     )
     mechanism, rng, frames = osimlite.mechanism(model), np.random.default_rng(1), 400
     names = [f"{body.name}_imu" for body in model.body_set.objects]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.fitting.fit_messages import told
+from osimlite.fitting.fit_messages import describe_fit
 from osimlite.fitting.marker_data import MarkerData
 from tests.labs import LABS, change, copy_lab
 
@@ -18,7 +18,7 @@ MARKERS = ("ASI", "PSI", "SAC", "THI", "KNE", "TIB", "ANK", "TOE")
 
 def fit(model: Path, markers: tuple[str, ...], **options: Any):
     """Fit the walk of a lab to some of its markers."""
-    data = MarkerData.of(LABS / "unseen" / "walk.trc")
+    data = MarkerData.from_source(LABS / "unseen" / "walk.trc")
     arrays = {
         name: data.positions[:, place] for place, name in enumerate(data.names) if name in markers
     }
@@ -32,7 +32,7 @@ def test_joints_that_no_marker_sees(count: int, names: tuple[str, ...]) -> None:
     motion = fit(LABS / "unseen" / "leg.osim", MARKERS[:count])
     assert motion.undetermined == names
     assert motion.summary.get("undetermined", []) == list(names)
-    words = " ".join(told(motion))
+    words = " ".join(describe_fit(motion))
     assert all(name in words for name in names)
     assert ("determines" in words) == bool(names)
     for name in names:
@@ -63,7 +63,7 @@ def test_a_coupled_joint_is_determined_by_the_other(tmp_path: Path) -> None:
 
 
 def test_a_motion_of_one_frame() -> None:
-    data = MarkerData.of(LABS / "unseen" / "walk.trc")
+    data = MarkerData.from_source(LABS / "unseen" / "walk.trc")
     arrays = {
         name: data.positions[:1, place]
         for place, name in enumerate(data.names)

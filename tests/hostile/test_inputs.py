@@ -349,8 +349,8 @@ def test_tables_of_tools_say_where_they_have_nan(tmp_path: Path) -> None:
 
     outcome = Outcome()
     table = StoTable("Forces", np.zeros(1), ("a", "b"), np.array([[np.nan, 1.0]]))
-    outcome.table(tmp_path / "old.sto", table, "about it\n")
-    outcome.new_table(tmp_path / "new.sto", table)
+    outcome.add_table(tmp_path / "old.sto", table, "about it\n")
+    outcome.add_typed_table(tmp_path / "new.sto", table)
     setup = tmp_path / "setup.xml"
     setup.write_text(
         '<OpenSimDocument Version="40600"><InverseDynamicsTool name="a"/></OpenSimDocument>'

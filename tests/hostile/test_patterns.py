@@ -12,7 +12,7 @@ import pytest
 from osimlite.errors import OsimliteError
 from osimlite.schema.patterns import MAX_STATES, Pattern, PatternError, UnsupportedPatternError
 from osimlite.tools import patterns as file_patterns
-from osimlite.tools.named_files import named_files
+from osimlite.tools.named_files import find_named_files
 from osimlite.tools.patterns import find_files
 
 SLOW = [
@@ -192,11 +192,11 @@ def test_setups_that_name_each_other_are_read_once(
     for number in range(count):
         following = f"s{number + 1}.xml" if number + 1 < count else last
         (tmp_path / f"s{number}.xml").write_text(CHAIN.format(following))
-    found = {*named_files(str(tmp_path / "s0.xml"), "file")}
+    found = {*find_named_files(str(tmp_path / "s0.xml"), "file")}
     assert {str(tmp_path / f"s{number}.xml") for number in range(1, count)} <= found
-    from osimlite.tools.running import _reports
+    from osimlite.tools.running import _check_documents
 
-    assert len([*_reports(str(tmp_path / "s0.xml"), {})]) == count
+    assert len([*_check_documents(str(tmp_path / "s0.xml"), {})]) == count
     monkeypatch.setattr("osimlite.tools.named_files.MAX_DOCUMENTS", 5)
     with pytest.raises(OsimliteError, match="more than 5 documents"):
-        [*named_files(str(tmp_path / "s0.xml"), "file")]
+        [*find_named_files(str(tmp_path / "s0.xml"), "file")]

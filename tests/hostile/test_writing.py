@@ -204,12 +204,12 @@ def test_a_pipe_in_the_place_of_the_journal(study: Path, words: tuple[str, ...])
     ids=str,
 )
 def test_a_damaged_journal_counts_for_nothing(study: Path, damage: dict[str, object]) -> None:
-    from osimlite.tools.many import Trial, read_trial
+    from osimlite.tools.many import RunRecord, read_record
 
-    line = json.dumps(vars(Trial("setup.xml", "done")))
-    assert read_trial(line.encode()) is not None
-    assert read_trial(json.dumps(json.loads(line) | damage).encode()) is None
-    assert read_trial(b"[" * 100_000) is None
+    line = json.dumps(vars(RunRecord("setup.xml", "done")))
+    assert read_record(line.encode()) is not None
+    assert read_record(json.dumps(json.loads(line) | damage).encode()) is None
+    assert read_record(b"[" * 100_000) is None
 
 
 def test_findings_are_not_kept_in_a_project(tmp_path: Path, cache: Path) -> None:

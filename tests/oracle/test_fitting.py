@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.fitting.ik_tool import run_inverse_kinematics, tasks_of
-from osimlite.fitting.inverse_kinematics import marker_stations
+from osimlite.fitting.ik_tool import collect_targets, run_inverse_kinematics
+from osimlite.fitting.inverse_kinematics import find_marker_stations
 from osimlite.fitting.marker_data import MarkerData
-from osimlite.fitting.person_files import SETUP, UNSCALED, person_texts
-from osimlite.fitting.pose_layout import Marker
+from osimlite.fitting.person_files import SETUP, UNSCALED, create_person_files
+from osimlite.fitting.pose_layout import MarkerTarget
 from osimlite.fitting.scaling import scale_model
 from osimlite.io.tables.storage import read_sto
 from osimlite.io.tables.writers import write_trc
@@ -197,7 +197,10 @@ def test_public_setups_at_the_best_accuracy(
     tool.results_directory, tool.accuracy = ".", 1e-9
     osimlite.write(tool, tmp_path / "setup.xml")
     ask(f"import opensim; {QUIET}; opensim.InverseKinematicsTool('setup.xml').run()", tmp_path)
-    theirs, data = read_sto(tmp_path / "theirs.mot"), MarkerData.of(trial).between(*tool.time_range)
+    theirs, data = (
+        read_sto(tmp_path / "theirs.mot"),
+        MarkerData.from_source(trial).select_times(*tool.time_range),
+    )
     subject = osimlite.read("model.osim")
     ours = run_inverse_kinematics(tool, subject, data)
     mechanism = ours.mechanism
@@ -206,9 +209,9 @@ def test_public_setups_at_the_best_accuracy(
     # minimum.
     apart = np.abs(ours.in_degrees - theirs.rows).max(axis=1)
     assert np.count_nonzero(apart > 2e-5) <= 0.05 * len(apart) and apart.max() < 1e-3
-    tasks = tasks_of(subject, mechanism, tool.ik_task_set.objects, data, None)
-    stations = marker_stations(subject, mechanism)
-    markers = [Marker(stations[name], weight) for name, weight in tasks.weights.items()]
+    tasks = collect_targets(subject, mechanism, tool.ik_task_set.objects, data, None)
+    stations = find_marker_stations(subject, mechanism)
+    markers = [MarkerTarget(stations[name], weight) for name, weight in tasks.weights.items()]
     turning = [info.motion_type == "rotational" for info in mechanism.coordinates]
     poses = np.where(turning, np.deg2rad(theirs.rows), theirs.rows)
     for q, measured, wanted, cost in zip(
@@ -225,7 +228,7 @@ def test_the_setup_of_a_fit_makes_the_same_model_in_opensim(tmp_path: Path) -> N
     """Sizes, masses and places of markers, from the generic model."""
     osimlite.write(marked(), tmp_path / "generic.osim")
     result = osimlite.fit(marked(), {"moving": person(4)[0]}, held=HELD, mass=70.0)
-    texts = person_texts(result, tmp_path / "generic.osim", tmp_path, 70.0)
+    texts = create_person_files(result, tmp_path / "generic.osim", tmp_path, 70.0)
     for name in (SETUP, UNSCALED):
         (tmp_path / name).write_text(texts[name])
     ask(f"import opensim; {QUIET}; opensim.ScaleTool('{SETUP}').run()", tmp_path)
@@ -255,7 +258,7 @@ def test_who_turns_around_is_held_at_the_end_of_the_range_in_opensim(
     ask(FIT, tmp_path, "1e-9")
     theirs = read_sto(tmp_path / "theirs.mot")
     ours = osimlite.inverse_kinematics(model, tmp_path / "trial.trc")
-    markers = [Marker(station) for station in stations]
+    markers = [MarkerTarget(station) for station in stations]
     turned = [info.motion_type == "rotational" for info in mechanism.coordinates]
     values = np.where(turned, np.radians(theirs.rows), theirs.rows)
     costs = np.array(

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import osimlite
-from osimlite.fitting.modifying.operators import processed
+from osimlite.fitting.modifying.operators import process_model
 from osimlite.fitting.modifying.path_fitting import fit_paths
 from osimlite.schema.difference import differences
 from osimlite.schema.tools import processors as p
@@ -59,7 +59,7 @@ def changed(folder: Path, model: Path, operators: list[Any]) -> list[Any]:
     subprocess.run(
         [sys.executable, "-c", SCRIPT], cwd=folder, check=True, capture_output=True, timeout=100
     )
-    osimlite.write(processed(processor, folder), folder / "ours.osim")
+    osimlite.write(process_model(processor, folder), folder / "ours.osim")
     ours, theirs = (osimlite.read(folder / f"{name}.osim") for name in ("ours", "theirs"))
     return [str(item) for item in differences(ours, theirs)]
 

@@ -16,7 +16,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import Millard2012AccelerationMuscle
 from osimlite.schema.states import outputs_of
 from osimlite.tools.job import NotRunnable
-from osimlite.tools.outputs import LAWS
+from osimlite.tools.outputs import LAW_OUTPUTS
 from tests.oracle.test_muscle_analysis import with_muscles_of
 from tests.oracle.test_run_tools import both, real
 
@@ -33,7 +33,7 @@ NOT_YET = {*STIFF, "passive_force_multiplier"}
 WITH_MASS = {
     "fiber_force_along_tendon",
     "tendon_force",
-    *(name for name in LAWS if name.startswith("passive")),
+    *(name for name in LAW_OUTPUTS if name.startswith("passive")),
 }
 """More of them for muscles with a mass."""
 NEVER = {"PathWrapPoint", "PathWrap", "MovingPathPoint"}

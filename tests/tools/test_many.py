@@ -16,8 +16,8 @@ import pytest
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.io.tables.writers import write_trc
-from osimlite.tools.many import JOURNAL, digest_of, found, run_many
-from osimlite.tools.running import runnable
+from osimlite.tools.many import JOURNAL, compute_digest, find_setups, run_many
+from osimlite.tools.running import list_runnable
 from tests.cli.command import ROOT, run
 from tests.fitting.test_inverse_kinematics import MARKERS, free_body, positions
 
@@ -137,7 +137,8 @@ def test_what_another_program_made_is_taken(trials: Path, monkeypatch: pytest.Mo
     """A setup that cannot be run here keeps none waiting for what it made elsewhere."""
     monkeypatch.chdir(trials)
     monkeypatch.setattr(
-        "osimlite.tools.many.runnable", lambda: [tag for tag in runnable() if tag != "RRATool"]
+        "osimlite.tools.many.list_runnable",
+        lambda: [tag for tag in list_runnable() if tag != "RRATool"],
     )
     osimlite.run(trials / "trial0" / "z_ik.xml")
     other = osimlite.RRATool(
@@ -150,17 +151,17 @@ def test_what_another_program_made_is_taken(trials: Path, monkeypatch: pytest.Mo
 
 def test_what_is_read_makes_the_digest(trials: Path) -> None:
     setup = trials / "trial0" / "z_ik.xml"
-    before = digest_of(setup)
+    before = compute_digest(setup)
     (trials / "model.osim").write_text(
         (trials / "model.osim").read_text().replace('"one"', '"other"', 1)
     )
-    changed = digest_of(setup)
+    changed = compute_digest(setup)
     (trials / "trial0" / "trial.trc").unlink()
-    assert len({before, changed, digest_of(setup)}) == 3
+    assert len({before, changed, compute_digest(setup)}) == 3
 
 
 def test_a_folder_for_all_has_one_for_each(trials: Path) -> None:
-    made = run_many(found([f"{trials}/trial*/z_ik.xml"]), trials / "out")
+    made = run_many(find_setups([f"{trials}/trial*/z_ik.xml"]), trials / "out")
     assert [trial.status for trial in made] == ["done"] * 3
     assert sorted(results(trials / "out")) == [
         f"trial{k}/z_ik/{name}" for k in range(3) for name in ("ik.mot", "ik_ik_marker_errors.sto")
@@ -182,19 +183,21 @@ def test_two_that_write_one_file_are_told(trials: Path, monkeypatch: pytest.Monk
 
 def test_names_and_patterns(trials: Path) -> None:
     words: list[str | Path] = [trials / "trial1" / "id.xml", f"{trials}/**/id.xml"]
-    assert found(words) == [trials / f"trial{k}" / "id.xml" for k in (1, 0, 2)]
+    assert find_setups(words) == [trials / f"trial{k}" / "id.xml" for k in (1, 0, 2)]
     osimlite.write(osimlite.ExternalLoads(name="loads"), trials / "trial0" / "grf.xml")
     osimlite.write(osimlite.IKTaskSet(name="tasks"), trials / "trial0" / "tasks.xml")
     (trials / "trial0" / "broken.xml").write_text("<OpenSimDocument")
-    names = [path.name for path in found([f"{trials}/**/*"]) if path.suffix in (".xml", ".osim")]
+    names = [
+        path.name for path in find_setups([f"{trials}/**/*"]) if path.suffix in (".xml", ".osim")
+    ]
     assert sorted(names) == ["broken.xml", *["id.xml"] * 3, *["z_ik.xml"] * 3], (
         "models and sets are no setups"
     )
-    assert found([trials / "model.osim"]) == [trials / "model.osim"], "what is named is meant"
+    assert find_setups([trials / "model.osim"]) == [trials / "model.osim"], "what is named is meant"
     with pytest.raises(OsimliteError, match=r"no setup matches '.*/grf\*\.xml'"):
-        found([f"{trials}/trial0/grf*.xml"])
+        find_setups([f"{trials}/trial0/grf*.xml"])
     with pytest.raises(OsimliteError, match=r"no file matches 'nothing\*\.xml'"):
-        found(["nothing*.xml"])
+        find_setups(["nothing*.xml"])
 
 
 def started(folder: Path, *words: str) -> subprocess.Popen[str]:
@@ -220,7 +223,7 @@ def test_what_is_there_is_whole_and_resuming_ends_with_the_same_bytes(
 ) -> None:
     for seed in range(3, 12):
         make_trial(trials / f"trial{seed}", seed, 400)
-    run_many(found([f"{trials}/trial*/*.xml"]))
+    run_many(find_setups([f"{trials}/trial*/*.xml"]))
     whole = results(trials)
     clear(trials)
     process = started(trials, "trial*/*.xml", "--workers", "2")

@@ -6,7 +6,7 @@ import pytest
 
 from osimlite.schema.registry import MODULES
 from osimlite.tools.registry import ANALYSES, TOOLS, import_function
-from osimlite.tools.running import runnable
+from osimlite.tools.running import list_runnable
 
 
 @pytest.mark.parametrize("path", [*TOOLS.values(), *ANALYSES.values()])
@@ -25,4 +25,4 @@ def test_no_function_carries_out_two_classes() -> None:
 
 
 def test_all_tools_of_the_table_can_be_run() -> None:
-    assert sorted(runnable()) == sorted(TOOLS)
+    assert sorted(list_runnable()) == sorted(TOOLS)

@@ -17,9 +17,9 @@ import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.io.tables.storage import write_sto
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.tools.evidence import root_of, side_of, steps_of
+from osimlite.tools.evidence import find_root_coordinates, find_steps, split_side
 from osimlite.tools.outcome import Outcome
-from osimlite.tools.report import Trial, collect_angles, collect_moments, report
+from osimlite.tools.report import TrialOutcomes, collect_angles, collect_moments, report
 from tests.cli.command import run
 from tests.fitting.test_inverse_kinematics import free_body
 from tests.tools.test_many import make_trial
@@ -49,7 +49,7 @@ def loads(tmp_path: Path) -> Path:
 
 
 def test_steps_are_where_the_force_begins_and_ends(loads: Path) -> None:
-    steps = steps_of(loads, 1)
+    steps = find_steps(loads, 1)
     assert steps["r"].strikes == pytest.approx((0.25, 1.25, 2.25), abs=0.0101)
     assert steps["r"].offs == pytest.approx((0.85, 1.85, 2.85), abs=0.0101)
     assert (
@@ -57,15 +57,15 @@ def test_steps_are_where_the_force_begins_and_ends(loads: Path) -> None:
         and len(steps["l"].offs) == 2
     )
     assert len(steps["r"].cycles) == 2
-    assert steps_of(loads, 0)["r"].strikes == ()
+    assert find_steps(loads, 0)["r"].strikes == ()
 
 
 def test_sides_and_roots() -> None:
     names = ["knee_angle_r", "r_knee_angle", "knee_angle_l", "lumbar", "r"]
-    assert [side_of(name) for name in names] == [("knee_angle", "r")] * 2 + [
+    assert [split_side(name) for name in names] == [("knee_angle", "r")] * 2 + [
         ("knee_angle", "l"), ("lumbar", ""), ("r", ""),
     ]  # fmt: skip
-    assert root_of(build_mechanism(free_body())) == tuple(range(6))
+    assert find_root_coordinates(build_mechanism(free_body())) == tuple(range(6))
 
 
 @pytest.fixture
@@ -155,7 +155,7 @@ def test_one_call_leaves_the_next_one_possible(trials: Path) -> None:
 def test_what_is_drawn_are_the_tables(trials: Path, loads: Path) -> None:
     folder = trials / "trial0"
     outcomes: list[Outcome] = [osimlite.run(folder / "z_ik.xml"), osimlite.run(folder / "id.xml")]
-    trial = Trial("trial0", outcomes)
+    trial = TrialOutcomes("trial0", outcomes)
     panels = collect_angles([trial])
     table = outcomes[0].tables["ik.mot"]
     drawn = {label.removesuffix(" (deg)"): lines[0].column for label, lines in panels.items()}

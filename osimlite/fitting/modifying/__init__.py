@@ -1,1 +1,1 @@
-"""Models changed as a whole: OpenSim's operators on models (ModOp...), and the words of ``osimlite modify``."""
+"""Modification of models: OpenSim's operators (ModOp...), and the words of ``osimlite modify``."""

@@ -1,4 +1,4 @@
-"""Smooth contact in the place of Hunt and Crossley's: a SmoothSphereHalfSpaceForce for each sphere on a half space."""
+"""Smooth contact: replace HuntCrossleyForce by SmoothSphereHalfSpaceForce."""
 
 from __future__ import annotations
 
@@ -12,20 +12,22 @@ from osimlite.schema.model import Model
 
 
 def smooth_contacts(model: Model) -> None:
-    """Replace all forces of Hunt and Crossley's between spheres and half spaces by smooth ones of the same stiffness.
+    """Replace all Hunt-Crossley forces between spheres and half spaces by smooth forces.
 
-    Simbody combines both surfaces: stiffnesses as two springs in a row, dissipations by how much
-    each yields, friction by the harmonic mean. Where both are alike the smooth force has the same
-    numbers.
+    Simbody combines both surfaces: stiffnesses as springs in series, dissipations by the share of
+    the deformation, friction by the harmonic mean. If both surfaces are alike, the smooth force has
+    the same numbers.
 
     Raises:
-        UnsupportedError: other surfaces touch.
+        UnsupportedError: a force is between other surfaces.
     """
     geometries = {item.name: item for item in model.contact_geometry_set.objects}
     for force in [item for item in model.force_set.objects if isinstance(item, HuntCrossleyForce)]:
         known: dict[str, Any] = {}
         for parameters in force.contact_parameters.objects:
-            known |= dict.fromkeys((_last(item) for item in parameters.geometry), parameters)
+            known |= dict.fromkeys(
+                (_get_geometry_name(item) for item in parameters.geometry), parameters
+            )
         spheres = [name for name in known if isinstance(geometries.get(name), ContactSphere)]
         planes = [name for name in known if isinstance(geometries.get(name), ContactHalfSpace)]
         if len(spheres) + len(planes) < len(known) or not planes or not spheres:
@@ -33,7 +35,7 @@ def smooth_contacts(model: Model) -> None:
                 f"'{force.name}' is not between spheres and half spaces, for which alone there is a smooth force"
             )
         made = [
-            _smooth(force, sphere, plane, known, len(spheres) * len(planes) > 1)
+            _create_smooth_force(force, sphere, plane, known, len(spheres) * len(planes) > 1)
             for plane in planes
             for sphere in spheres
         ]
@@ -41,14 +43,15 @@ def smooth_contacts(model: Model) -> None:
         model.force_set.objects[place : place + 1] = made
 
 
-def _last(item: Any) -> str:
-    """The name of a geometry, or the last part of its path."""
+def _get_geometry_name(item: Any) -> str:
+    """Return the name of a geometry, or the last part of its path."""
     return str(getattr(item, "name", item)).rpartition("/")[2]
 
 
-def _smooth(
+def _create_smooth_force(
     force: Any, sphere: str, plane: str, known: dict[str, Any], several: bool
 ) -> SmoothSphereHalfSpaceForce:
+    """Return the smooth force between one sphere and one half space."""
     one, other = known[sphere], known[plane]
     softness = [
         item.stiffness ** (-2.0 / 3.0) if item.stiffness else float("inf") for item in (one, other)

@@ -1,6 +1,6 @@
-"""What each of OpenSim's operators does to a model: one function for each class of the schema.
+"""OpenSim's operators on models: one function for each class, and ModelProcessor.
 
-The results are those of OpenSim's ModelProcessor, names and places included.
+The results are those of OpenSim's ModelProcessor, including names and order.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from osimlite.schema.tools import processors as p
 from osimlite.schema.tools.processors import ModelOperator, ModelProcessor
 
 GREY = (0.5, 0.5, 0.5)
-"""Of paths that were muscles'."""
-ALIKE = (
+"""Color of paths that belonged to muscles."""
+COMMON_PROPERTIES = (
     "appliesForce",
     "min_control",
     "max_control",
@@ -47,76 +47,101 @@ ALIKE = (
     "ignore_tendon_compliance",
     "ignore_activation_dynamics",
 )
-"""What muscles of all classes have."""
+"""Properties that muscles of all classes have."""
 
 Operation = Callable[[Model, Any, Path], None]
+"""Function that changes a model by an operator; files are resolved from a folder."""
 OPERATIONS: dict[type, Operation] = {}
-"""By class, what changes a model as an object of it says; files are looked for from a folder."""
+"""Operations by class of the operator."""
 
 
-def operation(cls: type) -> Callable[[Operation], Operation]:
-    """Declare what an operator does."""
+def register_operation(cls: type) -> Callable[[Operation], Operation]:
+    """Return a decorator that registers the operation of an operator."""
 
-    def declared(function: Operation) -> Operation:
+    def register(function: Operation) -> Operation:
         OPERATIONS[cls] = function
         return function
 
-    return declared
+    return register
 
 
-def muscles(model: Model) -> list[Muscle]:
-    """Of the model's set of forces, in its order."""
+def find_muscles(model: Model) -> list[Muscle]:
+    """Return the muscles in the model's set of forces, in its order."""
     return [force for force in model.force_set.objects if isinstance(force, Muscle)]
 
 
 SETTINGS: dict[type, tuple[type[Muscle], str, Callable[[Any, Any], object]]] = {
-    p.ModOpIgnoreActivationDynamics: (Muscle, "ignore_activation_dynamics", lambda operator, old: True),
+    p.ModOpIgnoreActivationDynamics: (
+        Muscle,
+        "ignore_activation_dynamics",
+        lambda operator, old: True,
+    ),
     p.ModOpIgnoreTendonCompliance: (Muscle, "ignore_tendon_compliance", lambda operator, old: True),
-    p.ModOpScaleMaxIsometricForce: (Muscle, "max_isometric_force", lambda operator, old: old * operator.scale_factor),
+    p.ModOpScaleMaxIsometricForce: (
+        Muscle,
+        "max_isometric_force",
+        lambda operator, old: old * operator.scale_factor,
+    ),
     p.ModOpIgnorePassiveFiberForcesDGF: (
-        DeGrooteFregly2016Muscle, "ignore_passive_fiber_force", lambda operator, old: True,
+        DeGrooteFregly2016Muscle,
+        "ignore_passive_fiber_force",
+        lambda operator, old: True,
     ),
     p.ModOpScaleActiveFiberForceCurveWidthDGF: (
-        DeGrooteFregly2016Muscle, "active_force_width_scale", lambda operator, old: operator.scale_factor,
+        DeGrooteFregly2016Muscle,
+        "active_force_width_scale",
+        lambda operator, old: operator.scale_factor,
     ),
     p.ModOpTendonComplianceDynamicsModeDGF: (
-        DeGrooteFregly2016Muscle, "tendon_compliance_dynamics_mode", lambda operator, old: operator.mode,
+        DeGrooteFregly2016Muscle,
+        "tendon_compliance_dynamics_mode",
+        lambda operator, old: operator.mode,
     ),
-}  # fmt: skip
-"""By operator, the muscles that it sets a property of, which, and to what: as the operator says, from what it was."""
+}
+"""Operators that set a property of muscles.
+
+Each has the class of the muscles, the property, and a function of the operator and the old value.
+"""
 
 
-def _set(model: Model, operator: Any, folder: Path) -> None:
+def _set_muscle_property(model: Model, operator: Any, folder: Path) -> None:
+    """Set a property of muscles; see `SETTINGS`."""
     kind, name, value = SETTINGS[type(operator)]
     for muscle in model.components(kind):
         setattr(muscle, name, value(operator, getattr(muscle, name)))
 
 
-OPERATIONS.update(dict.fromkeys(SETTINGS, _set))
+OPERATIONS.update(dict.fromkeys(SETTINGS, _set_muscle_property))
 
 
-@operation(p.ModOpRemoveMuscles)
-def _remove(model: Model, operator: Any, folder: Path) -> None:
-    for muscle in muscles(model):
-        _take_out(model, muscle)
+@register_operation(p.ModOpRemoveMuscles)
+def _remove_muscles(model: Model, operator: Any, folder: Path) -> None:
+    """Remove all muscles."""
+    for muscle in find_muscles(model):
+        _remove_muscle(model, muscle)
 
 
-@operation(p.ModOpReplaceMusclesWithPathActuators)
-def _path_actuators(model: Model, operator: Any, folder: Path) -> None:
-    for muscle in muscles(model):
+@register_operation(p.ModOpReplaceMusclesWithPathActuators)
+def _replace_with_path_actuators(model: Model, operator: Any, folder: Path) -> None:
+    """Replace all muscles by path actuators."""
+    for muscle in find_muscles(model):
         other = PathActuator(name=muscle.name, optimal_force=muscle.max_isometric_force)
         for name in ("appliesForce", "min_control", "max_control"):
             setattr(other, name, getattr(muscle, name))
-        _replace(model, muscle, other)
+        _replace_muscle(model, muscle, other)
         if hasattr(other.geometry_path, "appearance"):
             other.geometry_path.appearance.color = GREY
 
 
-@operation(p.ModOpReplaceMusclesWithDeGrooteFregly2016)
-def _degroote(model: Model, operator: Any, folder: Path) -> None:
-    """Thelen's and Millard's muscles; others are refused, those of the class stay."""
-    for muscle in muscles(model):
-        given: dict[str, Any] = {name: getattr(muscle, name) for name in ALIKE}
+@register_operation(p.ModOpReplaceMusclesWithDeGrooteFregly2016)
+def _replace_with_degroote(model: Model, operator: Any, folder: Path) -> None:
+    """Replace Thelen's and Millard's muscles by DeGrooteFregly2016Muscle.
+
+    Raises:
+        UnsupportedError: a muscle is of another class.
+    """
+    for muscle in find_muscles(model):
+        given: dict[str, Any] = {name: getattr(muscle, name) for name in COMMON_PROPERTIES}
         if isinstance(muscle, Millard2012EquilibriumMuscle):
             given |= {
                 "fiber_damping": muscle.fiber_damping,
@@ -140,18 +165,21 @@ def _degroote(model: Model, operator: Any, folder: Path) -> None:
             "deactivation_time_constant",
         ):
             given[name] = getattr(muscle, name)
-        _replace(model, muscle, DeGrooteFregly2016Muscle(name=muscle.name, **given))
+        _replace_muscle(model, muscle, DeGrooteFregly2016Muscle(name=muscle.name, **given))
 
 
-def _replace(model: Model, muscle: Muscle, other: Any) -> None:
-    """Take a muscle out, and put something along its path behind all forces, as OpenSim does."""
+def _replace_muscle(model: Model, muscle: Muscle, other: Any) -> None:
+    """Replace a muscle by another force along its path, as the last force, as OpenSim does."""
     other.geometry_path = muscle.geometry_path.copy_deep()
-    _take_out(model, muscle)
+    _remove_muscle(model, muscle)
     model.force_set.objects.append(other)
 
 
-def _take_out(model: Model, muscle: Muscle) -> None:
-    """Out of the set of forces, and of its groups: what takes its place is no member, in OpenSim."""
+def _remove_muscle(model: Model, muscle: Muscle) -> None:
+    """Remove a muscle from the set of forces and from its groups.
+
+    Its replacement does not join the groups, as in OpenSim.
+    """
     model.force_set.objects.remove(muscle)
     for group in model.force_set.groups:
         names = [
@@ -162,8 +190,9 @@ def _take_out(model: Model, muscle: Muscle) -> None:
         )
 
 
-@operation(p.ModOpAddReserves)
-def _reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> None:
+@register_operation(p.ModOpAddReserves)
+def _add_reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> None:
+    """Add reserve actuators for coordinates."""
     if operator.optimal_force <= 0.0:
         raise ModelError(
             f"reserve actuators have an optimal_force of {operator.optimal_force:g}; give a positive one"
@@ -173,7 +202,7 @@ def _reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> None:
             f"reserve actuators have a bound of {operator.bound:g}; give one that is not negative"
         )
     tree, mechanism = model.tree(), build_mechanism(model)
-    driven = {tree.path_of(item) for item in _driven(model)}
+    driven = {tree.path_of(item) for item in _find_driven_coordinates(model)}
     dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
     fixed = {
         info.path
@@ -200,20 +229,20 @@ def _reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> None:
         model.force_set.objects.append(reserve)
 
 
-def _driven(model: Model) -> list[Any]:
-    """The coordinates that an actuator drives."""
+def _find_driven_coordinates(model: Model) -> list[Any]:
+    """Return the coordinates that an actuator drives."""
     names = {actuator.coordinate for actuator in model.components(CoordinateActuator)}
     return [item for item in model.components(Coordinate) if item.name in names]
 
 
 def _is_on_ground(model: Model, path: str) -> bool:
-    """Whether a coordinate is one of a joint to ground."""
+    """Return whether a coordinate belongs to a joint to ground."""
     joint = model.tree().at(path.rpartition("/")[0])
-    return isinstance(_base(model, joint, "socket_parent_frame"), Ground)
+    return isinstance(_find_base(model, joint, "socket_parent_frame"), Ground)
 
 
-def _base(model: Model, owner: Any, socket: str) -> Any:
-    """The body, or the ground, that a frame of a socket is fixed to."""
+def _find_base(model: Model, owner: Any, socket: str) -> Any:
+    """Return the body, or ground, to which the frame of a socket is fixed."""
     tree = model.tree()
     frame: Any = tree.target(owner, socket, getattr(owner, socket))
     while isinstance(frame, PhysicalOffsetFrame):
@@ -221,8 +250,11 @@ def _base(model: Model, owner: Any, socket: str) -> Any:
     return frame
 
 
-@operation(p.ModOpReplaceJointsWithWelds)
-def _welds(model: Model, operator: p.ModOpReplaceJointsWithWelds, folder: Path) -> None:
+@register_operation(p.ModOpReplaceJointsWithWelds)
+def _replace_joints_with_welds(
+    model: Model, operator: p.ModOpReplaceJointsWithWelds, folder: Path
+) -> None:
+    """Replace joints by weld joints."""
     for path in map(str, operator.joint_paths):
         tree = model.tree()
         joints = {tree.path_of(item) or "": item for item in model.components(Joint)}
@@ -236,7 +268,7 @@ def _welds(model: Model, operator: p.ModOpReplaceJointsWithWelds, folder: Path) 
         for socket in ("socket_parent_frame", "socket_child_frame"):
             frame, base = (
                 tree.target(joint, socket, getattr(joint, socket)),
-                _base(model, joint, socket),
+                _find_base(model, joint, socket),
             )
             offset = PhysicalOffsetFrame(
                 name=f"{base.name}_offset", socket_parent=tree.path_of(base) or ""
@@ -252,18 +284,23 @@ def _welds(model: Model, operator: p.ModOpReplaceJointsWithWelds, folder: Path) 
         model.joint_set.objects.append(weld)
 
 
-@operation(p.ModOpReplacePathsWithFunctionBasedPaths)
-def _function_paths(
+@register_operation(p.ModOpReplacePathsWithFunctionBasedPaths)
+def _replace_with_function_paths(
     model: Model, operator: p.ModOpReplacePathsWithFunctionBasedPaths, folder: Path
 ) -> None:
+    """Replace paths by the function-based paths of a file."""
     given = read_document(
         Source.of_file(folder / operator.paths_file.strip()), of=p.FunctionBasedPathSet
     ).top
-    put_paths(model, given.objects)
+    replace_paths(model, given.objects)
 
 
-def put_paths(model: Model, paths: Any) -> None:
-    """Give forces other paths, each of which has the path of its force as its name so far.
+def replace_paths(model: Model, paths: Any) -> None:
+    """Replace the paths of forces.
+
+    Args:
+        model: the model, which is changed.
+        paths: new paths, each named by the path of its force.
 
     Raises:
         ModelError: there is no such force, or it has no path.
@@ -279,8 +316,9 @@ def put_paths(model: Model, paths: Any) -> None:
         force.geometry_path.name = "path"
 
 
-@operation(p.ModOpAddExternalLoads)
-def _loads(model: Model, operator: p.ModOpAddExternalLoads, folder: Path) -> None:
+@register_operation(p.ModOpAddExternalLoads)
+def _add_external_loads(model: Model, operator: p.ModOpAddExternalLoads, folder: Path) -> None:
+    """Add external loads of a file to the model."""
     file = folder / operator.filepath.strip()
     loads = read_document(Source.of_file(file), of=ExternalLoads).top
     assert isinstance(loads, ExternalLoads)
@@ -289,16 +327,16 @@ def _loads(model: Model, operator: p.ModOpAddExternalLoads, folder: Path) -> Non
     model.add(loads)
 
 
-def processed(processor: ModelProcessor, folder: str | Path = ".") -> Model:
-    """The model of a processor, changed as that says.
+def process_model(processor: ModelProcessor, folder: str | Path = ".") -> Model:
+    """Return the model of a processor, changed by its operators.
 
     Args:
-        processor: of a study or a tool; its `filepath` is looked for from the folder.
-        folder: of its document.
+        processor: processor of a study or a tool.
+        folder: folder of its document, from which its paths start.
 
     Raises:
-        DocumentError: a file is missing or holds something else.
-        ModelError: it has no model, or an operator names what is not there.
+        DocumentError: a file is missing or has another class.
+        ModelError: the processor has no model, or an operator has an unknown name.
         UnsupportedError: an operator cannot be applied.
     """
     name = processor.filepath.strip()
@@ -308,12 +346,23 @@ def processed(processor: ModelProcessor, folder: str | Path = ".") -> Model:
         model = processor.model.copy_deep()
     else:
         raise ModelError("a ModelProcessor has neither a filepath nor a model; give it one")
-    apply(model, processor.operators, folder)
+    apply_operators(model, processor.operators, folder)
     return model
 
 
-def apply(model: Model, operators: Iterable[ModelOperator], folder: str | Path = ".") -> None:
-    """Change a model as operators say, in their order; errors as of :func:`processed`."""
+def apply_operators(
+    model: Model, operators: Iterable[ModelOperator], folder: str | Path = "."
+) -> None:
+    """Change a model by operators, in their order.
+
+    Args:
+        model: the model, which is changed.
+        operators: the operators.
+        folder: folder from which paths start.
+
+    Raises:
+        OsimliteError: as for :func:`process_model`.
+    """
     for operator in operators:
         operation = OPERATIONS.get(type(operator))
         if operation is None:

@@ -1,8 +1,8 @@
-"""Polynomials of the coordinates in the places of paths, fitted to lengths and moment arms over the ranges of motion.
+"""Polynomials of coordinates that replace muscle paths, fitted to lengths and moment arms.
 
-As OpenSim's PolynomialPathFitter: of rising order, until both are met. The moment arms are the
-derivatives of the length, so that a path that slips, whose moment arms are not, is met as well as
-both can be.
+As in OpenSim's PolynomialPathFitter, the order rises until both are within a tolerance. Moment arms
+are derivatives of the length. A path that slips has other moment arms; its polynomial is the best
+compromise.
 """
 
 from __future__ import annotations
@@ -22,24 +22,28 @@ from osimlite.schema.model import Model
 from osimlite.schema.paths import FunctionBasedPath
 from osimlite.simulation.paths import Paths, paths
 
-TOLERANCE = 1e-4
-"""Root mean square of what is off in lengths, and in moment arms, at which no higher order is tried, m."""
-COUNTS = 1e-4
-"""A coordinate about which the moment arm is nowhere larger means nothing to a path, m."""
+TOLERANCE_M = 1e-4
+"""Root mean square error of lengths and moment arms at which the order stops rising, m."""
+MIN_MOMENT_ARM_M = 1e-4
+"""Largest moment arm of a coordinate that has no influence on a path, m."""
 ORDERS = range(2, 7)
-POSES = 700
-WIDEST = math.pi
-"""Coordinates without bounds are varied so far, rad or m."""
+"""Orders of the polynomials."""
+POSE_COUNT = 700
+"""Default number of poses."""
+UNBOUNDED_RANGE = math.pi
+"""Range, on each side of zero, of coordinates without bounds, rad or m."""
 
 
-class Fitted(NamedTuple):
-    """A path as a polynomial.
+class PathFit(NamedTuple):
+    """Path as a polynomial.
 
     Attributes:
-        path: with the path of its force as its name.
-        order: of the polynomial.
-        length, arm: root mean squares of what is off, m.
-        worst_length, worst_arm: the largest, m.
+        path: the path, named by the path of its force.
+        order: order of the polynomial.
+        length: root mean square error of the length, m.
+        arm: root mean square error of the moment arms, m.
+        worst_length: largest error of the length, m.
+        worst_arm: largest error of the moment arms, m.
     """
 
     path: FunctionBasedPath
@@ -50,17 +54,19 @@ class Fitted(NamedTuple):
     worst_arm: float
 
 
-def fit_paths(model: Model, tolerance: float = TOLERANCE, poses: int = POSES) -> list[Fitted]:
-    """Polynomials for all paths of forces of a model; see the module.
+def fit_paths(
+    model: Model, tolerance: float = TOLERANCE_M, poses: int = POSE_COUNT
+) -> list[PathFit]:
+    """Fit polynomials to all paths of forces of a model.
 
     Args:
-        model: whose paths; those that are functions already are left as they are.
-        tolerance: root mean squares that are good enough, m.
-        poses: how many are tried, over the ranges of the coordinates.
+        model: the model; function-based paths are skipped.
+        tolerance: root mean square error at which the order stops rising, m.
+        poses: number of poses, spread over the ranges of the coordinates.
     """
     known = paths(model)
     mechanism = known.mechanism
-    q, free = _poses(mechanism, poses)
+    q, free = _sample_poses(mechanism, poses)
     still = np.zeros(len(mechanism.coordinates))
     lengths = np.array([known.system.measured(row, still, LENGTH) for row in q])
     arms = known.all_moment_arms(q)
@@ -69,13 +75,17 @@ def fit_paths(model: Model, tolerance: float = TOLERANCE, poses: int = POSES) ->
         if isinstance(getattr(tree.at(name), "geometry_path", None), FunctionBasedPath):
             continue
         result.append(
-            _fitted(known, mechanism, name, q, free, lengths[:, place], arms[:, place], tolerance)
+            _fit_path(known, mechanism, name, q, free, lengths[:, place], arms[:, place], tolerance)
         )
     return result
 
 
-def _poses(mechanism: Mechanism, count: int) -> tuple[Array, list[int]]:
-    """Poses (k, n) where the constraints hold, and the coordinates that are varied."""
+def _sample_poses(mechanism: Mechanism, count: int) -> tuple[Array, list[int]]:
+    """Sample poses that satisfy the constraints.
+
+    Returns:
+        Poses (k, n), and the indices of the sampled coordinates.
+    """
     infos = mechanism.coordinates
     dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
     free = [
@@ -83,7 +93,7 @@ def _poses(mechanism: Mechanism, count: int) -> tuple[Array, list[int]]:
         for k, info in enumerate(infos)
         if k not in dependent and not info.locked and info.prescribed is None
     ]
-    bounds = np.array([_range(infos[k].range) for k in free]).reshape(-1, 2)
+    bounds = np.array([_limit_range(infos[k].range) for k in free]).reshape(-1, 2)
     rng = np.random.default_rng(0)
     # One in each of as many equal parts of every range.
     parts = np.array([rng.permutation(count) for _ in free]).T.reshape(
@@ -96,12 +106,17 @@ def _poses(mechanism: Mechanism, count: int) -> tuple[Array, list[int]]:
     return q, free
 
 
-def _range(given: tuple[float, float]) -> tuple[float, float]:
+def _limit_range(given: tuple[float, float]) -> tuple[float, float]:
+    """Return a range, or the default range if it is empty or too wide."""
     low, high = given
-    return (low, high) if low < high and high - low <= 2.0 * WIDEST else (-WIDEST, WIDEST)
+    return (
+        (low, high)
+        if low < high and high - low <= 2.0 * UNBOUNDED_RANGE
+        else (-UNBOUNDED_RANGE, UNBOUNDED_RANGE)
+    )
 
 
-def _fitted(
+def _fit_path(
     known: Paths,
     mechanism: Mechanism,
     name: str,
@@ -110,18 +125,19 @@ def _fitted(
     lengths: Array,
     arms: Array,
     tolerance: float,
-) -> Fitted:
-    own = [k for k in free if np.nanmax(np.abs(arms[:, k])) > COUNTS] or free[:1]
+) -> PathFit:
+    """Fit the polynomial of one path."""
+    own = [k for k in free if np.nanmax(np.abs(arms[:, k])) > MIN_MOMENT_ARM_M] or free[:1]
     good = np.isfinite(lengths) & np.isfinite(arms[:, own]).all(axis=1)
     x, wanted, pulls = q[good][:, own], lengths[good], arms[good][:, own]
-    best: Fitted | None = None
+    best: PathFit | None = None
     for order in ORDERS:
         powers = np.array(
             [item for item in product(range(order + 1), repeat=len(own)) if sum(item) <= order]
         )
         if len(powers) > 0.5 * len(wanted) * (1 + len(own)):
             break
-        values, slopes = _monomials(x, powers)
+        values, slopes = _compute_monomials(x, powers)
         matrix = np.vstack([values, *(-slope for slope in slopes)])
         right = np.concatenate([wanted, *pulls.T])
         sizes = np.linalg.norm(matrix, axis=0)
@@ -133,7 +149,7 @@ def _fitted(
         )
         places = tuple(mechanism.coordinates[k].path for k in own)
         path = FunctionBasedPath(name=name, coordinate_paths=places, length_function=polynomial)
-        best = Fitted(
+        best = PathFit(
             path,
             order,
             *(float(np.sqrt(np.mean(each**2))) for each in (length, arm)),
@@ -145,8 +161,8 @@ def _fitted(
     return best
 
 
-def _monomials(x: Array, powers: Array) -> tuple[Array, list[Array]]:
-    """All monomials (k, m) at some arguments (k, n), and their derivatives by each argument."""
+def _compute_monomials(x: Array, powers: Array) -> tuple[Array, list[Array]]:
+    """Return all monomials (k, m) at arguments (k, n), and their derivatives by each argument."""
     highest = int(powers.max(initial=0))
     table = np.stack([x**power for power in range(highest + 1)])
     columns = range(x.shape[1])

@@ -1,4 +1,4 @@
-"""Replacements in words, as ``osimlite modify --replace`` takes them: ``muscles=degroote``, ``reserves=100:1``."""
+"""Replacements in words, as of ``osimlite modify --replace muscles=degroote``."""
 
 from __future__ import annotations
 
@@ -9,102 +9,114 @@ from typing import Any
 from osimlite.base.text import suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.fitting.modifying.contact import smooth_contacts
-from osimlite.fitting.modifying.operators import apply, put_paths
-from osimlite.fitting.modifying.path_fitting import Fitted, fit_paths
+from osimlite.fitting.modifying.operators import apply_operators, replace_paths
+from osimlite.fitting.modifying.path_fitting import PathFit, fit_paths
 from osimlite.schema.model import Model, expect_model
 from osimlite.schema.tools import processors as p
 
-Change = Callable[[Model, Path], "list[Fitted] | None"]
+Change = Callable[[Model, Path], "list[PathFit] | None"]
+"""Function that changes a model; files are resolved from a folder."""
 
 
-def _operator(operator: Any) -> Change:
+def _create_change(operator: Any) -> Change:
+    """Return a change that applies an operator."""
+
     def change(model: Model, folder: Path) -> None:
-        apply(model, [operator], folder)
+        apply_operators(model, [operator], folder)
 
     return change
 
 
-def _fit(model: Model, folder: Path) -> list[Fitted]:
+def _replace_paths_with_polynomials(model: Model, folder: Path) -> list[PathFit]:
+    """Replace all paths by polynomials."""
     fitted = fit_paths(model)
-    put_paths(model, [item.path for item in fitted])
+    replace_paths(model, [item.path for item in fitted])
     return fitted
 
 
-def _smooth(model: Model, folder: Path) -> None:
+def _replace_contacts(model: Model, folder: Path) -> None:
+    """Replace Hunt-Crossley contact by smooth contact."""
     smooth_contacts(model)
 
 
-CHOICES: dict[str, dict[str, Callable[[], Change]]] = {
+CHANGES_BY_WORD: dict[str, dict[str, Callable[[], Change]]] = {
     "muscles": {
-        "degroote": lambda: _operator(p.ModOpReplaceMusclesWithDeGrooteFregly2016()),
-        "path-actuators": lambda: _operator(p.ModOpReplaceMusclesWithPathActuators()),
-        "none": lambda: _operator(p.ModOpRemoveMuscles()),
+        "degroote": lambda: _create_change(p.ModOpReplaceMusclesWithDeGrooteFregly2016()),
+        "path-actuators": lambda: _create_change(p.ModOpReplaceMusclesWithPathActuators()),
+        "none": lambda: _create_change(p.ModOpRemoveMuscles()),
     },
     "tendon": {
-        "rigid": lambda: _operator(p.ModOpIgnoreTendonCompliance()),
-        "explicit": lambda: _operator(p.ModOpTendonComplianceDynamicsModeDGF(mode="explicit")),
-        "implicit": lambda: _operator(p.ModOpTendonComplianceDynamicsModeDGF(mode="implicit")),
+        "rigid": lambda: _create_change(p.ModOpIgnoreTendonCompliance()),
+        "explicit": lambda: _create_change(p.ModOpTendonComplianceDynamicsModeDGF(mode="explicit")),
+        "implicit": lambda: _create_change(p.ModOpTendonComplianceDynamicsModeDGF(mode="implicit")),
     },
-    "activation": {"none": lambda: _operator(p.ModOpIgnoreActivationDynamics())},
-    "passive": {"none": lambda: _operator(p.ModOpIgnorePassiveFiberForcesDGF())},
-    "paths": {"polynomial": lambda: _fit},
-    "contact": {"smooth": lambda: _smooth},
+    "activation": {"none": lambda: _create_change(p.ModOpIgnoreActivationDynamics())},
+    "passive": {"none": lambda: _create_change(p.ModOpIgnorePassiveFiberForcesDGF())},
+    "paths": {"polynomial": lambda: _replace_paths_with_polynomials},
+    "contact": {"smooth": lambda: _replace_contacts},
 }
-"""What a name may be replaced with by a word."""
+"""Changes by name of the replaced part and word for its replacement."""
 
 
-def _welds(value: str) -> Any:
+def _parse_welds(value: str) -> Any:
+    """Return the operator for ``weld:NAME,NAME``."""
     kind, _, names = value.partition(":")
     if kind != "weld" or not names:
         raise SettingError(f"joints={value} is none; say joints=weld:NAME, or several with commas")
     return p.ModOpReplaceJointsWithWelds(joint_paths=tuple(names.split(",")))
 
 
-def _reserves(value: str) -> Any:
+def _parse_reserves(value: str) -> Any:
+    """Return the operator for ``FORCE:BOUND``."""
     force, _, bound = value.partition(":")
-    given: dict[str, Any] = {"bound": _number("reserves", bound)} if bound else {}
-    return p.ModOpAddReserves(optimal_force=_number("reserves", force), **given)
+    given: dict[str, Any] = {"bound": _parse_number("reserves", bound)} if bound else {}
+    return p.ModOpAddReserves(optimal_force=_parse_number("reserves", force), **given)
 
 
-GIVEN: dict[str, Callable[[str], Any]] = {
-    "joints": _welds,
-    "reserves": _reserves,
+OPERATORS_BY_NAME: dict[str, Callable[[str], Any]] = {
+    "joints": _parse_welds,
+    "reserves": _parse_reserves,
     "strength": lambda value: p.ModOpScaleMaxIsometricForce(
-        scale_factor=_number("strength", value)
+        scale_factor=_parse_number("strength", value)
     ),
     "width": lambda value: p.ModOpScaleActiveFiberForceCurveWidthDGF(
-        scale_factor=_number("width", value)
+        scale_factor=_parse_number("width", value)
     ),
     "external-loads": lambda value: p.ModOpAddExternalLoads(filepath=value),
     "paths": lambda value: p.ModOpReplacePathsWithFunctionBasedPaths(paths_file=value),
 }
-"""What is given a number, a file or names: the operator for it."""
+"""Operators of replacements that take a number, a file or names."""
 
 
-def _number(name: str, text: str) -> float:
+def _parse_number(name: str, text: str) -> float:
+    """Return the number of a replacement."""
     try:
         return float(text)
     except ValueError:
         raise SettingError(f"{name} takes a number, not '{text}'") from None
 
 
-def change_of(name: str, value: str) -> Change:
-    """What a replacement does.
+def find_change(name: str, value: str) -> Change:
+    """Return the change of a replacement.
+
+    Args:
+        name: name of the part to replace.
+        value: word, number, file or names.
 
     Raises:
-        SettingError: there is none.
+        SettingError: there is no such replacement.
     """
-    if (made := CHOICES.get(name, {}).get(value)) is not None:
+    if (made := CHANGES_BY_WORD.get(name, {}).get(value)) is not None:
         return made()
-    if name in GIVEN and (name not in CHOICES or Path(value).suffix):
-        return _operator(GIVEN[name](value))
-    names = sorted({*CHOICES, *GIVEN})
+    if name in OPERATORS_BY_NAME and (name not in CHANGES_BY_WORD or Path(value).suffix):
+        return _create_change(OPERATORS_BY_NAME[name](value))
+    names = sorted({*CHANGES_BY_WORD, *OPERATORS_BY_NAME})
     if name not in names:
         raise SettingError(
             f"nothing is called '{name}' that could be replaced{suggest_or_list(name, names)}"
         )
     raise SettingError(
-        f"{name} cannot be replaced with '{value}'{suggest_or_list(value, sorted(CHOICES[name]))}"
+        f"{name} cannot be replaced with '{value}'{suggest_or_list(value, sorted(CHANGES_BY_WORD[name]))}"
     )
 
 
@@ -115,23 +127,27 @@ def modify(
     replace: Iterable[tuple[str, str]] = (),
     **words: str,
 ) -> Model:
-    """A copy of a model with smoother, stiffer or other parts, as OpenSim's ModelProcessor makes it.
+    """Return a copy of a model with other parts, as OpenSim's ModelProcessor makes it.
 
-    Args: model: that stays as it is. operators: OpenSim's, such as
-        ``osimlite.ModOpAddReserves(optimal_force=100.0)``, applied first. folder: where files are
-        that are named. replace: pairs of a name and what takes its place, in their order:
-        ``("muscles", "degroote")``, ``("tendon", "rigid")``, ``("paths", "polynomial")``,
-        ``("contact", "smooth")``, ``("joints", "weld:mtp_r,mtp_l")``, ``("reserves", "100:1")``
-        (optimal force, bound), ``("muscles", "none")``. words: the same by keyword.
+    Args:
+        model: the model, which is not changed.
+        operators: OpenSim's operators, such as ``osimlite.ModOpAddReserves(optimal_force=100.0)``,
+            applied first.
+        folder: folder from which paths start.
+        replace: pairs of a name and its replacement, in their order: ``("muscles", "degroote")``,
+            ``("tendon", "rigid")``, ``("paths", "polynomial")``, ``("contact", "smooth")``,
+            ``("joints", "weld:mtp_r,mtp_l")``, ``("reserves", "100:1")`` (optimal force, bound),
+            ``("muscles", "none")``.
+        words: the same by keyword.
 
     Raises:
         SettingError: there is no such replacement.
-        ModelError: something is named that is not there.
-        UnsupportedError: a part of the model has nothing that could take its place.
+        ModelError: the model lacks a named part.
+        UnsupportedError: a part of the model has no replacement.
     """
     expect_model(model)
     result = model.copy_deep()
-    apply(result, operators, folder)
+    apply_operators(result, operators, folder)
     for name, value in [*replace, *words.items()]:
-        change_of(name, value)(result, Path(folder))
+        find_change(name, value)(result, Path(folder))
     return result

@@ -1,6 +1,7 @@
-"""What OpenSim's analyses compute along a motion.
+"""OpenSim's analyses of a motion.
 
-An analysis is one module with the name of its class in lower case, which is how it is found. It has
-a function ``compute(analysis, motion, tables)``: what the setup says of it, the
-:class:`~osimlite.tools.motion.Motion`, and where its :class:`~osimlite.tools.motion.Tables` go.
+Each analysis is a function ``write_...(analysis, motion, tables)``, which
+:data:`osimlite.tools.registry.ANALYSES` lists by OpenSim's class names. It gets the analysis of the
+setup, the :class:`~osimlite.tools.motion.Motion`, and the writer of its tables,
+:class:`~osimlite.tools.motion.AnalysisTables`.
 """

@@ -20,42 +20,51 @@ from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.run_controls import driven
 from osimlite.simulation.static_optimization import ideal
 from osimlite.tools.dynamics_setup import build_simulation
-from osimlite.tools.motion import Motion, Tables
+from osimlite.tools.motion import AnalysisTables, Motion
 from osimlite.tools.reaction_forces import JointWrenches
 
 REACTION_TITLE = "Joint Reaction Loads"
+"""OpenSim's title of the table."""
 REACTION_DESCRIPTION = (
     "\nThis file contains the reaction forces and moments\n"
     "applied to the specified body of a joint pair and expressed  in the specified reference frame.\n"
     "\nUnits are S.I. units (seconds, meters, Newtons, ...)"
 )
+"""OpenSim's text in the header of the table."""
 REACTION_ENDINGS = ("fx", "fy", "fz", "mx", "my", "mz", "px", "py", "pz")
+"""Suffixes of the columns of one joint: force, moment and point."""
 
 
-def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Tables) -> None:
-    """Write the force (N), the moment (N m) and the point (m) at which they act of every joint that is asked for."""
+def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: AnalysisTables) -> None:
+    """Write force (N), moment (N m) and point of application (m) of the requested joints.
+
+    Args:
+        analysis: settings of the analysis.
+        motion: the motion.
+        tables: writer of the table.
+    """
     mechanism, model = motion.mechanism, motion.model
     joints = _find_joints(analysis, model, tables)
     sides = _expand_words("apply_on_bodies", analysis.apply_on_bodies or ("child",), joints, tables)
     frames = _expand_words(
         "express_in_frame", analysis.express_in_frame or ("ground",), joints, tables
     )
-    loads = JointWrenches.along(*_override_forces(analysis, motion, tables))
+    loads = JointWrenches.compute_along(*_override_forces(analysis, motion, tables))
     columns: list[str] = []
     rows: list[Array] = []
     for joint, word, asked in zip(joints, sides, frames, strict=True):
         side = word.lower()
         if side not in ("child", "parent"):
-            raise tables.job.error(f"apply_on_bodies has '{side}'; it says child or parent")
+            raise tables.job.create_error(f"apply_on_bodies has '{side}'; it says child or parent")
         bases = {end: _find_base_path(model, joint, end) for end in ("child", "parent")}
         frame = _find_frame_path(motion, asked, bases, tables)
-        force, moment, place = loads.of(joint, side)
+        force, moment, place = loads.get_reaction(joint, side)
         rotation, origin = loads.moved.placed(*mechanism.placement(frame))
         back = rotation.transpose(0, 2, 1)
         rows += [(back @ item[..., None])[..., 0] for item in (force, moment, place - origin)]
         root = f"{joint.name}_on_{_get_last_name(bases[side])}_in_{_get_last_name(frame)}"
         columns += [f"{root}_{ending}" for ending in REACTION_ENDINGS]
-    tables.add(
+    tables.add_table(
         "ReactionLoads",
         REACTION_TITLE,
         columns,
@@ -64,8 +73,11 @@ def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Table
     )
 
 
-def _find_joints(analysis: JointReaction, model: Model, tables: Tables) -> list[Joint]:
-    """The joints that are asked for; OpenSim finds each after the one before only, and leaves the others out."""
+def _find_joints(analysis: JointReaction, model: Model, tables: AnalysisTables) -> list[Joint]:
+    """Return the requested joints.
+
+    OpenSim searches for each joint only after the one before, and ignores the others.
+    """
     every = model.joint_set.objects
     names = list(map(str, analysis.joint_names)) or ["ALL"]
     if names[0].upper() == "ALL":
@@ -73,52 +85,74 @@ def _find_joints(analysis: JointReaction, model: Model, tables: Tables) -> list[
     known = {joint.name: joint for joint in every}
     for name in names:
         if name not in known:
-            raise tables.job.error(
+            raise tables.job.create_error(
                 f"there is no joint '{name}' for '{analysis.name}'{suggest_name(name, known)}"
             )
     return [known[name] for name in names]
 
 
 def _expand_words(
-    what: str, given: Sequence[object], joints: Sequence[Joint], tables: Tables
+    what: str, given: Sequence[object], joints: Sequence[Joint], tables: AnalysisTables
 ) -> list[str]:
-    """The word for each joint; one may be for all."""
+    """Return a word for each joint; a single word holds for all."""
     words = list(map(str, given))
     if len(words) == 1:
         return words * len(joints)
     if len(words) != len(joints):
         count = format_count(len(joints), "joint")
-        raise tables.job.error(f"{what} has {len(words)} words for {count}; give one, or as many")
+        raise tables.job.create_error(
+            f"{what} has {len(words)} words for {count}; give one, or as many"
+        )
     return words
 
 
 def _find_base_path(model: Model, joint: Joint, end: str) -> str:
-    """The path of the body (or ground) that an end of a joint is fixed to."""
+    """Return the path of the body, or of ground, to which one end of a joint is fixed."""
     placements = Placements(model.tree())
     return placements.resolve_frame(placements.follow_socket(joint, f"socket_{end}_frame"))[0]
 
 
-def _find_frame_path(motion: Motion, asked: str, bases: dict[str, str], tables: Tables) -> str:
-    """The path of a frame that is asked for by a word or as OpenSim finds it: in the model, its bodies, its joints."""
-    result = motion.frame(asked, "Frame", "/bodyset", "/jointset") or bases.get(asked.lower())
+def _find_frame_path(
+    motion: Motion, asked: str, bases: dict[str, str], tables: AnalysisTables
+) -> str:
+    """Return the path of a frame that a setup names, by a word or as OpenSim searches for it.
+
+    Args:
+        motion: the motion.
+        asked: ``"child"``, ``"parent"``, or name of a frame.
+        bases: paths of the joint's bodies by these words.
+        tables: writer of the tables.
+    """
+    result = motion.find_frame_path(asked, "Frame", "/bodyset", "/jointset") or bases.get(
+        asked.lower()
+    )
     if result is None:
         message = f"express_in_frame has '{asked}', which is no frame of the model; say child, parent or a frame"
-        raise tables.job.error(message)
+        raise tables.job.create_error(message)
     return result
 
 
 def _get_last_name(path: str) -> str:
+    """Return the last part of a path."""
     return path.rpartition("/")[2]
 
 
 def _override_forces(
-    analysis: JointReaction, motion: Motion, tables: Tables
+    analysis: JointReaction, motion: Motion, tables: AnalysisTables
 ) -> tuple[Motion, Controls | None]:
-    """The motion of a model whose actuators push as a file says, and what drives them.
+    """Return a motion whose actuators have the forces of a file, and the controls that drive them.
 
-    OpenSim does so if every actuator has a column; else it takes the forces of the states.
+    OpenSim does so if every actuator has a column; otherwise it uses the forces of the states.
+
+    Args:
+        analysis: settings of the analysis.
+        motion: the motion.
+        tables: writer of the tables.
+
+    Returns:
+        The motion, and its controls; the motion itself and None if no forces are replaced.
     """
-    path = tables.job.place(analysis.forces_file)
+    path = tables.job.resolve_name(analysis.forces_file)
     if path is None:
         return motion, None
     table = read_sto(path)
@@ -126,7 +160,7 @@ def _override_forces(
     actuators = [item for item in model.components(ScalarActuator)]
     lacking = [item.name for item in actuators if item.name not in table.columns]
     if lacking:
-        tables.outcome.tell(
+        tables.outcome.add_message(
             analysis.name,
             f"'{path}' has no column for {join_words(lacking)}: the forces are those of the states, as in OpenSim",
         )
@@ -139,7 +173,7 @@ def _override_forces(
     for item in actuators:
         other = ideal(item, 1.0)
         if other is None or id(item) not in places:
-            raise tables.job.unable(
+            raise tables.job.create_unsupported_error(
                 f"the {type(item).__name__} '{item.name}' cannot push as '{path}' says, which is not done yet"
             )
         model.force_set.objects[places[id(item)]] = other
@@ -167,10 +201,17 @@ ACTUATION_DESCRIPTION = (
     "is absorbing energy from the model.\n"
     f"\n{UNITS}"
 )
+"""OpenSim's text in the header of the tables."""
 
 
-def write_actuation(analysis: Actuation, motion: Motion, tables: Tables) -> None:
-    """Write three tables of the actuators that are on."""
+def write_actuation(analysis: Actuation, motion: Motion, tables: AnalysisTables) -> None:
+    """Write forces, speeds and powers of the actuators that are on.
+
+    Args:
+        analysis: settings of the analysis.
+        motion: the motion.
+        tables: writer of the tables.
+    """
     actuators = [
         item
         for item in motion.model.force_set.objects
@@ -178,12 +219,14 @@ def write_actuation(analysis: Actuation, motion: Motion, tables: Tables) -> None
     ]
     for item in actuators:
         if item.control_count != 1:
-            raise tables.job.unable(
+            raise tables.job.create_unsupported_error(
                 f"'{analysis.name}' asks for one force of '{item.name}', a {type(item).__name__}, which has several; "
                 "OpenSim crashes there"
             )
     tree = motion.model.tree()
-    known = motion.known([tree.path_of(item) or "" for item in actuators], "actuation", "speed")
+    known = motion.read_records(
+        [tree.path_of(item) or "" for item in actuators], "actuation", "speed"
+    )
     force, speed = known["actuation"], known["speed"]
     # A tension pulls against the lengthening speed.
     sense = np.array([-1.0 if isinstance(item, PathActuator) else 1.0 for item in actuators])
@@ -193,4 +236,4 @@ def write_actuation(analysis: Actuation, motion: Motion, tables: Tables) -> None
         ("speed", "ActuatorSpeeds", speed),
         ("power", "ActuatorPowers", sense * force * speed),
     ):
-        tables.add(suffix, title, names, rows, description=ACTUATION_DESCRIPTION)
+        tables.add_table(suffix, title, names, rows, description=ACTUATION_DESCRIPTION)

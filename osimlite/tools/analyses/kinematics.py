@@ -7,14 +7,22 @@ import numpy as np
 from osimlite.io.tables.old_storage import DEGREES, UNITS
 from osimlite.mechanics.multibody.spatial import angles_xyz
 from osimlite.schema.tools.analyses import BodyKinematics, Kinematics, PointKinematics
-from osimlite.tools.motion import Motion, Tables
+from osimlite.tools.motion import AnalysisTables, Motion
 
 
-def write_kinematics(analysis: Kinematics, motion: Motion, tables: Tables) -> None:
-    """Write values, speeds and accelerations, the last by the model's own forces."""
+def write_kinematics(analysis: Kinematics, motion: Motion, tables: AnalysisTables) -> None:
+    """Write values, speeds and accelerations of coordinates.
+
+    The accelerations follow from the forces of the model.
+
+    Args:
+        analysis: settings of the analysis.
+        motion: the motion.
+        tables: writer of the tables.
+    """
     infos = motion.mechanism.coordinates
     names = [info.name for info in infos]
-    places = motion.chosen(analysis.coordinates, names, f"coordinates of '{analysis.name}'")
+    places = motion.find_indices(analysis.coordinates, names, f"coordinates of '{analysis.name}'")
     turns = [analysis.in_degrees and infos[place].motion_type == "rotational" for place in places]
     for suffix, name, rows in (
         ("q", "Coordinates", motion.values),
@@ -22,7 +30,7 @@ def write_kinematics(analysis: Kinematics, motion: Motion, tables: Tables) -> No
         ("dudt", "Accelerations", motion.accelerations),
     ):
         chosen = rows[:, places]
-        tables.add(
+        tables.add_table(
             suffix,
             name,
             [names[place] for place in places],
@@ -33,12 +41,19 @@ def write_kinematics(analysis: Kinematics, motion: Motion, tables: Tables) -> No
 
 
 CENTER_OF_MASS = "center_of_mass"
+"""OpenSim's name of the mass centre of all bodies."""
 
 
-def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Tables) -> None:
-    """Write places with body-fixed X-Y-Z angles, velocities and accelerations, in ground or along each body's axes.
+def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: AnalysisTables) -> None:
+    """Write positions, X-Y-Z angles, velocities and accelerations of bodies and of the mass centre.
 
-    Places, and what is said of the whole mass centre, are always in ground.
+    Velocities and accelerations are in ground or along each body's axes. Positions, and everything
+    about the mass centre of the model, are in ground.
+
+    Args:
+        analysis: settings of the analysis.
+        motion: the motion.
+        tables: writer of the tables.
     """
     bodies, tree = motion.model.body_set.objects, motion.model.tree()
     places = {body.path: place for place, body in enumerate(motion.mechanism.bodies)}
@@ -59,7 +74,7 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Tabl
             rows[:, :, 1] = np.degrees(rows[:, :, 1])
         result.append(rows.reshape(3, -1, 6))
     names = [body.name for body in bodies]
-    chosen = motion.chosen(
+    chosen = motion.find_indices(
         analysis.bodies, [*names, CENTER_OF_MASS], f"bodies of '{analysis.name}'"
     )
     own = [place for place in chosen if place < len(names)]
@@ -83,7 +98,7 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Tabl
         description = BODY_DESCRIPTION.format(
             motion.model.name, "body-local" if local else "ground"
         )
-        tables.add(
+        tables.add_table(
             suffix, title, columns, rows, in_degrees=analysis.in_degrees, description=description
         )
 
@@ -96,31 +111,43 @@ BODY_DESCRIPTION = (
     "\nAngular velocities and accelerations are expressed in the {} frame.\n"
     f"\nUnits are S.I. units (seconds, meters, Newtons, ...)\n{DEGREES}"
 )
+"""OpenSim's text in the header of the tables."""
 
 
-def write_point_kinematics(analysis: PointKinematics, motion: Motion, tables: Tables) -> None:
-    """Write the three: in ground, or the place in the frame of another body, and the rates of ground along its axes."""
+def write_point_kinematics(
+    analysis: PointKinematics, motion: Motion, tables: AnalysisTables
+) -> None:
+    """Write position, velocity and acceleration of a point that is fixed in a body.
+
+    They are in ground; with another body, the position is in its frame, and the other two are along
+    its axes.
+
+    Args:
+        analysis: settings of the analysis.
+        motion: the motion.
+        tables: writer of the tables.
+    """
     mechanism, own, beside = (
         motion.mechanism,
         str(analysis.body_name),
         str(analysis.relative_to_body_name),
     )
-    body, placed = mechanism.placement(motion.frame(own, *FRAME_SEARCH) or own)
+    body, placed = mechanism.placement(motion.find_frame_path(own, *FRAME_SEARCH) or own)
     result = np.array(
         motion.links.point(body, placed[:3, :3] @ np.array(analysis.point) + placed[:3, 3])
     )
-    path = motion.frame(beside, *FRAME_SEARCH)
+    path = motion.find_frame_path(beside, *FRAME_SEARCH)
     if path is not None:
         rotation, origin = motion.links.placed(*mechanism.placement(path))
         result[0] -= origin
         result = (result[..., None, :] @ rotation)[..., 0, :]
     elif beside not in ("", "none"):
-        tables.outcome.tell(
+        tables.outcome.add_message(
             analysis.name, f"there is no frame '{beside}': results are in ground, as in OpenSim"
         )
     labels = [f"state_{axis}" for axis in range(3)]
     for rows, (suffix, title) in zip(result, POINT_TABLES, strict=True):
-        tables.add(
+        tables.add_table(
             suffix,
             f"Point{title}",
             labels,
@@ -131,4 +158,6 @@ def write_point_kinematics(analysis: PointKinematics, motion: Motion, tables: Ta
 
 
 FRAME_SEARCH = "PhysicalFrame", "/bodyset"
+"""Class of frames that the analysis searches for, and the component below which it searches."""
 POINT_TABLES = ("pos", "Position"), ("vel", "Velocity"), ("acc", "Acceleration")
+"""Suffixes and titles of the three tables."""

@@ -14,57 +14,76 @@ from osimlite.simulation.paths import Paths
 from osimlite.simulation.static_optimization import Shared
 from osimlite.tools.analyses.reporters import FORCES_DESCRIPTION
 from osimlite.tools.dynamics_setup import build_static_optimization
-from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.muscle_quantities import CHECKED, KNOWN, OF_DYNAMICS, quantities
+from osimlite.tools.motion import AnalysisTables, Motion
+from osimlite.tools.muscle_quantities import (
+    CORRECTIONS,
+    DYNAMIC_QUANTITIES,
+    LAW_RECORDS,
+    compute_quantities,
+)
 
 MUSCLE_DESCRIPTION = (
     "\nThis analysis gathers basic information about muscles during a simulation "
     f"(e.g., forces, tendon lengths, moment arms, etc).\n{UNITS}"
 )
+"""OpenSim's text in the header of the tables."""
 
 
-def write_muscle_analysis(analysis: MuscleAnalysis, motion: Motion, tables: Tables) -> None:
-    """Write a table for each quantity, and two for each coordinate."""
+def write_muscle_analysis(analysis: MuscleAnalysis, motion: Motion, tables: AnalysisTables) -> None:
+    """Write a table for each quantity of muscles, and two for each coordinate.
+
+    Args:
+        analysis: settings of the analysis.
+        motion: the motion.
+        tables: writer of the tables.
+    """
     every = list(motion.model.components(Muscle))
-    chosen = motion.chosen(
+    chosen = motion.find_indices(
         analysis.muscle_list, [muscle.name for muscle in every], f"muscles of '{analysis.name}'"
     )
     muscles = [every[place] for place in chosen]
     for muscle in muscles:
-        why = "which it cannot analyse yet" if type(muscle) not in CHECKED else ""
+        why = "which it cannot analyse yet" if type(muscle) not in CORRECTIONS else ""
         why = why or ("" if muscle.appliesForce else "which applies no force")
         if why:
-            raise tables.job.unable(
+            raise tables.job.create_unsupported_error(
                 f"'{analysis.name}' asks for '{muscle.name}', a {type(muscle).__name__}, {why}"
             )
     names = [muscle.name for muscle in muscles]
     result = _compute_tables(motion, muscles)
     if not motion.mechanism.total_mass > np.finfo(float).eps:
-        result |= {suffix: np.full_like(result[suffix], np.nan) for suffix in OF_DYNAMICS}
+        result |= {suffix: np.full_like(result[suffix], np.nan) for suffix in DYNAMIC_QUANTITIES}
     for suffix, rows in result.items():
-        tables.add(suffix, suffix, names, rows, description=MUSCLE_DESCRIPTION)
+        tables.add_table(suffix, suffix, names, rows, description=MUSCLE_DESCRIPTION)
     if analysis.compute_moments:
         _add_moments(analysis, motion, tables, muscles, result["TendonForce"])
 
 
 def _compute_tables(motion: Motion, muscles: list[Muscle]) -> dict[str, Array]:
-    """The tables (t, m) of muscles of whatever classes."""
+    """Return the tables (t, m) of muscles of any classes."""
     result: dict[str, Array] = {}
     tree = motion.model.tree()
     for cls in dict.fromkeys(map(type, muscles)):
         own = [place for place, muscle in enumerate(muscles) if type(muscle) is cls]
         paths = [tree.path_of(muscles[place]) or "" for place in own]
-        names = KNOWN if not motion.system.knows(paths[0], SPRING) else (*KNOWN, SPRING)
+        names = LAW_RECORDS if not motion.system.knows(paths[0], SPRING) else (*LAW_RECORDS, SPRING)
         with np.errstate(invalid="ignore", divide="ignore"):
-            of_class = quantities(motion.known(paths, *names), [muscles[place] for place in own])
+            of_class = compute_quantities(
+                motion.read_records(paths, *names), [muscles[place] for place in own]
+            )
         for suffix, rows in of_class.items():
             result.setdefault(suffix, np.empty((len(motion.times), len(muscles))))[:, own] = rows
     return result
 
 
 def _add_moments(
-    analysis: MuscleAnalysis, motion: Motion, tables: Tables, muscles: list[Muscle], tension: Array
+    analysis: MuscleAnalysis,
+    motion: Motion,
+    tables: AnalysisTables,
+    muscles: list[Muscle],
+    tension: Array,
 ) -> None:
+    """Write the tables of moment arms and moments about coordinates."""
     infos, tree = motion.mechanism.coordinates, motion.model.tree()
     paths = Paths(motion.model)
     rows = [paths.names.index(tree.path_of(muscle) or "") for muscle in muscles]
@@ -73,52 +92,65 @@ def _add_moments(
         "all" if str(name).lower() == "all" else name
         for name in analysis.moment_arm_coordinate_list
     ]
-    for place in motion.chosen(
+    for place in motion.find_indices(
         asked, [info.name for info in infos], f"coordinates of '{analysis.name}'"
     ):
         names, own = [muscle.name for muscle in muscles], arms[:, :, place]
         for what, result in (("MomentArm", own), ("Moment", own * tension)):
             title = f"{what}_{infos[place].name}"
-            tables.add(title, title, names, result, description=MUSCLE_DESCRIPTION)
+            tables.add_table(title, title, names, result, description=MUSCLE_DESCRIPTION)
 
 
 ACTIVATION_DESCRIPTION = "This file contains static optimization results.\n"
+"""OpenSim's text in the header of the activations."""
 
 
-def write_static_optimization(analysis: StaticOptimization, motion: Motion, tables: Tables) -> None:
-    """Write activations, forces and controls; what has no solution is no number there, and told."""
+def write_static_optimization(
+    analysis: StaticOptimization, motion: Motion, tables: AnalysisTables
+) -> None:
+    """Write activations, forces and controls; NaN at times without a solution.
+
+    Args:
+        analysis: settings of the analysis.
+        motion: the motion.
+        tables: writer of the tables.
+    """
     job = tables.job
     if motion.record is None:
-        raise job.unable(
+        raise job.create_unsupported_error(
             f"'{analysis.name}' cannot be computed of a motion that was not measured; give it to an AnalyzeTool"
         )
     if not analysis.use_model_force_set:
-        raise job.unable(
+        raise job.create_unsupported_error(
             f"'{analysis.name}' has use_model_force_set off, with which OpenSim crashes; set it to true"
         )
     muscles = "active" if analysis.use_muscle_physiology else "isometric"
     problem = build_static_optimization(
         job, motion.model, motion.mechanism, exponent=analysis.activation_exponent, muscles=muscles
     )
-    shared = problem.share(motion.times, motion.values, motion.speeds, motion.wanted)
+    shared = problem.share(
+        motion.times, motion.values, motion.speeds, motion.measured_accelerations
+    )
     forces = problem.records(shared, motion.values, motion.speeds)
     activations = shared.table()
-    tables.add(
+    tables.add_table(
         "activation",
         activations.name,
         activations.columns,
         activations.rows,
         description=ACTIVATION_DESCRIPTION,
     )
-    tables.add("force", forces.name, forces.columns, forces.rows, description=FORCES_DESCRIPTION)
+    tables.add_table(
+        "force", forces.name, forces.columns, forces.rows, description=FORCES_DESCRIPTION
+    )
     tables.add_text("controls.xml", "".join(control_set(activations)))
     _report_unsolved(shared, analysis.name, tables)
 
 
-def _report_unsolved(shared: Shared, name: str, tables: Tables) -> None:
-    """Say how it went: times without a solution, and what is missing there."""
+def _report_unsolved(shared: Shared, name: str, tables: AnalysisTables) -> None:
+    """Report the times without a solution, and the coordinates that lack strength there."""
     outcome = tables.outcome
     outcome.summary[f"{name}_unsolved"] = np.count_nonzero(~shared.solved)
     if said := shared.unsolved():
         outcome.done = False
-        outcome.tell(name, said)
+        outcome.add_message(name, said)

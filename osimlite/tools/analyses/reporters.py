@@ -21,60 +21,67 @@ from osimlite.schema.tools.analyses import (
 from osimlite.simulation.run_report import probe_labels, probe_rows
 from osimlite.simulation.system import System
 from osimlite.simulation.trajectory import label_as_opensim
-from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.outputs import reader_of
+from osimlite.tools.motion import AnalysisTables, Motion
+from osimlite.tools.outputs import find_reader
 from osimlite.tools.reaction_forces import compute_constraint_records
 
 OUTPUT_FILES = {"double": "Outputs", "Vec3": "OutputsVec3", "SpatialVec": "OutputsSpatialVec"}
-"""By type of the outputs: what the file is called."""
+"""Suffix of the file by type of the outputs."""
 OUTPUT_PATTERN = re.compile(
     r"(?P<path>[^|:(]*)\|(?P<output>[^|:(]+)(:(?P<channel>[^(]*))?(\((?P<alias>.*)\))?"
 )
+"""Syntax of a requested output: ``path|output:channel(alias)``."""
 
 
-def write_outputs(analysis: OutputReporter, motion: Motion, tables: Tables) -> None:
-    """Write the outputs that are asked for; those of other types are left out and told, as in OpenSim."""
+def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTables) -> None:
+    """Write the requested outputs; ignore and report those of other types, as in OpenSim.
+
+    Args:
+        analysis: settings of the analysis.
+        motion: the motion.
+        tables: writer of the tables.
+    """
     tree, columns = motion.model.tree(), {kind: list[str]() for kind in OUTPUT_FILES}
     rows = {kind: [np.empty((len(motion.times), 0))] for kind in OUTPUT_FILES}
     left_out = []
     for asked in map(str, analysis.output_paths):
         parts = OUTPUT_PATTERN.fullmatch(asked.strip())
         if parts is None:
-            raise tables.job.error(
+            raise tables.job.create_error(
                 f"'{analysis.name}' asks for '{asked}', which is no output; write path|output"
             )
         path = "/" + parts["path"].strip("/")
         component = tree.walk(path, "", "Component").target if path != "/" else motion.model
         if not isinstance(component, Component):
-            raise tables.job.error(
+            raise tables.job.create_error(
                 f"'{analysis.name}' asks for an output of '{path}', which is not in the model"
             )
         outputs = outputs_of(type(component))
-        reader = reader_of(motion, component, parts["output"])
+        reader = find_reader(motion, component, parts["output"])
         kind = outputs[parts["output"]].type if parts["output"] in outputs else "double"
         if kind not in OUTPUT_FILES:
             left_out.append(asked)
             continue
         if parts["output"] not in outputs and reader is None:
             near = suggest_name(parts["output"], outputs)
-            raise tables.job.error(
+            raise tables.job.create_error(
                 f"'{path}' has no output '{parts['output']}' for '{analysis.name}'{near}"
             )
         if reader is None or parts["channel"]:
-            raise tables.job.unable(
+            raise tables.job.create_unsupported_error(
                 f"'{analysis.name}' asks for '{asked}' of a {type(component).__name__}, which cannot be computed yet"
             )
         columns[kind].append(parts["alias"] or f"{path}|{parts['output']}")
         rows[kind].append(reader(motion, component, path))
     if left_out:
         kinds = join_words([*OUTPUT_FILES])
-        tables.outcome.tell(
+        tables.outcome.add_message(
             analysis.name,
             f"{join_words(left_out)}: left out, as only {kinds} are reported, as in OpenSim",
         )
     for kind, name in OUTPUT_FILES.items():
         if columns[kind]:
-            tables.add_newer(name, columns[kind], np.hstack(rows[kind]), kind)
+            tables.add_typed_table(name, columns[kind], np.hstack(rows[kind]), kind)
 
 
 FORCES_DESCRIPTION = (
@@ -82,25 +89,31 @@ FORCES_DESCRIPTION = (
     "\nA force is a generalized force, meaning that it can be either a force (N) or a torque (Nm).\n"
     f"\n{UNITS}"
 )
-"""What the header of forces says besides."""
+"""OpenSim's text in the header of tables of forces."""
 
 
-def write_forces(analysis: ForceReporter, motion: Motion, tables: Tables) -> None:
-    """Write the columns of every force, and of every constraint if they are asked for."""
+def write_forces(analysis: ForceReporter, motion: Motion, tables: AnalysisTables) -> None:
+    """Write the records of every force and, if requested, of every constraint.
+
+    Args:
+        analysis: settings of the analysis.
+        motion: the motion.
+        tables: writer of the tables.
+    """
     rows = motion.compute_by_parts(lambda part: collect_force_records(part, motion.system))
     labels = label_as_opensim(motion.system.columns)
     if analysis.include_constraint_forces and motion.simulation.constraints:
         more, result = compute_constraint_records(motion)
         labels, rows = labels + more, np.hstack([rows, result])
-    tables.add("forces", "ModelForces", labels, rows, description=FORCES_DESCRIPTION)
+    tables.add_table("forces", "ModelForces", labels, rows, description=FORCES_DESCRIPTION)
 
 
 def collect_force_records(motion: Motion, system: System) -> Array:
-    """Return the force records (t, m) of a motion in the columns of a system; NaN of muscles that are left out.
+    """Return the records of forces (t, m) of a motion; NaN for muscles that are off.
 
     Args:
-        motion: at whose states they are.
-        system: with all forces, among them those that the motion leaves out.
+        motion: motion at whose states the records are evaluated.
+        system: engine with all forces, which has the columns.
     """
     result = np.full((len(motion.times), len(system.columns)), np.nan)
     owners = [element.path for element in system.forces.elements for _ in element.columns]
@@ -113,15 +126,22 @@ PROBES_DESCRIPTION = (
     "\nThis file contains the probes on a model during a simulation.\n"
     f"\nThe units used are dependent on the type of probe component\n{DEGREES}"
 )
+"""OpenSim's text in the header of the table."""
 
 
-def write_probes(analysis: ProbeReporter, motion: Motion, tables: Tables) -> None:
-    """Write what the probes that are enabled report."""
+def write_probes(analysis: ProbeReporter, motion: Motion, tables: AnalysisTables) -> None:
+    """Write the values of the probes that are enabled.
+
+    Args:
+        analysis: settings of the analysis.
+        motion: the motion.
+        tables: writer of the table.
+    """
     engine, tree = motion.simulation.engine, motion.model.tree()
     computed = {probe.path for probe in engine.probes}
     for probe in motion.model.components(Probe):
         if probe.enabled and tree.path_of(probe) not in computed:
-            raise tables.job.unable(
+            raise tables.job.create_unsupported_error(
                 f"'{analysis.name}' asks for '{probe.name}', a {type(probe).__name__} that cannot be computed"
             )
     rows = motion.compute_balanced(_compute_probe_rows)
@@ -134,11 +154,13 @@ def write_probes(analysis: ProbeReporter, motion: Motion, tables: Tables) -> Non
         for label, is_shown in zip(probe_labels(engine.probes), shown, strict=True)
         if is_shown
     ]
-    tables.add("probes", "ModelProbes", labels, rows[:, shown], description=PROBES_DESCRIPTION)
+    tables.add_table(
+        "probes", "ModelProbes", labels, rows[:, shown], description=PROBES_DESCRIPTION
+    )
 
 
 def _compute_probe_rows(motion: Motion) -> Array:
-    """Return what all probes report at every time (t, m)."""
+    """Return the values of all probes at every time (t, m)."""
     rows = list(probe_rows(motion.simulation.engine, [*motion.moments], motion.steps))
     return np.array(rows).reshape(
         len(motion.times), len(probe_labels(motion.simulation.engine.probes))
@@ -146,12 +168,19 @@ def _compute_probe_rows(motion: Motion) -> Array:
 
 
 STATES_DESCRIPTION = f"\nThis file contains the states of a model during a simulation.\n\n{UNITS}"
+"""OpenSim's text in the header of the table."""
 
 
-def write_states(analysis: StatesReporter, motion: Motion, tables: Tables) -> None:
-    """Write the states in OpenSim's order."""
+def write_states(analysis: StatesReporter, motion: Motion, tables: AnalysisTables) -> None:
+    """Write the states in OpenSim's order.
+
+    Args:
+        analysis: settings of the analysis.
+        motion: the motion.
+        tables: writer of the table.
+    """
     states = motion.histories
-    tables.add(
+    tables.add_table(
         "states",
         "ModelStates",
         list(states),

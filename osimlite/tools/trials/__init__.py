@@ -1,1 +1,1 @@
-"""Whether finished trials are good enough, by the limits that OpenSim's authors and others have published."""
+"""Quality of finished trials, by limits that OpenSim's authors and others have published."""

@@ -1,4 +1,4 @@
-"""What actuators give in a trial: residuals, reserves, activations of muscles."""
+"""Measurements of actuators in a trial: residuals, reserves and activations."""
 
 from __future__ import annotations
 
@@ -20,39 +20,40 @@ from osimlite.schema.actuators import (
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.inverse_dynamics import inverse_dynamics
 from osimlite.simulation.paths import Paths
-from osimlite.tools.evidence import root_of
+from osimlite.tools.evidence import find_root_coordinates
 from osimlite.tools.trials.fit import Numbers
-from osimlite.tools.trials.folder import LOADS, MOTIONS, Folder, Missing, Tool
-from osimlite.tools.trials.loads import Scale, scale_of
+from osimlite.tools.trials.folder import LOADS, MOTIONS, MissingInput, TrialFolder, TrialTool
+from osimlite.tools.trials.loads import LoadScale, compute_scale
 
 RESIDUALS = {"FX": "N", "FY": "N", "FZ": "N", "MX": "N m", "MY": "N m", "MZ": "N m"}
-"""Names of residual actuators, where no setup says what they push."""
-LEAST = 1.0
-"""A reserve of less (N m) is none."""
-ARM = 1e-3
-"""A muscle whose moment arm is never longer (m) does not cross a coordinate."""
-FULL = 0.99
-"""So active is fully active."""
-POSES = 5
-SLACK = 0.1
-"""So much longer (s) a motion may be than what is known of its moments."""
+"""Names and units of residual actuators, for results without a setup."""
+MIN_RESERVE_NM = 1.0
+"""Smallest moment of a reserve actuator that counts, N m."""
+MIN_MOMENT_ARM_M = 1e-3
+"""Smallest moment arm, anywhere in the motion, of a muscle that crosses a coordinate, m."""
+FULL_ACTIVATION = 0.99
+"""Activation that counts as full."""
+POSE_COUNT = 5
+"""Number of poses in which moment arms are computed."""
+TIME_SLACK_S = 0.1
+"""Time by which the motion may exceed the table of its moments at either end, s."""
 
 
-class Actuators(NamedTuple):
-    """What the actuators of a tool are."""
+class ActuatorRoles(NamedTuple):
+    """Roles of the actuators of a tool."""
 
     residuals: Mapping[str, str]  # units of those that push the body at the root, by their names
     reserves: Mapping[str, str]  # coordinates of those that push others, by their names
     muscles: Sequence[str]  # names
 
 
-def actuators_of(tool: Tool | None) -> Actuators:
-    """What the actuators of a tool are; without one, what their names tell."""
+def find_actuators(tool: TrialTool | None) -> ActuatorRoles:
+    """Return the roles of a tool's actuators; without a tool, those that their names imply."""
     if tool is None:
-        return Actuators(RESIDUALS, {}, ())
+        return ActuatorRoles(RESIDUALS, {}, ())
     mechanism, residuals, reserves, muscles = tool.mechanism, dict[str, str](), dict[str, str](), []
     infos = {info.name: info for info in mechanism.coordinates}
-    root = {mechanism.coordinates[place].name for place in root_of(mechanism)}
+    root = {mechanism.coordinates[place].name for place in find_root_coordinates(mechanism)}
     joints = {infos[name].joint for name in root}
     bodies = {
         body.name.rpartition("/")[2]
@@ -77,20 +78,29 @@ def actuators_of(tool: Tool | None) -> Actuators:
             isinstance(force, Muscle) and force.appliesForce and not isinstance(force, BodyActuator)
         ):
             muscles.append(force.name)
-    return Actuators(residuals, reserves, muscles)
+    return ActuatorRoles(residuals, reserves, muscles)
 
 
-def residual_numbers(
-    folder: Folder,
+def measure_residuals(
+    folder: TrialFolder,
     file: Path,
     units: Mapping[str, str],
-    scale: Scale,
+    scale: LoadScale,
     what: str,
     *,
     is_final: bool = True,
 ) -> Numbers:
-    """Peaks and root mean squares of the columns with residuals."""
-    table = folder.table(file)
+    """Yield peaks and root mean squares of residual columns.
+
+    Args:
+        folder: the trial.
+        file: table with the residuals.
+        units: unit of each residual column.
+        scale: force and moment with which residuals are compared.
+        what: name of the tool, for messages.
+        is_final: whether no later tool reduces these residuals.
+    """
+    table = folder.read_table(file)
     for column, unit in units.items():
         if column in table.columns:
             values = np.abs(table[column])
@@ -103,7 +113,7 @@ def residual_numbers(
             of, where, at = (
                 f"{column} of {what}",
                 f"at {table.times[row]:g} s",
-                folder.place(file, row),
+                folder.locate_row(file, row),
             )
             yield (
                 file,
@@ -112,52 +122,73 @@ def residual_numbers(
             rms = float(np.sqrt(np.mean(values**2)))
             yield (
                 file,
-                Number(rule, "rms", of, rms, unit, at=folder.place(file, 0), is_final=is_final),
+                Number(
+                    rule, "rms", of, rms, unit, at=folder.locate_row(file, 0), is_final=is_final
+                ),
             )
 
 
-def dynamics_numbers(tool: Tool, *, is_final: bool) -> Numbers:
-    """Residuals of inverse dynamics."""
-    file = tool.result(tool.setup.output_gen_force_file)
+def measure_inverse_dynamics(tool: TrialTool, *, is_final: bool) -> Numbers:
+    """Yield the residuals of inverse dynamics.
+
+    Args:
+        tool: an InverseDynamicsTool.
+        is_final: whether no later tool reduces these residuals.
+    """
+    file = tool.find_result(tool.setup.output_gen_force_file)
     if file is None:
-        raise Missing(
+        raise MissingInput(
             f"the forces of {tool} are missing ('{tool.setup.output_gen_force_file}'); run it"
         )
     units = {}
-    for place in root_of(tool.mechanism):
+    for place in find_root_coordinates(tool.mechanism):
         info = tool.mechanism.coordinates[place]
         turning = info.motion_type == "rotational"
         units[f"{info.name}_{'moment' if turning else 'force'}"] = "N m" if turning else "N"
-    yield from residual_numbers(
-        tool.folder, file, units, scale_of(tool), "inverse dynamics", is_final=is_final
+    yield from measure_residuals(
+        tool.folder, file, units, compute_scale(tool), "inverse dynamics", is_final=is_final
     )
 
 
-def reserve_numbers(
-    tool: Tool, file: Path, actuators: Actuators, others: Sequence[Tool]
+def measure_reserves(
+    tool: TrialTool, file: Path, actuators: ActuatorRoles, others: Sequence[TrialTool]
 ) -> Numbers:
-    """Reserve actuators beside the moments that the motion takes at the joints that muscles cross."""
-    table = tool.folder.table(file)
+    """Yield the moments of reserve actuators relative to the joint moments of the motion.
+
+    Only coordinates that a muscle crosses count.
+
+    Args:
+        tool: tool with the reserve actuators.
+        file: table of actuator forces.
+        actuators: roles of the actuators.
+        others: all tools of the trial.
+    """
+    table = tool.folder.read_table(file)
     own = {name: column for column, name in actuators.reserves.items() if column in table.columns}
-    crossed = tool.folder.once(("crossed", tool.model_file), lambda: _crossed(tool))
+    crossed = tool.folder.compute_once(
+        ("crossed", tool.model_file), lambda: _find_crossed_coordinates(tool)
+    )
     wanted = [name for name in own if name in crossed]
     if not actuators.muscles or not wanted:
-        raise Missing(f"{tool} has no reserve actuators beside muscles")
-    moments = _moments(tool, table, others)
+        raise MissingInput(f"{tool} has no reserve actuators beside muscles")
+    moments = _find_joint_moments(tool, table, others)
     judged = 0
     for name in wanted:
         reserve, moment = np.abs(table[own[name]]), moments.get(name)
         row = int(np.argmax(reserve))
-        if moment is None or reserve[row] < LEAST:
+        if moment is None or reserve[row] < MIN_RESERVE_NM:
             continue
         judged += 1
         of = f"the reserve of '{name}', of its joint moment"
         where = f"{reserve[row]:.3g} N m at {table.times[row]:g} s, the motion takes {np.abs(moment).max():.3g} N m"
         peak = 100.0 * float(reserve[row] / np.abs(moment).max())
-        at = tool.folder.place(file, row)
+        at = tool.folder.locate_row(file, row)
         yield file, Number("reserve-moment", "peak", of, peak, "%", where=where, at=at)
         rms = 100.0 * float(np.sqrt(np.mean(reserve**2) / np.mean(moment**2)))
-        yield file, Number("reserve-moment", "rms", of, rms, "%", at=tool.folder.place(file, 0))
+        yield (
+            file,
+            Number("reserve-moment", "rms", of, rms, "%", at=tool.folder.locate_row(file, 0)),
+        )
     if not judged:
         yield (
             file,
@@ -171,8 +202,8 @@ def reserve_numbers(
         )
 
 
-def _crossed(tool: Tool) -> set[str]:
-    """The coordinates that a muscle crosses."""
+def _find_crossed_coordinates(tool: TrialTool) -> set[str]:
+    """Return the names of the coordinates that a muscle crosses."""
     model, mechanism = tool.model, tool.mechanism
     paths = Paths(model)
     tree, names = model.tree(), paths.names
@@ -181,20 +212,34 @@ def _crossed(tool: Tool) -> set[str]:
     ]
     try:
         motion = tool.motion.values
-        poses = motion[np.unique(np.linspace(0, len(motion) - 1, POSES).astype(int))]
-    except Missing:
+        poses = motion[np.unique(np.linspace(0, len(motion) - 1, POSE_COUNT).astype(int))]
+    except MissingInput:
         poses = mechanism.values({})[None]
     arms = np.abs(paths.all_moment_arms(poses)[:, rows]).max(axis=(0, 1)) if rows else np.zeros(0)
     return {
-        info.name for info, arm in zip(mechanism.coordinates, arms, strict=bool(rows)) if arm > ARM
+        info.name
+        for info, arm in zip(mechanism.coordinates, arms, strict=bool(rows))
+        if arm > MIN_MOMENT_ARM_M
     }
 
 
-def _moments(tool: Tool, table: StoTable, others: Sequence[Tool]) -> dict[str, Array]:
-    """The moments that the whole motion around a table takes, by coordinates: of inverse dynamics, or of RRA.
+def _find_joint_moments(
+    tool: TrialTool, table: StoTable, others: Sequence[TrialTool]
+) -> dict[str, Array]:
+    """Return the moments of the complete motion around a table, by coordinate.
+
+    They are results of inverse dynamics or of RRA, or are computed.
+
+    Args:
+        tool: tool whose motion it is.
+        table: table whose times the moments must cover.
+        others: all tools of the trial.
+
+    Returns:
+        Moments (t,) by coordinate, N m.
 
     Raises:
-        Missing: they are not there, and cannot be computed.
+        MissingInput: the moments are missing and cannot be computed.
     """
     names = [info.name for info in tool.mechanism.coordinates]
     for tag in ("InverseDynamicsTool", "RRATool"):
@@ -202,50 +247,56 @@ def _moments(tool: Tool, table: StoTable, others: Sequence[Tool]) -> dict[str, A
             if tag == "RRATool":
                 name, columns = (
                     f"{other.setup.name}_Actuation_force.sto",
-                    actuators_of(other).reserves,
+                    find_actuators(other).reserves,
                 )
             else:
                 name, columns = (
                     other.setup.output_gen_force_file,
                     {f"{name}_moment": name for name in names},
                 )
-            file = other.result(name)
-            known = None if file is None else tool.folder.table(file)
+            file = other.find_result(name)
+            known = None if file is None else tool.folder.read_table(file)
             if (
                 known is not None
-                and known.times[0] <= table.times[0] + SLACK
-                and known.times[-1] >= table.times[-1] - SLACK
+                and known.times[0] <= table.times[0] + TIME_SLACK_S
+                and known.times[-1] >= table.times[-1] - TIME_SLACK_S
             ):
                 return {columns[label]: known[label] for label in known.columns if label in columns}
-    if tool.input(*MOTIONS) is None:
-        raise Missing(
+    if tool.find_input(*MOTIONS) is None:
+        raise MissingInput(
             f"there are no joint moments beside the reserves of {tool}; run inverse dynamics"
         )
     known = inverse_dynamics(
         tool.model,
         tool.motion,
-        tool.input(LOADS),
+        tool.find_input(LOADS),
         lowpass=tool.cutoff if tool.cutoff > 0.0 else None,
     )
     return {name: known[f"{name}_moment"] for name in names if f"{name}_moment" in known.columns}
 
 
-def activation_numbers(folder: Folder, file: Path, muscles: Sequence[str]) -> Numbers:
-    """In how much of the time muscles are fully active."""
-    table, most = folder.table(file), 0
+def measure_activations(folder: TrialFolder, file: Path, muscles: Sequence[str]) -> Numbers:
+    """Yield the share of the time in which each muscle is fully active.
+
+    Args:
+        folder: the trial.
+        file: table of activations.
+        muscles: names of the muscles.
+    """
+    table, most = folder.read_table(file), 0
     for place, label in enumerate(table.columns):
         name = label.removesuffix("/activation").removesuffix(".activation").rpartition("/")[2]
         if name not in muscles or (
             label != name and not label.endswith(("/activation", ".activation"))
         ):
             continue
-        full = np.flatnonzero(table.rows[:, place] >= FULL)
+        full = np.flatnonzero(table.rows[:, place] >= FULL_ACTIVATION)
         if len(full):
             most += 1
             share, time = 100.0 * len(full) / len(table.times), table.times[full[0]]
             of, at = (
                 f"share of the time that '{name}' is fully active",
-                folder.place(file, int(full[0])),
+                folder.locate_row(file, int(full[0])),
             )
             yield (
                 file,

@@ -1,4 +1,4 @@
-"""Whether a finished trial is good enough: what was measured of its files, judged by the rules of the linter."""
+"""Check of finished trials: measurements of their files, judged by rules of the linter."""
 
 from __future__ import annotations
 
@@ -18,38 +18,38 @@ from osimlite.lint.many import Texts, settings_of
 from osimlite.lint.trial import Number, Trial, Verdict
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.tools.trials.actuators import (
-    activation_numbers,
-    actuators_of,
-    dynamics_numbers,
-    reserve_numbers,
-    residual_numbers,
+    find_actuators,
+    measure_activations,
+    measure_inverse_dynamics,
+    measure_reserves,
+    measure_residuals,
 )
 from osimlite.tools.trials.fit import (
     Numbers,
-    error_numbers,
-    filter_numbers,
-    marker_numbers,
-    range_numbers,
-    scale_numbers,
-    tracking_numbers,
+    measure_filter,
+    measure_marker_errors,
+    measure_ranges,
+    measure_scale_errors,
+    measure_tracking_errors,
+    measure_written_errors,
 )
-from osimlite.tools.trials.folder import LOADS, SETUPS, Folder, Missing, Tool
-from osimlite.tools.trials.loads import Scale, feet_numbers, scale_of, weight_numbers
-from osimlite.tools.trials.muscles import passive_numbers
+from osimlite.tools.trials.folder import LOADS, SETUPS, MissingInput, TrialFolder, TrialTool
+from osimlite.tools.trials.loads import LoadScale, compute_scale, measure_feet, measure_weight
+from osimlite.tools.trials.muscles import measure_passive_forces
 
-NAMES = {"RRATool": "RRA", "CMCTool": "CMC", "AnalyzeTool": "static optimization"}
-"""Of tools whose actuators are looked at."""
-IN_SETUPS = ("OSIM844", "OSIM845", "OSIM846", "OSIM849", "OSIM857", "OSIM858", "OSIM859")
-"""Rules about setups that ask the same: times, filters, units and loads."""
+TOOL_NAMES = {"RRATool": "RRA", "CMCTool": "CMC", "AnalyzeTool": "static optimization"}
+"""Names, in messages, of tools whose actuators are measured."""
+SETUP_RULES = ("OSIM844", "OSIM845", "OSIM846", "OSIM849", "OSIM857", "OSIM858", "OSIM859")
+"""Rules about setups that concern trials as well: times, filters, units and loads."""
 
 
 @dataclass(slots=True)
 class TrialReport(Report):
-    """What was found in a trial.
+    """Findings and verdicts about a trial.
 
     Attributes:
-        verdicts: every number that was compared with a limit.
-        unchecked: what was not looked at, and why.
+        verdicts: measured numbers with their limits.
+        unchecked: what could not be checked, with the reasons.
     """
 
     verdicts: list[Verdict] = field(default_factory=list)
@@ -57,16 +57,20 @@ class TrialReport(Report):
 
     @property
     def worst(self) -> list[Verdict]:
-        """Of each kind of number in each file the one that is farthest beyond its limits."""
+        """Verdict of each kind in each file that is farthest beyond its limits."""
         result: dict[tuple[str, str, str, str], Verdict] = {}
         for verdict in self.verdicts:
             key = verdict.name, verdict.file, verdict.unit, verdict.of.partition(" of ")[0]
-            if key not in result or _badness(verdict) > _badness(result[key]):
+            if key not in result or _compute_badness(verdict) > _compute_badness(result[key]):
                 result[key] = verdict
         return list(result.values())
 
     def as_dict(self) -> dict[str, Any]:
-        """All that was found, as JSON has it."""
+        """Return the report with values that JSON has.
+
+        Returns:
+            Findings, verdicts and unchecked parts, by these names.
+        """
         return {
             "findings": [finding.as_dict() for finding in self.findings],
             "verdicts": [verdict._asdict() for verdict in self.verdicts],
@@ -74,7 +78,8 @@ class TrialReport(Report):
         }
 
 
-def _badness(verdict: Verdict) -> float:
+def _compute_badness(verdict: Verdict) -> float:
+    """Return the value of a verdict relative to its limit."""
     return verdict.value / verdict.bad if verdict.bad else verdict.value
 
 
@@ -87,33 +92,41 @@ def check_trial(
     written: Iterable[Path] = (),
     progress: Callable[[int, int], object] | None = None,
 ) -> TrialReport:
-    """Check finished trials: is the model strong enough, are the data good?
+    """Check finished trials: are the data good, and is the model strong enough?
 
-    Args: paths: folders with setups and what these wrote, by OpenSim or by :func:`osimlite.run`; or
-        setups. select: codes, beginnings of codes, or names of rules to run; all that are about
-        trials if not given. ignore: the same, of rules to leave out. config: everything that can be
-        set; `select` and `ignore` take its place. written: results of the setups that are in
-        another place. progress: is told how many setups are done, of how many.
+    Args:
+        paths: folders with setups and their results, written by OpenSim or by :func:`osimlite.run`;
+            or setup files.
+        select: codes, prefixes of codes, or names of the rules to run; all rules about trials by
+            default.
+        ignore: codes, prefixes of codes, or names of rules to leave out.
+        config: complete settings, instead of `select` and `ignore`.
+        written: results of the setups that are in other folders.
+        progress: function that receives the number of finished measurements and of all
+            measurements.
 
-    Returns: Findings, as of :func:`osimlite.validate`; all numbers with their limits, and what was
-        not looked at.
+    Returns:
+        Findings, as of :func:`osimlite.validate`; measured numbers with their limits; and what
+        could not be checked.
 
     Raises:
-        MissingFileError: a path is not there.
-        OsimliteError: there is nothing of a trial, or no rule has a code in `select` or `ignore`.
+        MissingFileError: a path does not exist.
+        OsimliteError: there is no part of a trial, or no rule has a code in `select` or `ignore`.
     """
     given = config or Config(checked_words(select), checked_words(ignore))
-    folder = Folder(paths or (".",), written)
+    folder = TrialFolder(paths or (".",), written)
     numbers: dict[Path, list[Number]] = {}
     unchecked: dict[str, None] = {}
     looked: dict[str, None] = {}
-    measures = [*_measures(folder)]
+    measures = [*_plan_measurements(folder)]
     for count, (what, measure) in enumerate(measures, start=1):
         try:
             for file, number in measure():
                 numbers.setdefault(file, []).append(number)
         except OsimliteError as error:
-            unchecked[f"{what}: {error.message if isinstance(error, Missing) else error}"] = None
+            unchecked[f"{what}: {error.message if isinstance(error, MissingInput) else error}"] = (
+                None
+            )
         if progress is not None:
             progress(count, len(measures))
     if not folder.tools and not numbers:
@@ -133,11 +146,11 @@ def check_trial(
         )
         findings += run(trial).findings
         report.verdicts += trial.verdicts
-    for name in _documents(folder):
+    for name in _find_documents(folder):
         own_config = settings_of(name).config_for(name, given)
         subject = subject_of(name, own_config)
         findings += [
-            item for item in run(subject, measure=False) if item.code.startswith(IN_SETUPS)
+            item for item in run(subject, measure=False) if item.code.startswith(SETUP_RULES)
         ]
         looked[name] = None
     report.findings = sorted(
@@ -147,180 +160,223 @@ def check_trial(
     return report
 
 
-def _documents(folder: Folder) -> Iterator[str]:
-    """The setups, and the loads that they name."""
+def _find_documents(folder: TrialFolder) -> Iterator[str]:
+    """Yield the setups, and the loads that they name."""
     names: dict[str, None] = {}
     for tool in folder.tools:
         names[str(tool.job.file)] = None
         try:
-            file = tool.input(LOADS)
-        except Missing:
+            file = tool.find_input(LOADS)
+        except MissingInput:
             continue
         if file is not None:
             names[str(file)] = None
     yield from names
 
 
-Measure = tuple[str, Callable[[], Numbers]]
+Measurement = tuple[str, Callable[[], Numbers]]
+"""Description of a measurement, and the function that makes it."""
 
 
-def _measures(folder: Folder) -> Iterator[Measure]:
-    """What is measured: in words, and how."""
+def _plan_measurements(folder: TrialFolder) -> Iterator[Measurement]:
+    """Yield all measurements of a trial."""
     looked: set[tuple[object, ...]] = set()
     claimed: set[Path] = set()
     followed = any(
-        tool.tag in ("RRATool", "CMCTool") and _results(tool, "_Actuation_force.sto")
+        tool.tag in ("RRATool", "CMCTool") and _find_result(tool, "_Actuation_force.sto")
         for tool in folder.tools
     )
     for tool in folder.tools:
         if tool.tag == "ScaleTool":
-            yield "errors of the scaled model's markers", partial(scale_numbers, tool)
+            yield "errors of the scaled model's markers", partial(measure_scale_errors, tool)
         elif tool.tag == "InverseKinematicsTool":
-            yield "errors of markers", partial(marker_numbers, tool)
-            motion = folder.near(tool.job.result(tool.setup.output_motion_file.strip() or "-"))
+            yield "errors of markers", partial(measure_marker_errors, tool)
+            motion = folder.find_file(
+                tool.job.get_output_path(tool.setup.output_motion_file.strip() or "-")
+            )
             if motion is not None:
-                yield "ranges of coordinates", partial(range_numbers, tool, motion)
+                yield "ranges of coordinates", partial(measure_ranges, tool, motion)
         elif tool.tag == "InverseDynamicsTool":
-            yield "residuals", partial(dynamics_numbers, tool, is_final=not followed)
+            yield "residuals", partial(measure_inverse_dynamics, tool, is_final=not followed)
         elif tool.tag in ("RRATool", "CMCTool"):
-            yield from _of_tracking(tool, folder.tools, claimed)
+            yield from _plan_tracking(tool, folder.tools, claimed)
         elif tool.tag == "AnalyzeTool":
-            yield from _of_optimization(tool, folder.tools, claimed)
+            yield from _plan_static_optimization(tool, folder.tools, claimed)
         if tool.tag not in ("ScaleTool", "InverseKinematicsTool"):
-            yield from _of_inputs(tool, looked)
+            yield from _plan_inputs(tool, looked)
     if folder.is_whole:
-        yield from _without_setup(folder, claimed)
+        yield from _plan_results_without_setup(folder, claimed)
 
 
-def _results(tool: Tool, ending: str) -> Path | None:
-    return tool.result(f"{tool.setup.name}{ending}")
+def _find_result(tool: TrialTool, ending: str) -> Path | None:
+    """Return the path of a result of a tool by the end of its name; None if it is missing."""
+    return tool.find_result(f"{tool.setup.name}{ending}")
 
 
-def _of_inputs(tool: Tool, looked: set[tuple[object, ...]]) -> Iterator[Measure]:
-    """What motion and loads say of each other, once for each pair of them."""
+def _plan_inputs(tool: TrialTool, looked: set[tuple[object, ...]]) -> Iterator[Measurement]:
+    """Yield the measurements of motion and loads, once for each pair of them.
+
+    Args:
+        tool: tool that names them.
+        looked: inputs that are measured already, extended here.
+    """
     try:
         motion, loads = (
-            tool.input(*tags)
+            tool.find_input(*tags)
             for tags in (("coordinates_file", "desired_kinematics_file"), (LOADS,))
         )
-    except Missing as error:
-        yield "motion and loads", partial(_missing, error)
+    except MissingInput as error:
+        yield "motion and loads", partial(_raise_missing, error)
         return
     if motion is None:
         if tool.tag != "AnalyzeTool":
-            yield "motion and loads", partial(_missing, Missing(f"{tool} names no motion"))
+            yield (
+                "motion and loads",
+                partial(_raise_missing, MissingInput(f"{tool} names no motion")),
+            )
         return
     if (motion, tool.cutoff, tool.span) not in looked:
         looked.add((motion, tool.cutoff, tool.span))
-        yield "filters", partial(filter_numbers, tool)
+        yield "filters", partial(measure_filter, tool)
     if loads is None:
-        yield "loads", partial(_missing, Missing(f"{tool} names no external loads"))
+        yield "loads", partial(_raise_missing, MissingInput(f"{tool} names no external loads"))
     else:
         if (loads,) not in looked:
             looked.add((loads,))
-            yield "feet under loads", partial(feet_numbers, tool)
+            yield "feet under loads", partial(measure_feet, tool)
         if (loads, tool.setup.model_file) not in looked:
             looked.add((loads, tool.setup.model_file))
-            yield "weight on plates", partial(weight_numbers, tool)
+            yield "weight on plates", partial(measure_weight, tool)
 
 
-def _missing(error: Missing) -> Numbers:
+def _raise_missing(error: MissingInput) -> Numbers:
+    """Raise an error in place of a measurement."""
     raise error
 
 
-def _of_tracking(tool: Tool, others: Sequence[Tool], claimed: set[Path]) -> Iterator[Measure]:
-    """Results of RRA and CMC."""
+def _plan_tracking(
+    tool: TrialTool, others: Sequence[TrialTool], claimed: set[Path]
+) -> Iterator[Measurement]:
+    """Yield the measurements of results of RRA and CMC.
+
+    Args:
+        tool: the tool.
+        others: all tools of the trial.
+        claimed: receives the files that are measured.
+    """
     folder = tool.folder
-    force, error = _results(tool, "_Actuation_force.sto"), _results(tool, "_pErr.sto")
+    force, error = _find_result(tool, "_Actuation_force.sto"), _find_result(tool, "_pErr.sto")
     claimed.update(file for file in (force, error) if file is not None)
     if force is None:
-        gone = Missing(
+        gone = MissingInput(
             f"the forces of {tool} are missing ('{tool.setup.name}_Actuation_force.sto'); run it in OpenSim"
         )
-        yield "residuals", partial(_missing, gone)
+        yield "residuals", partial(_raise_missing, gone)
     else:
-        yield "residuals", partial(_residuals, tool, force)
+        yield "residuals", partial(_measure_residuals, tool, force)
         if tool.tag == "CMCTool":
-            yield "reserves", partial(_reserves, tool, force, others)
+            yield "reserves", partial(_measure_reserves, tool, force, others)
     if error is None:
         yield (
             "errors of tracking",
-            partial(_missing, Missing(f"'{tool.setup.name}_pErr.sto' of {tool} is missing")),
+            partial(
+                _raise_missing, MissingInput(f"'{tool.setup.name}_pErr.sto' of {tool} is missing")
+            ),
         )
     else:
-        yield "errors of tracking", partial(tracking_numbers, folder, error, tool)
-    motion = _results(tool, "_Kinematics_q.sto")
+        yield "errors of tracking", partial(measure_tracking_errors, folder, error, tool)
+    motion = _find_result(tool, "_Kinematics_q.sto")
     if motion is not None:
-        yield "ranges of coordinates", partial(range_numbers, tool, motion)
+        yield "ranges of coordinates", partial(measure_ranges, tool, motion)
     if tool.tag == "CMCTool":
-        states = _results(tool, "_states.sto") or _results(tool, "_controls.sto")
+        states = _find_result(tool, "_states.sto") or _find_result(tool, "_controls.sto")
         if states is None:
             yield (
                 "activations",
-                partial(_missing, Missing(f"'{tool.setup.name}_states.sto' of {tool} is missing")),
+                partial(
+                    _raise_missing,
+                    MissingInput(f"'{tool.setup.name}_states.sto' of {tool} is missing"),
+                ),
             )
         else:
             claimed.add(states)
-            yield "activations", partial(_activations, tool, states)
-        yield "passive forces", partial(passive_numbers, tool, _results(tool, "_states.sto"))
+            yield "activations", partial(_measure_activations, tool, states)
+        yield (
+            "passive forces",
+            partial(measure_passive_forces, tool, _find_result(tool, "_states.sto")),
+        )
 
 
-def _of_optimization(tool: Tool, others: Sequence[Tool], claimed: set[Path]) -> Iterator[Measure]:
-    """Results of StaticOptimization."""
+def _plan_static_optimization(
+    tool: TrialTool, others: Sequence[TrialTool], claimed: set[Path]
+) -> Iterator[Measurement]:
+    """Yield the measurements of results of StaticOptimization.
+
+    Args:
+        tool: the tool.
+        others: all tools of the trial.
+        claimed: receives the files that are measured.
+    """
     for item in tool.setup.analysis_set.objects:
         if type(item).__name__ != "StaticOptimization" or not item.on:
             continue
         for ending in ("force", "activation"):
-            file = _results(tool, f"_{item.name}_{ending}.sto")
+            file = _find_result(tool, f"_{item.name}_{ending}.sto")
             if file is None:
-                gone = Missing(
+                gone = MissingInput(
                     f"'{tool.setup.name}_{item.name}_{ending}.sto' of {tool} is missing; run it"
                 )
                 yield (
                     ("residuals and reserves" if ending == "force" else "activations"),
-                    partial(_missing, gone),
+                    partial(_raise_missing, gone),
                 )
                 continue
             claimed.add(file)
             if ending == "force":
-                yield "residuals", partial(_residuals, tool, file)
-                yield "reserves", partial(_reserves, tool, file, others)
+                yield "residuals", partial(_measure_residuals, tool, file)
+                yield "reserves", partial(_measure_reserves, tool, file, others)
             else:
-                yield "activations", partial(_activations, tool, file)
-        yield "passive forces", partial(passive_numbers, tool, None)
+                yield "activations", partial(_measure_activations, tool, file)
+        yield "passive forces", partial(measure_passive_forces, tool, None)
 
 
-def _residuals(tool: Tool, file: Path) -> Numbers:
-    units = actuators_of(tool).residuals
-    if not any(column in units for column in tool.folder.table(file).columns):
-        raise Missing(f"{tool} has no residual actuators")
-    return residual_numbers(tool.folder, file, units, scale_of(tool), NAMES[tool.tag])
+def _measure_residuals(tool: TrialTool, file: Path) -> Numbers:
+    """Yield the residuals of a tool."""
+    units = find_actuators(tool).residuals
+    if not any(column in units for column in tool.folder.read_table(file).columns):
+        raise MissingInput(f"{tool} has no residual actuators")
+    return measure_residuals(tool.folder, file, units, compute_scale(tool), TOOL_NAMES[tool.tag])
 
 
-def _reserves(tool: Tool, file: Path, others: Sequence[Tool]) -> Numbers:
-    return reserve_numbers(tool, file, actuators_of(tool), others)
+def _measure_reserves(tool: TrialTool, file: Path, others: Sequence[TrialTool]) -> Numbers:
+    """Yield the reserves of a tool."""
+    return measure_reserves(tool, file, find_actuators(tool), others)
 
 
-def _activations(tool: Tool, file: Path) -> Numbers:
-    return activation_numbers(tool.folder, file, actuators_of(tool).muscles)
+def _measure_activations(tool: TrialTool, file: Path) -> Numbers:
+    """Yield the activations of a tool."""
+    return measure_activations(tool.folder, file, find_actuators(tool).muscles)
 
 
-def _without_setup(folder: Folder, claimed: set[Path]) -> Iterator[Measure]:
-    """Results whose setup is not there: what their names and labels tell."""
+def _plan_results_without_setup(folder: TrialFolder, claimed: set[Path]) -> Iterator[Measurement]:
+    """Yield the measurements of results without a setup, by their names and labels."""
     has = {tool.tag for tool in folder.tools}
     if not has & {"RRATool", "CMCTool"}:
-        for file in folder.ending("_Actuation_force.sto", "_StaticOptimization_force.sto"):
+        for file in folder.find_files("_Actuation_force.sto", "_StaticOptimization_force.sto"):
             if file not in claimed:
-                units = actuators_of(None).residuals
+                units = find_actuators(None).residuals
                 yield (
                     "residuals",
-                    partial(residual_numbers, folder, file, units, Scale(), f"'{file.name}'"),
+                    partial(measure_residuals, folder, file, units, LoadScale(), f"'{file.name}'"),
                 )
-        for file in folder.ending("_pErr.sto"):
-            yield "errors of tracking", partial(tracking_numbers, folder, file, None)
+        for file in folder.find_files("_pErr.sto"):
+            yield "errors of tracking", partial(measure_tracking_errors, folder, file, None)
     if "InverseKinematicsTool" not in has:
-        for file in folder.ending("_ik_marker_errors.sto"):
-            yield "errors of markers", partial(error_numbers, folder, file)
+        for file in folder.find_files("_ik_marker_errors.sto"):
+            yield "errors of markers", partial(measure_written_errors, folder, file)
     lacking = [tag for tag in SETUPS if tag not in has]
     if lacking:
-        yield "all else", partial(_missing, Missing(f"there is no setup of {join_words(lacking)}"))
+        yield (
+            "all else",
+            partial(_raise_missing, MissingInput(f"there is no setup of {join_words(lacking)}")),
+        )

@@ -1,4 +1,4 @@
-"""How well a motion fits what was measured: markers, ranges of coordinates, filters, errors of tracking."""
+"""Measurements of a motion: marker errors, ranges of coordinates, filters and tracking errors."""
 
 from __future__ import annotations
 
@@ -10,46 +10,46 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.errors import OsimliteError
-from osimlite.fitting.fitted_motion import ADVICE, FittedMotion
-from osimlite.fitting.inverse_kinematics import marker_stations
+from osimlite.fitting.fitted_motion import MARKER_ERROR_LIMITS_M, FittedMotion
+from osimlite.fitting.inverse_kinematics import find_marker_stations
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.pose_fit import PoseFit
-from osimlite.fitting.pose_layout import Marker
-from osimlite.fitting.scale_tool import run_scale
+from osimlite.fitting.pose_layout import MarkerTarget
+from osimlite.fitting.scale_tool import compute_scaled_model
 from osimlite.io.tables.storage import both_of
 from osimlite.lint.trial import Number
 from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.tools.inverse_kinematics import IKMarkerTask
 from osimlite.simulation.recorded_motion import RecordedMotion
-from osimlite.tools.evidence import root_of
-from osimlite.tools.job import NONE
-from osimlite.tools.trials.folder import MOTIONS, Folder, Missing, Tool
+from osimlite.tools.evidence import find_root_coordinates
+from osimlite.tools.job import NO_FILE
+from osimlite.tools.trials.folder import MOTIONS, MissingInput, TrialFolder, TrialTool
 
-MOST_FRAMES = 500
-"""So many frames of a motion, evenly chosen, are compared with the markers."""
-BETTER = 0.5
-"""Markers that are exchanged leave less than this part of the squares of all errors."""
-SAMPLES = 24
-"""In so many frames, evenly chosen, they are exchanged."""
-FAST = 15.0
-"""Nothing that people do on foot is faster, Hz."""
-MOVING = np.radians(5.0), 0.02
-"""By so much (rad, m) a coordinate changes whose accelerations are looked at."""
-PERIODS = 3.0
-"""Of `FAST` that a motion lasts of which the content is looked at."""
+MAX_FRAMES = 500
+"""Number of frames of a motion, evenly spread, that are compared with the markers."""
+MAX_COST_RATIO = 0.5
+"""Largest ratio of the costs with and without an exchange of two markers that proves a swap."""
+SWAP_FRAMES = 24
+"""Number of frames, evenly spread, in which two markers are exchanged."""
+MAX_MOVEMENT_HZ = 15.0
+"""Highest frequency of human movement on foot, Hz."""
+MIN_CHANGE = np.radians(5.0), 0.02
+"""Smallest range (rad, m) of a coordinate whose accelerations are analysed."""
+MIN_PERIODS = 3.0
+"""Shortest motion that is analysed, in periods of `MAX_MOVEMENT_HZ`."""
 Numbers = Iterator[tuple[Path, Number]]
-"""What was measured, by files."""
+"""Measured numbers with their files."""
 
 
-def scale_numbers(tool: Tool) -> Numbers:
-    """Errors of the markers of a scaled model in the pose of the static trial, before they were moved."""
+def measure_scale_errors(tool: TrialTool) -> Numbers:
+    """Yield marker errors of a scaled model in its static pose, before the markers are moved."""
     placer = tool.setup.marker_placer
     if not placer.apply:
-        raise Missing(f"{tool} places no markers")
-    result = run_scale(tool.setup, tool.job.file.parent).placed
+        raise MissingInput(f"{tool} places no markers")
+    result = compute_scaled_model(tool.setup, tool.job.file.parent).placed
     if result is None:
-        raise Missing(f"{tool} places no markers")
+        raise MissingInput(f"{tool} places no markers")
     # Markers that weigh less than a tenth of the others go where their segment takes them.
     tasks = [
         task for task in placer.ik_task_set.objects if task.apply and isinstance(task, IKMarkerTask)
@@ -62,7 +62,7 @@ def scale_numbers(tool: Tool) -> Numbers:
     ]
     errors = pose.marker_errors[:, chosen]
     if not np.isfinite(errors).any():
-        raise Missing(f"{tool} fits no marker")
+        raise MissingInput(f"{tool} fits no marker")
     name = pose.markers[chosen[int(np.nanargmax(np.nanmax(errors, axis=0)))]]
     of = "the errors of the markers in the static pose"
     for kind, value in (("rms", np.sqrt(np.nanmean(errors**2))), ("peak", np.nanmax(errors))):
@@ -73,26 +73,26 @@ def scale_numbers(tool: Tool) -> Numbers:
         )
 
 
-def marker_numbers(tool: Tool) -> Numbers:
-    """Errors of the markers that inverse kinematics was to fit, and pairs of them that were taken for each other."""
+def measure_marker_errors(tool: TrialTool) -> Numbers:
+    """Yield marker errors of inverse kinematics, and pairs of swapped markers."""
     setup, folder = tool.setup, tool.folder
     name = setup.output_motion_file.strip()
-    file = None if name in NONE else folder.near(tool.job.result(name))
+    file = None if name in NO_FILE else folder.find_file(tool.job.get_output_path(name))
     if file is None:
-        raise Missing(f"the motion of {tool} is missing ('{name}'); run it")
+        raise MissingInput(f"the motion of {tool} is missing ('{name}'); run it")
     try:
-        motion = _fitted(tool, file)
+        motion = _read_fitted_motion(tool, file)
     except OsimliteError as error:
-        errors = tool.result(f"{setup.name}_ik_marker_errors.sto")
+        errors = tool.find_result(f"{setup.name}_ik_marker_errors.sto")
         if errors is None:
-            raise Missing(f"{error.message}; and there is no file of marker errors") from error
-        yield from error_numbers(folder, errors)
+            raise MissingInput(f"{error.message}; and there is no file of marker errors") from error
+        yield from measure_written_errors(folder, errors)
         return
     found = motion.summary
     of = "the errors of the markers"
     rms, peak = 100.0 * found["rms_marker_error"], 100.0 * found["largest_marker_error"]
     time = found["worst_time"]
-    at = folder.at(file, time)
+    at = folder.locate_time(file, time)
     where = f"{found['worst_marker']} at {time:g} s"
     each = np.sqrt(
         np.nanmean(
@@ -100,12 +100,15 @@ def marker_numbers(tool: Tool) -> Numbers:
         )
     )
     worst = f"most of {motion.markers[int(np.nanargmax(each))]}, {100.0 * np.nanmax(each):.3g} cm"
-    yield file, Number("marker-error", "rms", of, rms, "cm", where=worst, at=folder.place(file, 0))
+    yield (
+        file,
+        Number("marker-error", "rms", of, rms, "cm", where=worst, at=folder.locate_row(file, 0)),
+    )
     yield file, Number("marker-error", "peak", of, peak, "cm", where=where, at=at)
-    data = tool.needed("marker_file")
-    pairs = [*_exchanged(tool, motion)]
+    data = tool.require_input("marker_file")
+    pairs = [*_find_swapped_markers(tool, motion)]
     for one, other, frames in pairs:
-        share, times = 100.0 * len(frames) / SAMPLES, motion.times[frames]
+        share, times = 100.0 * len(frames) / SWAP_FRAMES, motion.times[frames]
         of = (
             f"share of frames in which the markers '{one}' and '{other}' would fit better exchanged"
         )
@@ -120,32 +123,46 @@ def marker_numbers(tool: Tool) -> Numbers:
         )
 
 
-def error_numbers(folder: Folder, file: Path) -> Numbers:
-    """Errors of markers that the tool has written itself."""
-    table = folder.table(file)
+def measure_written_errors(folder: TrialFolder, file: Path) -> Numbers:
+    """Yield marker errors from a file that the tool wrote.
+
+    Args:
+        folder: the trial.
+        file: table of marker errors.
+    """
+    table = folder.read_table(file)
     of = "the errors of the markers"
     rms = float(np.sqrt(np.mean(table["marker_error_RMS"] ** 2)))
     row = int(np.argmax(table["marker_error_max"]))
-    yield file, Number("marker-error", "rms", of, 100.0 * rms, "cm", at=folder.place(file, 0))
+    yield file, Number("marker-error", "rms", of, 100.0 * rms, "cm", at=folder.locate_row(file, 0))
     peak, where = 100.0 * float(table["marker_error_max"][row]), f"at {table.times[row]:g} s"
     yield (
         file,
-        Number("marker-error", "peak", of, peak, "cm", where=where, at=folder.place(file, row)),
+        Number(
+            "marker-error", "peak", of, peak, "cm", where=where, at=folder.locate_row(file, row)
+        ),
     )
 
 
-def _fitted(tool: Tool, file: Path) -> FittedMotion:
-    """The motion in a file beside the markers that were to be fitted, at the times of both."""
+def _read_fitted_motion(tool: TrialTool, file: Path) -> FittedMotion:
+    """Return the motion in a file with the measured markers, at the times of both.
+
+    Args:
+        tool: an InverseKinematicsTool.
+        file: table of its motion.
+    """
     model, mechanism = tool.model, tool.mechanism
-    recorded = tool.folder.motion(file, tool.model_file)
-    data = MarkerData.of(tool.needed("marker_file")).between(*both_of(tool.setup.time_range))
+    recorded = tool.folder.read_motion(file, tool.model_file)
+    data = MarkerData.from_source(tool.require_input("marker_file")).select_times(
+        *both_of(tool.setup.time_range)
+    )
     tasks = [
         task
         for task in tool.setup.ik_task_set.objects
         if task.apply and isinstance(task, IKMarkerTask)
     ]
-    stations = marker_stations(model, mechanism)
-    names = data.shared(
+    stations = find_marker_stations(model, mechanism)
+    names = data.find_shared_names(
         [*stations], {task.name: task.weight for task in tasks if task.weight > 0.0} or None
     )
     after = np.clip(np.searchsorted(data.times, recorded.times), 1, max(1, len(data.times) - 1))
@@ -156,8 +173,8 @@ def _fitted(tool: Tool, file: Path) -> FittedMotion:
     step = float(np.median(np.diff(data.times))) if len(data.times) > 1 else 1.0
     near = np.flatnonzero(np.abs(data.times[rows] - recorded.times) < 0.1 * step)
     if not len(near):
-        raise Missing(f"'{file}' and the markers of {tool} have no times in common")
-    near = near[np.unique(np.linspace(0, len(near) - 1, min(len(near), MOST_FRAMES)).astype(int))]
+        raise MissingInput(f"'{file}' and the markers of {tool} have no times in common")
+    near = near[np.unique(np.linspace(0, len(near) - 1, min(len(near), MAX_FRAMES)).astype(int))]
     values = recorded.values[near]
     states = [mechanism.at(q) for q in values]
     places = np.array([[state.point(*stations[name]) for name in names] for state in states])
@@ -167,28 +184,37 @@ def _fitted(tool: Tool, file: Path) -> FittedMotion:
         recorded.times[near],
         values,
         tuple(names),
-        data.only(names)[rows[near]],
+        data.select_values(names)[rows[near]],
         places,
         nothing,
         nothing,
     )
 
 
-def _exchanged(tool: Tool, motion: FittedMotion) -> Iterator[tuple[str, str, Array]]:
-    """Pairs of markers that would fit much better exchanged, with the numbers of frames in which that is so.
+def _find_swapped_markers(
+    tool: TrialTool, motion: FittedMotion
+) -> Iterator[tuple[str, str, Array]]:
+    """Yield pairs of markers that fit much better if they are exchanged.
 
-    A pose is fitted anew for every pair, in the frame that fits worst.
+    The pose of the frame with the largest error is fitted again for every pair.
+
+    Args:
+        tool: an InverseKinematicsTool.
+        motion: its motion.
+
+    Returns:
+        Names of both markers, and the numbers of the frames in which the exchange fits better.
     """
     errors = motion.marker_errors
     seen = np.where(np.isfinite(errors), errors, 0.0)
     worst = int(np.argmax(seen.max(axis=1)))
-    if seen[worst].max() < ADVICE[1] or len(motion.markers) < 2:
+    if seen[worst].max() < MARKER_ERROR_LIMITS_M[1] or len(motion.markers) < 2:
         return
-    stations = marker_stations(tool.model, motion.mechanism)
+    stations = find_marker_stations(tool.model, motion.mechanism)
     weights = {task.name: float(task.weight) for task in tool.setup.ik_task_set.objects}
     fit = PoseFit(
         motion.mechanism,
-        [Marker(stations[name], weights.get(name, 1.0)) for name in motion.markers],
+        [MarkerTarget(stations[name], weights.get(name, 1.0)) for name in motion.markers],
     )
 
     def cost(frame: int, pair: tuple[int, int] = (0, 0)) -> float:
@@ -196,48 +222,69 @@ def _exchanged(tool: Tool, motion: FittedMotion) -> Iterator[tuple[str, str, Arr
         order[list(pair)] = order[list(reversed(pair))]
         measured = motion.measured[frame : frame + 1, order].reshape(1, -1)
         return float(
-            fit.fit(measured, motion.times[frame : frame + 1], motion.values[frame]).costs[0]
+            fit.fit_frames(measured, motion.times[frame : frame + 1], motion.values[frame]).costs[0]
         )
 
-    frames = np.unique(np.linspace(0, len(motion.times) - 1, SAMPLES).astype(int))
+    frames = np.unique(np.linspace(0, len(motion.times) - 1, SWAP_FRAMES).astype(int))
     own = {frame: cost(frame) for frame in (worst, *frames.tolist())}
     costs = {pair: cost(worst, pair) for pair in combinations(range(len(motion.markers)), 2)}
     one, other = min(costs, key=lambda pair: costs[pair])
-    if costs[one, other] < BETTER * own[worst]:
+    if costs[one, other] < MAX_COST_RATIO * own[worst]:
         better = [
-            frame for frame in frames.tolist() if cost(frame, (one, other)) < BETTER * own[frame]
+            frame
+            for frame in frames.tolist()
+            if cost(frame, (one, other)) < MAX_COST_RATIO * own[frame]
         ]
         yield motion.markers[one], motion.markers[other], np.array(better or [worst])
 
 
-def range_numbers(tool: Tool, file: Path) -> Numbers:
-    """By how much a motion leaves the ranges of the coordinates of a model; those of the joint to ground have none."""
-    motion, mechanism = tool.folder.motion(file, tool.model_file), tool.mechanism
-    root, beyond = root_of(mechanism), 0
+def measure_ranges(tool: TrialTool, file: Path) -> Numbers:
+    """Yield the amounts by which a motion leaves the ranges of coordinates.
+
+    The coordinates of the joint to ground do not count.
+
+    Args:
+        tool: tool with the model.
+        file: table of the motion.
+    """
+    motion, mechanism = tool.folder.read_motion(file, tool.model_file), tool.mechanism
+    root, beyond = find_root_coordinates(mechanism), 0
     for place, info in enumerate(mechanism.coordinates):
         low, high = info.range
         excess = np.maximum(low - motion.values[:, place], motion.values[:, place] - high)
         row = int(np.argmax(excess))
-        size = _sized(info, float(excess[row]))
+        size = _to_display_unit(info, float(excess[row]))
         if place in root or info.name in motion.missing or info.locked or size < 0.05:
             continue
         beyond += 1
-        most = f"{_sized(info, low):.3g} to {_sized(info, high):.3g} {_unit(info)}"
-        time, unit = float(motion.times[row]), _unit(info)
+        most = f"{_to_display_unit(info, low):.3g} to {_to_display_unit(info, high):.3g} {_get_display_unit(info)}"
+        time, unit = float(motion.times[row]), _get_display_unit(info)
         where, of = f"at {time:g} s, the range is {most}", f"'{info.name}' beyond its range"
         yield (
             file,
             Number(
-                "beyond-range", "peak", of, size, unit, where=where, at=tool.folder.at(file, time)
+                "beyond-range",
+                "peak",
+                of,
+                size,
+                unit,
+                where=where,
+                at=tool.folder.locate_time(file, time),
             ),
         )
     if not beyond:
         yield file, Number("beyond-range", "peak", "coordinates beyond their ranges", 0.0, "deg")
 
 
-def tracking_numbers(folder: Folder, file: Path, tool: Tool | None) -> Numbers:
-    """By how much RRA or CMC missed the motion."""
-    table = folder.table(file)
+def measure_tracking_errors(folder: TrialFolder, file: Path, tool: TrialTool | None) -> Numbers:
+    """Yield the tracking errors of RRA or CMC.
+
+    Args:
+        folder: the trial.
+        file: table of the errors.
+        tool: the tool; None if its setup is missing.
+    """
+    table = folder.read_table(file)
     infos = {} if tool is None else {info.name: info for info in tool.mechanism.coordinates}
     for name in table.columns:
         info = infos.get(name)
@@ -251,18 +298,18 @@ def tracking_numbers(folder: Folder, file: Path, tool: Tool | None) -> Numbers:
         )
         row, unit = int(np.argmax(column)), "deg" if turning else "cm"
         of = f"the error of '{name}'"
-        where, at = f"at {table.times[row]:g} s", folder.place(file, row)
+        where, at = f"at {table.times[row]:g} s", folder.locate_row(file, row)
         yield (
             file,
             Number("tracking-error", "peak", of, float(column[row]), unit, where=where, at=at),
         )
         kind, value = "rms" if turning else "rms-translation", float(np.sqrt(np.mean(column**2)))
-        yield file, Number("tracking-error", kind, of, value, unit, at=folder.place(file, 0))
+        yield file, Number("tracking-error", kind, of, value, unit, at=folder.locate_row(file, 0))
 
 
-def filter_numbers(tool: Tool) -> Numbers:
-    """What the filter of a tool takes away of its motion, and what it leaves of noise."""
-    file = tool.needed(*MOTIONS)
+def measure_filter(tool: TrialTool) -> Numbers:
+    """Yield the part of a motion that a filter removes, and the noise that it leaves."""
+    file = tool.require_input(*MOTIONS)
     motion = tool.motion
     first, last = (min(max(time, motion.times[0]), motion.times[-1]) for time in tool.span)
     if tool.cutoff > 0.0:
@@ -271,13 +318,15 @@ def filter_numbers(tool: Tool) -> Numbers:
         worst, size, unit = "", 0.0, "deg"
         for place, info in enumerate(motion.mechanism.coordinates):
             column = np.interp(motion.times[own], filtered.times, filtered.values[:, place])
-            lost = _sized(info, float(np.sqrt(np.mean((column - motion.values[own, place]) ** 2))))
+            lost = _to_display_unit(
+                info, float(np.sqrt(np.mean((column - motion.values[own, place]) ** 2)))
+            )
             if lost > size:
-                worst, size, unit = info.name, lost, _unit(info)
+                worst, size, unit = info.name, lost, _get_display_unit(info)
         of = f"change of '{worst}' (root mean square) by the filter of {tool.cutoff:g} Hz"
         yield tool.job.file, Number("filter-content", "change", of, size, unit)
         motion = filtered
-    if _is_from_markers(file) and (share := _noise(motion, first, last)) is not None:
+    if _is_from_markers(file) and (share := _measure_noise(motion, first, last)) is not None:
         of = "noise: the power of the accelerations above 15 Hz, of all"
         how = (
             f"the motion is filtered at {tool.cutoff:g} Hz"
@@ -288,37 +337,44 @@ def filter_numbers(tool: Tool) -> Numbers:
 
 
 def _is_from_markers(file: Path) -> bool:
-    """Whether a motion was made by inverse kinematics, not by a tool that moves the model by forces."""
+    """Return whether inverse kinematics made a motion, and not a tool that integrates."""
     return not file.name.endswith(("_Kinematics_q.sto", "_states.sto", "_q.mot"))
 
 
-def _noise(motion: RecordedMotion, first: float, last: float) -> float | None:
-    """The median share of the power of accelerations above 15 Hz; None if that cannot be told."""
+def _measure_noise(motion: RecordedMotion, first: float, last: float) -> float | None:
+    """Return the median share of the accelerations' power above 15 Hz; None if it is unknown.
+
+    Args:
+        motion: the motion.
+        first: first time, s.
+        last: last time, s.
+    """
     own = (motion.times >= first) & (motion.times <= last)
     times = motion.times[own]
-    if len(times) < 8 or times[-1] - times[0] < PERIODS / FAST:
+    if len(times) < 8 or times[-1] - times[0] < MIN_PERIODS / MAX_MOVEMENT_HZ:
         return None
     step = (times[-1] - times[0]) / (len(times) - 1)
     values, even = motion.values[own], np.linspace(times[0], times[-1], len(times))
-    if step > 0.5 / (1.5 * FAST):
+    if step > 0.5 / (1.5 * MAX_MOVEMENT_HZ):
         return None
     shares = []
     frequencies = np.fft.rfftfreq(len(times), step)
     for place, info in enumerate(motion.mechanism.coordinates):
-        if np.ptp(values[:, place]) < MOVING[info.motion_type != "rotational"]:
+        if np.ptp(values[:, place]) < MIN_CHANGE[info.motion_type != "rotational"]:
             continue
         acceleration = np.interp(even, times, motion.rates[1][own, place])
         power = (
             np.abs(np.fft.rfft((acceleration - acceleration.mean()) * np.hanning(len(times)))) ** 2
         )
-        shares.append(float(power[frequencies > FAST].sum() / (power.sum() or 1.0)))
+        shares.append(float(power[frequencies > MAX_MOVEMENT_HZ].sum() / (power.sum() or 1.0)))
     return float(np.median(shares)) if shares else None
 
 
-def _sized(info: CoordinateInfo, value: float) -> float:
-    """A value in the unit of :func:`_unit`."""
+def _to_display_unit(info: CoordinateInfo, value: float) -> float:
+    """Return a value in the unit of :func:`_get_display_unit`."""
     return degrees(value) if info.motion_type == "rotational" else 100.0 * value
 
 
-def _unit(info: CoordinateInfo) -> str:
+def _get_display_unit(info: CoordinateInfo) -> str:
+    """Return the unit in which a coordinate is shown, degrees or cm."""
     return "deg" if info.motion_type == "rotational" else "cm"

@@ -1,4 +1,4 @@
-"""The files of a trial: setups, what they name, and what they wrote, wherever that is below the folders."""
+"""Files of a trial: setups, their inputs and their results, anywhere below some folders."""
 
 from __future__ import annotations
 
@@ -25,39 +25,49 @@ from osimlite.schema.forces import Force, ForceSet
 from osimlite.schema.model import Model
 from osimlite.schema.prescribed import ExternalLoads
 from osimlite.simulation.recorded_motion import RecordedMotion
-from osimlite.tools.job import NONE, Job
+from osimlite.tools.job import NO_FILE, Job
 
 T = TypeVar("T")
+"""Type of a cached value."""
 SETUPS = (
-    "ScaleTool", "InverseKinematicsTool", "InverseDynamicsTool", "RRATool", "CMCTool", "AnalyzeTool",
-)  # fmt: skip
-"""Classes of setups whose results are looked at."""
-ENDINGS = (".osim", ".xml", ".sto", ".mot", ".trc", ".c3d")
-MOTIONS = ("coordinates_file", "desired_kinematics_file")
-LOADS, CUTOFFS = (
-    "external_loads_file",
-    ("lowpass_cutoff_frequency_for_coordinates", "lowpass_cutoff_frequency"),
+    "ScaleTool",
+    "InverseKinematicsTool",
+    "InverseDynamicsTool",
+    "RRATool",
+    "CMCTool",
+    "AnalyzeTool",
 )
+"""Classes of setups whose results are checked, in the order in which a trial is processed."""
+SUFFIXES = (".osim", ".xml", ".sto", ".mot", ".trc", ".c3d")
+"""Suffixes of files that can belong to a trial."""
+MOTIONS = ("coordinates_file", "desired_kinematics_file")
+"""Properties of setups that name the motion."""
+LOADS = "external_loads_file"
+"""Property of setups that names the measured loads."""
+CUTOFFS = ("lowpass_cutoff_frequency_for_coordinates", "lowpass_cutoff_frequency")
+"""Properties of setups with the cutoff frequency of the motion's filter."""
 
 
-class Missing(OsimliteError):
-    """A file is not there that something would have been looked at in."""
+class MissingInput(OsimliteError):
+    """Error for a missing file without which something cannot be checked."""
 
 
-class Folder:
-    """Folders and setups that a trial consists of.
+class TrialFolder:
+    """Folders and setups of a trial.
 
-    Args: paths: folders, of which everything below counts, or setups, of which the folder counts.
-        written: results of these setups, wherever they are; they count before others of their
-        names.
+    Args:
+        paths: folders, which count with everything below, or setups, which count with their
+            folders.
+        written: results of these setups in other folders; they take precedence over files of the
+            same name.
 
     Raises:
-        MissingFileError: a path is not there.
-        OsimliteError: a file is no setup.
+        MissingFileError: a path does not exist.
+        OsimliteError: a file is not a setup.
     """
 
     def __init__(self, paths: Sequence[str | Path], written: Iterable[Path] = ()) -> None:
-        self.tools: list[Tool] = []
+        self.tools: list[TrialTool] = []
         self.is_whole = any(map(os.path.isdir, paths))
         self._written = {file.name: file for file in written}
         self._kept: dict[Any, Any] = {}
@@ -67,7 +77,7 @@ class Folder:
             if not path.exists():
                 raise make_missing_error(path, may_be_folder=True)
             for file in sorted((path if path.is_dir() else path.parent).rglob("*")):
-                if file.suffix.lower() in ENDINGS and file.is_file():
+                if file.suffix.lower() in SUFFIXES and file.is_file():
                     known = self._named.setdefault(file.name, [])
                     if file not in known:
                         known.append(file)
@@ -87,150 +97,178 @@ class Folder:
         for file in setups.values():
             top = top_at(str(file))
             if top is not None and type(top).__name__ in SETUPS:
-                self.tools.append(Tool(self, Job(top, file)))
+                self.tools.append(TrialTool(self, Job(top, file)))
         # In the order in which a trial is worked on.
         self.tools.sort(key=lambda tool: SETUPS.index(tool.tag))
 
-    def once(self, key: Any, make: Callable[[], T]) -> T:
-        """What is needed several times, made once."""
+    def compute_once(self, key: Any, make: Callable[[], T]) -> T:
+        """Return a value; compute it at the first request.
+
+        Args:
+            key: key of the value.
+            make: function that computes it.
+        """
         if key not in self._kept:
             self._kept[key] = make()
         return self._kept[key]
 
-    def near(self, path: Path) -> Path | None:
-        """A file, or else one of its name that is nearest to its place; None if there is none."""
+    def find_file(self, path: Path) -> Path | None:
+        """Return a path if the file exists, or else the nearest file of its name, or None."""
         if path.name in self._written:
             return self._written[path.name]
         if path.is_file():
             return Path(os.path.normpath(path))
 
-        def away(file: Path) -> int:
+        def count_steps(file: Path) -> int:
             return os.path.relpath(file.parent, path.parent).count(os.sep)
 
-        return min(self._named.get(path.name, ()), key=away, default=None)
+        return min(self._named.get(path.name, ()), key=count_steps, default=None)
 
-    def ending(self, *endings: str) -> Iterator[Path]:
-        """Every file whose name ends so."""
+    def find_files(self, *endings: str) -> Iterator[Path]:
+        """Yield all files with some endings of their names."""
         for name, files in self._named.items():
             if name.endswith(endings):
                 yield from files
 
-    def model(self, file: Path) -> Model:
-        """The model in a file."""
-        return self.once(("model", file), lambda: read_object(file, Model))
+    def read_model(self, file: Path) -> Model:
+        """Return the model in a file; cached."""
+        return self.compute_once(("model", file), lambda: read_object(file, Model))
 
-    def mechanism(self, file: Path) -> Mechanism:
-        """That of the model in a file."""
-        return self.once(("mechanism", file), lambda: build_mechanism(self.model(file)))
+    def build_mechanism(self, file: Path) -> Mechanism:
+        """Return the mechanism of the model in a file; cached."""
+        return self.compute_once(
+            ("mechanism", file), lambda: build_mechanism(self.read_model(file))
+        )
 
-    def table(self, file: Path) -> StoTable:
-        """The table in a file."""
-        return self.once(("table", file), lambda: read_sto(file))
+    def read_table(self, file: Path) -> StoTable:
+        """Return the table in a file; cached."""
+        return self.compute_once(("table", file), lambda: read_sto(file))
 
-    def motion(self, file: Path, model: Path) -> RecordedMotion:
-        """The motion in a file, of the model in another, without the rows that RRA writes twice."""
+    def read_motion(self, file: Path, model: Path) -> RecordedMotion:
+        """Return the motion in a file, without the rows that RRA writes twice; cached.
+
+        Args:
+            file: table of the motion.
+            model: file of the model.
+        """
 
         def read() -> RecordedMotion:
-            table = self.table(file)
+            table = self.read_table(file)
             is_later = np.diff(np.maximum.accumulate(table.times), prepend=-np.inf) > 0.0
             kept = replace(table, times=table.times[is_later], rows=table.rows[is_later])
-            return RecordedMotion.of_table(self.mechanism(model), kept)
+            return RecordedMotion.of_table(self.build_mechanism(model), kept)
 
-        return self.once(("motion", file, model), read)
+        return self.compute_once(("motion", file, model), read)
 
-    def loads(self, file: Path) -> tuple[ExternalLoads, StoTable]:
-        """Measured loads, and their data."""
+    def read_loads(self, file: Path) -> tuple[ExternalLoads, StoTable]:
+        """Return measured loads and their data; cached.
+
+        Returns:
+            Document of the loads, and table of their data.
+        """
 
         def read() -> tuple[ExternalLoads, StoTable]:
             document = read_object(file, ExternalLoads)
-            data = self.near(file.parent / document.datafile.strip())
+            data = self.find_file(file.parent / document.datafile.strip())
             if data is None:
-                raise Missing(f"'{document.datafile}' is missing, the data of '{file}'")
-            return document, self.table(data)
+                raise MissingInput(f"'{document.datafile}' is missing, the data of '{file}'")
+            return document, self.read_table(data)
 
-        return self.once(("loads", file), read)
+        return self.compute_once(("loads", file), read)
 
-    def place(self, file: Path, row: int) -> Position:
-        """Where a row of a table is in its file."""
-        table = self.once(("text", file), lambda: Table(Source.of_file(file).data, str(file)))
+    def locate_row(self, file: Path, row: int) -> Position:
+        """Return the position of a row of a table in its file."""
+        table = self.compute_once(
+            ("text", file), lambda: Table(Source.of_file(file).data, str(file))
+        )
         return table.time_at(table.rows.line_of(row))
 
-    def at(self, file: Path, time: float) -> Position:
-        """Where the row nearest to a time is in its file."""
-        return self.place(file, int(np.argmin(np.abs(self.table(file).times - time))))
+    def locate_time(self, file: Path, time: float) -> Position:
+        """Return the position, in the file of a table, of the row that is nearest to a time."""
+        return self.locate_row(file, int(np.argmin(np.abs(self.read_table(file).times - time))))
 
 
-class Tool:
-    """A setup, its inputs, and the results that are there.
+class TrialTool:
+    """Setup of a trial, with its inputs and results.
 
     Args:
-        folder: that it belongs to.
+        folder: the trial.
         job: the setup.
     """
 
-    def __init__(self, folder: Folder, job: Job) -> None:
+    def __init__(self, folder: TrialFolder, job: Job) -> None:
         self.folder, self.job, self.setup = folder, job, job.setup
         self.tag = type(job.setup).__name__
 
     def __str__(self) -> str:
         return f"{self.tag.removesuffix('Tool')} '{self.job.file.name}'"
 
-    def input(self, *tags: str) -> Path | None:
-        """The file that the first of some properties names that names one; None if none does.
+    def find_input(self, *tags: str) -> Path | None:
+        """Return the path of the file that the first non-empty of some properties names.
+
+        Args:
+            tags: names of properties of the setup.
+
+        Returns:
+            Path of the file; None if all properties are empty.
 
         Raises:
-            Missing: it is not there.
+            MissingInput: the file does not exist.
         """
         for tag in tags:
             name = str(getattr(self.setup, tag, "")).strip()
-            if name not in NONE:
-                result = self.folder.near(self.job.place(name) or Path(name))
+            if name not in NO_FILE:
+                result = self.folder.find_file(self.job.resolve_name(name) or Path(name))
                 if result is None:
-                    raise Missing(f"'{name}' is missing, the {tag} of {self}")
+                    raise MissingInput(f"'{name}' is missing, the {tag} of {self}")
                 return result
         return None
 
-    def needed(self, *tags: str) -> Path:
-        """As :meth:`input`, of what must be named."""
-        result = self.input(*tags)
+    def require_input(self, *tags: str) -> Path:
+        """Return the path of the file that one of some properties names.
+
+        Raises:
+            MissingInput: all properties are empty, or the file does not exist.
+        """
+        result = self.find_input(*tags)
         if result is None:
-            raise Missing(f"{self} names no {tags[0]}")
+            raise MissingInput(f"{self} names no {tags[0]}")
         return result
 
-    def result(self, name: str) -> Path | None:
-        """A file in the folder of results; None if it is not there."""
-        return self.folder.near(self.job.in_results(name))
+    def find_result(self, name: str) -> Path | None:
+        """Return the path of a result; None if it is missing."""
+        return self.folder.find_file(self.job.get_results_path(name))
 
     @property
     def model_file(self) -> Path:
-        """The file of the model."""
-        return self.needed("model_file")
+        """File of the model."""
+        return self.require_input("model_file")
 
     @property
     def model(self) -> Model:
-        """The model."""
-        return self.folder.model(self.model_file)
+        """Model of the setup."""
+        return self.folder.read_model(self.model_file)
 
     @property
     def mechanism(self) -> Mechanism:
-        """That of the model."""
-        return self.folder.mechanism(self.model_file)
+        """Mechanism of the model."""
+        return self.folder.build_mechanism(self.model_file)
 
     @property
     def motion(self) -> RecordedMotion:
-        """The motion that the tool is given."""
-        return self.folder.motion(self.needed(*MOTIONS), self.model_file)
+        """Motion that the tool reads."""
+        return self.folder.read_motion(self.require_input(*MOTIONS), self.model_file)
 
     @property
     def cutoff(self) -> float:
-        """Of the filter of that motion, Hz; negative for none."""
+        """Cutoff frequency of the filter of that motion, Hz; negative for no filter."""
         return next(
             (float(getattr(self.setup, tag)) for tag in CUTOFFS if hasattr(self.setup, tag)), -1.0
         )
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """The first and the last time, s, that the tool computes."""
+        """First and last time of the results, s."""
         given = getattr(self.setup, "time_range", None)
         if given is not None and len(given) > 1:
             return float(given[0]), float(given[1])
@@ -240,7 +278,7 @@ class Tool:
 
     @cached_property
     def forces(self) -> list[Force]:
-        """The forces of the model, and those that the setup adds to them or puts in their place."""
+        """Forces of the model, extended or replaced by those of the setup."""
         result = (
             []
             if getattr(self.setup, "replace_force_set", False)
@@ -248,10 +286,10 @@ class Tool:
         )
         for name in getattr(self.setup, "force_set_files", ()):
             file = (
-                self.folder.near(self.job.place(name) or Path(name))
-                if name.strip() not in NONE
+                self.folder.find_file(self.job.resolve_name(name) or Path(name))
+                if name.strip() not in NO_FILE
                 else None
             )
             if file is not None:
-                result += self.job.read(file, ForceSet).objects
+                result += self.job.read_object(file, ForceSet).objects
         return result

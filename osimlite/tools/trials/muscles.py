@@ -1,4 +1,4 @@
-"""Muscles along a trial: the forces of their passive fibers."""
+"""Measurements of muscles in a trial: forces of the passive fibers."""
 
 from __future__ import annotations
 
@@ -15,19 +15,24 @@ from osimlite.tools.analyze_tool import run_analyze_tool
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.trials.fit import Numbers
-from osimlite.tools.trials.folder import MOTIONS, Missing, Tool
+from osimlite.tools.trials.folder import MOTIONS, MissingInput, TrialTool
 
-MOST_ROWS = 100
-"""So many moments of a motion are looked at."""
-LEAST = 1.0
-"""What is less (% of the strength) is not told of each muscle."""
+MAX_ROWS = 100
+"""Number of times at which a motion is analysed, at most."""
+MIN_SHARE_PERCENT = 1.0
+"""Smallest passive force, in % of the strength, that is reported for a muscle."""
 
 
-def passive_numbers(tool: Tool, states: Path | None) -> Numbers:
-    """The largest passive force of each muscle in parts of its strength, along states or a motion."""
-    file = states or tool.input("states_file") or tool.needed(*MOTIONS)
-    is_states = states is not None or file == tool.input("states_file")
-    table = passive_forces(tool, file, is_states=is_states)
+def measure_passive_forces(tool: TrialTool, states: Path | None) -> Numbers:
+    """Yield the largest passive force of each muscle relative to its strength.
+
+    Args:
+        tool: tool with the model.
+        states: file of states; None for the motion of the tool.
+    """
+    file = states or tool.find_input("states_file") or tool.require_input(*MOTIONS)
+    is_states = states is not None or file == tool.find_input("states_file")
+    table = compute_passive_forces(tool, file, is_states=is_states)
     strengths = {
         muscle.name: float(muscle.max_isometric_force) for muscle in tool.model.components(Muscle)
     }
@@ -36,10 +41,10 @@ def passive_numbers(tool: Tool, states: Path | None) -> Numbers:
         column = np.where(np.isfinite(table[name]), table[name], 0.0)
         row = int(np.argmax(column))
         share = 100.0 * float(column[row]) / strengths[name] if strengths.get(name) else 0.0
-        if share >= LEAST:
+        if share >= MIN_SHARE_PERCENT:
             told += 1
             time = float(table.times[row])
-            at = tool.folder.at(file, time)
+            at = tool.folder.locate_time(file, time)
             of = f"the passive force of '{name}', of its strength"
             where = f"{column[row]:.4g} N at {time:g} s"
             yield file, Number("passive-force", "peak", of, share, "%", where=where, at=at)
@@ -56,15 +61,21 @@ def passive_numbers(tool: Tool, states: Path | None) -> Numbers:
         )
 
 
-def passive_forces(tool: Tool, file: Path, *, is_states: bool) -> StoTable:
-    """Forces (N) of the passive fibers of all muscles at some moments of a file."""
-    times = tool.folder.table(file).times
+def compute_passive_forces(tool: TrialTool, file: Path, *, is_states: bool) -> StoTable:
+    """Compute the forces (N) of the passive fibers of all muscles at some times.
+
+    Args:
+        tool: tool with the model.
+        file: file of states or of a motion.
+        is_states: whether the file has states.
+    """
+    times = tool.folder.read_table(file).times
     first, last = max(float(times[0]), tool.span[0]), min(float(times[-1]), tool.span[1])
     count = int(((times >= first) & (times <= last)).sum())
     if not count or not any(True for _ in tool.model.components(Muscle)):
-        raise Missing(f"{tool} has no muscles, or '{file}' none of its times")
+        raise MissingInput(f"{tool} has no muscles, or '{file}' none of its times")
     analysis = MuscleAnalysis(name="muscles", moment_arm_coordinate_list=(), compute_moments=False)
-    analysis.step_interval = max(1, count // MOST_ROWS)
+    analysis.step_interval = max(1, count // MAX_ROWS)
     setup = AnalyzeTool(
         name="trial",
         model_file=str(tool.model_file.absolute()),

@@ -11,7 +11,7 @@ pytest.importorskip("numpy", reason="needs numpy (extra 'sim')")
 
 import osimlite
 from osimlite.errors import OsimliteError, SettingError, UnsupportedError
-from osimlite.fitting.modifying.operators import processed
+from osimlite.fitting.modifying.operators import process_model
 from osimlite.fitting.modifying.path_fitting import fit_paths
 from osimlite.fitting.modifying.words import modify
 from osimlite.models.jumper import jumper
@@ -117,7 +117,7 @@ def test_the_model_of_a_study_is_made(tmp_path: Path) -> None:
         "modify", "study.omoco", "--replace", "strength=2", "-o", "stiff.osim", folder=tmp_path
     )
     assert done.code == 0, done.err
-    stiff, own = osimlite.read(tmp_path / "stiff.osim"), processed(processor, tmp_path)
+    stiff, own = osimlite.read(tmp_path / "stiff.osim"), process_model(processor, tmp_path)
     for changed, before in zip(
         stiff.components(osimlite.Muscle), own.components(osimlite.Muscle), strict=True
     ):

@@ -1,4 +1,4 @@
-"""Frames of several trials, chosen so that they say of a person what all of them do."""
+"""Frames that represent several trials when a model is fitted to a person."""
 
 from __future__ import annotations
 
@@ -12,26 +12,35 @@ from osimlite.fitting.inverse_kinematics import check_weight
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.mechanics.multibody.spatial import Array
 
-STATIC = "static"
-"""What the trial is called in which the subject stands."""
-STANDING = 0.05
-"""Its share of the frames."""
-FEWEST = 3
-"""A frame of fewer markers says nothing of how a person stands."""
-LOST, FAR = 6.0, 0.05
-"""A marker that is so many times as far away as usual, and at least so far (m), was taken for another."""
+STATIC_TRIAL = "static"
+"""Name of the trial in which the subject stands."""
+STATIC_SHARE = 0.05
+"""Share of the frames that come from the static trial."""
+MIN_MARKERS = 3
+"""Smallest number of markers in a frame that is used."""
+OUTLIER_RATIO = 6.0
+"""Distance of an outlier, relative to the median distance of its marker."""
+OUTLIER_DISTANCE_M = 0.05
+"""Smallest distance of an outlier, m: the marker was taken for another."""
 
 
-class ChosenFrames:
-    """The frames that are looked at.
+class SelectedFrames:
+    """Selected frames of all trials.
+
+    Args:
+        trials: measured markers by the name of the trial.
+        known: names of the markers of the model.
+        count: number of frames.
+        weights: weights of markers by name; the others have weight 1.
 
     Attributes:
-        markers: names of the m markers that are in the model and in a trial, and count.
-        weights: of them (m,).
-        trials: what each frame is from.
-        times: of the frames (t,), s.
-        measured: (t, m, 3), m; NaN where a marker was not seen.
-        notes: what was left out.
+        markers: names of the m markers that the model and a trial have, and whose weight is
+            positive.
+        weights: weights of these markers (m,).
+        trials: name of the trial of each frame.
+        times: times of the frames (t,), s.
+        measured: positions (t, m, 3), m; NaN where a marker was not seen.
+        notes: messages about trials and markers that are left out.
     """
 
     def __init__(
@@ -47,7 +56,7 @@ class ChosenFrames:
             check_weight(weight, f"'{name}'")
         if count < 1:
             raise SettingError(f"{count} frames are none; give at least 1")
-        shared = {name for trial in trials.values() for name in trial.shared(known)}
+        shared = {name for trial in trials.values() for name in trial.find_shared_names(known)}
         self.markers = [name for name in known if name in shared and weights.get(name, 1.0) > 0.0]
         if not self.markers:
             raise SettingError("no marker counts; give one a weight")
@@ -58,14 +67,18 @@ class ChosenFrames:
             list[float](),
             list[Array](),
         )
-        moving = sum(len(trial.times) for name, trial in trials.items() if name != STATIC)
+        moving = sum(len(trial.times) for name, trial in trials.items() if name != STATIC_TRIAL)
         for name, trial in trials.items():
-            share = STANDING if name == STATIC and moving else len(trial.times) / max(moving, 1)
+            share = (
+                STATIC_SHARE
+                if name == STATIC_TRIAL and moving
+                else len(trial.times) / max(moving, 1)
+            )
             rows = np.full((len(trial.times), len(self.markers), 3), np.nan)
             for index, marker in enumerate(self.markers):
                 if marker in trial.names:
                     rows[:, index] = trial.positions[:, trial.names.index(marker)]
-            seen = np.flatnonzero(np.isfinite(rows).all(axis=2).sum(axis=1) >= FEWEST)
+            seen = np.flatnonzero(np.isfinite(rows).all(axis=2).sum(axis=1) >= MIN_MARKERS)
             taken = max(1, round(count * min(share, 1.0)))
             for frame in (
                 seen[np.unique(np.linspace(0, len(seen) - 1, taken).round().astype(int))]
@@ -82,8 +95,15 @@ class ChosenFrames:
         self.times, self.measured = np.array(times), np.array(measured)
         self.measured[~np.isfinite(self.measured).all(axis=2)] = np.nan
 
-    def left_out(self, places: Array) -> bool:
-        """Leave out what is much further from places (t, m, 3) than the marker usually is; whether there is any."""
+    def exclude_outliers(self, places: Array) -> bool:
+        """Exclude measured positions that are much farther from fitted ones than usual.
+
+        Args:
+            places: fitted positions of the markers (t, m, 3), m.
+
+        Returns:
+            Whether any position was excluded.
+        """
         distances = np.linalg.norm(places - self.measured, axis=2)
         with np.errstate(all="ignore"):
             usual = np.array(
@@ -97,7 +117,9 @@ class ChosenFrames:
             worst = np.nanmax(
                 np.where(np.isfinite(distances), distances, 0.0), axis=1, keepdims=True
             )
-            far = (distances > np.maximum(LOST * usual, FAR)) & (distances > 0.5 * worst)
+            far = (distances > np.maximum(OUTLIER_RATIO * usual, OUTLIER_DISTANCE_M)) & (
+                distances > 0.5 * worst
+            )
         for place in np.flatnonzero(far.any(axis=0)):
             where = sorted({self.trials[frame] for frame in np.flatnonzero(far[:, place])})
             number = format_count(int(far[:, place].sum()), "frame")

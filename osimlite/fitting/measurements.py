@@ -1,4 +1,4 @@
-"""What was recorded of a subject: numbers of some things, which have names, at the times of some frames."""
+"""Measurements of named markers or sensors over time."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from osimlite.mechanics.multibody.spatial import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
-    """Numbers of m things at t times."""
+class Measurements:
+    """Measurements of m markers or sensors at t times."""
 
     names: tuple[str, ...]  # of the things (m,)
     times: Array  # (t,), s
@@ -49,8 +49,12 @@ class Recording:
             )
 
     @classmethod
-    def of_arrays(cls, arrays: Mapping[str, ArrayLike], times: ArrayLike | None) -> Self:
-        """What arrays (t, ...) hold by name, or single values; by default the times are 0, 1, 2 ...
+    def from_arrays(cls, arrays: Mapping[str, ArrayLike], times: ArrayLike | None) -> Self:
+        """Return measurements from arrays (t, ...), or single values, by name.
+
+        Args:
+            arrays: arrays by the names of the markers or sensors.
+            times: times (t,), s; by default 0, 1, 2 ...
 
         Raises:
             SettingError: the arrays do not fit together.
@@ -75,27 +79,30 @@ class Recording:
         return cls(tuple(arrays), moments, np.stack(values, axis=1))
 
     @classmethod
-    def nothing(cls, times: Array) -> Self:
-        """Of nothing, at some times (t,), s."""
+    def create_empty(cls, times: Array) -> Self:
+        """Return measurements of nothing at some times (t,), s."""
         return cls((), times, np.empty((len(times), 0, *cls.shape)))
 
-    def rows(self, start: int, end: int) -> Self:
-        """The frames from one number to before another."""
+    def slice_frames(self, start: int, end: int) -> Self:
+        """Return the frames from one number up to, but not including, another."""
         return type(self)(self.names, self.times[start:end], self.values[start:end], self.file)
 
-    def none_between(self, first: float, last: float) -> SettingError:
-        """The error where no frame lies between two times."""
+    def create_range_error(self, first: float, last: float) -> SettingError:
+        """Return the error for a range of times without frames."""
         where = f" of '{self.file}'" if self.file else ""
         return SettingError(
             f"no frame{where} lies between {first:g} and {last:g} s; the data are from {self.times[0]:g} to "
             f"{self.times[-1]:g} s"
         )
 
-    def only(self, names: Sequence[str]) -> Array:
-        """The values (t, k, ...) of some.
+    def select_values(self, names: Sequence[str]) -> Array:
+        """Return the values (t, k, ...) of k markers or sensors.
+
+        Args:
+            names: their names.
 
         Raises:
-            SettingError: there is no such name.
+            SettingError: a name is unknown.
         """
         places = {name: index for index, name in enumerate(self.names)}
         for name in names:
@@ -105,15 +112,17 @@ class Recording:
                 )
         return self.values[:, [places[name] for name in names]]
 
-    def shared(self, model: Sequence[str], chosen: Mapping[str, float] | None = None) -> list[str]:
-        """Names that a model has too, in the order of the data.
+    def find_shared_names(
+        self, model: Sequence[str], chosen: Mapping[str, float] | None = None
+    ) -> list[str]:
+        """Return the names that a model has as well, in the order of the data.
 
         Args:
             model: names in the model.
-            chosen: only of these, if given.
+            chosen: if given, only these names count.
 
         Raises:
-            OsimliteError: there are none.
+            OsimliteError: the data and the model share no name.
         """
         names = [
             name for name in self.names if name in model and (chosen is None or name in chosen)
@@ -127,5 +136,5 @@ class Recording:
 
     @property
     def source(self) -> str:
-        """Where the values come from, in words."""
+        """Origin of the values, in words."""
         return f"'{self.file}'" if self.file else "the data"
