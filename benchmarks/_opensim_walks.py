@@ -20,7 +20,7 @@ import numpy as np
 import osimlite
 from osimlite.simulation import Simulation
 from osimlite.studies.gait.foot_contacts import find_footing
-from osimlite.studies.gait.steps import Scuff, Step, Walk, along_slope, follow
+from osimlite.studies.gait.steps import Scuff, Step, Walk, along_slope, follow_events
 
 
 class Order(NamedTuple):
@@ -112,7 +112,7 @@ def _read_off(engine: Any, forces: Any, states: _States) -> Walk:
     paths = [engine.mechanism.coordinates[place].path for place in engine.order]
     order = [f"{path}/{kind}" for kind in ("value", "speed") for path in paths]
     moments = np.array([states.at(k, order) for k, _, _ in changes])
-    walk = follow(
+    walk = follow_events(
         find_footing(engine),
         engine.contacts,
         [(float(times[k]), contact, begins) for k, contact, begins in changes],

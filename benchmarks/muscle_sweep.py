@@ -26,7 +26,7 @@ from _pair import pair, report
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.run import sweep
 from osimlite.studies.sweep.runner import Runner
-from osimlite.studies.sweep.sampling import samples
+from osimlite.studies.sweep.sampling import choose_samples
 from osimlite.studies.sweep.variables import Floats
 from osimlite.studies.sweep.variants import Variants
 
@@ -43,9 +43,9 @@ def main() -> None:
         to=TO,
         equilibrate=True,
     )
-    chosen = samples(made.variables, "sobol", RUNS)
+    chosen = choose_samples(made.variables, "sobol", RUNS)
     rows, variants = chosen.block(0, RUNS), Variants(made)
-    variants.put(rows[0].tolist())
+    variants.apply_sample(rows[0].tolist())
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)
         osimlite.write(variants.model, path / "model.osim")

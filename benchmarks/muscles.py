@@ -36,7 +36,7 @@ from osimlite.simulation import Simulation
 from osimlite.simulation.system import System
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.runner import Runner
-from osimlite.studies.sweep.sampling import samples
+from osimlite.studies.sweep.sampling import choose_samples
 
 REAL = {
     "arm26": "m0001",
@@ -250,7 +250,7 @@ def sweep(path: Path | None, console: Console) -> None:
         return
     made = plan(osimlite.read(path), {"hip_flexion_r": "-0.1:0.1"}, to=TO, accuracy=ACCURACY)
     runner = Runner(made)
-    rows = samples(made.variables, "sobol", RUNS).block(0, RUNS)
+    rows = choose_samples(made.variables, "sobol", RUNS).block(0, RUNS)
     model = opensim.Model(str(path))
     state = model.initSystem()
     hip = model.getCoordinateSet().get("hip_flexion_r")
@@ -277,7 +277,7 @@ def sweep(path: Path | None, console: Console) -> None:
         console=console,
     )
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    many = samples(made.variables, "sobol", 10 * RUNS)
+    many = choose_samples(made.variables, "sobol", 10 * RUNS)
     for first in range(0, 10 * RUNS, RUNS):
         runner.run(many.block(first, first + RUNS))
     grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024

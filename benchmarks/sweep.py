@@ -35,7 +35,7 @@ from _pair import pair, report
 from osimlite.studies.sweep.plan import Plan, plan
 from osimlite.studies.sweep.run import sweep
 from osimlite.studies.sweep.runner import Runner
-from osimlite.studies.sweep.sampling import samples
+from osimlite.studies.sweep.sampling import choose_samples
 
 MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 VARY = {"RHip_rz": "20deg:40deg", "LHip_rz": "-20deg:0deg", "Pelvis_tx/speed": "0:1"}
@@ -53,14 +53,14 @@ def main() -> None:
             return
         starts = plan(osimlite.read(MODEL), VARY, to=TO)
         # What is made once, and what of machine code is not in the cache yet.
-        Runner(starts).run(samples(starts.variables, "sobol", 8).block(0, 8))
+        Runner(starts).run(choose_samples(starts.variables, "sobol", 8).block(0, 8))
         console.print(workers(starts, path))
         if "--workers" in sys.argv:
             return
         import opensim
 
         opensim.Logger.setLevelString("off")
-        rows = samples(starts.variables, "sobol", WALKERS).block(0, WALKERS)
+        rows = choose_samples(starts.variables, "sobol", WALKERS).block(0, WALKERS)
         theirs = run_opensim(opensim, rows)
         name = f"{WALKERS} walkers, processor time"
         report(
@@ -88,7 +88,7 @@ def main() -> None:
 def by_sweep(
     made: Plan, path: Path, count: int = WALKERS, workers: int = 1
 ) -> Callable[[], object]:
-    chosen = samples(made.variables, "sobol", count)
+    chosen = choose_samples(made.variables, "sobol", count)
     return lambda: sweep(made, chosen, path, workers=workers)
 
 
@@ -155,7 +155,7 @@ def separate_processes(made: Plan) -> Iterator[Callable[[int], float]]:
     context = get_context("spawn")
     ends = [context.Pipe() for _ in range(2)]
     others = [
-        context.Process(target=walk_when_told, args=(made.packed(), end), daemon=True)
+        context.Process(target=walk_when_told, args=(made.pack(), end), daemon=True)
         for _, end in ends
     ]
 
@@ -180,12 +180,12 @@ def separate_processes(made: Plan) -> Iterator[Callable[[int], float]]:
 
 def walk_when_told(packed: bytes, end: Any) -> None:
     """In a process of its own: walk as many as it is told, and tell the time that this took, until it is told none."""
-    made = Plan.unpacked(packed)
+    made = Plan.unpack(packed)
     runner = Runner(made)
-    runner.run(samples(made.variables, "sobol", 8).block(0, 8))
+    runner.run(choose_samples(made.variables, "sobol", 8).block(0, 8))
     end.send(0.0)
     while count := end.recv():
-        rows = samples(made.variables, "sobol", count).block(0, count)
+        rows = choose_samples(made.variables, "sobol", count).block(0, count)
         end.send(elapsed(partial(runner.run, rows)))
 
 
@@ -201,7 +201,7 @@ def kinds(path: Path) -> Table:
         ("starts, PyBullet", VARY, BY_BULLET, "bullet"),
     ):
         made = plan(osimlite.read(MODEL), vary, to=TO, engine=engine)
-        runner, rows = Runner(made), samples(made.variables, "sobol", count).block(0, count)
+        runner, rows = Runner(made), choose_samples(made.variables, "sobol", count).block(0, count)
         runner.run(rows[:2])
         started = time.process_time()
         runner.run(rows)
@@ -225,7 +225,7 @@ def many(path: Path) -> Table:
             marks.pop(0)
             table.add_row(f"{done:.0f}", f"{memory():.0f}", f"{time.perf_counter() - started:.0f}")
 
-    outcome = sweep(made, samples(made.variables, "lhs", MANY), path, progress=progress)
+    outcome = sweep(made, choose_samples(made.variables, "lhs", MANY), path, progress=progress)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     table.caption = f"{MANY / outcome.seconds:.0f} walkers/s; at most {peak:.0f} MB; {path.stat().st_size / 1e6:.1f} MB on disk"
     return table

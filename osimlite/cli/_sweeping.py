@@ -100,9 +100,9 @@ def make_plan(
 
     from osimlite.errors import SettingError, UnitWarning
     from osimlite.simulation.run_controls import words_to_controls
-    from osimlite.studies.sweep.variables import parse
+    from osimlite.studies.sweep.variables import parse_ranges
 
-    ranges = parse(vary or [])
+    ranges = parse_ranges(vary or [])
     if not ranges and choices.get("controller") is None:
         raise SettingError("say what to vary, as in --vary RHip_rz=0.2:0.6")
     levels = {"below": _levels(below, "--stop-below"), "above": _levels(above, "--stop-above")}

@@ -89,7 +89,12 @@ def gait(
     from osimlite.base.files import prepare_folder
     from osimlite.base.require import require
     from osimlite.simulation.run import Simulation
-    from osimlite.studies.gait.basin import basin_places, find_basin, perturbed, walks_from
+    from osimlite.studies.gait.basin import (
+        basin_places,
+        find_basin,
+        sample_perturbed_starts,
+        walks_from,
+    )
     from osimlite.studies.gait.stepmap import refuse_constraints
 
     if basin and pictures and output:
@@ -114,7 +119,7 @@ def gait(
         if step_map is not None and cycle is not None:
             for part in perturb or ():
                 with progress_bar(f"starting within {part:.0%}", starts) as progress:
-                    states = perturbed(step_map, state, part, starts, seed)
+                    states = sample_perturbed_starts(step_map, state, part, starts, seed)
                     walks = walks_from(step_map, cycle, states, steps, progress=progress)
                 result.nearby.append(
                     Nearby(part, sum(len(walk.steps) >= steps for walk in walks), starts, steps)

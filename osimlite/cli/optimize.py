@@ -117,7 +117,7 @@ def optimize(
         Pelvis_tx/speed=0:2
     """
     from osimlite.cli._progress import progress_bar
-    from osimlite.studies.sweep.optimize import Objective, found_by
+    from osimlite.studies.sweep.optimize import Objective, read_best_values
     from osimlite.studies.sweep.optimize import optimize as search
 
     plan = sweeping.make_plan(
@@ -151,7 +151,7 @@ def optimize(
             is_bounded=not unbounded,
             resume=resume,
             force=force,
-            start=found_by(start) if start else None,
+            start=read_best_values(start) if start else None,
             workers=workers,
             cluster=cluster,
             progress=progress,

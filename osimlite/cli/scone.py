@@ -77,7 +77,7 @@ def scone(
     from osimlite.studies.reflexes.gait import gait_of
     from osimlite.studies.reflexes.parameters import read_par
     from osimlite.studies.reflexes.scenario import Scenario
-    from osimlite.studies.reflexes.search import BEST, search
+    from osimlite.studies.reflexes.search import BEST, search_parameters
 
     if not optimize and (
         resume or any(given is not None for given in (generations, population, seed))
@@ -91,7 +91,7 @@ def scone(
     values = given.best() if par is None else {name: own[0] for name, own in read_par(par).items()}
     files = []
     if optimize:
-        values = search(
+        values = search_parameters(
             given,
             output,
             generations=generations,
@@ -117,7 +117,7 @@ def scone(
     for name, report in walked.report.items():
         facts.add(name, f"{report[0]:.6g} {UNITS.get(name, '')}".rstrip())
     gait = gait_of(given, walked)
-    for name, words in () if gait is None else gait.told().items():
+    for name, words in () if gait is None else gait.describe().items():
         facts.add(name, words)
     facts.add("files", ", ".join(map(str, files)))
     facts.show()

@@ -81,7 +81,7 @@ def sweep(
     """
     from osimlite.cli._progress import progress_bar
     from osimlite.studies.sweep.run import sweep as run
-    from osimlite.studies.sweep.sampling import samples as choose
+    from osimlite.studies.sweep.sampling import choose_samples as choose
 
     plan = sweeping.make_plan(
         source,
@@ -121,7 +121,7 @@ def sweep(
 def _told(plan: Plan, outcome: Outcome) -> Facts:
     from osimlite.base.text import format_count
     from osimlite.studies.sweep.measures import measure_name
-    from osimlite.studies.sweep.results import ranges
+    from osimlite.studies.sweep.results import compute_ranges
 
     facts = Facts(format_count(outcome.count, "run"))
     new = sum(outcome.status.values())
@@ -142,7 +142,7 @@ def _told(plan: Plan, outcome: Outcome) -> Facts:
             "failed",
             f"{format_count(others, 'run')} for other reasons; the column 'reason' has them all",
         )
-    for name, result in ranges(
+    for name, result in compute_ranges(
         outcome.path, [measure_name(spec) for spec in plan.measures]
     ).items():
         facts.add(

@@ -257,7 +257,7 @@ class Simulation:
             if isinstance(chosen.controller, str | Path | Mapping):
                 such = f"osimlite.Feedback({chosen.controller!r})"
                 raise SettingError(f"a controller is an osimlite.Feedback, such as {such}")
-            held = chosen.controller.held(self.model, self.engine)
+            held = chosen.controller.compile_for(self.model, self.engine)
             to = held.nearest(to)
             if chosen.resume is not None:
                 held.require_known(before, start)

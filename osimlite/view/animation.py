@@ -18,8 +18,15 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.view.collect import build_scene
-from osimlite.view.motion import Motion, activity, activity_color, at_times, moving, values_of
-from osimlite.view.picture import FORCE, INK, SKY, Arrow, Camera, Style, draw
+from osimlite.view.motion import (
+    Motion,
+    activity_color,
+    at_times,
+    find_moving_bodies,
+    read_activations,
+    values_of,
+)
+from osimlite.view.picture import FORCE, INK, SKY, Arrow, Camera, Style, draw_scene
 from osimlite.view.pushes import Pushes
 from osimlite.view.scene import STEEPEST, Scene
 
@@ -97,11 +104,11 @@ def animate(
         if progress is not None:
             progress(number + 1, len(film.times))
     target = Path(path)
-    write_atomically(target, _encoded(frames, fps, image))
+    write_atomically(target, _encode_frames(frames, fps, image))
     return target
 
 
-def _encoded(frames: list[Any], fps: int, image: Any) -> bytes:
+def _encode_frames(frames: list[Any], fps: int, image: Any) -> bytes:
     """The frames as a GIF, all with one palette, so that colours do not flicker."""
     # A sheet of some of the frames, side by side, has all the colours.
     some = frames[:: max(1, len(frames) // 6)]
@@ -134,11 +141,11 @@ class Film:
         values = values_of(motion, self.mechanism)
         self.q = at_times(motion, values, self.times)
         self.poses = [self.scene.at(row) for row in self.q]
-        self.moving = moving(self.poses)
+        self.moving = find_moving_bodies(self.poses)
         self.pushes = Pushes.of(self.scene, motion, self.times)
         self.activity = {
             path: np.interp(self.times, recorded, levels)
-            for path, levels in activity(self.scene, motion).items()
+            for path, levels in read_activations(self.scene, motion).items()
         }
         self.focus = self._focus()
         self.reach = self._reach()
@@ -221,7 +228,7 @@ class _Painter:
         colors = {
             path: activity_color(float(levels[number])) for path, levels in film.activity.items()
         }
-        frame = draw(
+        frame = draw_scene(
             film.scene, film.q[number], camera, self.size, arrows, Style(None, loaded, colors)
         )
         self._words(self.pen.Draw(frame), number)

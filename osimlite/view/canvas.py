@@ -100,9 +100,9 @@ class Canvas:
         chosen = np.flatnonzero(wanted & np.isfinite(places).all(axis=(1, 2)))
         top = np.ceil(low[chosen, 1] - 0.5).clip(0, self.height).astype(np.int64)
         bottom = np.floor(high[chosen, 1] - 0.5).clip(-1, self.height - 1).astype(np.int64)
-        which, rows = _counted(top, bottom - top + 1)
+        which, rows = _enumerate_ranges(top, bottom - top + 1)
         triangles = chosen[which]
-        starts, ends = self._ends(flat[triangles], _middle(rows))
+        starts, ends = self._ends(flat[triangles], _pixel_centres(rows))
         some = np.flatnonzero(starts <= ends)
         triangles, rows, starts, lengths = (
             triangles[some],
@@ -114,7 +114,7 @@ class Canvas:
         cuts = np.searchsorted(total, np.arange(_AT_ONCE, total[-1] if len(total) else 0, _AT_ONCE))
         for part in np.split(np.arange(len(rows)), cuts):
             triangle, row, start = triangles[part], rows[part], starts[part]
-            weights = _weights(flat[triangle], _middle(start), _middle(row))
+            weights = _compute_weights(flat[triangle], _pixel_centres(start), _pixel_centres(row))
             yield _Spans(triangle, row * self.width + start, lengths[part], *weights)
 
     def _ends(self, corners: Array, y: Array) -> tuple[Indices, Indices]:
@@ -143,7 +143,7 @@ class _Spans(NamedTuple):
 
     def pixels(self) -> tuple[Indices, Indices, Indices]:
         """All pixels (k,), the span of each, and its place in the span."""
-        which, steps = _counted(np.zeros_like(self.lengths), self.lengths)
+        which, steps = _enumerate_ranges(np.zeros_like(self.lengths), self.lengths)
         return self.starts[which] + steps, which, steps
 
     def values(self, corners: Array, which: Indices, steps: Indices) -> Array:
@@ -156,12 +156,12 @@ class _Spans(NamedTuple):
         return result
 
 
-def _middle(numbers: Indices) -> Array:
+def _pixel_centres(numbers: Indices) -> Array:
     """Where the middles of pixels are."""
     return numbers.astype(np.float64) + 0.5
 
 
-def _counted(starts: Indices, counts: Indices) -> tuple[Indices, Indices]:
+def _enumerate_ranges(starts: Indices, counts: Indices) -> tuple[Indices, Indices]:
     """For ranges of whole numbers, given their starts and lengths (r,): for every number its range, and the number."""
     counts = counts.clip(0)
     which = np.repeat(np.arange(len(counts)), counts)
@@ -169,7 +169,7 @@ def _counted(starts: Indices, counts: Indices) -> tuple[Indices, Indices]:
     return which, np.arange(len(which)) + (starts - before)[which]
 
 
-def _weights(corners: Array, x: Array, y: Array) -> tuple[Array, Array]:
+def _compute_weights(corners: Array, x: Array, y: Array) -> tuple[Array, Array]:
     """The weights (k, 3) of the corners (k, 3, 2) of triangles at points in them, and their derivatives along x."""
     (ax, ay), (bx, by), (cx, cy) = (corners[:, index].T for index in range(3))
     with np.errstate(all="ignore"):

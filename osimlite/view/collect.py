@@ -32,7 +32,17 @@ from osimlite.simulation.elements.builder import OPENSIM, ElementBuilder
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.polylines import Course
 from osimlite.simulation.robot.visuals import frame_of
-from osimlite.view.scene import Axes, Color, Item, Layer, Line, LinePoint, Pushed, Scene, sticks
+from osimlite.view.scene import (
+    Axes,
+    Color,
+    Item,
+    Layer,
+    Line,
+    LinePoint,
+    Pushed,
+    Scene,
+    draw_sticks,
+)
 
 WIDTH_OF_HALF_SPACE = 2.5
 """How much of a half space is drawn: edges of the square as a multiple of the model's size."""
@@ -106,7 +116,7 @@ class _Collector:
             with self._remarked(path):
                 self._component(component, path)
         bare = [k for k, _ in enumerate(self.mechanism.bodies) if k not in self.drawn]
-        for body, ends in sticks(self.mechanism, bare):
+        for body, ends in draw_sticks(self.mechanism, bare):
             self.lines.append(
                 Line(self.mechanism.bodies[body].path, "geometry", ends, STICK, 0.008)
             )
@@ -152,7 +162,7 @@ class _Collector:
                     "markers",
                     body,
                     unit_shapes.ball(),
-                    _stretched((_MARKER_RADIUS,) * 3, point),
+                    _make_stretch((_MARKER_RADIUS,) * 3, point),
                     color,
                 )
             case AbstractGeometryPath():
@@ -179,7 +189,7 @@ class _Collector:
             "geometry",
             body,
             own,
-            placed @ _stretched(scale) @ size,
+            placed @ _make_stretch(scale) @ size,
             look.color,
             look.opacity,
             visible,
@@ -216,28 +226,28 @@ class _Collector:
         """A unit shape, and what makes the shape of it (4, 4)."""
         match shape:
             case geometry.Brick():
-                return unit_shapes.cube(), _stretched(2.0 * np.array(shape.half_lengths))
+                return unit_shapes.cube(), _make_stretch(2.0 * np.array(shape.half_lengths))
             case geometry.Sphere() | contact.ContactSphere() | wrapping.WrapSphere():
-                return unit_shapes.ball(), _stretched((shape.radius,) * 3)
+                return unit_shapes.ball(), _make_stretch((shape.radius,) * 3)
             case geometry.Ellipsoid() | contact.ContactEllipsoid():
-                return unit_shapes.ball(), _stretched(shape.radii)
+                return unit_shapes.ball(), _make_stretch(shape.radii)
             case wrapping.WrapEllipsoid():
-                return unit_shapes.ball(), _stretched(shape.dimensions)
+                return unit_shapes.ball(), _make_stretch(shape.dimensions)
             case geometry.Cylinder():
-                return unit_shapes.tube(), _TO_Z @ _stretched(
+                return unit_shapes.tube(), _TO_Z @ _make_stretch(
                     (shape.radius, shape.radius, 2.0 * shape.half_height)
                 )
             case contact.ContactCylinder() | wrapping.WrapCylinder():
                 length = getattr(shape, "length", _ENDLESS)
-                return unit_shapes.tube(), _stretched((shape.radius, shape.radius, length))
+                return unit_shapes.tube(), _make_stretch((shape.radius, shape.radius, length))
             case contact.ContactTorus() if shape.torus_radius > 0.0:
-                return unit_shapes.ring(shape.tube_radius / shape.torus_radius), _stretched(
+                return unit_shapes.ring(shape.tube_radius / shape.torus_radius), _make_stretch(
                     (shape.torus_radius,) * 3
                 )
             case wrapping.WrapTorus() if shape.outer_radius > 0.0:
                 # In spite of their names: the radius of the tube, and that of the circle in its
                 # middle.
-                return unit_shapes.ring(shape.inner_radius / shape.outer_radius), _stretched(
+                return unit_shapes.ring(shape.inner_radius / shape.outer_radius), _make_stretch(
                     (shape.outer_radius,) * 3
                 )
             case geometry.Mesh() | contact.ContactMesh():
@@ -264,7 +274,7 @@ class _Collector:
                 for wrap in path.path_wrap_set.objects
             ]
         wraps = tuple(self.tree.path_of(surface) or "" for surface in result if surface is not None)
-        belly, tendon = _fibers(owner) if isinstance(owner, Muscle) else (0.0, 0.0)
+        belly, tendon = _measure_fibers(owner) if isinstance(owner, Muscle) else (0.0, 0.0)
         self.lines.append(
             Line(of, "paths", course, path.appearance.color, 0.0035, visible, wraps, belly, tendon)
         )
@@ -400,14 +410,14 @@ class _Collector:
         return scene
 
 
-def _fibers(muscle: Muscle) -> tuple[float, float]:
+def _measure_fibers(muscle: Muscle) -> tuple[float, float]:
     """How thick the fibers are drawn in their middle, and the slack length of the tendon, m."""
     force, tendon = abs(float(muscle.max_isometric_force)), abs(float(muscle.tendon_slack_length))
     radius = SLENDER * math.sqrt(force / (math.pi * STRESS)) if math.isfinite(force) else THICKEST
     return min(max(radius, 0.0035), THICKEST), tendon if math.isfinite(tendon) else 0.0
 
 
-def _stretched(size: Any, where: Any = (0.0, 0.0, 0.0)) -> Array:
+def _make_stretch(size: Any, where: Any = (0.0, 0.0, 0.0)) -> Array:
     """A matrix (4, 4) that stretches along the axes and then moves."""
     matrix = np.diag((*np.asarray(size, dtype=float).tolist(), 1.0))
     matrix[:3, 3] = where

@@ -51,14 +51,18 @@ def write_glb(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
         values = values_of(motion, scene.mechanism)
         rows = at_times(motion, values, times)
     poses = [scene.at(row) for row in rows]
-    written = _Writer(times - times[0], _turning(np.cross(scene.up, (0.0, 1.0, 0.0)), scene.up[1]))
+    written = _Writer(
+        times - times[0], _make_turns(np.cross(scene.up, (0.0, 1.0, 0.0)), scene.up[1])
+    )
     names = [*(body.name for body in scene.mechanism.bodies), "ground"]
     bodies = [
         written.node(
             name,
             _Track(
                 [p.origins[k] for p in poses],
-                _continuous(np.roll(quaternion_of([p.rotations[k] for p in poses]), -1, axis=1)),
+                _make_continuous(
+                    np.roll(quaternion_of([p.rotations[k] for p in poses]), -1, axis=1)
+                ),
             ),
         )
         for k, name in enumerate(names)
@@ -68,8 +72,8 @@ def write_glb(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
             surface = scene.surfaces[item.surface]
             mesh = written.mesh(surface, item.color, item.opacity)
             written.shape(bodies[item.body], item.path, mesh, item.matrix)
-    for name, color, radius, ends in _segments(scene, motion, times, rows, poses):
-        written.node(name, _along(ends, radius), written.mesh(_ROUND, color, 1.0))
+    for name, color, radius, ends in _list_segments(scene, motion, times, rows, poses):
+        written.node(name, _lay_tubes(ends, radius), written.mesh(_ROUND, color, 1.0))
     write_atomically(path, written.data(scene.mechanism.name))
     return Path(path)
 
@@ -82,7 +86,7 @@ class _Track(NamedTuple):
     scale: Array | None = None
 
 
-def _segments(
+def _list_segments(
     scene: Scene, motion: Motion | None, times: Array, rows: Array, poses: Sequence[Bodies]
 ) -> Iterator[tuple[str, Color, float, Array]]:
     """Straight pieces of paths, and forces: path of the component, colour, radius, ends (n, 2, 3) in ground.
@@ -110,24 +114,26 @@ def _segments(
         yield push.on.path, FORCE, 0.006 * size, np.stack((starts, starts + arrows), axis=1)
 
 
-def _along(ends: Array, radius: float) -> _Track:
+def _lay_tubes(ends: Array, radius: float) -> _Track:
     """A tube of length 1 along Z, laid from one end to the other (n, 2, 3)."""
     ways = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(ways, axis=1)
     ways = ways / np.maximum(lengths, 1e-300)[:, None]
-    turns = np.array([_turning(np.array((-y, x, 0.0)), z) for x, y, z in ways])
+    turns = np.array([_make_turns(np.array((-y, x, 0.0)), z) for x, y, z in ways])
     thick = np.where(lengths > 0.0, radius, 0.0)
-    return _Track(ends.mean(axis=1), _continuous(turns), np.column_stack((thick, thick, lengths)))
+    return _Track(
+        ends.mean(axis=1), _make_continuous(turns), np.column_stack((thick, thick, lengths))
+    )
 
 
-def _turning(axis: Array, cosine: float) -> Array:
+def _make_turns(axis: Array, cosine: float) -> Array:
     """The quaternion x y z w that turns one unit vector into another, from their cross product and cosine."""
     result = np.array((*axis, 1.0 + cosine))
     size = float(np.linalg.norm(result))
     return result / size if size > 1e-9 else np.array((1.0, 0.0, 0.0, 0.0))
 
 
-def _continuous(quaternions: Array) -> Array:
+def _make_continuous(quaternions: Array) -> Array:
     """The same turns, each with the sign that is nearer to the one before: players go the straight way between them."""
     turned = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
     signs = np.where(np.cumsum(np.concatenate(((False,), turned))) % 2 == 1, -1.0, 1.0)

@@ -61,12 +61,12 @@ def _take_out(model: Model, message: str) -> str | None:
         # without it.
         member = "/".join(path.split("/")[:3])
         component = tree.by_path.get(member)
-        if component is not None and member.count("/") == 2 and _remove(model, component):
+        if component is not None and member.count("/") == 2 and _remove_component(model, component):
             return member
     return None
 
 
-def _remove(model: Model, component: Component) -> bool:
+def _remove_component(model: Model, component: Component) -> bool:
     """Remove a component from the list that holds it, whatever else names it; return whether there is such a list."""
     for holder in model.walk():
         for spec, item in holder.objects_held():

@@ -43,7 +43,7 @@ def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[s
         path = tree.path_of(component) or "/"
         above = tree.parent_of(component)
         kind = component.class_name if isinstance(component, Unknown) else type(component).tag
-        rows = list(_properties(tree, component, ""))
+        rows = list(_list_properties(tree, component, ""))
         names = [name for name, _, _ in rows]
         node: dict[str, Any] = {
             "path": path,
@@ -62,7 +62,7 @@ def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[s
     return nodes, tags
 
 
-def _properties(tree: Tree, item: Object, way: str) -> Iterator[tuple[str, str, bool]]:
+def _list_properties(tree: Tree, item: Object, way: str) -> Iterator[tuple[str, str, bool]]:
     """Name, text and whether it was given, of every property; those of objects without a path follow their holder."""
     if isinstance(item, Unknown):
         yield f"{way}content", item.content, True
@@ -78,7 +78,7 @@ def _properties(tree: Tree, item: Object, way: str) -> Iterator[tuple[str, str, 
                         if isinstance(value, list) and held.name
                         else f"{spec.tag}."
                     )
-                    yield from _properties(tree, held, way + name)
+                    yield from _list_properties(tree, held, way + name)
         elif isinstance(spec.kind, Reference):
             yield way + spec.tag, _named(tree, item, spec.kind, value), given
         else:
@@ -110,7 +110,7 @@ def finding_rows(findings: Sequence[Finding]) -> list[dict[str, Any]]:
     ]
 
 
-def pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[dict[str, Any]]:
+def place_pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[dict[str, Any]]:
     """Where in space findings are pinned: for every component that is anywhere, its codes and the worst severity."""
     tree, mechanism = model.tree(), scene.mechanism
     results: dict[str, list[Finding]] = {}
@@ -119,7 +119,7 @@ def pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[dict[s
             results.setdefault(item.component, []).append(item)
     result = []
     for path, items in results.items():
-        place = _place(tree, mechanism, scene, tree.by_path[path])
+        place = _find_point(tree, mechanism, scene, tree.by_path[path])
         if place is not None:
             worst = min(items, key=lambda item: item.severity.rank)
             result.append(
@@ -134,7 +134,7 @@ def pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[dict[s
     return result
 
 
-def _place(
+def _find_point(
     tree: Tree, mechanism: Mechanism, scene: Scene, component: Component | None
 ) -> tuple[int, Any] | None:
     """Body and point (3,) in its frame of a component, or of the nearest above it that is anywhere."""

@@ -62,21 +62,23 @@ def contact_forces(motion: Motion) -> list[ContactForce]:
             place = label.removesuffix(".force.X")
             element, _, frame = place.partition(".")
             torques = (
-                _columns(motion, f"{place}.torque")
+                _find_columns(motion, f"{place}.torque")
                 if f"{place}.torque.X" in motion.forces
                 else None
             )
-            result.append(ContactForce(element, frame, _columns(motion, f"{place}.force"), torques))
+            result.append(
+                ContactForce(element, frame, _find_columns(motion, f"{place}.force"), torques)
+            )
     return result
 
 
-def _columns(motion: Motion, label: str) -> Array:
+def _find_columns(motion: Motion, label: str) -> Array:
     return np.column_stack(
         [np.asarray(motion.forces[f"{label}.{axis}"], dtype=float) for axis in "XYZ"]
     )
 
 
-def activity(scene: Scene, motion: Motion) -> dict[str, Array]:
+def read_activations(scene: Scene, motion: Motion) -> dict[str, Array]:
     """Activations (n,), from 0 to 1, of the muscles that have one on record, by the component paths of their lines.
 
     Files of OpenSim 3 have them as ``soleus_r.activation``.
@@ -94,7 +96,7 @@ def activity_color(activation: float) -> Color:
     return activation, 0.0, 1.0 - activation
 
 
-def moving(poses: Sequence[Bodies]) -> Array:
+def find_moving_bodies(poses: Sequence[Bodies]) -> Array:
     """Which bodies (b + 1,) change place from pose to pose; all but ground if none does."""
     rotations, origins = (
         np.array([p.rotations for p in poses]),

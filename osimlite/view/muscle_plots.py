@@ -12,7 +12,14 @@ from osimlite.base.files import make_folder
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.muscle_curves import QUANTITIES, MuscleCurves
 from osimlite.view.lettering import plain_lettering
-from osimlite.view.plots import figure_of, finish, lines_in, save, shared_out, sheet
+from osimlite.view.plots import (
+    figure_of,
+    finish_panels,
+    lines_in,
+    make_sheet,
+    save_figure,
+    shared_out,
+)
 
 _TITLES = {
     "length": "Muscle-tendon length",
@@ -53,16 +60,16 @@ def plot_muscles(
         for quantity, rows in curves.columns.items():
             title = _title(quantity)
             if len(curves.coordinates) == 2:
-                figure = _maps(curves, mechanism, rows, title)
+                figure = _draw_maps(curves, mechanism, rows, title)
             else:
-                figure = _lines(
+                figure = _draw_lines(
                     curves,
                     mechanism,
                     rows,
                     title,
                     None if other is None else other.columns[quantity],
                 )
-            written.append(save(figure, base / f"{quantity}.png"))
+            written.append(save_figure(figure, base / f"{quantity}.png"))
     return written
 
 
@@ -89,20 +96,22 @@ def _names(curves: MuscleCurves) -> list[str]:
     return [path.rpartition("/")[2] for path in curves.muscles]
 
 
-def _lines(curves: MuscleCurves, mechanism: Mechanism, rows: Any, title: str, other: Any) -> Any:
+def _draw_lines(
+    curves: MuscleCurves, mechanism: Mechanism, rows: Any, title: str, other: Any
+) -> Any:
     label, across = _axis(curves, mechanism, 0)
     parts = shared_out(dict(zip(_names(curves)[:_MOST], rows.T, strict=False)))
-    figure, axes = sheet(title, [3.0] * len(parts))
+    figure, axes = make_sheet(title, [3.0] * len(parts))
     for panel, part in zip(axes, parts, strict=True):
         lines_in(panel, across, part)
         if other is not None:
             beside = dict(zip(_names(curves), other.T, strict=True))
             lines_in(panel, across, {name: beside[name] for name in part}, ls="--", lw=0.9)
-    finish(axes, across, _note(curves), label)
+    finish_panels(axes, across, _add_note(curves), label)
     return figure
 
 
-def _maps(curves: MuscleCurves, mechanism: Mechanism, rows: Any, title: str) -> Any:
+def _draw_maps(curves: MuscleCurves, mechanism: Mechanism, rows: Any, title: str) -> Any:
     (label, x), (other, y) = (_axis(curves, mechanism, place) for place in (0, 1))
     xs, ys = np.unique(x), np.unique(y)
     names = _names(curves)[:_MOST]
@@ -122,6 +131,6 @@ def _maps(curves: MuscleCurves, mechanism: Mechanism, rows: Any, title: str) -> 
     return figure
 
 
-def _note(curves: MuscleCurves) -> str:
+def _add_note(curves: MuscleCurves) -> str:
     left = len(curves.muscles) - _MOST
     return f"the first {_MOST} muscles; {left} more are in the table" if left > 0 else ""

@@ -66,13 +66,13 @@ def model(item: Model) -> str:
 
     head = f"<b>{escape(item.name) or 'a model'}</b>: {format_count(len(own), 'component')}"
     inner = "".join(map(branch, below.get(id(item), [])))
-    return f"<details><summary>{head}</summary>{inner}{_left(len(own), MOST_COMPONENTS)}</details>{_space(item)}"
+    return f"<details><summary>{head}</summary>{inner}{_left(len(own), MOST_COMPONENTS)}</details>{_embed_viewer(item)}"
 
 
 def trajectory(item: Trajectory) -> str:
     """What it is in a line, and the motion, to be played."""
     return f"<div>{escape(repr(item))}</div>" + (
-        "" if item.model is None else _space(item.model, item)
+        "" if item.model is None else _embed_viewer(item.model, item)
     )
 
 
@@ -93,7 +93,9 @@ def findings(item: Report) -> str:
     )
     words = f"<div>{counts} in {format_count(item.checked, 'file')}</div>"
     return words + (
-        _table(("", "code", "place", "message", "suggestion"), cells, len(rows)) if rows else ""
+        _make_table(("", "code", "place", "message", "suggestion"), cells, len(rows))
+        if rows
+        else ""
     )
 
 
@@ -110,7 +112,7 @@ def paths(item: Paths) -> str:
         ]
         for name in item.names
     )
-    return "<div>in the default pose</div>" + _table(
+    return "<div>in the default pose</div>" + _make_table(
         ("path", "length (m)", "moment arms (m)"), cells, len(lengths)
     )
 
@@ -127,30 +129,30 @@ def muscle_curves(item: MuscleCurves) -> str:
     words = f"<div>{format_count(len(item.muscles), 'muscle')} in {format_count(len(item.poses), 'pose')}{over}</div>"
     units = ((name, QUANTITIES.get(name, "m")) for name in item.columns)
     heads = [escape(f"{name} ({unit})" if unit else name) for name, unit in units]
-    return words + _table(("muscle", *heads), cells, len(item.muscles))
+    return words + _make_table(("muscle", *heads), cells, len(item.muscles))
 
 
 def runs(item: Outcome) -> str:
     """The first rows of a sweep."""
     table = item.to_arrow()
     rows = table.slice(0, FIRST_ROWS).to_pylist()
-    cells = ([_number(value) for value in row.values()] for row in rows)
+    cells = ([_format_number(value) for value in row.values()] for row in rows)
     words = (
         f"<div>{format_count(table.num_rows, 'run')} in <code>{escape(str(item.path))}</code></div>"
     )
-    return words + _table(
+    return words + _make_table(
         [escape(name) for name in table.column_names], cells, table.num_rows, FIRST_ROWS
     )
 
 
 def optimum(item: Optimum) -> str:
     """The best that a search has found."""
-    words = f"{_number(item.value)} in evaluation {item.evaluation} of {item.evaluations} ({escape(item.ended)})"
-    cells = ([escape(name), _number(value)] for name, value in item.values.items())
-    return f"<div>best: {words}</div>" + _table(("variable", "value"), cells, len(item.values))
+    words = f"{_format_number(item.value)} in evaluation {item.evaluation} of {item.evaluations} ({escape(item.ended)})"
+    cells = ([escape(name), _format_number(value)] for name, value in item.values.items())
+    return f"<div>best: {words}</div>" + _make_table(("variable", "value"), cells, len(item.values))
 
 
-def _space(item: Model, motion: Trajectory | None = None) -> str:
+def _embed_viewer(item: Model, motion: Trajectory | None = None) -> str:
     """The page of the viewer, or why there is none."""
     file = None if item.layout is None else item.layout.file
     folders = [] if file is None else [Path(file).parent, Path(file).parent / "Geometry"]
@@ -174,7 +176,7 @@ def _space(item: Model, motion: Trajectory | None = None) -> str:
     )
 
 
-def _table(
+def _make_table(
     headings: Sequence[str], rows: Iterable[Sequence[str]], count: int, most: int = MOST_ROWS
 ) -> str:
     """A table of cells in HTML, of which the first rows are shown."""
@@ -195,7 +197,7 @@ def _left(count: int, most: int) -> str:
     return f"<div>… and {count - most} more</div>" if count > most else ""
 
 
-def _number(value: Any) -> str:
+def _format_number(value: Any) -> str:
     return (
         f"{value:.6g}" if isinstance(value, float) else escape("" if value is None else str(value))
     )

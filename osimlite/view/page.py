@@ -22,9 +22,9 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.translate.sidecar import finite
-from osimlite.view.inspect import component_tree, finding_rows, pins
+from osimlite.view.inspect import component_tree, finding_rows, place_pins
 from osimlite.view.kernels import kernels_text, program_data, text_of
-from osimlite.view.motion import Motion, activity, moving, values_of
+from osimlite.view.motion import Motion, find_moving_bodies, read_activations, values_of
 from osimlite.view.pushes import Pushes
 from osimlite.view.recording import MeasuredMarkers
 from osimlite.view.scene import LAYERS, STEEPEST, Scene
@@ -91,7 +91,7 @@ def page_data(
         motion.
     """
     mechanism = scene.mechanism
-    recorded = None if motion is None else _motion(scene, motion)
+    recorded = None if motion is None else _describe_motion(scene, motion)
     start = q if motion is None else values_of(motion, mechanism)[0]
     low, high = np.array(scene.box(q) if recorded is None else recorded["box"])
     tree, tags = component_tree(model)
@@ -114,11 +114,11 @@ def page_data(
             "labelled": hints.show_labels,
             "up": scene.up.tolist(),
             "gravity": mechanism.gravity.tolist(),
-            "floor": _floor(scene, start),
+            "floor": _place_floor(scene, start),
             "center": (0.5 * (low + high)).tolist(),
             "size": float(np.linalg.norm(high - low)),
             "directions": _directions(scene.up),
-            "coordinates": _coordinates(
+            "coordinates": _describe_coordinates(
                 mechanism, {item.dependent for item in couplers}, q, recorded
             ),
             "q": q.tolist(),
@@ -137,7 +137,7 @@ def page_data(
             "tree": tree,
             "tags": tags,
             "findings": finding_rows(findings),
-            "pins": pins(model, scene, findings),
+            "pins": place_pins(model, scene, findings),
             "remarks": [list(remark) for remark in scene.remarks],
         }
     )
@@ -147,9 +147,9 @@ def page_data(
 def _drawn(scene: Scene) -> dict[str, Any]:
     routes = count()
     return {
-        "surfaces": [_surface(surface) for surface in scene.surfaces],
+        "surfaces": [_describe_surface(surface) for surface in scene.surfaces],
         "items": [
-            {**vars(item), "matrix": _rows(item.matrix), "scenery": index in scene.large}
+            {**vars(item), "matrix": _flatten_rows(item.matrix), "scenery": index in scene.large}
             for index, item in enumerate(scene.items)
         ],
         "lines": [
@@ -172,11 +172,11 @@ def _drawn(scene: Scene) -> dict[str, Any]:
             }
             for line in scene.lines
         ],
-        "axes": [{**vars(axes), "matrix": _rows(axes.matrix)} for axes in scene.axes],
+        "axes": [{**vars(axes), "matrix": _flatten_rows(axes.matrix)} for axes in scene.axes],
     }
 
 
-def _surface(surface: Surface) -> dict[str, str]:
+def _describe_surface(surface: Surface) -> dict[str, str]:
     normals = np.rint(127.0 * np.clip(normals_of(surface), -1.0, 1.0)).astype(np.int8)
     return {
         "points": text_of(surface.points.astype("<f4")),
@@ -185,7 +185,7 @@ def _surface(surface: Surface) -> dict[str, str]:
     }
 
 
-def _coordinates(
+def _describe_coordinates(
     mechanism: Mechanism, dependent: set[int], q: Array, recorded: Mapping[str, Any] | None
 ) -> list[dict[str, Any]]:
     rows = []
@@ -215,7 +215,7 @@ def _coordinates(
     return rows
 
 
-def _motion(scene: Scene, motion: Motion) -> dict[str, Any]:
+def _describe_motion(scene: Scene, motion: Motion) -> dict[str, Any]:
     mechanism = scene.mechanism
     times = np.asarray(motion.times, dtype=float)
     values = values_of(motion, mechanism)
@@ -236,17 +236,17 @@ def _motion(scene: Scene, motion: Motion) -> dict[str, Any]:
         "times": text_of(times.astype("<f8")),
         "values": text_of(values.astype("<f8")),
         "ends": np.column_stack((values.min(axis=0), values.max(axis=0))).tolist(),
-        **_view(scene, values),
-        "measured": _measured(getattr(motion, "measured", None)),
+        **_choose_view(scene, values),
+        "measured": _describe_measured_markers(getattr(motion, "measured", None)),
         "forces": forces,
         "activations": {
             path: text_of(np.rint(255.0 * level).astype(np.uint8))
-            for path, level in activity(scene, motion).items()
+            for path, level in read_activations(scene, motion).items()
         },
     }
 
 
-def _measured(markers: MeasuredMarkers | None) -> dict[str, Any] | None:
+def _describe_measured_markers(markers: MeasuredMarkers | None) -> dict[str, Any] | None:
     """Where markers were measured, and what they belong to."""
     if markers is None:
         return None
@@ -259,11 +259,11 @@ def _measured(markers: MeasuredMarkers | None) -> dict[str, Any] | None:
     }
 
 
-def _view(scene: Scene, values: Array) -> dict[str, Any]:
+def _choose_view(scene: Scene, values: Array) -> dict[str, Any]:
     """What the camera follows, if it does, and the room that the motion takes: around that, if it is followed."""
     rows = values[np.unique(np.linspace(0, len(values) - 1, MOMENTS).astype(int))]
     poses = [scene.at(row) for row in rows]
-    moves = moving(poses)[:-1]
+    moves = find_moving_bodies(poses)[:-1]
     middles = np.array([pose.origins[:-1][moves].mean(axis=0) for pose in poses])
     boxes = np.array([scene.box(row) for row in rows])
     travels = np.linalg.norm(middles[-1] - middles[0]) > TRAVELS * np.linalg.norm(
@@ -280,7 +280,7 @@ def _view(scene: Scene, values: Array) -> dict[str, Any]:
     }
 
 
-def _across(up: Array) -> tuple[Array, Array]:
+def _choose_directions(up: Array) -> tuple[Array, Array]:
     """Unit vectors (3,) to the front and to the right. OpenSim's models face +X, and have Z on their right."""
     if abs(up[1]) > 0.9:
         return np.array((1.0, 0.0, 0.0)), np.array((0.0, 0.0, 1.0))
@@ -289,7 +289,7 @@ def _across(up: Array) -> tuple[Array, Array]:
     return front, np.cross(front, up)
 
 
-def _floor(scene: Scene, q: Array) -> dict[str, Any]:
+def _place_floor(scene: Scene, q: Array) -> dict[str, Any]:
     """Where the grid lies, in X and Z of a frame: on the model's own ground, or on a level floor."""
     bodies = scene.at(q)
     for item in scene.drawn():
@@ -298,16 +298,16 @@ def _floor(scene: Scene, q: Array) -> dict[str, Any]:
         if item.path in scene.half_spaces and outward @ scene.up > STEEPEST * size:
             matrix = item.matrix.copy()
             matrix[:3, :3] = np.column_stack((matrix[:3, 1], -matrix[:3, 0], matrix[:3, 2])) / size
-            return {"body": item.body, "matrix": _rows(matrix)}
-    front, side = _across(scene.up)
+            return {"body": item.body, "matrix": _flatten_rows(matrix)}
+    front, side = _choose_directions(scene.up)
     matrix = np.eye(4)
     matrix[:3] = np.column_stack((front, scene.up, side, scene.floor(q) * scene.up))
-    return {"body": -1, "matrix": _rows(matrix)}
+    return {"body": -1, "matrix": _flatten_rows(matrix)}
 
 
 def _directions(up: Array) -> dict[str, list[float]]:
     """From where to look: towards the viewer, in ground."""
-    front, side = _across(up)
+    front, side = _choose_directions(up)
     home = front + 0.35 * up + 1.3 * side
     # Straight from above, up is no direction in the picture.
     return {
@@ -321,7 +321,7 @@ def _directions(up: Array) -> dict[str, list[float]]:
     }
 
 
-def _rows(matrix: Array) -> list[float]:
+def _flatten_rows(matrix: Array) -> list[float]:
     """The upper three rows of a matrix (4, 4), one after the other."""
     rows: list[float] = matrix[:3].ravel().tolist()
     return rows

@@ -96,7 +96,7 @@ class Style:
     colors: Mapping[str, Color] = field(default_factory=dict)
 
 
-def draw(
+def draw_scene(
     scene: Scene,
     q: Array,
     camera: Camera,
@@ -126,12 +126,14 @@ def draw(
     width, height = _FINE * size[0], _FINE * size[1]
     canvas = Canvas(width, height, np.array(SKY))
     heap = _Heap(camera, width, height)
-    _fill(heap, scene, scene.at(q), arrows, style or Style())
+    _fill_background(heap, scene, scene.at(q), arrows, style or Style())
     heap.onto(canvas)
     return image.fromarray(canvas.pixels(_FINE))
 
 
-def _fill(heap: _Heap, scene: Scene, bodies: Bodies, arrows: Iterable[Arrow], style: Style) -> None:
+def _fill_background(
+    heap: _Heap, scene: Scene, bodies: Bodies, arrows: Iterable[Arrow], style: Style
+) -> None:
     if style.floor is not None:
         _lay_floor(heap, scene, style.floor)
     for item in scene.drawn():
@@ -148,7 +150,7 @@ def _fill(heap: _Heap, scene: Scene, bodies: Bodies, arrows: Iterable[Arrow], st
         if line.visible and line.layer in scene.shown:
             color = style.colors.get(line.path, line.color)
             for start, end in pairwise(corners):
-                heap.put(unit_shapes.tube(8), _between(start, end, line.radius), color)
+                heap.put(unit_shapes.tube(8), _make_cylinder(start, end, line.radius), color)
             for corner in corners:
                 heap.put(unit_shapes.ball(8, 4), _sized(corner, line.radius), color)
     if "frames" in scene.shown:
@@ -158,7 +160,7 @@ def _fill(heap: _Heap, scene: Scene, bodies: Bodies, arrows: Iterable[Arrow], st
                 end = placed[:3, 3] + axes.length * placed[:3, axis]
                 heap.put(
                     unit_shapes.tube(8),
-                    _between(placed[:3, 3], end, 0.002),
+                    _make_cylinder(placed[:3, 3], end, 0.002),
                     tuple(np.eye(3)[axis].tolist()),
                 )
     thick = 0.012 * heap.camera.half[1]
@@ -170,8 +172,8 @@ def _fill(heap: _Heap, scene: Scene, bodies: Bodies, arrows: Iterable[Arrow], st
             arrow.point + arrow.vector,
             arrow.point + arrow.vector * max(0.0, 1.0 - 5.0 * thick / length),
         )
-        heap.put(unit_shapes.tube(), _between(arrow.point, end, thick), FORCE, front=True)
-        head = _between(end, tip, 2.6 * thick)
+        heap.put(unit_shapes.tube(), _make_cylinder(arrow.point, end, thick), FORCE, front=True)
+        head = _make_cylinder(end, tip, 2.6 * thick)
         head[:3, 3] = end
         heap.put(unit_shapes.spike(), head, FORCE, front=True)
 
@@ -191,7 +193,9 @@ def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
         other = (first + k, second - reach), (first + k, second + reach)
         for ends in (one, other):
             start, end = (x * across + z * along + height * up for x, z in ends)
-            heap.put(unit_shapes.tube(4), _between(start, end, 0.0012 * half), FLOOR, lit=False)
+            heap.put(
+                unit_shapes.tube(4), _make_cylinder(start, end, 0.0012 * half), FLOOR, lit=False
+            )
 
 
 def _cut_open(heap: _Heap, placed: Array) -> None:
@@ -205,7 +209,7 @@ def _cut_open(heap: _Heap, placed: Array) -> None:
     start = placed[:3, 3] + along * float(along @ (camera.center - placed[:3, 3]))
     heap.put(
         unit_shapes.tube(4),
-        _between(start - far * along, start + far * along, 0.004 * camera.half[1]),
+        _make_cylinder(start - far * along, start + far * along, 0.004 * camera.half[1]),
         INK,
         lit=False,
     )
@@ -275,7 +279,7 @@ class _Heap:
             canvas.glassy(*(np.concatenate(column) for column in zip(*self._glassy, strict=True)))
 
 
-def _between(start: Array, end: Array, radius: float) -> Array:
+def _make_cylinder(start: Array, end: Array, radius: float) -> Array:
     """The matrix (4, 4) that puts a unit cylinder along Z between two points."""
     along = end - start
     length = float(np.linalg.norm(along))

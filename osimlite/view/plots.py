@@ -69,11 +69,11 @@ def plot_simulation(
     written = []
     with plain_lettering():
         for name, figure in draw_figures(trajectory, known):
-            written.append(save(figure, base / name))
+            written.append(save_figure(figure, base / name))
     return written
 
 
-def save(figure: Any, path: Path, dpi: float = 150) -> Path:
+def save_figure(figure: Any, path: Path, dpi: float = 150) -> Path:
     """Write a figure of matplotlib as PNG, whole or not at all."""
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=dpi)
@@ -81,7 +81,7 @@ def save(figure: Any, path: Path, dpi: float = 150) -> Path:
     return path
 
 
-def energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[str, Array]]:
+def compute_energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[str, Array]]:
     """Moments (m,) and, at them, kinetic energy and potential energy of gravity (J), zero at the origin of the ground.
 
     A trajectory knows what contacts and springs store besides; of another motion that cannot be
@@ -104,13 +104,13 @@ def energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[str, Arr
 def draw_figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
     """Yield file name and figure of each plot of a motion."""
     times = np.asarray(motion.times, dtype=float)
-    yield "coordinates.png", _coordinates(times, motion, mechanism)
+    yield "coordinates.png", _plot_coordinates(times, motion, mechanism)
     states = getattr(motion, "auxiliary", {})
     if states:
-        yield "states.png", _states(times, states)
+        yield "states.png", _plot_states(times, states)
     contacts = list(_one_of_each_pair(contact_forces(motion)))
     if contacts:
-        yield "contact_forces.png", _contacts(times, contacts)
+        yield "contact_forces.png", _plot_contacts(times, contacts)
     others = {
         label: np.asarray(column)
         for label, column in motion.forces.items()
@@ -123,16 +123,16 @@ def draw_figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[
         kinds = {"force (N) or torque (N·m)": acting}
         yield (
             "other_forces.png",
-            _panels(times, "Forces of muscles, springs and others", kinds, note),
+            _make_panels(times, "Forces of muscles, springs and others", kinds, note),
         )
     probes = getattr(motion, "probes", {})
     if probes:
-        yield "probes.png", _panels(times, "Probes", {"what a probe reports": probes})
+        yield "probes.png", _make_panels(times, "Probes", {"what a probe reports": probes})
     if mechanism is not None:
-        yield "energy.png", _energy(*energies(motion, mechanism))
+        yield "energy.png", _plot_energy(*compute_energies(motion, mechanism))
 
 
-def _coordinates(times: Array, motion: Motion, mechanism: Mechanism | None) -> Any:
+def _plot_coordinates(times: Array, motion: Motion, mechanism: Mechanism | None) -> Any:
     kinds: dict[str, dict[str, Array]] = {}
     held = []
     for k, name in enumerate(motion.coordinates):
@@ -151,16 +151,16 @@ def _coordinates(times: Array, motion: Motion, mechanism: Mechanism | None) -> A
             held.append(f"{name} is locked at {column[0]:.4g} {unit}".rstrip())
         else:
             kinds.setdefault(label, {})[name] = column
-    return _panels(times, "Coordinates", kinds, "; ".join(held))
+    return _make_panels(times, "Coordinates", kinds, "; ".join(held))
 
 
-def _states(times: Array, states: Mapping[str, Array]) -> Any:
+def _plot_states(times: Array, states: Mapping[str, Array]) -> Any:
     kinds: dict[str, dict[str, Array]] = {}
     for path, column in states.items():
         owner, _, kind = path.rpartition("/")
         label = kind.replace("_", " ") + _UNITS.get(kind, "")
         kinds.setdefault(label, {})[owner.rpartition("/")[2]] = column
-    return _panels(times, "States of muscles and other forces", kinds)
+    return _make_panels(times, "States of muscles and other forces", kinds)
 
 
 def _one_of_each_pair(forces: Sequence[ContactForce]) -> Iterator[ContactForce]:
@@ -173,52 +173,52 @@ def _one_of_each_pair(forces: Sequence[ContactForce]) -> Iterator[ContactForce]:
         yield from group[:1] if opposite else group
 
 
-def _contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
+def _plot_contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
     sizes = {
         f"{force.element} on {force.frame}": np.linalg.norm(force.vectors, axis=1)
         for force in forces
     }
     threshold = _NEVER_MIND * max(float(size.max()) for size in sizes.values())
     acting = {label: size for label, size in sizes.items() if size.max() > threshold}
-    figure, (above, below) = sheet("Contact forces", [3.4, 0.5 + 0.25 * max(1, len(acting))])
+    figure, (above, below) = make_sheet("Contact forces", [3.4, 0.5 + 0.25 * max(1, len(acting))])
     lines_in(above, times, acting)
     above.set_ylabel("force (N)")
     above.set_ylim(bottom=0.0)
     for row, size in enumerate(acting.values()):
         spans = [
             (times[first], max(times[last] - times[first], 1e-3))
-            for first, last in _spans(size > threshold)
+            for first, last in _find_spans(size > threshold)
         ]
-        below.broken_barh(spans, (row - 0.35, 0.7), facecolors=_style(row)["color"])
+        below.broken_barh(spans, (row - 0.35, 0.7), facecolors=_choose_style(row)["color"])
     below.set_yticks(range(len(acting)), [label.split(" on ")[0] for label in acting])
     below.set_ylim(len(acting) - 0.5, -0.5)
     below.set_ylabel("in contact")
     idle = [label.split(" on ")[0] for label in sizes if label not in acting]
-    finish((above, below), times, f"never in contact: {', '.join(idle)}" if idle else "")
+    finish_panels((above, below), times, f"never in contact: {', '.join(idle)}" if idle else "")
     return figure
 
 
-def _panels(
+def _make_panels(
     times: Array, title: str, kinds: Mapping[str, Mapping[str, Array]], note: str = ""
 ) -> Any:
     """A figure with as many panels as the lines of each kind, which has one unit, take."""
     panels = [(label, part) for label, lines in kinds.items() for part in shared_out(lines)]
-    figure, axes = sheet(title, [3.0] * max(1, len(panels)))
+    figure, axes = make_sheet(title, [3.0] * max(1, len(panels)))
     for panel, (label, lines) in zip(axes, panels, strict=False):
         lines_in(panel, times, lines)
         panel.set_ylabel(label)
-    finish(axes, times, note)
+    finish_panels(axes, times, note)
     return figure
 
 
-def _energy(times: Array, parts: Mapping[str, Array]) -> Any:
-    figure, (panel,) = sheet("Energy", [3.6])
+def _plot_energy(times: Array, parts: Mapping[str, Array]) -> Any:
+    figure, (panel,) = make_sheet("Energy", [3.6])
     lines_in(panel, times, {**parts, "sum": np.sum(list(parts.values()), axis=0)})
     panel.set_ylabel("energy (J)")
     note = "gravity: zero at the origin of the ground"
     if STORED not in parts:
         note += "; energy stored in contacts and limit springs is not in the sum"
-    finish((panel,), times, note)
+    finish_panels((panel,), times, note)
     return figure
 
 
@@ -231,7 +231,7 @@ def figure_of(title: str, size: tuple[float, float]) -> Any:
     return figure
 
 
-def sheet(title: str, heights: Sequence[float]) -> tuple[Any, Any]:
+def make_sheet(title: str, heights: Sequence[float]) -> tuple[Any, Any]:
     """A figure with panels of these heights (inches) above each other, and its panels."""
     figure = figure_of(title, (9.0, 0.7 + sum(heights)))
     grid = {"height_ratios": list(heights)}
@@ -246,7 +246,7 @@ def shared_out(lines: Mapping[str, Array]) -> list[dict[str, Array]]:
     return [dict(items[first : first + size]) for first in range(0, len(items), size)]
 
 
-def _style(number: int) -> dict[str, Any]:
+def _choose_style(number: int) -> dict[str, Any]:
     style = STYLES[number // len(COLORS) % len(STYLES)]
     return {"color": COLORS[number % len(COLORS)], "ls": style, "lw": 1.6}
 
@@ -255,7 +255,7 @@ def lines_in(panel: Any, across: Array, lines: Mapping[str, Array], **style: Any
     """Draw lines over times, or whatever is across; with a style of their own they are not in the legend."""
     drawn: list[Array] = []
     for number, (label, column) in enumerate(lines.items()):
-        looks = _style(number)
+        looks = _choose_style(number)
         near = 1e-3 * np.nanmax(np.abs(column), initial=0.0)
         if below := sum(
             np.allclose(column, other, rtol=0.0, atol=near, equal_nan=True) for other in drawn
@@ -272,7 +272,7 @@ def lines_in(panel: Any, across: Array, lines: Mapping[str, Array], **style: Any
     )
 
 
-def finish(panels: Sequence[Any], across: Array, note: str, label: str = "time (s)") -> None:
+def finish_panels(panels: Sequence[Any], across: Array, note: str, label: str = "time (s)") -> None:
     """Give panels their grids, the lowest its label, and a note below."""
     for panel in panels:
         panel.grid(True, color="0.9", lw=0.8)
@@ -295,7 +295,7 @@ def finish(panels: Sequence[Any], across: Array, note: str, label: str = "time (
         )
 
 
-def _spans(mask: Array) -> list[tuple[int, int]]:
+def _find_spans(mask: Array) -> list[tuple[int, int]]:
     """First and last place of every run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(int), [0]))))
     return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]

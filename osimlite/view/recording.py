@@ -76,13 +76,13 @@ def read_recording(
     rows = recorded.values
     for name, value in (values or {}).items():
         rows[:, mechanism.coordinate_index(name)] = value
-    _follow(mechanism, rows, set(recorded.missing))
+    _follow_couplers(mechanism, rows, set(recorded.missing))
     table = read_sto(path)
-    speeds = _speeds(mechanism, table)
+    speeds = _read_speeds(mechanism, table)
     remarks = []
     columns: Mapping[str, Array] = {}
     if forces is not None:
-        columns = _columns(read_sto(forces), recorded.times)
+        columns = _find_columns(read_sto(forces), recorded.times)
     elif speeds is not None:
         try:
             columns = computed_forces(model, mechanism, recorded.times, rows, speeds, folder)
@@ -95,7 +95,7 @@ def read_recording(
     )
 
 
-def _follow(mechanism: Mechanism, rows: Array, missing: set[str]) -> None:
+def _follow_couplers(mechanism: Mechanism, rows: Array, missing: set[str]) -> None:
     """Give coordinates that are not on record the values that their couplers want; those may depend on each other."""
     couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
     couplers = [item for item in couplers if mechanism.coordinates[item.dependent].name in missing]
@@ -139,7 +139,7 @@ def computed_forces(
     return {label: table[:, index] for index, label in enumerate(system.columns)}
 
 
-def _speeds(mechanism: Mechanism, table: StoTable) -> Array | None:
+def _read_speeds(mechanism: Mechanism, table: StoTable) -> Array | None:
     """Generalized speeds (n, k) on record; None if those of a coordinate that is not locked are not."""
     speeds = np.zeros((len(table.times), len(mechanism.coordinates)))
     for index, info in enumerate(mechanism.coordinates):
@@ -152,7 +152,7 @@ def _speeds(mechanism: Mechanism, table: StoTable) -> Array | None:
     return speeds
 
 
-def _columns(table: StoTable, times: Array) -> dict[str, Array]:
+def _find_columns(table: StoTable, times: Array) -> dict[str, Array]:
     if not len(table.times):
         return {}
     rows = at_times(Recording(table.times, (), table.rows, table.rows), table.rows, times)

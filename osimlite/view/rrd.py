@@ -15,7 +15,7 @@ import numpy as np
 from osimlite.base.files import write_atomically
 from osimlite.base.require import require
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.view.motion import Motion, activity, activity_color, values_of
+from osimlite.view.motion import Motion, activity_color, read_activations, values_of
 from osimlite.view.picture import FORCE
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
 from osimlite.view.scene import Color, Scene
@@ -70,12 +70,16 @@ def write_rrd(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
         moving(name, rr.Transform3D.columns(translation=origins, mat3x3=rotations))
     for item in scene.drawn():
         surface = scene.surfaces[item.surface]
-        points, corners, color = surface.points, surface.triangles, _rgba(item.color, item.opacity)
+        points, corners, color = (
+            surface.points,
+            surface.triangles,
+            _make_colour(item.color, item.opacity),
+        )
         shape = rr.Mesh3D(vertex_positions=points, triangle_indices=corners, albedo_factor=color)
         placed = rr.Transform3D(translation=item.matrix[:3, 3], mat3x3=item.matrix[:3, :3])
         still(bodies[item.body] + entity(item.path), placed, shape)
 
-    levels = {} if motion is None else activity(scene, motion)
+    levels = {} if motion is None else read_activations(scene, motion)
     for index, line in enumerate(scene.lines):
         if line.visible and line.layer in scene.shown:
             name, strips = (
@@ -85,7 +89,9 @@ def write_rrd(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
             still(name, rr.LineStrips3D.from_fields(radii=line.radius))
             level = levels.get(line.path)
             colors = [line.color] * len(poses) if level is None else map(activity_color, level)
-            moving(name, rr.LineStrips3D.columns(strips=strips, colors=list(map(_rgba, colors))))
+            moving(
+                name, rr.LineStrips3D.columns(strips=strips, colors=list(map(_make_colour, colors)))
+            )
     if motion is not None:
         for path_of, level in levels.items():
             strength(entity("activations", path_of), level)
@@ -98,7 +104,10 @@ def write_rrd(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
         for push in pushes.pushes:
             name = entity("forces", push.on.path, push.on.labels[0])
             starts = [push.point(number, pose) for number, pose in enumerate(poses)]
-            still(f"/model{name}", rr.Arrows3D.from_fields(radii=0.006 * size, colors=_rgba(FORCE)))
+            still(
+                f"/model{name}",
+                rr.Arrows3D.from_fields(radii=0.006 * size, colors=_make_colour(FORCE)),
+            )
             moving(
                 f"/model{name}", rr.Arrows3D.columns(vectors=scale * push.forces, origins=starts)
             )
@@ -116,5 +125,5 @@ def write_rrd(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
     return Path(path)
 
 
-def _rgba(color: Color, opacity: float = 1.0) -> list[int]:
+def _make_colour(color: Color, opacity: float = 1.0) -> list[int]:
     return [round(255.0 * part) for part in (*color, opacity)]

@@ -245,7 +245,7 @@ def _box_corners(low: Array, high: Array) -> Array:
     )
 
 
-def sticks(
+def draw_sticks(
     mechanism: Mechanism, bodies: Iterable[int]
 ) -> Iterator[tuple[int, tuple[LinePoint, LinePoint]]]:
     """Lines for bodies without shape, each as body and ends.

@@ -41,7 +41,9 @@ class PageServer:
 
     def __init__(self, page: str, mechanism: Mechanism, port: int = 0) -> None:
         try:
-            self.server = _QuietServer((HOST, port), _handler(page.encode(), mechanism, PATIENCE))
+            self.server = _QuietServer(
+                (HOST, port), _make_handler(page.encode(), mechanism, PATIENCE)
+            )
         except (OSError, OverflowError) as error:
             raise OsimliteError(
                 f"cannot listen at port {port}: {error}; choose another one by --port"
@@ -89,7 +91,9 @@ class _BadQuestion(Exception):
         self.status = status
 
 
-def _handler(page: bytes, mechanism: Mechanism, patience: float) -> type[BaseHTTPRequestHandler]:
+def _make_handler(
+    page: bytes, mechanism: Mechanism, patience: float
+) -> type[BaseHTTPRequestHandler]:
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
         timeout = patience
@@ -104,7 +108,7 @@ def _handler(page: bytes, mechanism: Mechanism, patience: float) -> type[BaseHTT
 
         def do_POST(self) -> None:
             try:
-                status, result = HTTPStatus.OK, assembled(mechanism, self._question())
+                status, result = HTTPStatus.OK, assemble_pose(mechanism, self._question())
             except _BadQuestion as problem:
                 status, result = problem.status, {"error": str(problem)}
                 # What is left of such a question is not the next one.
@@ -142,7 +146,7 @@ def _handler(page: bytes, mechanism: Mechanism, patience: float) -> type[BaseHTT
     return Handler
 
 
-def assembled(mechanism: Mechanism, question: bytes) -> dict[str, Any]:
+def assemble_pose(mechanism: Mechanism, question: bytes) -> dict[str, Any]:
     """The answer to the page's question for a pose that fulfils the constraints.
 
     Raises:

@@ -20,9 +20,9 @@ from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.view.collect import build_scene
 from osimlite.view.glb import write_glb
 from osimlite.view.incomplete import build_showable, describe_left_out
-from osimlite.view.motion import Motion, activity, activity_color, at_times, values_of
+from osimlite.view.motion import Motion, activity_color, at_times, read_activations, values_of
 from osimlite.view.page import Story, page_data, page_text
-from osimlite.view.picture import Arrow, Camera, Style, draw
+from osimlite.view.picture import Arrow, Camera, Style, draw_scene
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
 from osimlite.view.recording import Recording, read_recording
 from osimlite.view.rrd import write_rrd
@@ -149,7 +149,7 @@ class Shown:
         side = np.cross((1.0, 0.0, 0.0), up) if abs(up[0]) < 0.9 else np.cross((0.0, 1.0, 0.0), up)
         direction = HOME[0] * np.cross(up, side) + HOME[1] * up + HOME[2] * side
         camera = Camera.around(points, up, direction, size[0] / size[1])
-        picture = draw(scene, q, camera, size, arrows, Style(scene.floor(q), loaded, colors))
+        picture = draw_scene(scene, q, camera, size, arrows, Style(scene.floor(q), loaded, colors))
         out = io.BytesIO()
         try:
             picture.save(out, Path(path).suffix[1:].upper() or "PNG")
@@ -182,7 +182,7 @@ class Shown:
         )
         pushes = Pushes.of(self.scene, motion, moment).at(0, self.scene.at(q))
         loaded = frozenset(push.surface for push, _, force in pushes if force.any())
-        levels = activity(self.scene, motion).items()
+        levels = read_activations(self.scene, motion).items()
         colors = {
             path: activity_color(float(np.interp(moment[0], motion.times, level)))
             for path, level in levels

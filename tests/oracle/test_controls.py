@@ -71,7 +71,7 @@ def test_controls_that_a_search_writes(tmp_path, interpolation):
     table = (np.array([0.1, 0.4, 0.9]), np.array([0.3, -0.2, 0.8]))
     made = plan(model, vary, controls={f"on_{first}": table}, interpolation=interpolation, to=1.0)
     variants = Variants(made)
-    variants.put([0.3, -0.8, 0.5, 0.1, 1.7, 0.38, 0.38, 0.25, 0.45])
+    variants.apply_sample([0.3, -0.8, 0.5, 0.1, 1.7, 0.38, 0.38, 0.25, 0.45])
     osimlite.write(variants.model, tmp_path / "m.osim")
     compare_controls(tmp_path / "m.osim", TIMES)
 

@@ -12,7 +12,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import PathPoint
 from osimlite.view import Shown
-from osimlite.view.motion import activity
+from osimlite.view.motion import read_activations
 from osimlite.view.recording import read_recording
 from tests.view.motions import Recorded
 
@@ -50,7 +50,8 @@ def test_activations_have_the_names_of_both_versions_and_are_from_0_to_1(model):
         },
     )
     assert {
-        path: levels.tolist() for path, levels in activity(shown.scene, shown.motion).items()
+        path: levels.tolist()
+        for path, levels in read_activations(shown.scene, shown.motion).items()
     } == {
         "/forceset/one.a": [0.0, 0.25],
         "/forceset/two": [1.0, 0.0],

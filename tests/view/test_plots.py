@@ -11,7 +11,7 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import simulate
 from osimlite.view import plot_simulation
-from osimlite.view.plots import STORED, draw_figures, energies, figure_of, lines_in
+from osimlite.view.plots import STORED, compute_energies, draw_figures, figure_of, lines_in
 from tests.view.motions import Recorded, stroll
 
 pytest.importorskip("matplotlib")
@@ -167,7 +167,7 @@ def test_states_of_a_kind_share_panels_and_probes_have_theirs():
 
 def test_energy_is_that_of_the_mechanism():
     motion, mechanism = stroll(1001), walker()
-    times, parts = energies(motion, mechanism)
+    times, parts = compute_energies(motion, mechanism)
     assert len(times) == 400 and times[-1] == motion.times[-1]
     at = 200
     q, u = motion.values[0].copy(), motion.speeds[0]

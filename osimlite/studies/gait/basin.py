@@ -11,7 +11,7 @@ from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
 from osimlite.simulation.batches import BatchEngine, Floats, Ints
 from osimlite.studies.gait.cycle import Cycle
-from osimlite.studies.gait.starts import stood
+from osimlite.studies.gait.starts import lift_to_depth
 from osimlite.studies.gait.stepmap import StepMap
 from osimlite.studies.gait.steps import Walk, along_slope, walk_many
 
@@ -50,7 +50,9 @@ class Basin:
         return float((self.steps >= self.wanted).mean())
 
 
-def perturbed(step_map: StepMap, state: ArrayLike, part: float, count: int, seed: int) -> Floats:
+def sample_perturbed_starts(
+    step_map: StepMap, state: ArrayLike, part: float, count: int, seed: int
+) -> Floats:
     """Random starts (count, y) near a state.
 
     Every value and every speed, as far as it is not neutral, is multiplied by a number that lies
@@ -72,7 +74,7 @@ def perturbed(step_map: StepMap, state: ArrayLike, part: float, count: int, seed
         max(float(depths[0, engine.contacts.index(name)]) for name in foot) for foot in footing.feet
     ]
     foot = int(np.argmax(deepest))
-    return stood(
+    return lift_to_depth(
         engine, footing, here + change @ (step_map.basis @ step_map.basis.T), deepest[foot], foot
     )
 
@@ -145,7 +147,7 @@ def find_basin(
     columns, rows = np.meshgrid(axes[0].values, axes[1].values)
     states = np.tile(cycle.state, (grid * grid, 1))
     states[:, places[0]], states[:, places[1]] = columns.ravel(), rows.ravel()
-    starts = stood(step_map.engine, step_map.footing, states)
+    starts = lift_to_depth(step_map.engine, step_map.footing, states)
     walks = walks_from(step_map, cycle, starts, wanted, accuracy=accuracy, progress=progress)
     made = np.array([min(len(walk.steps), wanted) for walk in walks], dtype=np.int64)
     return Basin(
@@ -174,13 +176,13 @@ def basin_places(engine: BatchEngine, x: str = "", y: str = "") -> tuple[int | N
     Raises:
         OsimliteError: there is no such coordinate, it is locked, or both are the same.
     """
-    places = _place(engine, x) if x else None, _place(engine, y) if y else None
+    places = _find_index(engine, x) if x else None, _find_index(engine, y) if y else None
     if places[0] is not None and places[0] == places[1]:
         raise OsimliteError(f"'{x}' and '{y}' are the same number; a basin is drawn over two")
     return places
 
 
-def _place(engine: BatchEngine, name: str) -> int:
+def _find_index(engine: BatchEngine, name: str) -> int:
     coordinate, slash, kind = name.rpartition("/")
     is_speed = bool(slash) and kind == "speed"
     place = engine.mechanism.coordinate_index(coordinate if is_speed else name)

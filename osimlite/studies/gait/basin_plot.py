@@ -8,7 +8,7 @@ import numpy as np
 
 from osimlite.studies.gait.basin import Basin
 from osimlite.view.lettering import plain_lettering
-from osimlite.view.plots import figure_of, save
+from osimlite.view.plots import figure_of, save_figure
 
 
 def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the fall") -> Path:
@@ -24,10 +24,10 @@ def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the
         OsimliteError: the file cannot be written.
     """
     with plain_lettering():
-        return _draw(basin, Path(path), title)
+        return _draw_panels(basin, Path(path), title)
 
 
-def _draw(basin: Basin, path: Path, title: str) -> Path:
+def _draw_panels(basin: Basin, path: Path, title: str) -> Path:
     figure = figure_of("", (6.4, 5.2))
     axes = figure.subplots()
     half = [float(axis.values[1] - axis.values[0]) / 2.0 for axis in (basin.x, basin.y)]
@@ -62,4 +62,4 @@ def _draw(basin: Basin, path: Path, title: str) -> Path:
     bar = figure.colorbar(image, ax=axes)
     bar.set_label(f"steps, {basin.wanted} or more count as walking")
     bar.set_ticks(np.linspace(0, basin.wanted, 5).round().astype(int))
-    return save(figure, path, dpi=110)
+    return save_figure(figure, path, dpi=110)

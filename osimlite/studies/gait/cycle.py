@@ -88,7 +88,7 @@ def find_cycle(
             break
         here = there
     reduced = step_map.reduce(here)
-    miss, size = _miss(step_map, reduced)
+    miss, size = _compute_residual(step_map, reduced)
     taken, slope = 0, None
     while size > converged:
         if taken == most_steps:
@@ -103,7 +103,7 @@ def find_cycle(
         move = np.linalg.solve(slope - np.eye(len(reduced)), -miss)
         part, last = 1.0, size
         while True:
-            there, off = _miss(step_map, reduced + part * move)
+            there, off = _compute_residual(step_map, reduced + part * move)
             if off < last or part < 1e-4:
                 break
             part /= 2.0
@@ -137,7 +137,7 @@ def find_cycle(
     )
 
 
-def _miss(step_map: StepMap, reduced: Floats) -> tuple[Floats, float]:
+def _compute_residual(step_map: StepMap, reduced: Floats) -> tuple[Floats, float]:
     """How far the map moves a state, and the norm of that; infinite where it makes no step."""
     miss = step_map.reduce(step_map(step_map.expand(reduced)[None]).states[0]) - reduced
     size = float(np.linalg.norm(miss))

@@ -23,10 +23,10 @@ from osimlite.errors import OsimliteError, SettingError
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
 from osimlite.simulation.batches import BatchEngine, run_many
-from osimlite.studies.gait.basin import perturbed, walks_from
+from osimlite.studies.gait.basin import sample_perturbed_starts, walks_from
 from osimlite.studies.gait.cycle import CONVERGED, MOST_STEPS, Cycle, find_cycle, step_matrix
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
-from osimlite.studies.gait.starts import planted, upright
+from osimlite.studies.gait.starts import move_along_neutral_directions, plant_feet
 from osimlite.studies.gait.stepmap import TIGHT, StepMap
 from osimlite.studies.gait.steps import Walk, walk_many
 from osimlite.studies.sweep.plan import Plan
@@ -171,7 +171,7 @@ class CycleSearch:
         items = {item.name: item for item in self.plan.variables}
         return np.array([items[name].fraction(numbers[name]) for name in self.names])
 
-    def rounded(self, fractions: Floats, digits: int) -> Floats:
+    def round_fractions(self, fractions: Floats, digits: int) -> Floats:
         """Where the numbers lie when they have so many digits (k,)."""
         numbers = {
             name: float(f"{number:.{digits}g}") for name, number in self.numbers(fractions).items()
@@ -180,7 +180,7 @@ class CycleSearch:
 
     def model(self, fractions: Floats, start: Mapping[str, tuple[float, float]]) -> Model:
         """The model with these numbers, and with values and speeds of coordinates as their defaults."""
-        self.variants.put(self.values(fractions))
+        self.variants.apply_sample(self.values(fractions))
         model = self.variants.model
         for coordinate in model.components(Coordinate):
             if coordinate.name in start:
@@ -199,7 +199,7 @@ class CycleSearch:
         return variant.engine
 
     # ---------------------------------------------------------------------------------------- random starts
-    def candidates(
+    def find_candidates(
         self, count: int, seed: int, progress: Progress | None = None
     ) -> list[Candidate]:
         """Draw walkers, and keep those that make two steps without a scuff between, the most alike first.
@@ -212,12 +212,12 @@ class CycleSearch:
         rng, result = np.random.default_rng(seed), []
         for first in range(0, count, AT_ONCE):
             size = min(AT_ONCE, count - first)
-            result += self._drawn(rng, size)
+            result += self._draw_samples(rng, size)
             if progress is not None:
                 progress(first + size, count)
         return sorted(result, key=lambda candidate: candidate.miss)
 
-    def _drawn(self, rng: np.random.Generator, count: int) -> list[Candidate]:
+    def _draw_samples(self, rng: np.random.Generator, count: int) -> list[Candidate]:
         engine: Any = self.variants.given.engine
         models = rng.random((-(-count // ALIKE), len(self._numbers)))
         starts = rng.random((count, len(self._starts)))
@@ -244,8 +244,8 @@ class CycleSearch:
         states, vectors, fractions = states[made], vectors[made], fractions[made]
         if not len(states):
             return []
-        states = self.variants.started(
-            engine, variants, planted(engine, self.footing, states, numbers=vectors)
+        states = self.variants.prepare_states(
+            engine, variants, plant_feet(engine, self.footing, states, numbers=vectors)
         )
         walks = walk_many(
             engine,
@@ -257,10 +257,13 @@ class CycleSearch:
             most_tries=MOST_TRIES,
             threads=self.threads,
         )
-        pairs = (self._alike(walk, row) for walk, row in zip(walks, fractions, strict=True))
+        pairs = (
+            self._find_similar_strikes(walk, row)
+            for walk, row in zip(walks, fractions, strict=True)
+        )
         return [pair for pair in pairs if pair is not None]
 
-    def _alike(self, walk: Walk, fractions: Floats) -> Candidate | None:
+    def _find_similar_strikes(self, walk: Walk, fractions: Floats) -> Candidate | None:
         """The heel strikes of a walk that are most alike, one step apart, or one stride if the legs differ."""
         if len(walk.steps) < 2:
             return None
@@ -280,7 +283,7 @@ class CycleSearch:
             if step.foot == 0 or swap is not None
         ]
         for (start, one), (end, two) in pairwise(strikes):
-            miss = self._distance(self._first, one, two)
+            miss = self._compute_distance(self._first, one, two)
             if (best is None or miss < best.miss) and not any(
                 start < scuff.time < end for scuff in walk.scuffs
             ):
@@ -288,7 +291,7 @@ class CycleSearch:
         return best
 
     @staticmethod
-    def _distance(step_map: StepMap, one: Floats, two: Floats) -> float:
+    def _compute_distance(step_map: StepMap, one: Floats, two: Floats) -> float:
         difference = step_map.basis @ step_map.reduce(two - one)
         n = len(step_map.engine.order)
         others = *difference[:n], *difference[2 * n :]
@@ -297,15 +300,15 @@ class CycleSearch:
         )
 
     # ---------------------------------------------------------------------------------------- cycles
-    def close(self, candidate: Candidate) -> Found | None:
+    def close_cycle(self, candidate: Candidate) -> Found | None:
         """Move a candidate's start and numbers together until it walks in a cycle; None if it does not come to one."""
         optimize = require("scipy.optimize", extra="sweep", purpose="the search for cycles")
         try:
             problem = _Closing(self, candidate)
             solved = optimize.least_squares(
-                problem.miss,
+                problem.compute_residual,
                 problem.start,
-                problem.derivative,
+                problem.differentiate_residual,
                 method="dogbox",
                 bounds=problem.bounds,
                 x_scale=problem.scale,
@@ -318,11 +321,11 @@ class CycleSearch:
             if np.linalg.norm(solved.fun) > CLOSE:
                 return None
             fractions, _, state = problem.at(solved.x)
-            return self.cycle(fractions, state)
+            return self.find_cycle(fractions, state)
         except (OsimliteError, np.linalg.LinAlgError):
             return None
 
-    def cycle(self, fractions: Floats, state: Floats, *, fine: bool = False) -> Found:
+    def find_cycle(self, fractions: Floats, state: Floats, *, fine: bool = False) -> Found:
         """The cycle of the model with these numbers that is near a state, which is a heel strike of the first foot.
 
         Args:
@@ -342,15 +345,15 @@ class CycleSearch:
         )
         cost, walking = result.largest + SCUFFED * result.scuffs, 0.0
         if cost < self.stable or fine:
-            walking = self._walking(step_map, result)
+            walking = self._measure_basin(step_map, result)
         if cost < self.stable:
             cost = self.stable - walking
         return Found(np.array(fractions), self.numbers(fractions), result, walking, cost)
 
-    def _walking(self, step_map: StepMap, cycle: Cycle) -> float:
+    def _measure_basin(self, step_map: StepMap, cycle: Cycle) -> float:
         """Which part of the walkers that start near a cycle walk."""
-        (state,) = along(step_map, cycle, (MIDWAY,))
-        starts = perturbed(step_map, state, self.perturb, STARTS, 0)
+        (state,) = sample_states_of_step(step_map, cycle, (MIDWAY,))
+        starts = sample_perturbed_starts(step_map, state, self.perturb, STARTS, 0)
         walks = walks_from(step_map, cycle, starts, STEPS)
         return sum(len(walk.steps) >= STEPS for walk in walks) / STARTS
 
@@ -363,10 +366,10 @@ class CycleSearch:
         engine = self.engine(fractions)
         if self._first is None:
             self._first = StepMap(engine, state, footing=self.footing, threads=self.threads)
-        return self._first.varied(engine, state, accuracy)
+        return self._first.with_model(engine, state, accuracy)
 
 
-def along(step_map: StepMap, cycle: Cycle, parts: Sequence[float]) -> Floats:
+def sample_states_of_step(step_map: StepMap, cycle: Cycle, parts: Sequence[float]) -> Floats:
     """States (k, y) at parts of a step after the heel strike of a cycle; the parts increase.
 
     The walker is at the origin, its trunk as it was built, as far as neither matters.
@@ -380,7 +383,7 @@ def along(step_map: StepMap, cycle: Cycle, parts: Sequence[float]) -> Floats:
         accuracy=TIGHT,
         threads=step_map.threads,
     )
-    return upright(runs.reports[0], step_map.neutral)
+    return move_along_neutral_directions(runs.reports[0], step_map.neutral)
 
 
 class _Closing:
@@ -416,7 +419,7 @@ class _Closing:
         step_map = self._map(fractions, self._given.expand(reduced))
         return fractions, step_map, step_map.expand(reduced)
 
-    def miss(self, unknowns: Floats) -> Floats:
+    def compute_residual(self, unknowns: Floats) -> Floats:
         """How far the map moves the reduced state."""
         try:
             _, step_map, state = self.at(unknowns)
@@ -432,17 +435,20 @@ class _Closing:
         if here < CLOSE or (len(self._sizes) > PATIENCE and here > 0.5 * before):
             raise StopIteration
 
-    def derivative(self, unknowns: Floats) -> Floats:
+    def differentiate_residual(self, unknowns: Floats) -> Floats:
         """Of the miss; of what makes no step, zero."""
         _, step_map, state = self.at(unknowns)
         columns = [step_matrix(step_map, state, DIFFERENCE) - np.eye(self._size)]
-        here = self.miss(unknowns)
+        here = self.compute_residual(unknowns)
         for index in range(self._size, len(unknowns)):
             column = np.full(self._size, np.nan)
             for shift in (SHIFT, -SHIFT):
                 moved = unknowns.copy()
                 moved[index] += shift
-                if 0.0 <= moved[index] <= 1.0 and (there := self.miss(moved))[0] != LOST:
+                if (
+                    0.0 <= moved[index] <= 1.0
+                    and (there := self.compute_residual(moved))[0] != LOST
+                ):
                     column = (there - here) / shift
                     break
             columns.append(column[:, None])

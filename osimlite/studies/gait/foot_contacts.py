@@ -58,7 +58,7 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
         raise OsimliteError(
             f"'{engine.mechanism.name}' has no contact forces, so that nothing walks"
         )
-    soles = _soles(engine)
+    soles = _find_soles(engine)
     known = [sole.contact for sole in soles]
     if feet:
         given = tuple(tuple(part.strip() for part in foot.split("+")) for foot in feet)
@@ -78,15 +78,15 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
                 f"a walk needs two feet, not only '{feet[0]}'; name the contacts of each"
             )
     else:
-        given = _feet(engine.mechanism, soles)
+        given = _find_feet(engine.mechanism, soles)
     return FootContacts(
         given, tuple(name for name in known if not any(name in foot for foot in given))
     )
 
 
-def _feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...], ...]:
+def _find_feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...], ...]:
     bodies = {sole.body for sole in soles}
-    above = {body: set(_above(mechanism, body)) for body in bodies}
+    above = {body: set(_list_ancestors(mechanism, body)) for body in bodies}
     ends = sorted(body for body in bodies if not any(body in above[other] for other in bodies))
     if not ends:
         raise OsimliteError(
@@ -112,7 +112,7 @@ def _feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...]
     return tuple(result)
 
 
-def _soles(engine: BatchEngine) -> list[_Sole]:
+def _find_soles(engine: BatchEngine) -> list[_Sole]:
     result = []
     for element in engine.forces.elements:
         if not isinstance(element, HuntCrossley):
@@ -130,7 +130,7 @@ def _soles(engine: BatchEngine) -> list[_Sole]:
     return result
 
 
-def _above(mechanism: Mechanism, body: int) -> list[int]:
+def _list_ancestors(mechanism: Mechanism, body: int) -> list[int]:
     """The bodies that carry a body."""
     result: list[int] = []
     while (body := mechanism.bodies[body].parent) != GROUND:

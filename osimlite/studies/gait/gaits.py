@@ -14,7 +14,13 @@ from osimlite.base.files import prepare_folder, read_file, write_atomically
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.io.document.printer import write
-from osimlite.studies.gait.cycle_search import Candidate, CycleSearch, Found, Progress, along
+from osimlite.studies.gait.cycle_search import (
+    Candidate,
+    CycleSearch,
+    Found,
+    Progress,
+    sample_states_of_step,
+)
 from osimlite.studies.gait.stability import Improvement, cost
 from osimlite.studies.gait.stepmap import TIGHT, refuse_constraints
 from osimlite.studies.gait.steps import Walk, walk_many
@@ -102,28 +108,28 @@ def find_gait(
     tell = stage or (lambda *_: None)
     with prepare_folder(folder) as where:
         if not force:
-            _spare(where, settings)
+            _protect_results(where, settings)
         search = CycleSearch(plan, feet, stable=stable, perturb=perturb, threads=threads)
         refuse_constraints(search.variants.given.engine.mechanism)
-        candidates = search.candidates(
+        candidates = search.find_candidates(
             samples, seed, lambda done, of: tell("random walkers", done, of)
         )
         if not candidates:
             raise SimulationError(
                 f"none of {samples} random walkers made two steps; widen the ranges, or draw more (--samples)"
             )
-        cycles = closed(
+        cycles = close_candidates(
             search, candidates[:tries], enough, lambda done, of: tell("closing cycles", done, of)
         )
         improvement = Improvement(search, min(cycles, key=cost), digits)
         if search.names:
             improvement.run(budget, seed, lambda done, of: tell("making it stable", done, of))
-        best = rounded(search, improvement.best, digits)
+        best = round_cycle(search, improvement.best, digits)
         cycles += improvement.cycles
-        start, walk = started(search, best, start_digits)
+        start, walk = choose_start(search, best, start_digits)
         files = tuple(where / name for name in (BEST, CYCLES, SUMMARY))
         gait = Gait(best, start, walk, len(candidates), len(cycles), files)
-        _write(where, search, gait, cycles, settings)
+        _write_walker(where, search, gait, cycles, settings)
     return gait
 
 
@@ -144,7 +150,7 @@ def _check_numbers(given: Mapping[str, Any]) -> None:
         raise SettingError(f"the seed is a whole number from 0 to {most}, not {given['seed']}")
 
 
-def _spare(folder: Path, wanted: dict[str, Any]) -> None:
+def _protect_results(folder: Path, wanted: dict[str, Any]) -> None:
     """Stop before the walker of another search is lost.
 
     Raises:
@@ -159,7 +165,7 @@ def _spare(folder: Path, wanted: dict[str, Any]) -> None:
         refuse_others(summary, before, wanted)
 
 
-def closed(
+def close_candidates(
     search: CycleSearch,
     candidates: Sequence[Candidate],
     enough: int,
@@ -180,7 +186,7 @@ def closed(
     for number, candidate in enumerate(candidates):
         if progress is not None:
             progress(number, len(candidates))
-        result = search.close(candidate)
+        result = search.close_cycle(candidate)
         if result is not None:
             cycles.append(result)
         if len(cycles) == enough:
@@ -193,21 +199,23 @@ def closed(
     return cycles
 
 
-def rounded(search: CycleSearch, found: Found, digits: int) -> Found:
+def round_cycle(search: CycleSearch, found: Found, digits: int) -> Found:
     """The cycle, to its last digits, of the model whose numbers are rounded.
 
     Raises:
         SimulationError: there is none.
     """
     try:
-        return search.cycle(search.rounded(found.fractions, digits), found.cycle.state, fine=True)
+        return search.find_cycle(
+            search.round_fractions(found.fractions, digits), found.cycle.state, fine=True
+        )
     except OsimliteError as error:
         raise SimulationError(
             f"with numbers of {digits} digits the cycle is lost; keep more. {error.message}"
         ) from None
 
 
-def started(
+def choose_start(
     search: CycleSearch, found: Found, digits: int | None
 ) -> tuple[dict[str, tuple[float, float]], Walk]:
     """A start between two steps of a cycle, by the names of the coordinates, and the walk from there.
@@ -222,7 +230,9 @@ def started(
     """
     step_map = search.step_map(found.fractions, found.cycle.state, TIGHT)
     engine, ordered = step_map.engine, sorted(PHASES)
-    states = along(step_map, found.cycle, ordered)[[ordered.index(part) for part in PHASES]]
+    states = sample_states_of_step(step_map, found.cycle, ordered)[
+        [ordered.index(part) for part in PHASES]
+    ]
     states[np.abs(states) < 1e-12] = 0.0
     if digits is not None:
         states = np.array(
@@ -239,16 +249,16 @@ def started(
         threads=search.threads,
     )
     best = max(range(len(walks)), key=lambda k: (walks[k].walks and not walks[k].scuffs, -k))
-    return _named(engine, states[best]), walks[best]
+    return _name_values(engine, states[best]), walks[best]
 
 
-def _named(engine: Any, state: Floats) -> dict[str, tuple[float, float]]:
+def _name_values(engine: Any, state: Floats) -> dict[str, tuple[float, float]]:
     names = [engine.mechanism.coordinates[place].name for place in engine.order]
     values, speeds = state[: len(names)], state[len(names) : 2 * len(names)]
     return dict(zip(names, zip(values.tolist(), speeds.tolist(), strict=True), strict=True))
 
 
-def _write(
+def _write_walker(
     folder: Path, search: CycleSearch, gait: Gait, cycles: Sequence[Found], settings: dict[str, Any]
 ) -> None:
     model = search.model(gait.found.fractions, gait.start)

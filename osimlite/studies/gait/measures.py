@@ -9,9 +9,16 @@ import numpy as np
 
 from osimlite.errors import SettingError
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
-from osimlite.studies.gait.starts import planted as at_rest
-from osimlite.studies.gait.starts import stood
-from osimlite.studies.gait.steps import SHORTEST, Walk, along_slope, falls, room_for, walks_of
+from osimlite.studies.gait.starts import lift_to_depth
+from osimlite.studies.gait.starts import plant_feet as at_rest
+from osimlite.studies.gait.steps import (
+    SHORTEST,
+    Walk,
+    along_slope,
+    make_fall_watches,
+    room_for,
+    walks_of,
+)
 from osimlite.studies.sweep import registry
 from osimlite.studies.sweep.measures import Batch, Measure
 from osimlite.studies.sweep.variables import Floats
@@ -70,7 +77,7 @@ def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
         states: Floats, numbers: Floats | None, started: Callable[[Floats], Floats]
     ) -> Floats:
         resting = at_rest(engine, footing, states, numbers=numbers)
-        return started(stood(engine, footing, resting, PRESSED, -1, numbers=numbers))
+        return started(lift_to_depth(engine, footing, resting, PRESSED, -1, numbers=numbers))
 
     return place
 
@@ -103,7 +110,7 @@ def _footing(name: str, engine: Any, feet: Sequence[str] | None) -> FootContacts
 
 
 def _made(name: str, footing: FootContacts, numbers: Callable[[Batch], Floats]) -> Measure:
-    return Measure(name, numbers, tuple(falls(footing)), room_for, True)
+    return Measure(name, numbers, tuple(make_fall_watches(footing)), room_for, True)
 
 
 def _walks(footing: FootContacts, batch: Batch) -> list[Walk]:

@@ -86,14 +86,14 @@ class Improvement:
     def _cost(self, fractions: Floats, rounds: bool) -> float:
         """Of the cycle there, which is found from the nearest that is known; much if there is none."""
         if rounds:
-            fractions = self._search.rounded(fractions, self._digits)
+            fractions = self._search.round_fractions(fractions, self._digits)
         key = fractions.tobytes()
         if key not in self._costs:
-            near = min((self._first, *self.cycles), key=lambda each: _far(each, fractions))
+            near = min((self._first, *self.cycles), key=lambda each: _is_far(each, fractions))
             try:
-                result = self._search.cycle(fractions, near.cycle.state)
+                result = self._search.find_cycle(fractions, near.cycle.state)
             except (OsimliteError, np.linalg.LinAlgError):
-                self._costs[key] = WORST + _far(near, fractions)
+                self._costs[key] = WORST + _is_far(near, fractions)
             else:
                 self._costs[key] = result.cost
                 self.cycles.append(result)
@@ -102,5 +102,5 @@ class Improvement:
         return self._costs[key]
 
 
-def _far(found: Found, fractions: Floats) -> float:
+def _is_far(found: Found, fractions: Floats) -> float:
     return float(np.linalg.norm(found.fractions - fractions))

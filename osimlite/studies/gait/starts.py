@@ -24,18 +24,21 @@ class Carriers:
     lift: int | None  # place of the one among them that lifts it off the ground, or None
 
 
-def carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
+def find_carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
     """Find the coordinates that carry a walker as a whole, by moving each at some poses."""
     n = len(engine.order)
-    contacts = _contacts(engine, footing)
+    contacts = _list_contacts(engine, footing)
     rng = np.random.default_rng(0)
     poses = np.hstack((rng.uniform(-0.2, 0.2, (3, n)), np.zeros((3, n))))
-    here, depths = _centres(engine, poses)[:, contacts], along_slope(engine, poses)[1][:, contacts]
+    here, depths = (
+        _compute_contact_centres(engine, poses)[:, contacts],
+        along_slope(engine, poses)[1][:, contacts],
+    )
     places, lift = [], None
     for index in range(n):
         moved = poses.copy()
         moved[:, index] += APART
-        way = ((_centres(engine, moved)[:, contacts] - here) / APART).reshape(-1, 3)
+        way = ((_compute_contact_centres(engine, moved)[:, contacts] - here) / APART).reshape(-1, 3)
         if np.ptp(way, axis=0).max() > 1e-9 or np.linalg.norm(way[0]) < 1e-3:
             continue
         places.append(index)
@@ -47,7 +50,7 @@ def carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
     return Carriers(tuple(places), lift)
 
 
-def stood(
+def lift_to_depth(
     engine: BatchEngine,
     footing: FootContacts,
     states: Floats,
@@ -63,7 +66,7 @@ def stood(
         for the deeper. numbers: of models of the same structure, one row for each state; by default
         the engine's own.
     """
-    lift = carriers(engine, footing).lift
+    lift = find_carriers(engine, footing).lift
     if lift is None:
         return states
     rows = np.arange(len(states)) if numbers is not None else None
@@ -80,7 +83,7 @@ def stood(
     return placed
 
 
-def planted(
+def plant_feet(
     engine: BatchEngine, footing: FootContacts, states: Floats, *, numbers: Floats | None = None
 ) -> Floats:
     """States (W, y) put on the ground with the deeper foot, which is at rest there.
@@ -93,16 +96,16 @@ def planted(
         engine: of the model.
         footing: its feet.
         states: values and speeds of all other coordinates.
-        numbers: as in `stood`.
+        numbers: as in `lift_to_depth`.
     """
     n, count = len(engine.order), np.arange(len(states))
-    result = carriers(engine, footing)
+    result = find_carriers(engine, footing)
     free = states.copy()
     # What comes out must not depend, by a rounding, on what was there.
     free[:, [n + place for place in result.places]] = 0.0
     if result.lift is not None:
         free[:, result.lift] = 0.0
-    placed = stood(engine, footing, free, foot=-1, numbers=numbers)
+    placed = lift_to_depth(engine, footing, free, foot=-1, numbers=numbers)
     if not result.places:
         return placed
     rows = None if numbers is None else count
@@ -111,20 +114,24 @@ def planted(
     ahead, back = placed.copy(), placed.copy()
     ahead[:, :n] += NUDGE * placed[:, n:]
     back[:, :n] -= NUDGE * placed[:, n:]
-    ways = _centres(engine, ahead, numbers, rows) - _centres(engine, back, numbers, rows)
+    ways = _compute_contact_centres(engine, ahead, numbers, rows) - _compute_contact_centres(
+        engine, back, numbers, rows
+    )
     speeds = ways[count, deepest] / (2.0 * NUDGE)
     carried = []
-    here = _centres(engine, placed, numbers, rows)
+    here = _compute_contact_centres(engine, placed, numbers, rows)
     for place in result.places:
         moved = placed.copy()
         moved[:, place] += APART
-        carried.append((_centres(engine, moved, numbers, rows) - here)[count, deepest] / APART)
+        carried.append(
+            (_compute_contact_centres(engine, moved, numbers, rows) - here)[count, deepest] / APART
+        )
     needed = np.einsum("wi,wij->wj", speeds, np.linalg.pinv(np.stack(carried, axis=1)))
     placed[:, [n + place for place in result.places]] -= needed
     return placed
 
 
-def upright(states: Floats, neutral: Floats) -> Floats:
+def move_along_neutral_directions(states: Floats, neutral: Floats) -> Floats:
     """States (..., y) moved along the neutral directions (y, m) until the first entries that can be are zero.
 
     A walker that may be anywhere, and whose trunk may be turned in any way, is then at the origin
@@ -137,13 +144,13 @@ def upright(states: Floats, neutral: Floats) -> Floats:
     return states - np.linalg.solve(neutral[chosen], states[..., chosen].T).T @ neutral.T
 
 
-def _centres(
+def _compute_contact_centres(
     engine: BatchEngine, states: Floats, numbers: Floats | None = None, rows: Ints | None = None
 ) -> Floats:
     """Centres of the contacts' second surfaces (k, P, 3), in ground."""
     return engine.contact_places(states, numbers, rows)[..., 6:]
 
 
-def _contacts(engine: BatchEngine, footing: FootContacts) -> Ints:
+def _list_contacts(engine: BatchEngine, footing: FootContacts) -> Ints:
     names = [name for foot in footing.feet for name in foot] + list(footing.falls)
     return np.array([engine.contacts.index(name) for name in names])

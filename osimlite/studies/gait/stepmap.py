@@ -20,7 +20,7 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.batches import BatchEngine, Floats, Ints, Watch, run_many
 from osimlite.simulation.run import kept_constraints
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
-from osimlite.studies.gait.steps import Step, along_slope, falls, room_for, walks_of
+from osimlite.studies.gait.steps import Step, along_slope, make_fall_watches, room_for, walks_of
 from osimlite.studies.gait.symmetry import leg_exchange, neutral_directions
 
 TIGHT = 1e-10
@@ -106,7 +106,7 @@ class StepMap:
         if step.foot != 0:
             self.start = self._other_leg(self.start)
 
-    def varied(
+    def with_model(
         self, engine: BatchEngine, near: ArrayLike, accuracy: float | None = None
     ) -> StepMap:
         """The step map of a model with other numbers, whose reduced states are as near to these as they can be.
@@ -140,7 +140,7 @@ class StepMap:
             near[None],
             self.longest,
             accuracy=self.accuracy,
-            watches=falls(self.footing),
+            watches=make_fall_watches(self.footing),
             most_events=room_for(self.longest),
             event_states=True,
             threads=1,
@@ -159,7 +159,7 @@ class StepMap:
     def _other_leg(self, state: Floats) -> Floats:
         if self.exchange is not None:
             return state[self.exchange]
-        images = self._single(state[None], 1)
+        images = self._make_step(state[None], 1)
         if np.isnan(images.states).any():
             raise OsimliteError(
                 f"'{self.engine.mechanism.name}' makes one step only; give another start"
@@ -179,10 +179,10 @@ class StepMap:
     # ----------------------------------------------------------------------------------------------- images
     def __call__(self, states: ArrayLike) -> Images:
         """Map states (W, y) in which the first foot has just touched down."""
-        first = self._single(np.asarray(states, dtype=float), 0)
+        first = self._make_step(np.asarray(states, dtype=float), 0)
         if self.exchange is not None:
             return Images(first.states[:, self.exchange], first.lengths, first.times, first.scuffs)
-        second = self._single(first.states, 1)
+        second = self._make_step(first.states, 1)
         return Images(
             second.states,
             (first.lengths + second.lengths) / 2.0,
@@ -190,7 +190,7 @@ class StepMap:
             first.scuffs + second.scuffs,
         )
 
-    def _single(self, states: Floats, leading: int) -> Images:
+    def _make_step(self, states: Floats, leading: int) -> Images:
         """One step of the foot behind."""
         count, trailing = len(states), 1 - leading
         result = Images(
@@ -210,7 +210,7 @@ class StepMap:
             states[rows],
             self.longest,
             accuracy=self.accuracy,
-            watches=[*falls(self.footing), *stops],
+            watches=[*make_fall_watches(self.footing), *stops],
             most_events=room_for(self.longest),
             event_states=True,
             threads=self.threads,

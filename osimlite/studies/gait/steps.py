@@ -81,7 +81,7 @@ class Walk:
         return sum(step.time < first for step in self.steps)
 
 
-def falls(footing: FootContacts) -> list[Watch]:
+def make_fall_watches(footing: FootContacts) -> list[Watch]:
     """Watches that stop a run where the walk ends."""
     return [Watch(f"{FALL}{contact}", contact=contact, stops=1) for contact in footing.falls]
 
@@ -124,7 +124,7 @@ def walk_many(
         to,
         numbers=numbers,
         accuracy=accuracy,
-        watches=falls(feet),
+        watches=make_fall_watches(feet),
         most_events=room_for(to),
         event_states=True,
         most_tries=most_tries,
@@ -147,7 +147,7 @@ def walks_of(
     Args:
         engine: of the model.
         states: where the runs started (W, y).
-        runs: made with the watches of `falls`, among others.
+        runs: made with the watches of `make_fall_watches`, among others.
         footing: their feet.
         numbers: as given to `run_many`.
         room: for events that the runs had; with as many events a walk is given up as too restless.
@@ -169,7 +169,7 @@ def walks_of(
             contact = footing.falls[int(np.argmax(depths[k, fatal]))]
             result.append(Walk(0.0, "fell", contact))
             continue
-        walk = follow(
+        walk = follow_events(
             footing, engine.contacts, events, runs.event_states[k], reached[part], depths[k] > 0.0
         )
         if walk.walks:
@@ -182,7 +182,7 @@ def walks_of(
     return result
 
 
-def follow(
+def follow_events(
     footing: FootContacts,
     contacts: Sequence[str],
     events: Sequence[tuple[float, str, bool]],

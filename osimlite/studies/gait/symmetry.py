@@ -84,8 +84,8 @@ def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> Non
     # Those that belong together have equal values where all have just started.
     states = engine.state.started(states)
     columns = [*source[:first], first, first + 1]
-    before = np.stack([_effects(engine, state)[:, columns] for state in states], axis=1)
-    after = np.stack([_effects(engine, state[source]) for state in states], axis=1)
+    before = np.stack([_compute_effects(engine, state)[:, columns] for state in states], axis=1)
+    after = np.stack([_compute_effects(engine, state[source]) for state in states], axis=1)
     tolerances = SAME * np.abs(before).max(axis=(0, 1))
     for index, effects in enumerate(after):
         alike = np.flatnonzero((np.abs(before - effects) <= tolerances).all(axis=(1, 2)))
@@ -93,7 +93,7 @@ def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> Non
             source[first + index] = first + alike[0]
 
 
-def _effects(engine: BatchEngine, state: Floats) -> Floats:
+def _compute_effects(engine: BatchEngine, state: Floats) -> Floats:
     """What each auxiliary state (z) does: by how much it changes the other rates (2n) and its own, and that rate."""
     first, here = 2 * len(engine.order), np.array(engine.derivative(0.0, state.tolist()))
     rows = []

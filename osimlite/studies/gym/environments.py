@@ -101,7 +101,7 @@ class _Observed:
         )
 
 
-def _task(
+def _resolve_task(
     task: Task | Callable[[], Task] | None, model: Any, reward: Any, choices: dict[str, Any]
 ) -> Task:
     known = [field.name for field in fields(Task) if field.name not in ("model", "reward")]
@@ -120,7 +120,7 @@ def _task(
     return of_model(model, reward, **choices)
 
 
-def _mode(mode: str | None) -> str | None:
+def _check_render_mode(mode: str | None) -> str | None:
     if mode not in (None, "rgb_array"):
         raise gymnasium.error.UnsupportedMode(f"pictures come as 'rgb_array', not as '{mode}'")
     return mode
@@ -150,8 +150,8 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
         render_mode: str | None = None,
         **choices: Any,
     ) -> None:
-        self._all = _Observed(_task(task, model, reward, choices), 1)
-        self.render_mode = _mode(render_mode)
+        self._all = _Observed(_resolve_task(task, model, reward, choices), 1)
+        self.render_mode = _check_render_mode(render_mode)
         self.observation_space, self.action_space = self._all.observations, self._all.actions
         self.labels, self.controls = self._all.labels, self._all.copies.controls
         self._steps = 0
@@ -208,8 +208,8 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         render_mode: str | None = None,
         **choices: Any,
     ) -> None:
-        self.num_envs, self.render_mode = num_envs, _mode(render_mode)
-        self._all = _Observed(_task(task, model, reward, choices), num_envs)
+        self.num_envs, self.render_mode = num_envs, _check_render_mode(render_mode)
+        self._all = _Observed(_resolve_task(task, model, reward, choices), num_envs)
         self.single_observation_space, self.single_action_space = (
             self._all.observations,
             self._all.actions,
@@ -269,11 +269,11 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self._all.copies.close()
 
 
-def _single(name: str) -> Callable[..., MuscleEnv]:
+def _make_single(name: str) -> Callable[..., MuscleEnv]:
     return lambda **choices: MuscleEnv(TASKS[name], **choices)
 
 
-def _vector(name: str) -> Callable[..., MuscleVectorEnv]:
+def _make_vector(name: str) -> Callable[..., MuscleVectorEnv]:
     return lambda num_envs=1, **choices: MuscleVectorEnv(num_envs, TASKS[name], **choices)
 
 
@@ -281,6 +281,8 @@ def register_all() -> None:
     """Have gymnasium know the environments."""
     for name in TASKS:
         if f"osimlite/{name}" not in gymnasium.registry:
-            gymnasium.register(f"osimlite/{name}", _single(name), vector_entry_point=_vector(name))
+            gymnasium.register(
+                f"osimlite/{name}", _make_single(name), vector_entry_point=_make_vector(name)
+            )
     if "osimlite/Model-v0" not in gymnasium.registry:
         gymnasium.register("osimlite/Model-v0", MuscleEnv, vector_entry_point=MuscleVectorEnv)

@@ -9,7 +9,7 @@ import numpy as np
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.run import Simulation
 from osimlite.view.collect import build_scene
-from osimlite.view.picture import Camera, Style, draw
+from osimlite.view.picture import Camera, Style, draw_scene
 from osimlite.view.scene import Scene
 
 SIZE = 480, 360
@@ -25,4 +25,4 @@ def picture_of(simulation: Simulation, q: Array, size: tuple[int, int] = SIZE) -
     pose = simulation.mechanism.at(q)
     points = pose.origins[0] + FRAME
     camera = Camera.around(points, scene.up, np.array([0.15, 0.1, 1.0]), size[0] / size[1])
-    return np.asarray(draw(scene, q, camera, size, (), Style(scene.floor(q))).convert("RGB"))
+    return np.asarray(draw_scene(scene, q, camera, size, (), Style(scene.floor(q))).convert("RGB"))

@@ -69,7 +69,7 @@ HEIGHT = 0.93
 """Of the hips then, m."""
 
 
-def _human() -> Model:
+def _build_human() -> Model:
     model = jumper(driven=False)
     for coordinate in model.components(Coordinate):
         coordinate.default_value = STAND.get(coordinate.name, coordinate.default_value)
@@ -78,7 +78,7 @@ def _human() -> Model:
     return model
 
 
-def _shaken(scale: float) -> Callable[[Array, tuple[str, ...], np.random.Generator], Array]:
+def _perturb_state(scale: float) -> Callable[[Array, tuple[str, ...], np.random.Generator], Array]:
     """Values and speeds that are a little off."""
 
     def start(y: Array, names: tuple[str, ...], rng: np.random.Generator) -> Array:
@@ -90,7 +90,7 @@ def _shaken(scale: float) -> Callable[[Array, tuple[str, ...], np.random.Generat
     return start
 
 
-def _effort(seen: Seen) -> Array:
+def _compute_effort(seen: Seen) -> Array:
     return np.mean(seen.controls**2, axis=1)
 
 
@@ -99,13 +99,18 @@ def walk2d() -> Task:
 
     def reward(before: Seen, after: Seen) -> Array:
         speed = (after["pelvis_tx"] - before["pelvis_tx"]) / after.step
-        return np.exp(-4.0 * (speed - 1.2) ** 2) + 0.2 - 0.1 * _effort(after)
+        return np.exp(-4.0 * (speed - 1.2) ** 2) + 0.2 - 0.1 * _compute_effort(after)
 
     def is_over(seen: Seen) -> NDArray[np.bool_]:
         return (seen["pelvis_ty"] < 0.7) | (np.abs(seen["pelvis_tilt"]) > 0.8)
 
     return Task(
-        _human, reward, is_over, hidden=("pelvis_tx",), start=_shaken(0.01), integrator=CONTACT
+        _build_human,
+        reward,
+        is_over,
+        hidden=("pelvis_tx",),
+        start=_perturb_state(0.01),
+        integrator=CONTACT,
     )
 
 
@@ -113,7 +118,7 @@ def jump() -> Task:
     """The same human in a squat, who is to jump as high as can be in a second."""
 
     def reward(before: Seen, after: Seen) -> Array:
-        return 10.0 * (after["pelvis_ty"] - before["pelvis_ty"]) - 0.01 * _effort(after)
+        return 10.0 * (after["pelvis_ty"] - before["pelvis_ty"]) - 0.01 * _compute_effort(after)
 
     def is_over(seen: Seen) -> NDArray[np.bool_]:
         return (seen["pelvis_ty"] < 0.4) | (np.abs(seen["pelvis_tilt"]) > 1.5)
@@ -123,7 +128,7 @@ def jump() -> Task:
         reward,
         is_over,
         hidden=("pelvis_tx",),
-        start=_shaken(0.002),
+        start=_perturb_state(0.002),
         seconds=1.0,
         integrator=CONTACT,
     )
@@ -137,12 +142,12 @@ def arm() -> Task:
     """A forearm with a weight that is to be held up at 1.2 rad."""
 
     def reward(before: Seen, after: Seen) -> Array:
-        return np.exp(-10.0 * (after["elbow"] - WANTED) ** 2) - 0.05 * _effort(after)
+        return np.exp(-10.0 * (after["elbow"] - WANTED) ** 2) - 0.05 * _compute_effort(after)
 
     def is_over(seen: Seen) -> NDArray[np.bool_]:
         return np.abs(seen["elbow"]) > 3.0
 
-    return Task(arm_model, reward, is_over, start=_shaken(0.1), seconds=2.0)
+    return Task(arm_model, reward, is_over, start=_perturb_state(0.1), seconds=2.0)
 
 
 TASKS: dict[str, Callable[[], Task]] = {"Walk2D-v0": walk2d, "Jump-v0": jump, "Arm-v0": arm}

@@ -19,7 +19,7 @@ from osimlite.mechanics.kernels.reflexes import FREE, LIMITS, OF_RESULT, OF_SENS
 from osimlite.mechanics.kernels.walks import LEGS
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.parameters import Parameters
-from osimlite.studies.reflexes.settings import Node, matches
+from osimlite.studies.reflexes.settings import Node, matches_pattern
 from osimlite.studies.reflexes.sources import KINDS, SPEED, VALUE, Kind, Source, load
 from osimlite.studies.reflexes.walkers import SIDES, Felt
 
@@ -50,7 +50,7 @@ Powers = Iterable[tuple[int, Array, Array]]
 """Terms that a function of time is the sum of: power, and of each candidate start (s) and gain (w,)."""
 
 
-def _whole(node: Node, key: str, least: int) -> int:
+def _read_integer(node: Node, key: str, least: int) -> int:
     number = node.number(key)
     if number not in range(least, MOST_POINTS + 1):
         raise node.error(
@@ -59,9 +59,9 @@ def _whole(node: Node, key: str, least: int) -> int:
     return int(number)
 
 
-def _points(node: Node, parameters: Parameters, before: str) -> tuple[Array, Array]:
+def _read_control_points(node: Node, parameters: Parameters, before: str) -> tuple[Array, Array]:
     """Times (n, w) and values of the control points of a function."""
-    count = _whole(node, "control_points", 1)
+    count = _read_integer(node, "control_points", 1)
     node.text("control_point_y")
     if node.get("control_point_dt") is None and count > 1:
         raise node.error("several control points need 'control_point_dt'")
@@ -74,22 +74,22 @@ def _points(node: Node, parameters: Parameters, before: str) -> tuple[Array, Arr
     return np.cumsum([np.zeros_like(values[0]), *spans], axis=0), np.array(values)
 
 
-def _constants(node: Node, parameters: Parameters, before: str) -> Powers:
-    times, values = _points(node, parameters, before)
+def _make_constants(node: Node, parameters: Parameters, before: str) -> Powers:
+    times, values = _read_control_points(node, parameters, before)
     return [(0, *each) for each in zip(times, np.diff(values, axis=0, prepend=0.0), strict=True)]
 
 
-def _lines(node: Node, parameters: Parameters, before: str) -> Powers:
+def _make_lines(node: Node, parameters: Parameters, before: str) -> Powers:
     """The last goes on, unless it is flat there."""
-    times, values = _points(node, parameters, before)
+    times, values = _read_control_points(node, parameters, before)
     slopes = np.diff(values, axis=0) / np.diff(times, axis=0)
     ends = [np.zeros_like(values[:1])] if node.flag("flat_extrapolation", False) else []
     bends = np.diff(np.concatenate([np.zeros_like(values[:1]), slopes, *ends]), axis=0)
     return [(0, times[0], values[0]), *((1, *each) for each in zip(times, bends, strict=False))]
 
 
-def _polynomial(node: Node, parameters: Parameters, before: str) -> Powers:
-    degree = _whole(node, "degree" if node.get("order") is None else "order", 0)
+def _read_polynomial(node: Node, parameters: Parameters, before: str) -> Powers:
+    degree = _read_integer(node, "degree" if node.get("order") is None else "order", 0)
     for k in range(degree + 1):
         node.text(f"coefficient{k}")
     gains = [
@@ -100,9 +100,9 @@ def _polynomial(node: Node, parameters: Parameters, before: str) -> Powers:
 
 MOST_POINTS = 99
 FUNCTIONS: dict[str, Callable[[Node, Parameters, str], Powers]] = {
-    "PieceWiseConstant": _constants,
-    "PieceWiseLinear": _lines,
-    "Polynomial": _polynomial,
+    "PieceWiseConstant": _make_constants,
+    "PieceWiseLinear": _make_lines,
+    "Polynomial": _read_polynomial,
 }
 """Of time, by the names that scenarios have for them."""
 
@@ -193,7 +193,7 @@ class Reflexes:
         names = {
             k: n
             for k, n in enumerate(self.walkers.names)
-            if matches(n, include) and not matches(n, exclude)
+            if matches_pattern(n, include) and not matches_pattern(n, exclude)
         }
         if not names:
             raise node.error(f"no actuator is in '{include}' and not in '{exclude}'")
@@ -277,7 +277,7 @@ class Reflexes:
         if not any(kind in KINDS for block in blocks for kind, _ in block.parts):
             raise node.error("a ReflexController needs reflexes")
 
-    def _named(self, node: Node, name: str, names: list[str], leg: int) -> int:
+    def _find_index(self, node: Node, name: str, names: list[str], leg: int) -> int:
         """The number of what has a name, with or without the side of a leg; `_o` is the other one."""
         own = name[:-2] + SIDES[1 - leg] if self._is_sided and name.endswith(OTHER) else name
         for full in (own, own + SIDES[leg]) if self._is_sided else (own,):
@@ -286,7 +286,7 @@ class Reflexes:
         beside = f" or '{own}{SIDES[leg]}'" if self._is_sided else ""
         raise node.error(f"the model has no '{own}'{beside}{suggest_or_list(own, names)}")
 
-    def _begin(
+    def _begin_reflex(
         self, node: Node, prefix: str, leg: int, symmetric: bool, kind: Kind
     ) -> tuple[int, int, str]:
         """Numbers of the target and of the source, and what stands before the names of parameters."""
@@ -309,8 +309,12 @@ class Reflexes:
         first, second = named(target), named(source)
         own = node.text("par_name", "")
         name = named(own) if own else first if first == second else f"{first}-{second}"
-        number = self._named(node, target, self.walkers.names, leg)
-        return number, self._named(node, source, kind.names(self.walkers), leg), f"{prefix}{name}."
+        number = self._find_index(node, target, self.walkers.names, leg)
+        return (
+            number,
+            self._find_index(node, source, kind.names(self.walkers), leg),
+            f"{prefix}{name}.",
+        )
 
     @staticmethod
     def _delay(node: Node, parameters: Parameters, before: str) -> Array:
@@ -339,7 +343,7 @@ class Reflexes:
     ) -> None:
         kind = KINDS[name]
         node.asked.update(kind.settings)
-        target, number, before = self._begin(node, prefix, leg, symmetric, kind)
+        target, number, before = self._begin_reflex(node, prefix, leg, symmetric, kind)
         delay = self._delay(node, parameters, before)
         gate = self._gate(node, parameters, before, leg) if name == CONDITIONAL else -1
         written = {key for key, _ in node.parts}
@@ -379,7 +383,7 @@ class Reflexes:
         if node.get("dof") is None:
             return -1
         name = node.text("dof")
-        number = self._named(node, name, self.walkers.coordinates, leg)
+        number = self._find_index(node, name, self.walkers.coordinates, leg)
         start = f"{before[:-1]}-{name}."
         delay = self._delay(node, parameters, start)
         low, high = (
@@ -392,7 +396,7 @@ class Reflexes:
         self._gates.append(Part((value, speed), delay, low, high))
         return len(self._gates) - 1
 
-    def compiled(self) -> tuple[Ints, Array]:
+    def pack(self) -> tuple[Ints, Array]:
         """What the kernels go by (see :mod:`osimlite.mechanics.kernels.reflexes`): integers, and of
         each candidate the numbers (w, r).
         """

@@ -19,7 +19,12 @@ from osimlite.schema.model import Model
 from osimlite.simulation.control_steps import Gain, Held
 from osimlite.studies.reflexes.controllers import CONTROLLERS, Reflexes
 from osimlite.studies.reflexes.parameters import AUTO, Parameter, Parameters, par_line, read_par
-from osimlite.studies.reflexes.scenario import OPTIMIZERS, begun, control_step, legs_of
+from osimlite.studies.reflexes.scenario import (
+    OPTIMIZERS,
+    control_step,
+    legs_of,
+    read_initial_parameters,
+)
 from osimlite.studies.reflexes.settings import Node, read_settings, settings_of
 from osimlite.studies.reflexes.walkers import Felt
 
@@ -62,7 +67,9 @@ class Feedback:
             raise holder.error(f"a controller is needed: {join_words(list(CONTROLLERS))}")
         self._kind, self._node = found
         self.step, self._legs = control_step(model), legs_of(model)
-        known = {name: best for name, (best, _, _) in begun(optimizer, folder).items()}
+        known = {
+            name: best for name, (best, _, _) in read_initial_parameters(optimizer, folder).items()
+        }
         if isinstance(values, str | Path):
             values = {name: best for name, (best, _, _) in read_par(values).items()}
         self._begun, self._values = known, {**known, **values}
@@ -109,14 +116,14 @@ class Feedback:
                 )
         return felt, reflexes, parameters
 
-    def held(self, model: Model, engine: Any) -> Held:
+    def compile_for(self, model: Model, engine: Any) -> Held:
         """What the kernels go by, for a model with its engine.
 
         Raises: OsimliteError: the model has not what a reflex names, or a value belongs to no
             parameter.
         """
         felt, reflexes, parameters = self._read(model, engine)
-        plan, numbers = reflexes.compiled()
+        plan, numbers = reflexes.pack()
         # What no reflex names, and no noise, is left to others.
         everything, is_noisy = np.arange(len(felt.names)), numbers[0, LIMITS.CONTROL_NOISE] > 0.0
         targets = [term.ints[TERM.TARGET] for term in reflexes.terms]

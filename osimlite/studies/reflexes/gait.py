@@ -54,7 +54,7 @@ class Gait(NamedTuple):
     pelvis: tuple[float, float, float]
     strides: Strides | None
 
-    def told(self) -> dict[str, str]:
+    def describe(self) -> dict[str, str]:
         """In words."""
         names = ("mass centre", self.centre), ("pelvis", self.pelvis)
         high = (
@@ -111,7 +111,7 @@ def strides_of(times: Array, way: Array, loads: Array) -> Strides | None:
     touches: Any = loads > TOUCHES
     spans = []
     for on in touches.T:
-        _steady(on, times)
+        _remove_brief_contacts(on, times)
         begins = np.flatnonzero(on[1:] & ~on[:-1]) + 1
         if len(begins) < 3:
             return None
@@ -136,7 +136,7 @@ def strides_of(times: Array, way: Array, loads: Array) -> Strides | None:
     )
 
 
-def _steady(on: Any, times: Array) -> None:
+def _remove_brief_contacts(on: Any, times: Array) -> None:
     """Take brief times on the ground, and then those off it, for none."""
     for what in (True, False):
         edges = np.flatnonzero(on[1:] != on[:-1]) + 1

@@ -68,7 +68,7 @@ class Criteria:
         self.room += GAIT_NOTED.STEPS + 2 * self.most if kind == GAIT else NOTED.SIZE
         return first
 
-    def compiled(self) -> tuple[Ints, Array]:
+    def pack(self) -> tuple[Ints, Array]:
         """Integers and numbers, as the kernels take them."""
         return np.array([len(self._ints) // CRITERION.SIZE, *self._ints], dtype=np.int64), np.array(
             self._numbers
@@ -137,7 +137,7 @@ class Measure(ABC):
     def result(self, times: Array, duration: float) -> Array:
         """The measure (w,), of walks that ended at times (w,) before or at a duration, s."""
 
-    def weighted(self, times: Array, duration: float) -> Array:
+    def add_weighted(self, times: Array, duration: float) -> Array:
         """What it adds to the sum (w,), noted in `terms`."""
         value = self.result(times, duration) + self.offset
         if self.minimize and self.threshold is not None:
@@ -149,7 +149,7 @@ class Measure(ABC):
         self.terms = self.terms or {self.name: found}
         return found
 
-    def noted(self, first: int, place: int) -> Array:
+    def read_recorded(self, first: int, place: int) -> Array:
         """A number (w,) of what was asked for."""
         found: Array = self.walkers.noted[:, first + place]
         return found
@@ -157,7 +157,7 @@ class Measure(ABC):
     def average(self, first: int) -> Array:
         """Of a number over time (w,)."""
         total, span, last = (
-            self.noted(first, place) for place in (NOTED.TOTAL, NOTED.SPAN, NOTED.VALUE)
+            self.read_recorded(first, place) for place in (NOTED.TOTAL, NOTED.SPAN, NOTED.VALUE)
         )
         return np.divide(total, span, out=last.copy(), where=span > 0.0)
 
@@ -245,7 +245,7 @@ class JumpMeasure(Measure):
     def result(self, times: Array, duration: float) -> Array:
         """As `Measure` says; of one that has not taken off, where it would be after a second."""
         start, here, peak, prepared, does = (
-            self.noted(self._first, getattr(JUMP_NOTED, name))
+            self.read_recorded(self._first, getattr(JUMP_NOTED, name))
             for name in ("START", "HERE", "PEAK", "PREPARED", "DOES")
         )
         early = 100.0 * np.maximum(prepared - start, 0.0)
@@ -285,7 +285,7 @@ class EffortMeasure(Measure):
     def result(self, times: Array, duration: float) -> Array:
         """As `Measure` says."""
         total, start, here = (
-            self.noted(self._first, k) for k in (NOTED.TOTAL, NOTED.START, NOTED.HERE)
+            self.read_recorded(self._first, k) for k in (NOTED.TOTAL, NOTED.START, NOTED.HERE)
         )
         far = np.maximum(self.least_distance, np.abs(here - start))
         if self._kind == WANG:
@@ -323,7 +323,9 @@ class Penalty(Measure):
             np.zeros(self.count),
         )
         for mode, first in self._asked:
-            total += self.noted(first, places[mode]) if mode in places else self.average(first)
+            total += (
+                self.read_recorded(first, places[mode]) if mode in places else self.average(first)
+            )
         return total
 
 
@@ -384,7 +386,9 @@ class CompositeMeasure(Measure):
 
     def result(self, times: Array, duration: float) -> Array:
         """As `Measure` says."""
-        total = sum((part.weighted(times, duration) for part in self.parts), np.zeros(self.count))
+        total = sum(
+            (part.add_weighted(times, duration) for part in self.parts), np.zeros(self.count)
+        )
         for part in self.parts:
             self.terms |= part.terms
             self.report |= part.report

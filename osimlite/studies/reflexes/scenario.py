@@ -19,7 +19,13 @@ from osimlite.schema.model import Model
 from osimlite.studies.reflexes.controllers import CONTROLLERS, Reflexes
 from osimlite.studies.reflexes.measures import MEASURES, Criteria, Measure
 from osimlite.studies.reflexes.parameters import Parameter, Parameters, read_par
-from osimlite.studies.reflexes.settings import Node, found_file, matches, read_settings, settings_of
+from osimlite.studies.reflexes.settings import (
+    Node,
+    find_file,
+    matches_pattern,
+    read_settings,
+    settings_of,
+)
 from osimlite.studies.reflexes.walkers import Walkers
 
 OPTIMIZERS = "CmaOptimizer", "CmaPoolOptimizer"
@@ -119,7 +125,7 @@ class Scenario:
             )
         self.settings: Node = settings
         if model is None:
-            model = read(found_file(settings.text("model_file"), self.folder))
+            model = read(find_file(settings.text("model_file"), self.folder))
         settings.get("model_file")
         self.model = model
         self.step = control_step(settings)
@@ -127,7 +133,7 @@ class Scenario:
             raise objective.error(
                 f"a walk of {self.duration:g} s is shorter than a control step of {self.step:g} s"
             )
-        self.begun = begun(self.optimizer, self.folder)
+        self.begun = read_initial_parameters(self.optimizer, self.folder)
         if found is not None:
             self.population = self.optimizer.count("lambda", POPULATION, 1, MAX_POPULATION)
             self.generations = self.optimizer.count("max_generations", GENERATIONS, 0, 10**9)
@@ -266,7 +272,7 @@ class Candidates:
         name, own = scenario.measure
         criteria = Criteria(self._steps)
         self.measure: Measure = MEASURES[name](own, walkers, criteria)
-        walkers.go_by(*reflexes.compiled(), *criteria.compiled(), criteria.room)
+        walkers.go_by(*reflexes.pack(), *criteria.pack(), criteria.room)
         node = scenario.settings
         load = node.number("initial_load", 0.2)
         height = walkers.places.get(
@@ -274,7 +280,7 @@ class Candidates:
         )
         if load > 0.0 and height is not None:
             for k in range(walkers.count):
-                _carry(walkers, k, height, load)
+                _settle_on_ground(walkers, k, height, load)
 
     def _start(self) -> None:
         """States at the start."""
@@ -283,7 +289,7 @@ class Candidates:
         walkers.copies.put(slice(None), np.tile(walkers.copies.start, (walkers.count, 1)))
         file = node.text("state_init_file", "")
         if file:
-            self._read_state(found_file(file, scenario.folder))
+            self._read_state(find_file(file, scenario.folder))
         offset = node.get("initial_state_offset")
         if offset is not None:
             included = node.text("initial_state_offset_include", "*")
@@ -292,7 +298,7 @@ class Candidates:
             )
             symmetric = node.flag("initial_state_offset_symmetric", False)
             for path, place in walkers.places.items():
-                if matches(path, included) and not matches(path, excluded):
+                if matches_pattern(path, included) and not matches_pattern(path, excluded):
                     name = path.replace("_l/", "/").replace("_r/", "/") if symmetric else path
                     states[:, place] += self.parameters.read(offset, f"{name}.offset")
 
@@ -329,9 +335,9 @@ class Candidates:
         """As of `Scenario.walk`."""
         walkers = self.walkers
         small = self.scenario.settings.number("initial_equilibration_activation", 0.05)
-        walkers.equilibrated(np.full(walkers.excitations.shape, small))
+        walkers.equilibrate_muscles(np.full(walkers.excitations.shape, small))
         walkers.go(BEGIN)
-        walkers.equilibrated(walkers.excitations)
+        walkers.equilibrate_muscles(walkers.excitations)
         walkers.go(START)
         rows, going = [], list(range(walkers.count))
         for first in range(0, self._steps, AT_ONCE):
@@ -345,7 +351,7 @@ class Candidates:
             ]
         )
         times = walkers.step * walkers.progress[:, STEPS].astype(np.float64)
-        results = self.measure.weighted(times, self.duration) * (
+        results = self.measure.add_weighted(times, self.duration) * (
             1.0 if self.measure.minimize else -1.0
         )
         return Walked(
@@ -369,11 +375,11 @@ class Candidates:
         )
 
 
-def begun(optimizer: Node, folder: Path) -> dict[str, tuple[float, float, float]]:
+def read_initial_parameters(optimizer: Node, folder: Path) -> dict[str, tuple[float, float, float]]:
     """Parameters of the files that a search begins with: best, mean and standard deviation."""
     result: dict[str, tuple[float, float, float]] = {}
     for _, init in optimizer.all_of("init"):
-        own = read_par(found_file(init.text("file"), folder))
+        own = read_par(find_file(init.text("file"), folder))
         factor, best = init.number("std_factor", 1.0), init.flag("use_best_as_mean", False)
         result |= {name: (v[0], v[0] if best else v[1], factor * v[2]) for name, v in own.items()}
         init.expect_all_asked("an init")
@@ -397,7 +403,7 @@ def legs_of(node: Node) -> dict[str, str]:
     }
 
 
-def _carry(walkers: Walkers, which: int, height: int, load: float) -> None:
+def _settle_on_ground(walkers: Walkers, which: int, height: int, load: float) -> None:
     """Move a walker to the height in which the ground carries a part of the weight, as SCONE looks for it."""
     state = walkers.copies.states[which]
     start = float(state[height])

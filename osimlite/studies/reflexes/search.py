@@ -43,7 +43,7 @@ class Generation:
         return f"{self.number:5d}  best {self.best:.6g}  median {self.median:.6g}  longest {self.longest:.2f} s  {rate}"
 
 
-def search(
+def search_parameters(
     scenario: Scenario,
     folder: str | Path,
     *,

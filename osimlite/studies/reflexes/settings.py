@@ -219,7 +219,7 @@ def read_settings(path: str | Path) -> Node:
         DocumentError: one is damaged; with its line.
     """
     constants: dict[str, str] = {}
-    return _read(Path(path), Path(path).parent, constants, 0, _Budget())
+    return _read_source(Path(path), Path(path).parent, constants, 0, _Budget())
 
 
 def settings_of(data: Mapping[str, Any]) -> Node:
@@ -240,7 +240,9 @@ def _parts_of(key: str, value: Any) -> Iterator[tuple[str, Node]]:
         )
 
 
-def _read(path: Path, base: Path, constants: dict[str, str], depth: int, budget: _Budget) -> Node:
+def _read_source(
+    path: Path, base: Path, constants: dict[str, str], depth: int, budget: _Budget
+) -> Node:
     budget.take_file(path)
     try:
         text = read_file(path).decode()
@@ -300,7 +302,7 @@ def _fill_from_yaml(
                     line=value.start_mark.line + 1,
                 )
             included = _resolve_include(value.value, path, base)
-            node.parts += _read(included, base, {}, depth + 1, budget).parts
+            node.parts += _read_source(included, base, {}, depth + 1, budget).parts
             continue
         several = value.value if value.id == "sequence" else [value]
         if value.id == "sequence" and all(item.id == "scalar" for item in several):
@@ -352,7 +354,7 @@ class _Reader:
                 words = []
                 while (word := self.next()) != ">>":
                     words.append(word.strip('"'))
-                node.parts += self._included(" ".join(words)).parts
+                node.parts += self._read_included(" ".join(words)).parts
                 continue
             self.budget.take_part(node)
             part = Node(file=str(self.path), line=self.line())
@@ -392,12 +394,12 @@ class _Reader:
             return self.constants[value]
         return value.strip('"')
 
-    def _included(self, name: str) -> Node:
+    def _read_included(self, name: str) -> Node:
         included = _resolve_include(name, self.path, self.base)
-        return _read(included, self.base, self.constants, self.depth + 1, self.budget)
+        return _read_source(included, self.base, self.constants, self.depth + 1, self.budget)
 
 
-def matches(name: str, patterns: str) -> bool:
+def matches_pattern(name: str, patterns: str) -> bool:
     """Whether a name fits one of some patterns, between which there are semicolons."""
     return any(fnmatchcase(name, pattern) for pattern in patterns.split(";") if pattern)
 
@@ -413,7 +415,7 @@ def _resolve_include(name: str, path: Path, base: Path) -> Path:
         MissingFileError: there is no such file.
         DocumentError: it may not be included.
     """
-    found = found_file(name, path.parent, base)
+    found = find_file(name, path.parent, base)
     real = found.resolve()
     if not {found.suffix.lower(), real.suffix.lower()} <= {*INCLUDED_ENDINGS}:
         endings = join_words(INCLUDED_ENDINGS)
@@ -431,7 +433,7 @@ def _resolve_include(name: str, path: Path, base: Path) -> Path:
     return found
 
 
-def found_file(name: str, *folders: Path) -> Path:
+def find_file(name: str, *folders: Path) -> Path:
     """A file that a scenario names: beside it, or in one of the folders above.
 
     Raises:

@@ -76,15 +76,15 @@ class Kind(NamedTuple):
     refused: tuple[str, ...] = ()
 
 
-def _muscles(felt: Felt) -> list[str]:
+def _list_muscles(felt: Felt) -> list[str]:
     return felt.names[: len(felt.muscles)]
 
 
-def _coordinates(felt: Felt) -> list[str]:
+def _list_coordinates(felt: Felt) -> list[str]:
     return felt.coordinates
 
 
-def _bodies(felt: Felt) -> list[str]:
+def _list_bodies(felt: Felt) -> list[str]:
     return [body.name for body in felt.mechanism.bodies]
 
 
@@ -125,7 +125,7 @@ def load(felt: Felt, leg: int) -> Source:
     return Source(f"leg{felt.legs[leg].side}.load", IN_ROW, int(felt.senses[SENSES.LOADS]) + leg)
 
 
-def _told(*vectors: Array) -> str:
+def _describe(*vectors: Array) -> str:
     return "".join(f"({','.join(f'{x + 0.0:.10g}' for x in vector)})" for vector in vectors)
 
 
@@ -137,7 +137,11 @@ def _point(what: str, kind: int) -> Feel:
         link, frame = felt.engine.placements[number]
         numbers = *(frame[:3, :3] @ offset + frame[:3, 3]), *direction
         return Source(
-            f"{_bodies(felt)[number]}.{what}{_told(offset, direction)}", kind, link, 0, numbers
+            f"{_list_bodies(felt)[number]}.{what}{_describe(offset, direction)}",
+            kind,
+            link,
+            0,
+            numbers,
         )
 
     return feel
@@ -150,7 +154,7 @@ def _axis(felt: Felt, node: Node, number: int, side: str) -> Array:
     axis = node.vector("axis", "0 0 1")
     if not axis.any():
         raise node.error("'axis' has no direction")
-    own = next((end for end in SIDES if _bodies(felt)[number].endswith(end)), side)
+    own = next((end for end in SIDES if _list_bodies(felt)[number].endswith(end)), side)
     return axis / np.linalg.norm(axis) * ((-1.0, -1.0, 1.0) if own == SIDES[0] else (1.0, 1.0, 1.0))
 
 
@@ -160,14 +164,18 @@ def _angle(felt: Felt, node: Node, number: int, side: str) -> Source:
         raise node.error(
             "angles are about [ 1 0 0 ], [ 0 1 0 ] or [ 0 0 1 ]; about another 'axis' there is only KV"
         )
-    name = f"{_bodies(felt)[number]}.angle{_told(axis)}"
+    name = f"{_list_bodies(felt)[number]}.angle{_describe(axis)}"
     return Source(name, ANGLE, link, 0, (*np.ravel(frame[:3, :3].T), *axis))
 
 
-def _turn(felt: Felt, node: Node, number: int, side: str) -> Source:
+def _mirror_axis(felt: Felt, node: Node, number: int, side: str) -> Source:
     axis, (link, frame) = _axis(felt, node, number, side), felt.engine.placements[number]
     return Source(
-        f"{_bodies(felt)[number]}.turn{_told(axis)}", TURN, link, 0, tuple(frame[:3, :3] @ axis)
+        f"{_list_bodies(felt)[number]}.turn{_describe(axis)}",
+        TURN,
+        link,
+        0,
+        tuple(frame[:3, :3] @ axis),
     )
 
 
@@ -179,10 +187,10 @@ _OF_MUSCLES = (
     Channel("A", _of_muscle("activation", SENSES.ACTIVATIONS), is_free=False),
 )
 KINDS = {
-    "MuscleReflex": Kind(_muscles, _OF_MUSCLES, corrects=False, is_own=True),
-    "ConditionalMuscleReflex": Kind(_muscles, _OF_MUSCLES, corrects=False, is_own=True),
+    "MuscleReflex": Kind(_list_muscles, _OF_MUSCLES, corrects=False, is_own=True),
+    "ConditionalMuscleReflex": Kind(_list_muscles, _OF_MUSCLES, corrects=False, is_own=True),
     "DofReflex": Kind(
-        _coordinates,
+        _list_coordinates,
         (Channel("P", VALUE), Channel("V", SPEED)),
         refused=(
             "source_parent",
@@ -194,7 +202,7 @@ KINDS = {
         ),
     ),
     "BodyPointReflex": Kind(
-        _bodies,
+        _list_bodies,
         (
             Channel("P", _point("position", POSITION), is_free=None),
             Channel("V", _point("speed", VELOCITY), is_free=None),
@@ -203,8 +211,8 @@ KINDS = {
         refused=("KA",),
     ),
     "BodyOrientationReflex": Kind(
-        _bodies,
-        (Channel("P", _angle), Channel("V", _turn)),
+        _list_bodies,
+        (Channel("P", _angle), Channel("V", _mirror_axis)),
         settings=("axis", "axis_name", "use_rotation_vector"),
     ),
 }

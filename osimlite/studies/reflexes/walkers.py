@@ -88,9 +88,9 @@ class Felt:
         self.muscles: list[Any] = [owners[k] for k in self.order if isinstance(owners[k], Muscle)]
         self.optimal = np.array([item.optimal_fiber_length for item in self.muscles])
         self.strengths = np.array([item.max_isometric_force for item in self.muscles])
-        self.least, self.most = np.transpose([_bounds(owners[k]) for k in self.order]).reshape(
-            2, -1
-        )
+        self.least, self.most = np.transpose(
+            [_read_control_bounds(owners[k]) for k in self.order]
+        ).reshape(2, -1)
         self.mass = self.mechanism.total_mass
         self.weight = self.mass * float(np.linalg.norm(self.mechanism.gravity))
         infos = self.mechanism.coordinates
@@ -190,7 +190,7 @@ class Felt:
             raise ModelError(f"the model has no legs, which are {wanted}{near}")
 
 
-def _bounds(actuator: Any) -> tuple[float, float]:
+def _read_control_bounds(actuator: Any) -> tuple[float, float]:
     """Least and largest control; OpenSim's own tools know of none for actuators with several."""
     if isinstance(actuator, Muscle):
         return getattr(actuator, "minimum_activation", actuator.min_control), 1.0
@@ -292,7 +292,7 @@ class Walkers(Felt):
         """Forces of the ground on the legs over the weight, as they were felt last (w, l)."""
         return self.rows[:, self.senses[SENSES.LOADS] : self.senses[SENSES.PLACES]]
 
-    def equilibrated(self, activations: Array) -> None:
+    def equilibrate_muscles(self, activations: Array) -> None:
         """Have muscles be in equilibrium with activations (w, m)."""
         for k in range(self.count):
             state = self.copies.states[k].copy()

@@ -86,7 +86,7 @@ def control(name: str, actuators: Sequence[str], word: str) -> Control:
     elif number := re.fullmatch(rf"{SWITCH}(\d+)", word):
         kind, at = SWITCH, float(number[1])
     elif word:
-        kind, at = NODE, _time(name, word)
+        kind, at = NODE, _parse_time(name, word)
     return Control(tuple(actuators), kind, at)
 
 
@@ -98,7 +98,7 @@ def nodes_of(name: str) -> list[str]:
     """
     front, at, word = name.partition("@")
     if at and not word:
-        _time(name, word)
+        _parse_time(name, word)
     if ":" in word:
         first, _, rest = word.partition(":")
         last, _, number = rest.partition(":")
@@ -106,15 +106,15 @@ def nodes_of(name: str) -> list[str]:
             raise SettingError(
                 f"nodes are given as @FIRST:LAST:COUNT, with a count of two or more; got '{name}'"
             )
-        times = np.linspace(_time(name, first), _time(name, last), int(number)).tolist()
+        times = np.linspace(_parse_time(name, first), _parse_time(name, last), int(number)).tolist()
     elif "," in word:
-        times = [_time(name, part) for part in word.split(",")]
+        times = [_parse_time(name, part) for part in word.split(",")]
     else:
         return [name]
     return [f"{front}@{time:.12g}" for time in times]
 
 
-def _time(name: str, word: str) -> float:
+def _parse_time(name: str, word: str) -> float:
     try:
         time = float(word)
     except ValueError:
@@ -165,7 +165,7 @@ def controller_of(model: Model, controls: Mapping[str, Any]) -> PrescribedContro
     actuators = {
         key: item.path for item in model.components(Actuator) for key in (item.name, item.path)
     }
-    made = _controller(model, "given", [actuators.get(key, key) for key in controls])
+    made = _make_controller(model, "given", [actuators.get(key, key) for key in controls])
     for name, given in controls.items():
         if name not in actuators:
             raise SettingError(
@@ -174,7 +174,9 @@ def controller_of(model: Model, controls: Mapping[str, Any]) -> PrescribedContro
         if isinstance(given, tuple):
             times, values = (np.asarray(numbers, dtype=float).tolist() for numbers in given)
             y = (values[0], *values, values[-1])
-            made.ControlFunctions.objects.append(PiecewiseLinearFunction(x=_around(times), y=y))
+            made.ControlFunctions.objects.append(
+                PiecewiseLinearFunction(x=_extend_times(times), y=y)
+            )
         elif isinstance(given, int | float):
             made.ControlFunctions.objects.append(Constant(value=float(given)))
         else:
@@ -184,14 +186,14 @@ def controller_of(model: Model, controls: Mapping[str, Any]) -> PrescribedContro
     return made
 
 
-def _controller(model: Model, kind: str, actuators: Sequence[str]) -> PrescribedController:
+def _make_controller(model: Model, kind: str, actuators: Sequence[str]) -> PrescribedController:
     """One without functions, and with a name of its own: a model that a search has written has others of the kind."""
     taken = {item.name for item in model.components(Controller)}
     name = next(name for number in count(1) if (name := f"{kind}_{number}") not in taken)
     return PrescribedController(name=name, socket_actuators=tuple(actuators))
 
 
-def _around(times: Values) -> tuple[float, ...]:
+def _extend_times(times: Values) -> tuple[float, ...]:
     """Times with one more at either end, so that the outer values hold."""
     return (min(BEFORE, times[0] - 1.0), *times, times[-1] + 1.0)
 
@@ -218,13 +220,13 @@ class VariedControls:
             self._scale(model, actuator, place)
         for kind in (OFFSET, NODE, SWITCH):
             if parts := _by_actuator(controls, kind):
-                made = _controller(model, kind, list(parts))
+                made = _make_controller(model, kind, list(parts))
                 made.ControlFunctions.objects += [
                     self._function(kind, own, interpolation) for own in parts.values()
                 ]
                 self.controllers.append(model.add(made))
 
-    def put(self, values: Values) -> None:
+    def apply(self, values: Values) -> None:
         """Set the controls to what the values of all variables make them."""
         for function, name, made in self._puts:
             setattr(function, name, made(values))
@@ -253,7 +255,7 @@ class VariedControls:
                     if interpolation == "linear"
                     else PiecewiseConstantFunction
                 )
-                function, places = made(x=_around(times)), (places[0], *places, places[-1])
+                function, places = made(x=_extend_times(times)), (places[0], *places, places[-1])
             function.y = (0.0,) * len(places)
             self._puts.append((function, "y", lambda values: tuple(values[k] for k in places)))
         return function

@@ -73,7 +73,7 @@ class Expression:
     """
 
     def __init__(self, text: str, engine: Any) -> None:
-        self._text, known = text, quantities(engine)
+        self._text, known = text, list_quantities(engine)
         names = sorted(map(re.escape, known), key=len, reverse=True)
         calls = "|".join([*REDUCTIONS, *FUNCTIONS])
         self._quantities: list[Quantity] = []
@@ -143,7 +143,7 @@ class Expression:
         )
 
 
-def quantities(engine: Any) -> Mapping[str, Quantity]:
+def list_quantities(engine: Any) -> Mapping[str, Quantity]:
     """What can be looked at during the runs of a model, by name; of several with one name the first."""
     mechanism, count = engine.mechanism, len(engine.order)
     result: dict[str, Quantity] = {

@@ -159,7 +159,7 @@ class Gradients:
         variant = self._variants.variant(values)
         start = self._variants.start(variant, values)
         return _Near(
-            values, variant, self._variants.placed(variant.engine, [variant], start[None])[0]
+            values, variant, self._variants.place_states(variant.engine, [variant], start[None])[0]
         )
 
     def _run(self, here: _Near) -> Runs:

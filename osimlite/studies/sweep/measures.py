@@ -25,7 +25,7 @@ from osimlite.base.text import suggest_name, suggest_or_list
 from osimlite.errors import ModelError, SettingError
 from osimlite.simulation.batches import Runs, Watch
 from osimlite.studies.sweep import registry
-from osimlite.studies.sweep.expressions import Expression, Quantity, quantities
+from osimlite.studies.sweep.expressions import Expression, Quantity, list_quantities
 from osimlite.studies.sweep.variables import Floats
 
 
@@ -47,7 +47,7 @@ class Batch:
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
         """What can be looked at during the runs."""
-        return quantities(self.engine)
+        return list_quantities(self.engine)
 
     def part(self, place: int) -> Batch:
         """One of the runs."""
@@ -135,19 +135,19 @@ def measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> Measur
     """
     name = measure_name(spec)
     if callable(spec):
-        return Measure(name, partial(_each, spec), room=_room)
+        return Measure(name, partial(_each, spec), room=_reserve_rows)
     if (known := registry.measure_named(name)) is not None:
         return known.make(engine, feet)
     if ":" in name:
-        return Measure(name, partial(_each, _function(name)), room=_room)
+        return Measure(name, partial(_each, _function(name)), room=_reserve_rows)
     if is_expression(name):
-        return Measure(name, partial(_expressed, Expression(name, engine)))
+        return Measure(name, partial(_measure_expression, Expression(name, engine)))
     if "/" in name:
         try:
             place, locked = _state_place(engine, name)
         except ModelError as error:
             raise SettingError(f"there is no measure '{name}': {error.message}") from None
-        return Measure(name, partial(_ends, place, locked))
+        return Measure(name, partial(_find_ends, place, locked))
     raise SettingError(
         f"there is no measure '{name}'{suggest_or_list(name, registry.measure_names(), 'module:function')}"
     )
@@ -162,7 +162,7 @@ EVENTS_PER_SECOND = 100
 """So many events of a run a function can see."""
 
 
-def _room(to: float) -> int:
+def _reserve_rows(to: float) -> int:
     return 40 + round(EVENTS_PER_SECOND * to)
 
 
@@ -211,11 +211,11 @@ def energy(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     return Measure("energy", gained)
 
 
-def _ends(place: int | None, locked: float, batch: Batch) -> Floats:
+def _find_ends(place: int | None, locked: float, batch: Batch) -> Floats:
     return np.full(len(batch.starts), locked) if place is None else batch.runs.states[:, place]
 
 
-def _expressed(expression: Expression, batch: Batch) -> list[float]:
+def _measure_expression(expression: Expression, batch: Batch) -> list[float]:
     result = []
     runs, times = batch.runs, batch.report_times
     for k, (end, state) in enumerate(zip(runs.times.tolist(), runs.states.tolist(), strict=True)):

@@ -22,18 +22,18 @@ from osimlite.io.document.printer import write
 from osimlite.studies.sweep import registry
 from osimlite.studies.sweep.measures import measure_name
 from osimlite.studies.sweep.plan import Plan
-from osimlite.studies.sweep.pools import pool
+from osimlite.studies.sweep.pools import make_pool
 from osimlite.studies.sweep.results import (
     KEY,
     Partial,
     ResultTable,
     damage_told,
+    make_schema,
     partial_of,
+    protect_results,
     refuse_overwrite,
-    schema,
-    spare,
 )
-from osimlite.studies.sweep.run import interrupted
+from osimlite.studies.sweep.run import describe_interruption
 from osimlite.studies.sweep.runner import FAILED, Block
 from osimlite.studies.sweep.search import BudgetExhausted, Search, gradient, method_named
 from osimlite.studies.sweep.variables import Floats, refuse_counts
@@ -154,7 +154,7 @@ def optimize(
     measures = tuple(dict(zip(names, (objective.measure, *plan.measures), strict=True)).values())
     plan = replace(plan, measures=measures)
     variants = Variants(plan)
-    point = _start(plan, variants, free, start, is_bounded)
+    point = _resolve_start(plan, variants, free, start, is_bounded)
     wanted = {
         **plan.settings(),
         "objective": names[0],
@@ -167,13 +167,16 @@ def optimize(
         "bounded": is_bounded,
         "start": point.tolist(),
     }
-    with prepare_folder(folder) as where, pool(plan, workers=workers, cluster=cluster) as workforce:
+    with (
+        prepare_folder(folder) as where,
+        make_pool(plan, workers=workers, cluster=cluster) as workforce,
+    ):
         evaluations = _Evaluations(
             plan, free, objective.sign, is_bounded, budget, workforce, progress
         )
-        partial = _open(
+        partial = _open_history(
             where / HISTORY,
-            schema(plan.columns("evaluation", "batch"), wanted),
+            make_schema(plan.columns("evaluation", "batch"), wanted),
             resume,
             force,
             evaluations,
@@ -186,14 +189,14 @@ def optimize(
                 ended = look(evaluations.ask, search)
             partial.finish()
         except KeyboardInterrupt:
-            raise interrupted(partial, format_count(partial.rows, "run")) from None
+            raise describe_interruption(partial, format_count(partial.rows, "run")) from None
         finally:
             partial.close()
     ended = ended or f"as many runs as were allowed: {evaluations.count}"
-    return _finish(where, plan, variants, evaluations, wanted, ended)
+    return _finish_search(where, plan, variants, evaluations, wanted, ended)
 
 
-def _start(
+def _resolve_start(
     plan: Plan,
     variants: Variants,
     free: Sequence[int],
@@ -221,7 +224,7 @@ def _start(
     return np.array(result)
 
 
-def found_by(folder: str | Path) -> dict[str, float]:
+def read_best_values(folder: str | Path) -> dict[str, float]:
     """The best values that another search has left in its folder, by the names of its variables.
 
     Raises:
@@ -236,10 +239,12 @@ def found_by(folder: str | Path) -> dict[str, float]:
         ) from None
 
 
-def _open(path: Path, table: Any, resume: bool, force: bool, evaluations: _Evaluations) -> Partial:
+def _open_history(
+    path: Path, table: Any, resume: bool, force: bool, evaluations: _Evaluations
+) -> Partial:
     """The history, and what is in it already."""
     if path.is_file() and not force and not (resume and partial_of(path).exists()):
-        spare(path, json.loads(table.metadata[KEY]))
+        protect_results(path, json.loads(table.metadata[KEY]))
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
         with damage_told(path), open_file(path) as stream:
             # A program that ends while pyarrow's threads do is killed by their C++ now and then.
@@ -368,7 +373,7 @@ class _Evaluations:
         for place in starts:
             self.pool.submit(place, values[place : place + size])
         blocks: dict[int, Block] = dict(self.pool.result() for _ in starts)
-        block = Block.joined([blocks[place] for place in starts])
+        block = Block.join([blocks[place] for place in starts])
         numbers = np.arange(first, first + len(values)), np.full(len(values), self.batches)
         self.partial.add([*numbers, *values.T, *block.columns])
         self._note(block.status, block.reasons)
@@ -377,7 +382,7 @@ class _Evaluations:
         )
 
 
-def _finish(
+def _finish_search(
     where: Path,
     plan: Plan,
     variants: Variants,
@@ -390,7 +395,7 @@ def _finish(
             raise SimulationError(f"no run came to its end: {evaluations.reason}")
         raise SimulationError(f"'{wanted['objective']}' is not a finite number in any run")
     cost, number, row = evaluations.best
-    write(variants.found(row), where / BEST)
+    write(variants.build_model(row), where / BEST)
     if plan.controller is not None:
         write_atomically(where / PAR, variants.controller(row).par())
     value = evaluations.sign * cost

@@ -26,7 +26,7 @@ from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, check_integrat
 from osimlite.simulation.run import Simulation
 from osimlite.studies.sweep.controls import Control, check_nodes, controller_of
 from osimlite.studies.sweep.measures import is_expression, measure_name
-from osimlite.studies.sweep.variables import Gains, Parameter, Range, Variable, variables
+from osimlite.studies.sweep.variables import Gains, Parameter, Range, Variable, resolve_variables
 
 if TYPE_CHECKING:
     from osimlite.simulation.control_steps import Controller, Gain
@@ -97,7 +97,7 @@ class Plan:
             REPORT_INTERVAL if any(map(is_expression, self.measures)) else None
         )
 
-    def packed(self) -> bytes:
+    def pack(self) -> bytes:
         """The plan for other processes.
 
         Raises:
@@ -112,7 +112,7 @@ class Plan:
             ) from None
 
     @staticmethod
-    def unpacked(data: bytes) -> Plan:
+    def unpack(data: bytes) -> Plan:
         """The plan that was packed; only from those whom you would let run programs here."""
         return pickle.loads(zlib.decompress(data))
 
@@ -186,8 +186,8 @@ def plan(
         ModelError: the model is no mechanism.
     """
     if controls:
-        maker = partial(_copy, to_text(source)) if isinstance(source, Model) else source
-        source = partial(_driven, maker, controls)
+        maker = partial(_copy_model, to_text(source)) if isinstance(source, Model) else source
+        source = partial(_list_driven_actuators, maker, controls)
     model = source if isinstance(source, Model) else source({})
     mechanism = build_mechanism(model)
     gains: list[Gain] = []
@@ -202,13 +202,13 @@ def plan(
             raise SettingError(
                 "say what to vary; the controller has no parameters, which are written as ~2<0,20>"
             )
-    result = variables(vary, model, mechanism, parameters, gains)
+    result = resolve_variables(vary, model, mechanism, parameters, gains)
     if all(item.is_fixed for item in result):
         held = {
             name for item in result if isinstance(item.target, Gains) for name in item.target.parts
         }
-        rest = {gain.name: _bounds(gain) for gain in gains if gain.name not in held}
-        result = variables({**vary, **rest}, model, mechanism, parameters, gains)
+        rest = {gain.name: _read_bounds(gain) for gain in gains if gain.name not in held}
+        result = resolve_variables({**vary, **rest}, model, mechanism, parameters, gains)
     for item in result:
         warn_of_unit(item.doubt)
     needs_maker = any(isinstance(item.target, Parameter) for item in result)
@@ -233,12 +233,14 @@ def plan(
     targets = {place: item.target for place, item in enumerate(result)}
     nodes = {place: target for place, target in targets.items() if isinstance(target, Control)}
     check_nodes(nodes, made.interpolation, made.to)
-    named = (*_stops(mechanism, below, True), *_stops(mechanism, above, False))
-    given = (_stop(mechanism, stop.coordinate, stop.level, stop.is_below) for stop in made.stops)
+    named = (*_make_stops(mechanism, below, True), *_make_stops(mechanism, above, False))
+    given = (
+        _make_stop(mechanism, stop.coordinate, stop.level, stop.is_below) for stop in made.stops
+    )
     return replace(made, engine=engine_name(made.engine), stops=(*given, *named))
 
 
-def _bounds(gain: Gain) -> tuple[float, float]:
+def _read_bounds(gain: Gain) -> tuple[float, float]:
     if not (isfinite(gain.low) and isfinite(gain.high)):
         raise SettingError(
             f"the parameter '{gain.name}' has no bounds, as in 1~0.1<0,2>; vary it as in {gain.name}=0:2"
@@ -246,21 +248,25 @@ def _bounds(gain: Gain) -> tuple[float, float]:
     return gain.low, gain.high
 
 
-def _copy(text: str, parameters: Mapping[str, float]) -> Model:
+def _copy_model(text: str, parameters: Mapping[str, float]) -> Model:
     return read_text(text.encode())
 
 
-def _driven(source: Maker, controls: Mapping[str, Any], parameters: Mapping[str, float]) -> Model:
+def _list_driven_actuators(
+    source: Maker, controls: Mapping[str, Any], parameters: Mapping[str, float]
+) -> Model:
     model = source(parameters)
     model.add(controller_of(model, controls))
     return model
 
 
-def _stops(mechanism: Mechanism, levels: Mapping[str, float | str], is_below: bool) -> list[Stop]:
-    return [_stop(mechanism, name, level, is_below) for name, level in levels.items()]
+def _make_stops(
+    mechanism: Mechanism, levels: Mapping[str, float | str], is_below: bool
+) -> list[Stop]:
+    return [_make_stop(mechanism, name, level, is_below) for name, level in levels.items()]
 
 
-def _stop(mechanism: Mechanism, name: str, given: float | str, is_below: bool) -> Stop:
+def _make_stop(mechanism: Mechanism, name: str, given: float | str, is_below: bool) -> Stop:
     infos = {key: info for info in mechanism.coordinates for key in (info.name, info.path)}
     if name not in infos:
         raise SettingError(f"there is no coordinate '{name}'{suggest_name(name, infos)}")

@@ -15,7 +15,9 @@ from osimlite.studies.sweep.variables import Floats
 
 
 @contextmanager
-def pool(plan: Plan, *, workers: int | None = None, cluster: str | None = None) -> Iterator[Pool]:
+def make_pool(
+    plan: Plan, *, workers: int | None = None, cluster: str | None = None
+) -> Iterator[Pool]:
     """Make a pool for a plan; without a cluster, on this machine.
 
     Args:
@@ -35,7 +37,7 @@ def pool(plan: Plan, *, workers: int | None = None, cluster: str | None = None) 
     # What tells of a plan that cannot be run does so here.
     Runner(plan)
     with open_process_pool(
-        partial(run_packed, plan.packed()), workers=workers, cluster=cluster
+        partial(run_packed, plan.pack()), workers=workers, cluster=cluster
     ) as made:
         yield made
 
@@ -75,5 +77,5 @@ def run_packed(packed: bytes, values: Floats) -> Block:
         OsimliteError: a sample cannot be run.
     """
     if getattr(_local, "packed", None) != packed:
-        _local.packed, _local.plan = packed, Plan.unpacked(packed)
+        _local.packed, _local.plan = packed, Plan.unpack(packed)
     return _thread_runner(_local.plan).run(values)

@@ -59,7 +59,7 @@ def start(make: F) -> F:
 
 def measure_named(name: str) -> Known | None:
     """The measure of a name; None if nobody has one."""
-    return _found(_MEASURES, name) if name.isidentifier() else None
+    return _load_provider(_MEASURES, name) if name.isidentifier() else None
 
 
 def gradients(plan: Plan) -> Any:
@@ -69,18 +69,18 @@ def gradients(plan: Plan) -> Any:
 
 def start_named(name: str) -> Callable[[Any, Sequence[str] | None], Place]:
     """What makes the start of a name."""
-    result = _found(_STARTS, name)
+    result = _load_provider(_STARTS, name)
     assert result is not None
     return result
 
 
 def measure_names() -> list[str]:
     """The names of all measures."""
-    _found(_MEASURES, "")
+    _load_provider(_MEASURES, "")
     return list(_MEASURES)
 
 
-def _found(table: dict[str, T], name: str) -> T | None:
+def _load_provider(table: dict[str, T], name: str) -> T | None:
     for module in PROVIDERS:
         import_module(module)
         if name in table:

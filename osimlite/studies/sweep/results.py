@@ -39,13 +39,13 @@ _MARK = b"OSB1"
 _log = logging.getLogger(__name__)
 
 
-def _arrow() -> Any:
+def _load_arrow() -> Any:
     return require("pyarrow", extra="sweep", purpose="a table of results")
 
 
-def schema(columns: Mapping[str, str], settings: Mapping[str, Any]) -> Any:
+def make_schema(columns: Mapping[str, str], settings: Mapping[str, Any]) -> Any:
     """Of a table: type of each column by its name ("int64", "float64" or "string"), and the settings."""
-    pa = _arrow()
+    pa = _load_arrow()
     fields = [
         pa.field(name, getattr(pa, kind)(), nullable=kind != "int64")
         for name, kind in columns.items()
@@ -85,7 +85,7 @@ def _settings_in(table: Any) -> dict[str, Any]:
     return result
 
 
-def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+def describe_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     """In what settings differ, in words."""
     result = []
     for name in {**old, **new}:
@@ -100,7 +100,7 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     return result
 
 
-def spare(path: Path, wanted: Mapping[str, Any]) -> None:
+def protect_results(path: Path, wanted: Mapping[str, Any]) -> None:
     """Stop before finished results of other settings are lost.
 
     Raises:
@@ -116,7 +116,7 @@ def refuse_others(path: Path, before: Mapping[str, Any], wanted: Mapping[str, An
     Raises:
         SettingError: they are.
     """
-    if unlike := differences(before, wanted):
+    if unlike := describe_differences(before, wanted):
         raise SettingError(
             f"'{path}' has results of other settings: {join_words(unlike)}; name another place with -o, or replace them "
             "with --force"
@@ -170,7 +170,7 @@ class Partial:
                 f"interrupted work is in '{self.partial}'; go on with --resume, or remove that file"
             )
         try:
-            self._lock = _locked(self.partial)
+            self._lock = _lock_file(self.partial)
             try:
                 self.stream = open_to_append(self.partial)
                 if is_there:
@@ -187,7 +187,7 @@ class Partial:
 
     def add(self, columns: Sequence[Any]) -> None:
         """Add rows, column by column."""
-        pa = _arrow()
+        pa = _load_arrow()
         arrays = [
             pa.array(column, field.type, from_pandas=False)
             for column, field in zip(columns, self.schema, strict=True)
@@ -209,7 +209,7 @@ class Partial:
         Raises:
             OsimliteError: another program has damaged the file meanwhile.
         """
-        end = _batches(self.partial, take)
+        end = _read_batches(self.partial, take)
         if end < self.partial.stat().st_size:
             raise OsimliteError(
                 "the file was damaged meanwhile; go on with --resume", file=str(self.partial)
@@ -217,7 +217,7 @@ class Partial:
 
     def _put(self, item: Any) -> None:
         body = item.serialize().to_pybytes()
-        self.stream.write(HEAD.pack(_MARK, len(body), _checksum(body)) + body)
+        self.stream.write(HEAD.pack(_MARK, len(body), _compute_checksum(body)) + body)
         self.stream.flush()
 
     def finish(self) -> Path:
@@ -225,7 +225,7 @@ class Partial:
         if self.rows == 0:
             return self.path
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
-        pa = _arrow()
+        pa = _load_arrow()
         self.stream.close()
         beside = self.path.with_name(f".{self.path.name}.{os.getpid()}")
         waiting: list[Any] = []
@@ -280,8 +280,8 @@ class Partial:
 
     def _reopen(self) -> None:
         """Count what is there, and cut off what is damaged."""
-        pa = _arrow()
-        first = next(_records(self.partial), None)
+        pa = _load_arrow()
+        first = next(_read_records(self.partial), None)
         try:
             result = pa.ipc.read_schema(pa.py_buffer(b"" if first is None else first[0]))
             before = _settings_in(result)
@@ -290,13 +290,13 @@ class Partial:
                 f"'{self.partial}' is no interrupted sweep, or is damaged at its beginning; remove it, or take another "
                 "name"
             ) from None
-        unlike = differences(before, json.loads(self.schema.metadata[KEY]))
+        unlike = describe_differences(before, json.loads(self.schema.metadata[KEY]))
         if unlike or not result.equals(self.schema):
             raise SettingError(
                 f"the interrupted work in '{self.partial}' has other settings: {join_words(unlike) or 'its columns'}; "
                 "ask for the same as before, or remove that file"
             )
-        end = _batches(self.partial, self._count)
+        end = _read_batches(self.partial, self._count)
         if end < self.partial.stat().st_size:
             _log.warning(
                 "'%s' is damaged or cut off after the first %s; the rest is computed again",
@@ -309,7 +309,7 @@ class Partial:
         self.rows += batch.num_rows
 
 
-def _locked(path: Path) -> Any:
+def _lock_file(path: Path) -> Any:
     """A lock that keeps other programs from writing a file until it is released.
 
     Raises:
@@ -332,7 +332,7 @@ def _locked(path: Path) -> Any:
     return lock
 
 
-def _records(path: Path) -> Iterator[tuple[bytes, int]]:
+def _read_records(path: Path) -> Iterator[tuple[bytes, int]]:
     """The records of a partial file as far as they are whole, and where each ends."""
     with open_file(path) as stream:
         while len(head := stream.read(HEAD.size)) == HEAD.size:
@@ -341,19 +341,19 @@ def _records(path: Path) -> Iterator[tuple[bytes, int]]:
             if mark != _MARK or length > path.stat().st_size:
                 return
             body = stream.read(length)
-            if len(body) < length or _checksum(body) != checksum:
+            if len(body) < length or _compute_checksum(body) != checksum:
                 return
             yield body, stream.tell()
 
 
-def _checksum(body: bytes) -> bytes:
+def _compute_checksum(body: bytes) -> bytes:
     return blake2b(body, digest_size=16).digest()
 
 
-def _batches(path: Path, take: Callable[[Any], object]) -> int:
+def _read_batches(path: Path, take: Callable[[Any], object]) -> int:
     """Give every batch of a partial file to a function, up to the first that is damaged; where the last one ends."""
-    pa = _arrow()
-    records = _records(path)
+    pa = _load_arrow()
+    records = _read_records(path)
     head, end = next(records)
     schema = pa.ipc.read_schema(pa.py_buffer(head))
     for body, after in records:
@@ -411,7 +411,7 @@ class Range(NamedTuple):
     mean: float
 
 
-def ranges(path: str | Path, names: Sequence[str]) -> dict[str, Range]:
+def compute_ranges(path: str | Path, names: Sequence[str]) -> dict[str, Range]:
     """Ranges of columns of results; those without any number are left out."""
     pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
     result: dict[str, Range] = {}

@@ -16,8 +16,14 @@ from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.studies.sweep.plan import Plan
-from osimlite.studies.sweep.pools import pool
-from osimlite.studies.sweep.results import Partial, ResultTable, partial_of, schema, spare
+from osimlite.studies.sweep.pools import make_pool
+from osimlite.studies.sweep.results import (
+    Partial,
+    ResultTable,
+    make_schema,
+    partial_of,
+    protect_results,
+)
 from osimlite.studies.sweep.runner import Block
 from osimlite.studies.sweep.sampling import Samples
 from osimlite.studies.sweep.variables import Floats
@@ -42,7 +48,7 @@ class Interrupted(OsimliteError):
     exit_code = 130
 
 
-def interrupted(partial: Partial, runs: str) -> Interrupted:
+def describe_interruption(partial: Partial, runs: str) -> Interrupted:
     """What is said of a file that is not whole, after so many runs."""
     if partial.rows == 0:
         return Interrupted("interrupted before any run was saved")
@@ -123,20 +129,22 @@ def sweep(
             f"the results are a Parquet file, not '{path.name}'; name the file '{better}'"
         )
     wanted = settings(plan, samples)
-    table = schema(plan.columns("run"), wanted)
+    table = make_schema(plan.columns("run"), wanted)
     # Who goes on with an interrupted sweep was asked before it began.
     if path.is_file() and not force and not (resume and partial_of(path).exists()):
-        spare(path, wanted)
+        protect_results(path, wanted)
         if resume:
             return Outcome(path, samples.count, samples.count)
-    with pool(plan, workers=workers, cluster=cluster) as workforce:
+    with make_pool(plan, workers=workers, cluster=cluster) as workforce:
         partial = Partial(path, table, resume=resume)
         outcome = Outcome(path, samples.count, partial.rows)
         try:
             _Work(samples, workforce, partial, outcome, progress).do()
             partial.finish()
         except KeyboardInterrupt:
-            raise interrupted(partial, f"{partial.rows} of {samples.count} runs") from None
+            raise describe_interruption(
+                partial, f"{partial.rows} of {samples.count} runs"
+            ) from None
         finally:
             partial.close()
     outcome.seconds = time.perf_counter() - started
@@ -228,4 +236,4 @@ class _Work:
         self.last_saved = time.monotonic()
         if blocks:
             numbers = np.arange(first, self.saved)
-            self.partial.add([numbers, *np.concatenate(values).T, *Block.joined(blocks).columns])
+            self.partial.add([numbers, *np.concatenate(values).T, *Block.join(blocks).columns])

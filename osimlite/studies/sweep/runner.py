@@ -42,7 +42,7 @@ class Block:
     seconds: float = 0.0  # that the work took
 
     @classmethod
-    def joined(cls, blocks: Sequence[Block]) -> Block:
+    def join(cls, blocks: Sequence[Block]) -> Block:
         """Several of them in one."""
         return cls(
             [word for block in blocks for word in block.status],
@@ -167,7 +167,7 @@ class Runner:
         engine = (given if first.structure == given.structure else first).engine
         look = self._look(first.structure, engine)
         variants = [sample.variant for sample in group]
-        starts = self.variants.placed(
+        starts = self.variants.place_states(
             engine, variants, np.stack([sample.start for sample in group])
         )
         runs, why = self._simulate(engine, look, variants, starts)

@@ -56,11 +56,11 @@ class Samples:
             return self.memory.setdefault("sobol", Sobol(self.seed, len(varied))).points(
                 first, last
             )
-        numbers = _uniform(self.seed, first, last, len(varied))
+        numbers = _draw_uniform(self.seed, first, last, len(varied))
         if self.sampler == "random":
             return numbers
         layers = [
-            _shuffled(first, last, self.count, self.seed, column) for column in range(len(varied))
+            _shuffle(first, last, self.count, self.seed, column) for column in range(len(varied))
         ]
         return (np.stack(layers, axis=1) + numbers) / self.count
 
@@ -73,7 +73,7 @@ class Samples:
         )
 
 
-def samples(
+def choose_samples(
     variables: Sequence[Variable],
     sampler: str | None = None,
     count: int | None = None,
@@ -154,7 +154,7 @@ class Sobol:
         return result
 
 
-def _uniform(seed: int, first: int, last: int, width: int) -> Floats:
+def _draw_uniform(seed: int, first: int, last: int, width: int) -> Floats:
     """Rows first ... last - 1 of independent numbers in [0, 1)."""
     # Each state of this generator makes four numbers, so that a row begins at a state of its own.
     states = -(-width // 4)
@@ -164,7 +164,7 @@ def _uniform(seed: int, first: int, last: int, width: int) -> Floats:
     return rows[:, :width]
 
 
-def _shuffled(first: int, last: int, count: int, seed: int, column: int) -> Floats:
+def _shuffle(first: int, last: int, count: int, seed: int, column: int) -> Floats:
     """Entries first ... last - 1 of a random order of 0 ... count - 1, the rest of which is never made.
 
     A Feistel network permutes the numbers of 2k bits; those beyond `count` go through it again
@@ -178,13 +178,13 @@ def _shuffled(first: int, last: int, count: int, seed: int, column: int) -> Floa
     while beyond.any():
         left, right = result[beyond] >> np.uint64(half), result[beyond] & mask
         for key in keys:
-            left, right = right, left ^ (_mixed(right + key) & mask)
+            left, right = right, left ^ (_mix_bits(right + key) & mask)
         result[beyond] = (left << np.uint64(half)) | right
         beyond = result >= count
     return result.astype(np.float64)
 
 
-def _mixed(x: Counts) -> Counts:
+def _mix_bits(x: Counts) -> Counts:
     """Every bit of the result depends on every bit of x (the finalizer of SplitMix64)."""
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)

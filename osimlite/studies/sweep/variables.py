@@ -147,7 +147,7 @@ class Variable:
         return {**row, "log": True} if self.is_log else row
 
 
-def parse(words: Sequence[str]) -> dict[str, Range]:
+def parse_ranges(words: Sequence[str]) -> dict[str, Range]:
     """Ranges by name from words ``NAME=LOW:HIGH[:COUNT][:log]`` or ``NAME=VALUE``.
 
     Raises:
@@ -164,7 +164,7 @@ def parse(words: Sequence[str]) -> dict[str, Range]:
     return result
 
 
-def variables(
+def resolve_variables(
     ranges: Mapping[str, Range],
     model: Model,
     mechanism: Mechanism,
@@ -186,18 +186,20 @@ def variables(
     result: list[Variable] = []
     for names, given in ranges.items():
         known = [
-            (name, _target(name, model, mechanism, parameters, gains))
+            (name, _resolve_target(name, model, mechanism, parameters, gains))
             for word in each(names, model)
             for name in nodes_of(word)
         ]
         for name, meaning in known:
             if meaning is not None:
-                made = _variable(name, *meaning, given)
+                made = _make_variable(name, *meaning, given)
                 if isinstance(made.target, Start) and not made.target.is_speed:
-                    made = replace(made, doubt=_doubt(made, given, mechanism))
+                    made = replace(made, doubt=_looks_like_degrees(made, given, mechanism))
                 result.append(made)
         if all(meaning is None for _, meaning in known):
-            raise _unknown(names, model, mechanism, [*parameters, *(gain.name for gain in gains)])
+            raise _describe_unknown_name(
+                names, model, mechanism, [*parameters, *(gain.name for gain in gains)]
+            )
     taken: dict[object, str] = {}
     for item in result:
         for part in getattr(item.target, "parts", (item.target,)):
@@ -223,7 +225,7 @@ def refuse_counts(found: Sequence[Variable]) -> None:
             )
 
 
-def _target(
+def _resolve_target(
     name: str,
     model: Model,
     mechanism: Mechanism,
@@ -236,7 +238,7 @@ def _target(
         if (key == name or last in ("value", "speed")) and (
             meant := named(key, mechanism.coordinates)
         ):
-            return _coordinates(name, meant, is_speed, model)
+            return _list_coordinates(name, meant, is_speed, model)
     if name in parameters:
         default = parameters[name]
         return Parameter(
@@ -261,7 +263,7 @@ def _target(
     return None
 
 
-def _unknown(
+def _describe_unknown_name(
     name: str, model: Model, mechanism: Mechanism, parameters: Sequence[str]
 ) -> SettingError:
     """The error for a name that means nothing."""
@@ -285,7 +287,7 @@ def _unknown(
     )
 
 
-def _coordinates(
+def _list_coordinates(
     name: str, infos: Sequence[CoordinateInfo], is_speed: bool, model: Model
 ) -> tuple[Target, str]:
     unit, locked = infos[0].unit or "rad | m", [info for info in infos if info.locked]
@@ -302,7 +304,7 @@ def _coordinates(
     return Property(places(model, ",".join(info.path for info in infos) + "/default_value")), unit
 
 
-def _variable(name: str, target: Target, unit: str, given: Range) -> Variable:
+def _make_variable(name: str, target: Target, unit: str, given: Range) -> Variable:
     parts = (
         given.split(":")
         if isinstance(given, str)
@@ -323,7 +325,7 @@ def _variable(name: str, target: Target, unit: str, given: Range) -> Variable:
         count = int(text)
     if len(parts) not in (1, 2):
         raise SettingError(f"'{name}' takes LOW:HIGH, LOW:HIGH:COUNT or one value, not '{given}'")
-    low, high = (_number(name, part, unit) for part in (parts[0], parts[-1]))
+    low, high = (_parse_number(name, part, unit) for part in (parts[0], parts[-1]))
     _refuse_mixed(name, parts, unit)
     if len(parts) == 1:
         count = 1
@@ -360,7 +362,7 @@ def _refuse_mixed(name: str, ends: Sequence[object], unit: str) -> None:
         )
 
 
-def _doubt(made: Variable, given: Range, mechanism: Mechanism) -> str:
+def _looks_like_degrees(made: Variable, given: Range, mechanism: Mechanism) -> str:
     """Whether an angle of the start was written as a number of degrees."""
     assert isinstance(made.target, Start)
     ends = given.split(":")[:2] if isinstance(given, str) else [made.low, made.high]
@@ -371,7 +373,7 @@ def _doubt(made: Variable, given: Range, mechanism: Mechanism) -> str:
     return next((words for words in odd if words), "")
 
 
-def _number(name: str, part: object, unit: str) -> float:
+def _parse_number(name: str, part: object, unit: str) -> float:
     if isinstance(part, int | float):
         given: Quantity | None = Quantity(float(part), None)
     else:

@@ -147,9 +147,9 @@ class Variants:
                     raise SettingError(f"'{path}' is locked in this model, so that it has no start")
                 number = engine.order.index(coordinate)
                 row[number + (len(engine.order) if is_speed else 0)] = values[place]
-        return self.started(engine, [variant], row[None])[0]
+        return self.prepare_states(engine, [variant], row[None])[0]
 
-    def started(self, engine: Any, variants: Sequence[Variant], states: Floats) -> Floats:
+    def prepare_states(self, engine: Any, variants: Sequence[Variant], states: Floats) -> Floats:
         """States (k, y) of as many models, with the auxiliary ones where they start from the values and speeds.
 
         Args:
@@ -177,7 +177,7 @@ class Variants:
                 row[:] = variant.engine.equilibrated(0.0, y) if result is None else result
         return rows
 
-    def placed(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> Floats:
+    def place_states(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> Floats:
         """Initial states (k, y), put on their feet if the plan says so.
 
         Args:
@@ -192,7 +192,7 @@ class Variants:
             return starts
         place = start_named("planted")(engine, self._plan.feet)
         numbers = None if self.is_fixed else np.stack([variant.numbers for variant in variants])
-        return place(starts, numbers, lambda states: self.started(engine, variants, states))
+        return place(starts, numbers, lambda states: self.prepare_states(engine, variants, states))
 
     def present(self) -> list[float | None]:
         """The values of the variables in the model as it is given; None where nothing tells it."""
@@ -225,7 +225,9 @@ class Variants:
         if self._plan.is_planted:
             variant = self.variant(values)
             engine = variant.engine
-            (row,) = self.placed(engine, [variant], self.start(variant, values)[None]).tolist()
+            (row,) = self.place_states(
+                engine, [variant], self.start(variant, values)[None]
+            ).tolist()
             for number, place in enumerate(engine.order):
                 coordinate = coordinates[engine.mechanism.coordinates[place].path]
                 coordinate.default_value, coordinate.default_speed_value = (
@@ -244,15 +246,15 @@ class Variants:
         )
         return self._plan.controller.with_values({name: float(value) for name, value in parts})
 
-    def found(self, values: Sequence[float]) -> Model:
+    def build_model(self, values: Sequence[float]) -> Model:
         """The model of a sample, as others are to have it."""
-        self.put(values)
+        self.apply_sample(values)
         self.set_start(values)
         if self._plan.controller is not None:
             self.model.remove(self._open)
         return self.model
 
-    def put(self, values: Sequence[float]) -> None:
+    def apply_sample(self, values: Sequence[float]) -> None:
         """Make `model` that of a sample, but for its initial state.
 
         Raises:
@@ -269,7 +271,7 @@ class Variants:
         for place, setters in self._setters:
             for setter in setters:
                 setter.put(float(values[place]))
-        self._controls.put(values)
+        self._controls.apply(values)
         for place in self._slopes:
             angle, g = float(values[place]), self._gravity
             self.model.gravity = (g * math.sin(angle), -g * math.cos(angle), self.model.gravity[2])
@@ -319,23 +321,23 @@ class Variants:
         kind = (*(info.path for info in infos), *engine.order, *engine.contacts)
         structure = repr(kind).encode() + getattr(engine, "structure", np.zeros(0)).tobytes()
         numbers = getattr(engine, "numbers", np.zeros(0))
-        return self._controlled(
+        return self._add_controls(
             Variant(simulation.state, structure, numbers, lambda: engine, simulation)
         )
 
-    def _controlled(self, variant: Variant) -> Variant:
+    def _add_controls(self, variant: Variant) -> Variant:
         if self._controller is not None:
             variant.controller, variant.held = (
                 self._controller,
-                self._controller.held(self.model, variant.engine),
+                self._controller.compile_for(self.model, variant.engine),
             )
         return variant
 
     def _make(self, values: Sequence[float]) -> Variant:
-        self.put(values)
+        self.apply_sample(values)
         given = self.given
         if self._changes == self._gains:
-            return self._controlled(replace(given))
+            return self._add_controls(replace(given))
         if self._owners is None:
             return self._whole()
         if self._renewal is None:
@@ -347,4 +349,4 @@ class Variants:
             return self._whole()
         # The auxiliary states may start otherwise.
         state = StateLayout(made.mechanism, given.state.order, made.forces.elements)
-        return self._controlled(Variant(state, given.structure, made.numbers, made.engine))
+        return self._add_controls(Variant(state, given.structure, made.numbers, made.engine))

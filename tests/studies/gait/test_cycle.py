@@ -14,7 +14,7 @@ from osimlite.errors import OsimliteError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.models.walkers import human_walker, steady_walker
 from osimlite.simulation import Simulation
-from osimlite.studies.gait.basin import find_basin, perturbed, walks_from
+from osimlite.studies.gait.basin import find_basin, sample_perturbed_starts, walks_from
 from osimlite.studies.gait.cycle import find_cycle, step_matrix
 from osimlite.studies.gait.stepmap import StepMap
 from osimlite.studies.gait.steps import along_slope, walk_many
@@ -113,7 +113,7 @@ def test_a_varied_map_is_that_of_the_other_model(steady):
     """Its reduced states lie along nearly the same directions, where those of a new map may be turned."""
     with Simulation(steady_walker(foot_ahead=0.073), "compiled") as simulation:
         new = StepMap(simulation.engine, simulation.initial_state({}, {}))
-        varied = steady.step_map.varied(simulation.engine, simulation.initial_state({}, {}))
+        varied = steady.step_map.with_model(simulation.engine, simulation.initial_state({}, {}))
         here = steady.cycle.state[None]
         assert np.array_equal(varied(here).states, new(here).states)
     assert np.abs(varied.basis - steady.step_map.basis).max() < 1e-2
@@ -122,8 +122,10 @@ def test_a_varied_map_is_that_of_the_other_model(steady):
 
 
 def test_perturbed_starts_stand_as_deep_as_before(steady):
-    starts = perturbed(steady.step_map, steady.start, 0.05, 8, 3)
-    assert np.array_equal(starts, perturbed(steady.step_map, steady.start, 0.05, 8, 3))
+    starts = sample_perturbed_starts(steady.step_map, steady.start, 0.05, 8, 3)
+    assert np.array_equal(
+        starts, sample_perturbed_starts(steady.step_map, steady.start, 0.05, 8, 3)
+    )
     place = steady.engine.contacts.index("RFootForce")
     before, after = (
         along_slope(steady.engine, np.atleast_2d(rows))[1][:, place]

@@ -166,11 +166,11 @@ def test_more_of_them_walk_where_a_cycle_costs_less():
     search = CycleSearch(plan(dynamic_walker(), NEAR), stable=1.0, perturb=0.02)
     with Simulation(steady_walker(), "compiled") as simulation:
         cycle = find_cycle(StepMap(simulation.engine, simulation.initial_state({}, {})))
-    known = search.cycle(search.fractions({INERTIA: 0.0921, AHEAD: 0.0744}), cycle.state)
+    known = search.find_cycle(search.fractions({INERTIA: 0.0921, AHEAD: 0.0744}), cycle.state)
     assert known.cycle.state == pytest.approx(cycle.state, abs=1e-4)
     assert known.walking > 0.5 and known.cost == 1.0 - known.walking
     search.stable = 0.1
-    strict = search.cycle(known.fractions, cycle.state)
+    strict = search.find_cycle(known.fractions, cycle.state)
     assert strict.cost == strict.cycle.largest and strict.walking == 0.0
 
 
@@ -178,7 +178,7 @@ def test_rounded_numbers_have_no_noise_in_the_last_bit():
     search = CycleSearch(plan(dynamic_walker(), NEAR | {INERTIA: (0.02, 1.0, "log")}))
     for inertia in (0.0894, 0.0673, 0.112, 0.33):
         numbers = search.numbers(
-            search.rounded(search.fractions({INERTIA: inertia, AHEAD: 0.0694}), 3)
+            search.round_fractions(search.fractions({INERTIA: inertia, AHEAD: 0.0694}), 3)
         )
         assert numbers == {INERTIA: inertia, AHEAD: 0.0694}
 
@@ -194,7 +194,7 @@ def test_random_walkers_do_not_depend_on_the_numbers_that_are_searched():
         made = plan(
             lambda numbers, given=given: human_walker(**(given | numbers)), ranges, parameters=given
         )
-        found.append(CycleSearch(made).candidates(512, 0))
+        found.append(CycleSearch(made).find_candidates(512, 0))
     assert len(found[0]) > 3
     assert [each.miss for each in found[0]] == [each.miss for each in found[1]]
     for one, other in zip(*found, strict=True):
@@ -211,10 +211,10 @@ class Valley:
     def __init__(self):
         self.asked = []
 
-    def rounded(self, fractions, digits):
+    def round_fractions(self, fractions, digits):
         return np.round(fractions, digits)
 
-    def cycle(self, fractions, state):
+    def find_cycle(self, fractions, state):
         self.asked.append(fractions)
         along, across = fractions.sum() - 1.6, fractions[0] - fractions[1]
         largest = 0.2 + abs(along) + 300.0 * abs(across)
@@ -227,7 +227,7 @@ class Valley:
 def test_a_narrow_valley_is_followed_to_rounded_numbers():
     """It follows the narrow valley without rounding, and rounds where it is wide enough for that."""
     valley = Valley()
-    first = valley.cycle(np.array([0.3111, 0.3113]), np.zeros(2))
+    first = valley.find_cycle(np.array([0.3111, 0.3113]), np.zeros(2))
     improvement = Improvement(valley, first, 2)
     improvement.run(400, 0)
     assert improvement.best.cost < valley.stable
@@ -239,7 +239,7 @@ def test_a_narrow_valley_is_followed_to_rounded_numbers():
 
 def test_a_search_that_gets_nowhere_keeps_the_first_cycle():
     valley = Valley()
-    first = valley.cycle(np.array([0.3, 0.3]), np.zeros(2))
+    first = valley.find_cycle(np.array([0.3, 0.3]), np.zeros(2))
     improvement = Improvement(valley, first, 2)
     improvement.run(0, 0)
     assert improvement.best is first and not improvement.cycles

@@ -8,7 +8,12 @@ import pytest
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import Simulation
 from osimlite.studies.gait.foot_contacts import find_footing
-from osimlite.studies.gait.starts import carriers, planted, stood, upright
+from osimlite.studies.gait.starts import (
+    find_carriers,
+    lift_to_depth,
+    move_along_neutral_directions,
+    plant_feet,
+)
 from osimlite.studies.gait.steps import along_slope
 
 
@@ -31,7 +36,7 @@ def places_of(walker, *names: str) -> list[int]:
 
 
 def test_the_pelvis_carries_the_walker(walker):
-    result = carriers(walker, find_footing(walker))
+    result = find_carriers(walker, find_footing(walker))
     forward, up = places_of(walker, "Pelvis_tx", "Pelvis_ty")
     assert result.places == (forward, up) and result.lift == up
 
@@ -43,7 +48,7 @@ def test_a_planted_foot_touches_and_rests(walker, states, slope):
     if slope is not None:
         with Simulation(dynamic_walker(slope=slope), "compiled") as simulation:
             numbers = np.tile(simulation.engine.numbers, (len(states), 1))
-    placed = planted(walker, footing, states, numbers=numbers)
+    placed = plant_feet(walker, footing, states, numbers=numbers)
     feet = [walker.contacts.index(foot[0]) for foot in footing.feet]
     which = None if numbers is None else rows
     depths = along_slope(walker, placed, numbers, which)[1][:, feet]
@@ -65,7 +70,7 @@ def test_a_planted_foot_touches_and_rests(walker, states, slope):
 def test_one_foot_is_put_as_deep_as_it_is_wanted(walker, states):
     footing = find_footing(walker)
     for foot in (0, 1):
-        placed = stood(walker, footing, states, 0.002, foot)
+        placed = lift_to_depth(walker, footing, states, 0.002, foot)
         depths = along_slope(walker, placed)[1][:, walker.contacts.index(footing.feet[foot][0])]
         assert depths == pytest.approx(0.002, abs=1e-12)
 
@@ -73,5 +78,5 @@ def test_one_foot_is_put_as_deep_as_it_is_wanted(walker, states):
 def test_upright_takes_away_what_does_not_matter():
     """The first entry that a direction changes becomes zero; what it does not change stays."""
     neutral = np.array([[0.0, 1.0, 0.0, 2.0], [0.0, 0.0, 3.0, -3.0]]).T
-    moved = upright(np.array([[5.0, 1.0, 2.0, 3.0]]), neutral)
+    moved = move_along_neutral_directions(np.array([[5.0, 1.0, 2.0, 3.0]]), neutral)
     assert moved == pytest.approx(np.array([[5.0, 0.0, 0.0, 3.0 - 2.0 + 2.0]]))

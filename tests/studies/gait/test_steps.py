@@ -100,7 +100,7 @@ def test_places_along_the_slope(engine):
 def follow(events, along, touching=(False, False)) -> Walk:
     contacts = ["RFootForce", "LFootForce", "RHipForce"]
     states = np.arange(len(events), dtype=float)[:, None]
-    return steps.follow(
+    return steps.follow_events(
         FootContacts(FEET, ("RHipForce",)),
         contacts,
         events,
@@ -153,7 +153,7 @@ def test_a_heel_and_a_toe_are_one_foot():
         (0.9, "heel", True),
     ]
     footing = FootContacts((("heel", "toe"), ("other",)), ())
-    walk = steps.follow(
+    walk = steps.follow_events(
         footing,
         ["heel", "toe", "other"],
         events,

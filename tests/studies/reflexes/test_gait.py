@@ -59,7 +59,7 @@ def test_our_human_s_gait(tmp_path) -> None:
     assert 0.93 < gait.centre[1] < gait.centre[0] < gait.centre[2] < 1.05
     assert gait.speed == pytest.approx(walked.report["speed"][0], rel=0.05)
     assert all(0.5 < part < 0.65 for part in gait.strides.stance) and 0.05 < gait.strides.both < 0.2
-    told = gait.told()
+    told = gait.describe()
     assert (
         list(told) == ["way", "heights", "strides", "stance", "ground"]
         and "weights" in told["ground"]

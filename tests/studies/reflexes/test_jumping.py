@@ -161,12 +161,12 @@ def test_candidates_jump_as_they_do_alone(folder) -> None:
 
 def test_a_search_finds_higher_jumps(folder, tmp_path) -> None:
     pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
-    from osimlite.studies.reflexes.search import search
+    from osimlite.studies.reflexes.search import search_parameters
 
     given = scenario(folder)
     assert {each.name for each in given.parameters()} == {*PUSHES}
     before = given.walk({}).report["jump height"][0]
-    found = search(given, tmp_path, generations=6)
+    found = search_parameters(given, tmp_path, generations=6)
     assert given.walk(found).report["jump height"][0] > before + 3.0
 
 

@@ -18,7 +18,7 @@ TURN = {"target": "flexor", "source": "forearm", "KP": "~0.1<0,1>", "KV": 0.1}
 
 def held(model: Any, given: dict[str, Any], values: dict[str, float] | None = None) -> Held:
     controller = osimlite.Feedback({"ReflexController": given}, values or {})
-    return controller.held(model, osimlite.simulation.Simulation(model, "compiled").engine)
+    return controller.compile_for(model, osimlite.simulation.Simulation(model, "compiled").engine)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_sides(tmp_path) -> None:
     turn = {"target": "vasti", "source": "femur_o", "axis": [1, 0, 0], "KP": "~0.1<0,1>"}
     controller = osimlite.Feedback({"ReflexController": {"symmetric": 1, "BodyOrientationReflex": turn}},
                                    {"vasti-femur_o.KP": 0.2})  # fmt: skip
-    felt = controller.held(model, osimlite.simulation.Simulation(model, "compiled").engine)
+    felt = controller.compile_for(model, osimlite.simulation.Simulation(model, "compiled").engine)
     assert felt.sensors == ("femur_r.angle(1,0,0)", "femur_l.angle(-1,0,0)")
 
 

@@ -115,13 +115,15 @@ def test_a_file_of_states_is_a_start(tmp_path) -> None:
 def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
     pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
     from osimlite.studies.reflexes.parameters import read_par
-    from osimlite.studies.reflexes.search import search
+    from osimlite.studies.reflexes.search import search_parameters
 
     scenario = Scenario(arm)
     assert [each.name for each in scenario.parameters()] == ["flexor-elbow.KP", "flexor-elbow.C0"]
     before = scenario.walk({}).results[0]
     seen: list[Any] = []
-    found = search(scenario, tmp_path / "out", generations=8, population=8, tell=seen.append)
+    found = search_parameters(
+        scenario, tmp_path / "out", generations=8, population=8, tell=seen.append
+    )
     assert len(seen) == 8 and seen[-1].best < 0.5 * before
     assert scenario.walk(found).results[0] == pytest.approx(seen[-1].best, rel=1e-6)
     assert set(read_par(tmp_path / "out" / "best.par")) == set(found)
@@ -129,20 +131,22 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
         name: best for name, (best, _, _) in read_par(tmp_path / "out" / "best.par").items()
     } == found
     with pytest.raises(OsimliteError, match=r"best\.par' is there already: go on with it"):
-        search(Scenario(arm), tmp_path / "out", generations=1, population=8)
+        search_parameters(Scenario(arm), tmp_path / "out", generations=1, population=8)
     text = (tmp_path / "out" / "best.par").read_text()
     (tmp_path / "out" / "best.par").write_text(text.replace("elbow.KP", "elbow.KQ"))
     with pytest.raises(
         OsimliteError,
         match=r"has no parameter 'flexor-elbow\.K[PQ]': they are of different searches",
     ):
-        search(Scenario(arm), tmp_path / "out", generations=1, population=8, resume=True)
+        search_parameters(Scenario(arm), tmp_path / "out", generations=1, population=8, resume=True)
     (tmp_path / "out" / "best.par").write_text(text)
     # The best so far is one of the candidates, and a mean beyond the bounds is none.
     text = (tmp_path / "out" / "best.par").read_text().split("\n", 1)
     name, best, _, std = text[0].split()
     (tmp_path / "out" / "best.par").write_text(f"{name} {best} -5 {std}\n{text[1]}")
-    again = search(Scenario(arm), tmp_path / "out", generations=1, population=8, resume=True)
+    again = search_parameters(
+        Scenario(arm), tmp_path / "out", generations=1, population=8, resume=True
+    )
     assert scenario.walk(again).results[0] <= scenario.walk(found).results[0]
 
 
@@ -244,12 +248,12 @@ def test_what_is_not_done_is_refused_by_name(arm, old, new, words) -> None:
 
 def test_settings_without_sense(ours, tmp_path) -> None:
     pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
-    from osimlite.studies.reflexes.search import search
+    from osimlite.studies.reflexes.search import search_parameters
 
     with pytest.raises(OsimliteError, match="shorter than a control step"):
         ours.walk({}, duration=0.0)
     with pytest.raises(OsimliteError, match="4 candidates in a generation"):
-        search(ours, tmp_path, population=1)
+        search_parameters(ours, tmp_path, population=1)
 
 
 def test_the_scenario_says_how_to_search_and_step(arm) -> None:

@@ -18,7 +18,7 @@ from osimlite.errors import OsimliteError, SettingError
 from osimlite.studies.sweep.optimize import BEST, HISTORY, SUMMARY, Objective, optimize
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.run import sweep
-from osimlite.studies.sweep.sampling import samples
+from osimlite.studies.sweep.sampling import choose_samples
 from tests.studies.sweep.test_controls import pulled
 
 distributed = pytest.importorskip("distributed", reason="needs dask.distributed (extra 'sweep')")
@@ -127,7 +127,7 @@ def test_workers_and_coordinator_are_killed_and_nothing_is_lost(
     vary = {"RHip_rz": "0.3:0.7", "/bodyset/Pelvis/mass": "1:2:log"}
     measures = ("distance", "patience:ended")
     here = plan(osimlite.read(tmp_path / "walker.osim"), vary, measures=measures, to=1.5)
-    alone = sweep(here, samples(here.variables, None, 420, 3), tmp_path / "alone.parquet")
+    alone = sweep(here, choose_samples(here.variables, None, 420, 3), tmp_path / "alone.parquet")
     partial = tmp_path / "results.parquet.partial"
 
     def grows(process):
@@ -164,13 +164,13 @@ def test_workers_and_coordinator_are_killed_and_nothing_is_lost(
 def test_a_cluster_that_is_not_there_is_told(walker, tmp_path, monkeypatch):
     monkeypatch.setattr("osimlite.base.pools.CLUSTER_TIMEOUT_S", 1)
     made = plan(walker, {"RHip_rz": (0.3, 0.7)})
-    chosen = samples(made.variables, "random", 10)
+    chosen = choose_samples(made.variables, "random", 10)
     with pytest.raises(
         OsimliteError, match=r"no Dask scheduler at 'tcp://127.0.0.1:1'.*dask scheduler"
     ):
         sweep(made, chosen, tmp_path / "r.parquet", cluster="tcp://127.0.0.1:1")
     for address, words in (
-        ("scheduler", "'scheduler' is no address .*missing port.*tcp://127.0.0.1:8786"),
+        ("scheduler", "'scheduler' is not an address .*missing port.*tcp://127.0.0.1:8786"),
         ("http://127.0.0.1:8786", "unknown address scheme"),
     ):
         with pytest.raises(SettingError, match=words):
@@ -199,7 +199,7 @@ def test_a_search_finds_the_same_there(cluster, tmp_path):
 
 def test_functions_that_cannot_travel_are_told(cluster, walker, tmp_path):
     made = plan(walker, {"RHip_rz": (0.3, 0.7)}, measures=(lambda run: 1.0,))
-    chosen = samples(made.variables, "random", 10)
+    chosen = choose_samples(made.variables, "random", 10)
     with pytest.raises(OsimliteError, match="module:function"):
         sweep(made, chosen, tmp_path / "r.parquet", cluster=cluster.address)
     # Threads of this process need to send nothing.
@@ -212,7 +212,7 @@ def test_workers_that_cannot_do_the_task_are_told(cluster, walker, tmp_path, mon
     monkeypatch.syspath_prepend(str(tmp_path))
     one = importlib.import_module("only_here").one
 
-    chosen = samples(plan(walker, {"RHip_rz": (0.3, 0.7)}).variables, "random", 10)
+    chosen = choose_samples(plan(walker, {"RHip_rz": (0.3, 0.7)}).variables, "random", 10)
     for measure in (one, "only_here:one"):
         made = plan(walker, {"RHip_rz": (0.3, 0.7)}, measures=(measure,), to=0.1)
         with pytest.raises(OsimliteError, match="only_here"):
@@ -237,7 +237,7 @@ def test_a_scheduler_that_goes_is_told_and_nothing_is_lost(
         made = plan(
             walker, {"RHip_rz": (0.3, 0.7)}, measures=("distance", "patience:ended"), to=0.3
         )
-        chosen = samples(made.variables, "random", 900)
+        chosen = choose_samples(made.variables, "random", 900)
 
         def end(done, of):
             if done > 40:

@@ -19,8 +19,8 @@ from osimlite.studies.sweep.controls import Control
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.run import sweep
 from osimlite.studies.sweep.runner import Runner
-from osimlite.studies.sweep.sampling import samples
-from osimlite.studies.sweep.variables import variables
+from osimlite.studies.sweep.sampling import choose_samples
+from osimlite.studies.sweep.variables import resolve_variables
 from osimlite.studies.sweep.variants import Variants
 from tests.simulation.elements.muscle_rows import hung, muscle
 
@@ -167,7 +167,7 @@ def test_the_model_that_is_written_does_the_same(tmp_path):
     row, given = (0.2, 0.9, 0.4, 0.01, 1.7), {"motor": 0.1}
     (result,) = runs(pulled(), vary, row, controls=given)
     variants = Variants(plan(pulled(), vary, to=TO, controls=given))
-    variants.put(row)
+    variants.apply_sample(row)
     osimlite.write(variants.model, tmp_path / "best.osim")
     best = osimlite.read(tmp_path / "best.osim")
     assert ends(best) == pytest.approx(result, rel=1e-12)
@@ -182,7 +182,7 @@ def test_the_results_are_the_same_for_any_number_of_workers(tmp_path):
         "mu/max_isometric_force": (100, 500),
     }
     made = plan(pulled(), vary, measures=(*ENDS, "max(mu)", "mean(x/speed)"), to=TO)
-    chosen = samples(made.variables, "sobol", 40)
+    chosen = choose_samples(made.variables, "sobol", 40)
     one, three = (
         sweep(made, chosen, tmp_path / f"{n}.parquet", workers=n).path.read_bytes() for n in (1, 3)
     )
@@ -193,7 +193,9 @@ def test_names():
     model = pulled()
 
     def targets(name):
-        return [item.target for item in variables({name: "0:1"}, model, build_mechanism(model))]
+        return [
+            item.target for item in resolve_variables({name: "0:1"}, model, build_mechanism(model))
+        ]
 
     mu, motor = "/forceset/mu", "/forceset/motor"
     assert targets("mu/control") == [Control((mu,))]

@@ -12,7 +12,14 @@ import osimlite
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import Simulation
-from osimlite.studies.sweep.optimize import BEST, HISTORY, SUMMARY, Objective, found_by, optimize
+from osimlite.studies.sweep.optimize import (
+    BEST,
+    HISTORY,
+    SUMMARY,
+    Objective,
+    optimize,
+    read_best_values,
+)
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.run import Interrupted
 from osimlite.studies.sweep.search import METHODS, BudgetExhausted, Search
@@ -90,7 +97,7 @@ def test_it_begins_where_another_search_has_ended(made, walker, tmp_path):
     first = optimize(made, DISTANCE, tmp_path / "first", budget=16, popsize=8)
     other = plan(walker, {**VARY, "LHip_rz": (-0.4, 0.0)}, to=0.5)
     choices = {
-        "start": found_by(tmp_path / "first"),
+        "start": read_best_values(tmp_path / "first"),
         "method": "cma",
         "budget": 4,
         "popsize": 4,
@@ -99,7 +106,7 @@ def test_it_begins_where_another_search_has_ended(made, walker, tmp_path):
     again = optimize(other, DISTANCE, tmp_path / "again", **choices)
     assert again.values == pytest.approx({**first.values, "LHip_rz": np.radians(-10.0)}, abs=1e-6)
     with pytest.raises(OsimliteError, match=r"'none.summary.json' is not the summary of a search"):
-        found_by("none")
+        read_best_values("none")
 
 
 def test_it_looks_around_from_where_the_model_is(made, tmp_path):

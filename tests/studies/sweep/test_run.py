@@ -18,9 +18,15 @@ from osimlite.errors import MissingFileError, OsimliteError, SettingError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.studies.sweep import results
 from osimlite.studies.sweep.plan import plan
-from osimlite.studies.sweep.results import Partial, differences, ranges, schema, settings_of
+from osimlite.studies.sweep.results import (
+    Partial,
+    compute_ranges,
+    describe_differences,
+    make_schema,
+    settings_of,
+)
 from osimlite.studies.sweep.run import Interrupted, sweep
-from osimlite.studies.sweep.sampling import samples
+from osimlite.studies.sweep.sampling import choose_samples
 
 pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
 VARY = {"RHip_rz": (0.3, 0.7), "/forceset/*Foot*/contact_parameters/stiffness": (1e5, 1e6, "log")}
@@ -32,7 +38,7 @@ def made(walker):
 
 
 def test_the_file_is_the_same_from_any_number_of_workers(made, tmp_path):
-    chosen = samples(made.variables, "sobol", 60, 5)
+    chosen = choose_samples(made.variables, "sobol", 60, 5)
     outcomes = [
         sweep(made, chosen, tmp_path / f"{count}.parquet", workers=count) for count in (1, 2, 3)
     ]
@@ -53,7 +59,7 @@ def test_the_file_is_the_same_from_any_number_of_workers(made, tmp_path):
 def test_results_are_tables_and_show_themselves(made, tmp_path):
     for package in ("pandas", "xarray"):
         pytest.importorskip(package, reason=f"needs {package} (extra 'frame')")
-    outcome = sweep(made, samples(made.variables, "sobol", 12, 5), tmp_path / "r.parquet")
+    outcome = sweep(made, choose_samples(made.variables, "sobol", 12, 5), tmp_path / "r.parquet")
     table, frame, data = outcome.to_arrow(), outcome.to_frame(), outcome.to_xarray()
     assert table.num_rows == 12 and frame.index.name == "run" and data.sizes == {"run": 12}
     assert (
@@ -72,7 +78,7 @@ def test_results_are_tables_and_show_themselves(made, tmp_path):
 def test_processes_of_bullet_too(walker, tmp_path):
     pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     made = plan(walker, {"RHip_rz": (0.3, 0.7)}, to=0.2, engine="bullet")
-    chosen = samples(made.variables, "random", 12, 1)
+    chosen = choose_samples(made.variables, "random", 12, 1)
     whole = [
         sweep(made, chosen, tmp_path / f"{n}.parquet", workers=n).path.read_bytes() for n in (1, 2)
     ]
@@ -80,7 +86,7 @@ def test_processes_of_bullet_too(walker, tmp_path):
 
 
 def test_settings_are_in_the_file(made, tmp_path):
-    chosen = samples(made.variables, "lhs", 5, 3)
+    chosen = choose_samples(made.variables, "lhs", 5, 3)
     result = settings_of(sweep(made, chosen, tmp_path / "r.parquet").path)
     assert result["sampler"] == "lhs" and result["samples"] == 5 and result["seed"] == 3
     assert result["vary"][0] == {"name": "RHip_rz", "low": 0.3, "high": 0.7}
@@ -104,7 +110,7 @@ class Stopper:
 
 
 def test_an_interrupted_sweep_goes_on(made, tmp_path):
-    chosen = samples(made.variables, "sobol", 80, 5)
+    chosen = choose_samples(made.variables, "sobol", 80, 5)
     whole = sweep(made, chosen, tmp_path / "whole.parquet").path.read_bytes()
     path = tmp_path / "r.parquet"
     for after in (10, 40):
@@ -124,9 +130,11 @@ def test_an_interrupted_sweep_goes_on(made, tmp_path):
 
 def test_a_colon_in_the_name_of_a_file_is_no_protocol(made, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    chosen = samples(made.variables, "sobol", 4, 5)
+    chosen = choose_samples(made.variables, "sobol", 4, 5)
     assert sweep(made, chosen, "s3:r.parquet").count == 4
-    assert settings_of("s3:r.parquet")["samples"] == 4 and ranges("s3:r.parquet", ["distance"])
+    assert settings_of("s3:r.parquet")["samples"] == 4 and compute_ranges(
+        "s3:r.parquet", ["distance"]
+    )
     assert sweep(made, chosen, "s3:r.parquet", resume=True).before == 4
     with pytest.raises(MissingFileError, match="no such file"):
         settings_of("s3:none.parquet")
@@ -136,7 +144,7 @@ def test_interrupted_before_anything_was_saved(made, tmp_path):
     with pytest.raises(Interrupted, match=r"^interrupted before any run was saved$"):
         sweep(
             made,
-            samples(made.variables, "sobol", 80, 5),
+            choose_samples(made.variables, "sobol", 80, 5),
             tmp_path / "r.parquet",
             progress=Stopper(0),
         )
@@ -145,11 +153,11 @@ def test_interrupted_before_anything_was_saved(made, tmp_path):
 
 def test_other_settings_are_told_apart(made, walker, tmp_path):
     path = tmp_path / "r.parquet"
-    chosen = samples(made.variables, "sobol", 40, 5)
+    chosen = choose_samples(made.variables, "sobol", 40, 5)
     with pytest.raises(Interrupted):
         sweep(made, chosen, path, workers=1, progress=Stopper(8))
     with pytest.raises(SettingError, match=r"seed \(5 before, 6 now\)"):
-        sweep(made, samples(made.variables, "sobol", 40, 6), path, resume=True)
+        sweep(made, choose_samples(made.variables, "sobol", 40, 6), path, resume=True)
     walker.tree().by_path["/bodyset/Pelvis"].mass = 2.0
     other = plan(walker, VARY, measures=("distance", "largest_force"), to=0.4)
     with pytest.raises(SettingError, match=r"other settings: model and to \(0.3 before, 0.4 now\)"):
@@ -163,12 +171,12 @@ def test_other_settings_are_told_apart(made, walker, tmp_path):
         sweep(made, chosen, tmp_path / "x.parquet", resume=True)
     sweep(made, chosen, path, resume=True)
     with pytest.raises(SettingError, match=r"samples \(40 before, 41 now\); name another place"):
-        sweep(made, samples(made.variables, "sobol", 41, 5), path, resume=True)
+        sweep(made, choose_samples(made.variables, "sobol", 41, 5), path, resume=True)
 
 
 def test_finished_results_are_spared_unless_forced(made, tmp_path):
     path = tmp_path / "r.parquet"
-    few, more = (samples(made.variables, "sobol", count, 5) for count in (6, 8))
+    few, more = (choose_samples(made.variables, "sobol", count, 5) for count in (6, 8))
     first = sweep(made, few, path).path.read_bytes()
     for resume in (False, True):
         with pytest.raises(SettingError, match="--force"):
@@ -192,7 +200,7 @@ def test_finished_results_are_spared_unless_forced(made, tmp_path):
 
 
 def test_a_torn_message_at_the_end_is_cut_off(made, tmp_path):
-    chosen = samples(made.variables, "sobol", 40, 5)
+    chosen = choose_samples(made.variables, "sobol", 40, 5)
     whole = sweep(made, chosen, tmp_path / "whole.parquet").path.read_bytes()
     path, partial = tmp_path / "r.parquet", tmp_path / "r.parquet.partial"
     with pytest.raises(Interrupted):
@@ -220,7 +228,10 @@ def _ends(content: bytes) -> list[int]:
 def interrupted_three_times(tmp_path_factory):
     """A plan and its samples, the whole results, and the partial file, with three batches."""
     made = plan(dynamic_walker(), {"RHip_rz": (0.3, 0.5)}, to=0.05)
-    chosen, folder = samples(made.variables, "sobol", 40, 5), tmp_path_factory.mktemp("sweep")
+    chosen, folder = (
+        choose_samples(made.variables, "sobol", 40, 5),
+        tmp_path_factory.mktemp("sweep"),
+    )
     whole = sweep(made, chosen, folder / "whole.parquet").path.read_bytes()
     for count in (8, 16, 30):
         with pytest.raises(Interrupted):
@@ -300,7 +311,7 @@ def test_work_damaged_at_its_beginning_is_refused(interrupted_three_times, tmp_p
 
 
 def test_what_is_damaged_during_the_work_makes_no_results(tmp_path):
-    partial = Partial(tmp_path / "r", schema({"run": "int64"}, {}))
+    partial = Partial(tmp_path / "r", make_schema({"run": "int64"}, {}))
     for first in (0, 2):
         partial.add([[first, first + 1]])
     content = partial.partial.read_bytes()
@@ -312,19 +323,19 @@ def test_what_is_damaged_during_the_work_makes_no_results(tmp_path):
 
 
 def test_damaged_results_are_told(tmp_path):
-    partial = Partial(tmp_path / "r", schema({"run": "int64", "x": "float64"}, {"a": 1}))
+    partial = Partial(tmp_path / "r", make_schema({"run": "int64", "x": "float64"}, {"a": 1}))
     partial.add([np.arange(1000), np.random.default_rng(1).uniform(size=1000)])
     partial.finish()
     partial.close()
     content = (tmp_path / "r").read_bytes()
     (tmp_path / "r").write_bytes(_flipped(content, len(content) // 2))
     with pytest.raises(OsimliteError, match="the results are damaged"):
-        ranges(tmp_path / "r", ["x"])
+        compute_ranges(tmp_path / "r", ["x"])
 
 
 @pytest.mark.parametrize("text", [b"[]", b"7", b"null", b'"a"', b"{", b"[" * 100_000])
 def test_settings_of_another_type_are_none(tmp_path, text):
-    table = schema({"run": "int64"}, {}).with_metadata({results.KEY: text})
+    table = make_schema({"run": "int64"}, {}).with_metadata({results.KEY: text})
     pq.write_table(table.empty_table(), tmp_path / "r")
     with pytest.raises(OsimliteError, match="not the results of a sweep"):
         results.settings_of(tmp_path / "r")
@@ -332,7 +343,7 @@ def test_settings_of_another_type_are_none(tmp_path, text):
 
 def test_row_groups_do_not_depend_on_the_pieces(tmp_path, monkeypatch):
     monkeypatch.setattr(results, "ROWS_PER_GROUP", 10)
-    table = schema({"run": "int64", "x": "float64", "status": "string"}, {"a": 1})
+    table = make_schema({"run": "int64", "x": "float64", "status": "string"}, {"a": 1})
     for name, pieces in {"one": [37], "many": [1, 9, 3, 20, 4], "few": [25, 12]}.items():
         partial = Partial(tmp_path / name, table)
         first = 0
@@ -354,23 +365,23 @@ def test_row_groups_do_not_depend_on_the_pieces(tmp_path, monkeypatch):
         10,
         7,
     ]
-    assert ranges(tmp_path / "one", ["x"])["x"] == (0.0, 0, 18.0, 36, 9.0)
+    assert compute_ranges(tmp_path / "one", ["x"])["x"] == (0.0, 0, 18.0, 36, 9.0)
 
 
 def test_a_column_has_a_name_of_its_own(walker, tmp_path):
     made = plan(walker, {"RHip_rz/speed": (0.0, 1.0)}, measures=("RHip_rz/speed",), to=0.1)
     with pytest.raises(SettingError, match="two columns 'RHip_rz/speed'"):
-        sweep(made, samples(made.variables, "random", 4), tmp_path / "r.parquet")
+        sweep(made, choose_samples(made.variables, "random", 4), tmp_path / "r.parquet")
     assert not list(tmp_path.iterdir())
     path = "/jointset/RightThighToPelvis/RHip_rz/speed"
     made = plan(walker, {"RHip_rz/speed": (0.0, 1.0)}, measures=(path,), to=0.1)
-    sweep(made, samples(made.variables, "random", 4), tmp_path / "r.parquet")
+    sweep(made, choose_samples(made.variables, "random", 4), tmp_path / "r.parquet")
     assert {"RHip_rz/speed", path} < set(pq.read_table(tmp_path / "r.parquet").column_names)
 
 
 def test_one_program_at_a_time_writes(made, tmp_path):
     """Who goes on with a sweep that is still running would write rows twice."""
-    path, chosen = tmp_path / "r.parquet", samples(made.variables, "sobol", 40, 5)
+    path, chosen = tmp_path / "r.parquet", choose_samples(made.variables, "sobol", 40, 5)
     told = []
 
     def interfere(done, of):
@@ -387,7 +398,7 @@ def test_one_program_at_a_time_writes(made, tmp_path):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
 def test_a_full_disk_is_told(tmp_path):
-    partial = Partial(tmp_path / "r", schema({"run": "int64"}, {}))
+    partial = Partial(tmp_path / "r", make_schema({"run": "int64"}, {}))
     partial.add([[0, 1]])
     partial.stream.close()
     partial.stream = open("/dev/full", "ab", buffering=0)  # noqa: SIM115
@@ -400,7 +411,7 @@ def test_a_full_disk_is_told(tmp_path):
 
 @pytest.mark.usefixtures("windows_files")
 def test_a_table_of_results_lets_go_of_its_files_first(tmp_path):
-    columns = schema({"run": "int64"}, {})
+    columns = make_schema({"run": "int64"}, {})
     Partial(tmp_path / "empty", columns).close()
     assert not (tmp_path / "empty.partial").exists()
     partial = Partial(tmp_path / "whole", columns)
@@ -415,7 +426,7 @@ def test_a_table_of_results_lets_go_of_its_files_first(tmp_path):
 
 
 def test_differences_in_words():
-    assert differences({"a": 1, "b": [1]}, {"a": 2, "b": [2], "c": 3}) == [
+    assert describe_differences({"a": 1, "b": [1]}, {"a": 2, "b": [2], "c": 3}) == [
         "a (1 before, 2 now)",
         "b",
         "c (None before, 3 now)",
@@ -459,7 +470,7 @@ def test_a_command_that_is_ended_goes_on(signum, made, tmp_path: Path, walker):
     made = plan(
         osimlite.read(tmp_path / "walker.osim"), {"RHip_rz": "0.3:0.7"}, to=3.0, accuracy=1e-5
     )
-    chosen = samples(made.variables, None, 4000)
+    chosen = choose_samples(made.variables, None, 4000)
     before: list[float] = []
     with pytest.raises(Interrupted):
         sweep(
@@ -486,14 +497,14 @@ def _first(before, number):
 def schema_of(made, chosen):
     from osimlite.studies.sweep.run import settings
 
-    return schema(made.columns("run"), settings(made, chosen))
+    return make_schema(made.columns("run"), settings(made, chosen))
 
 
 def test_memory_does_not_grow_with_the_number_of_runs(made, tmp_path):
     """Of Python's own objects, after the first hundred runs."""
     import tracemalloc
 
-    chosen = samples(made.variables, "lhs", 400, 5)
+    chosen = choose_samples(made.variables, "lhs", 400, 5)
     peaks = []
 
     def note(done, of):

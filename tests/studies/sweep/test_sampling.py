@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.errors import SettingError
-from osimlite.studies.sweep.sampling import SAMPLERS, Samples, samples
+from osimlite.studies.sweep.sampling import SAMPLERS, Samples, choose_samples
 from osimlite.studies.sweep.variables import Slope, Start, Variable
 
 qmc = pytest.importorskip("scipy.stats.qmc", reason="needs scipy (extra 'sweep')")
@@ -57,7 +57,7 @@ def test_pieces_come_in_any_order(sampler, pieces):
 
 
 def test_grid_has_every_combination_and_both_ends():
-    result = samples(THREE)
+    result = choose_samples(THREE)
     assert result.sampler == "grid" and result.count == 12
     rows = result.block(0, 100)
     assert len({tuple(row) for row in rows}) == 12
@@ -110,16 +110,16 @@ def test_a_block_of_many_needs_no_more_memory_than_the_block():
 def test_what_does_not_go_together_is_said():
     free = variable("a", 0.0, 1.0)
     with pytest.raises(SettingError, match="did you mean 'sobol'"):
-        samples([free], "sobl", 5)
+        choose_samples([free], "sobl", 5)
     with pytest.raises(SettingError, match="a=LOW:HIGH:COUNT"):
-        samples([free], "grid")
+        choose_samples([free], "grid")
     with pytest.raises(SettingError, match="--samples"):
-        samples([free])
+        choose_samples([free])
     with pytest.raises(SettingError, match="12 points"):
-        samples(THREE, "grid", 5)
+        choose_samples(THREE, "grid", 5)
     with pytest.raises(SettingError, match="leave out one of the two, or name the --sampler"):
-        samples(THREE, None, 5)
-    assert samples(THREE, "lhs", 5).count == 5
+        choose_samples(THREE, None, 5)
+    assert choose_samples(THREE, "lhs", 5).count == 5
     with pytest.raises(SettingError, match="above zero"):
-        samples([free], "random", 0)
-    assert samples([Variable("slope", Slope(), 0.1, 0.1, 1)]).count == 1
+        choose_samples([free], "random", 0)
+    assert choose_samples([Variable("slope", Slope(), 0.1, 0.1, 1)]).count == 1

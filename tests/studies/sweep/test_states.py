@@ -13,7 +13,7 @@ from osimlite.simulation import Simulation
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.run import Interrupted, sweep
 from osimlite.studies.sweep.runner import Runner
-from osimlite.studies.sweep.sampling import samples
+from osimlite.studies.sweep.sampling import choose_samples
 from tests.oracle.random_models import RandomModel
 from tests.simulation.elements.muscle_rows import hung, muscle
 
@@ -47,7 +47,7 @@ def test_random_models_keep_their_states_through_an_interruption(seed, tmp_path_
     made = plan(
         random.model, vary, measures=(*paths, all_of_them), to=0.02, accuracy=1e-7, report_interval=0.01
     )  # fmt: skip
-    chosen = samples(made.variables, "sobol", 16, 1)
+    chosen = choose_samples(made.variables, "sobol", 16, 1)
     whole = sweep(made, chosen, folder / "whole.parquet", workers=1).path
     with pytest.raises(Interrupted):
         sweep(made, chosen, folder / "r.parquet", workers=1, progress=interrupt)

@@ -21,8 +21,8 @@ from osimlite.studies.sweep.variables import (
     Slope,
     Start,
     Variable,
-    parse,
-    variables,
+    parse_ranges,
+    resolve_variables,
 )
 
 MODEL = dynamic_walker()
@@ -31,7 +31,7 @@ HIP = "/jointset/RightThighToPelvis/RHip_rz"
 
 
 def one(name, given="0:1", parameters=None):
-    return variables({name: given}, MODEL, MECHANISM, parameters or {})[0]
+    return resolve_variables({name: given}, MODEL, MECHANISM, parameters or {})[0]
 
 
 def test_names():
@@ -60,14 +60,14 @@ def test_controls():
     model = dynamic_walker()
     model.add(CoordinateActuator(name="motor", coordinate="RHip_rz"))
     for name in ("motor/control", "/forceset/motor/control"):
-        (result,) = variables({name: "-1:1"}, model, build_mechanism(model))
+        (result,) = resolve_variables({name: "-1:1"}, model, build_mechanism(model))
         assert result.target == Control(("/forceset/motor",))
     with pytest.raises(SettingError, match="'motor' is an actuator: vary 'motor/control', or"):
-        variables({"motor": "0:1"}, model, build_mechanism(model), {})
+        resolve_variables({"motor": "0:1"}, model, build_mechanism(model), {})
     with pytest.raises(SettingError, match="did you mean 'motor/control'"):
-        variables({"moter/control": "0:1"}, model, build_mechanism(model))
+        resolve_variables({"moter/control": "0:1"}, model, build_mechanism(model))
     with pytest.raises(SettingError, match="are the same number; vary one of them"):
-        variables(
+        resolve_variables(
             {"motor/control": "0:1", "/forceset/motor/control": "0:1"},
             model,
             build_mechanism(model),
@@ -169,19 +169,21 @@ def test_ranges_that_are_none(given, words):
 
 
 def test_words_of_the_command_line():
-    assert parse(["a=0:1", " b = 2:3:4 "]) == {"a": "0:1", "b": "2:3:4"}
+    assert parse_ranges(["a=0:1", " b = 2:3:4 "]) == {"a": "0:1", "b": "2:3:4"}
     for word in ("a", "a=", "=1:2"):
         with pytest.raises(SettingError, match="--vary takes"):
-            parse([word])
+            parse_ranges([word])
     with pytest.raises(SettingError, match="twice"):
-        parse(["a=1:2", "a=2:3"])
+        parse_ranges(["a=1:2", "a=2:3"])
 
 
 def test_the_same_number_is_not_varied_twice():
     with pytest.raises(SettingError, match="same number"):
-        variables({"/bodyset/*/mass": "1:2", "/bodyset/Pelvis/mass": "1:2"}, MODEL, MECHANISM)
+        resolve_variables(
+            {"/bodyset/*/mass": "1:2", "/bodyset/Pelvis/mass": "1:2"}, MODEL, MECHANISM
+        )
     with pytest.raises(SettingError, match="same number"):
-        variables({"RHip_rz": "1:2", HIP: "1:2"}, MODEL, MECHANISM)
+        resolve_variables({"RHip_rz": "1:2", HIP: "1:2"}, MODEL, MECHANISM)
     with pytest.raises(SettingError, match="locked"):
         one("platform_rz/speed")
 

@@ -13,7 +13,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import Simulation
 from osimlite.studies.gait.foot_contacts import find_footing
 from osimlite.studies.gait.measures import PRESSED
-from osimlite.studies.gait.starts import planted
+from osimlite.studies.gait.starts import plant_feet
 from osimlite.studies.gait.steps import along_slope, walk_many
 from osimlite.studies.sweep.measures import measure
 from osimlite.studies.sweep.optimize import Objective, optimize
@@ -38,7 +38,7 @@ def walks_of(made, rows):
     for row in rows:
         engine = runner.variants.variant(row.tolist()).engine
         start = runner.variants.start(runner.variants.variant(row.tolist()), row.tolist())
-        starts.append(planted(engine, find_footing(engine), start[None])[0])
+        starts.append(plant_feet(engine, find_footing(engine), start[None])[0])
         starts[-1][engine.order.index(engine.mechanism.coordinate_index("Pelvis_ty"))] -= PRESSED
         walks += walk_many(engine, starts[-1][None], made.to, accuracy=made.accuracy)
     return np.array(starts), walks
@@ -81,7 +81,7 @@ def test_a_planted_walker_stands_at_rest(walker):
     given = runner.variants.given
     engine = given.engine
     bare = np.array([runner.variants.start(given, row) for row in rows.tolist()])
-    starts = runner.variants.placed(engine, [given] * len(rows), bare)
+    starts = runner.variants.place_states(engine, [given] * len(rows), bare)
     feet = [engine.contacts.index(name) for foot in find_footing(engine).feet for name in foot]
     n, which = len(engine.order), np.arange(len(rows))
 
