@@ -1,9 +1,10 @@
-"""Code that branches on symbols, run so that what it computes holds on both sides.
+"""Execution of code that branches on symbols, so that the result holds on both sides.
 
-A branch that only assigns is run for both sides, and what they have set is merged at its end
-(`Branch`). Where a side returns, or leaves a round of a loop, the whole function is run once for
-each way through it (`run_all_branches`). What cannot be merged, such as how many points a path runs through,
-is torn; if somebody asks for it, a wider part is run in both ways.
+A branch whose sides only assign is run for both sides, and the assigned values are merged
+(`Branch`). Where a side returns or leaves a loop, the whole function is run once for each
+combination of sides (`run_all_branches`). Values that cannot be merged, such as the number of
+points of a path, become unmergeable; when one is used, a wider part of the code is run for both
+sides.
 """
 
 from __future__ import annotations
@@ -25,17 +26,19 @@ from osimlite.derivatives.symbols import (
 )
 
 MAX_BRANCH_COMBINATIONS = 64
-"""Through one function; what has more is refused."""
+"""Maximum number of combinations of branches through one function."""
 
 Writes = dict[tuple[int, int], tuple[list[Any], int, Any]]
-"""Cells with what is written into them."""
+"""Cells with the values written into them."""
 
 
 class _EvaluationState:
-    """What is known while a system is evaluated.
+    """State of the evaluation of a system.
 
-    Attributes: wider: parts of the code, what they would merge being needed apart: their branches
-        are those of what calls them. frame: of the function that is being run in all its ways.
+    Attributes:
+        widened: parts of the code whose branches belong to their caller, as a merged value of them
+            was unmergeable.
+        frame: function that is run for all combinations of its branches.
         failures: conditions under which a law has no solution, or a matrix no inverse.
     """
 
@@ -49,7 +52,7 @@ run = _EvaluationState()
 
 
 class _FunctionFrame:
-    """One way through a function: what was sides at its branches, and the tests there."""
+    """One combination of branches through a function: the sides taken, and their tests."""
 
     def __init__(self) -> None:
         self.sides: list[bool] = []
@@ -59,7 +62,11 @@ class _FunctionFrame:
 
 
 def run_until_mergeable(function: Callable[[], Any]) -> Any:
-    """What a function finds once it is known which of its parts are needed apart."""
+    """Return the result of a function, rerun with wider branches until all used values can be merged.
+
+    Raises:
+        NoFormula: a part depends on the state in a way that has no formula.
+    """
     while True:
         run.frame, run.failures, where.condition = None, [], None
         Vector.journals.clear()
@@ -77,7 +84,7 @@ def run_until_mergeable(function: Callable[[], Any]) -> Any:
 
 
 def _undo_writes() -> Writes:
-    """Take back what was written since the last journal began; what it was."""
+    """Undo what was written since the last journal began, and return it."""
     written: Writes = {}
     for key, (cells, place, before) in Vector.journals.pop().items():
         written[key] = cells, place, cells[place]
@@ -86,11 +93,13 @@ def _undo_writes() -> Writes:
 
 
 def _apply_writes(written: Writes) -> None:
+    """Write values into their cells."""
     for cells, place, value in written.values():
         Vector(cells)[place] = value
 
 
 def _merge_writes(test: Any, one: Writes, other: Writes, part: Any) -> Writes:
+    """Return the writes of two sides, merged by a test."""
     result: Writes = {}
     for key in one | other:
         cells, place, _ = one.get(key) or other[key]
@@ -101,11 +110,11 @@ def _merge_writes(test: Any, one: Writes, other: Writes, part: Any) -> Writes:
 
 
 class Branch:
-    """An `if` whose sides only assign.
+    """Branch (`if`) whose sides only assign.
 
     Args:
-        part: of the code.
-        test: what decides.
+        part: part of the code, for messages and identity.
+        test: condition.
     """
 
     def __init__(self, part: str, test: Any) -> None:
@@ -117,7 +126,7 @@ class Branch:
         self.ends: list[tuple[Any, ...]] = []
 
     def sides(self) -> Iterator[bool]:
-        """Which sides are run."""
+        """Yield the sides to run."""
         if not is_symbol(self.test):
             yield bool(self.test)
             return
@@ -134,7 +143,7 @@ class Branch:
 
     @property
     def end(self) -> tuple[Any, ...]:
-        """The variables afterwards."""
+        """Values of the variables after the branch."""
         if len(self.ends) == 1:
             return self.ends[0]
         one, other = self.ends
@@ -144,7 +153,11 @@ class Branch:
 
 
 def decide(part: str, test: Any) -> bool:
-    """Which side of a branch is sides on the way that is being run."""
+    """Return the side of a branch in the combination that is being run.
+
+    Raises:
+        NoFormula: the branch is outside of functions that can be rerun.
+    """
     test = simplify_number(test)
     if not is_symbol(test):
         return bool(test)
@@ -162,7 +175,7 @@ def decide(part: str, test: Any) -> bool:
 
 
 def record_failure(test: Any) -> bool:
-    """Whether there is no result; where that depends on the state, the results will be no numbers."""
+    """Return whether there is certainly no result; record a test on symbols, where results become NaN."""
     test = simplify_number(test)
     if not is_symbol(test):
         return bool(test)
@@ -171,7 +184,16 @@ def record_failure(test: Any) -> bool:
 
 
 def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> Any:
-    """What a function returns and writes, merged over all ways through it."""
+    """Return what a function returns, merged over all combinations of its branches; writes are merged too.
+
+    Args:
+        part: part of the code, for messages and identity.
+        function: function.
+        *given: arguments of the function.
+
+    Raises:
+        NoFormula: there are more than `MAX_BRANCH_COMBINATIONS` combinations.
+    """
     outer, condition = run.frame, where.condition
     if part in run.widened and outer is not None:
         return function(*given)

@@ -1,4 +1,4 @@
-"""Accelerations under constraints as formulas: which equations count is decided when the functions are made."""
+"""Formulas of accelerations under constraints; redundant equations are removed when the functions are made."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from osimlite.simulation.pack import Packed
 from osimlite.simulation.states import StateLayout
 
 TESTED_POSES = 3
-"""In so many poses is looked which equations follow from others."""
+"""Number of poses in which redundant equations are identified."""
 
 
 def list_position_equations(structure: Sequence[int]) -> list[int]:
-    """Numbers of the equations that bind positions, in the order of their errors."""
+    """Return the indices of the position equations, in the order of their errors."""
     h = structure[structure[MODEL.CONSTRAINED] :]
     records = structure[h[CONSTRAINED.CONSTRAINT_AT] :][: h[CONSTRAINED.CONSTRAINTS]]
     ranges = (
@@ -38,7 +38,12 @@ def list_position_equations(structure: Sequence[int]) -> list[int]:
 def find_independent_equations(
     mechanism: Mechanism, packed: Packed, state: StateLayout
 ) -> list[int]:
-    """Numbers of as many equations as say something beyond others, where the constraints hold.
+    """Find the largest set of independent constraint equations, in poses that fulfil the constraints.
+
+    Args:
+        mechanism: mechanism of the model.
+        packed: packed model.
+        state: layout of the state.
 
     Raises:
         SimulationError: no pose fulfils the constraints.
@@ -64,7 +69,7 @@ def find_independent_equations(
 
 
 def _select_independent_rows(rows: Array) -> list[int]:
-    """The longest rest first, of equations that weigh the same."""
+    """Select independent rows of normalized equations by pivoting: the row with the largest remainder first."""
     lengths = np.linalg.norm(rows, axis=1)
     rest = (
         rows
@@ -85,10 +90,10 @@ def _select_independent_rows(rows: Array) -> list[int]:
 
 
 def make_constrained_dynamics(equations: Sequence[int]) -> Law:
-    """The law of accelerations that fulfil some of the equations, which all others follow from.
+    """Return the law of accelerations that fulfil the given independent equations.
 
-    As in `by_multipliers`: the tree's own factor of the mass matrix gives what each equation's
-    force does.
+    As in the kernel `by_multipliers`, the tree's factorization of the mass matrix gives the
+    accelerations by each equation's force.
     """
 
     def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector, unused: int) -> int:

@@ -1,4 +1,4 @@
-"""Curves of Bezier sections on symbols: the search for a place on a section as so many of its steps."""
+"""Curves of Bezier sections on symbols: a fixed number of search steps, with exact derivatives."""
 
 from __future__ import annotations
 
@@ -32,13 +32,24 @@ from osimlite.mechanics.laws.bezier import (
 )
 
 HALLEY_STEPS = 5
-"""Of Halley's method in the search for a place: four meet all curves and velocities of damped fibers to rounding."""
+"""Number of steps of Halley's method: four reach rounding on all curves and damped fiber velocities."""
 ROUNDING_GRID = 2.0**53
-"""To whose parts a place is rounded: those of a number from a half to one."""
+"""Number of grid points per unit to which a root is rounded: the resolution of numbers from 0.5 to 1."""
 
 
 def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
-    """As :func:`osimlite.mechanics.kernels.functions.pieces_at`: the piece that counts is chosen before anything is computed."""
+    """Evaluate a piecewise polynomial as :func:`osimlite.mechanics.kernels.functions.pieces_at`.
+
+    The coefficients of the active piece are selected before anything is computed.
+
+    Args:
+        table: table of the pieces.
+        z: argument.
+        kind: kind of the polynomial.
+
+    Returns:
+        Value, slope and curvature.
+    """
     knots, width = int(simplify_number(table[2])), int(simplify_number(table[3]))
     if not is_symbol(z):
         numbers: Any = [simplify_number(number) for number in table[: 4 + knots * (1 + width)]]
@@ -64,7 +75,15 @@ def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
 
 
 def evaluate_curve(c: Any, x: Any) -> tuple[Any, Any]:
-    """As :func:`osimlite.mechanics.laws.bezier.curve_value`, with its derivatives."""
+    """Return value and slope of a curve, as :func:`osimlite.mechanics.laws.bezier.curve_value`.
+
+    Args:
+        c: curve.
+        x: argument.
+
+    Returns:
+        Value, and slope.
+    """
     count = int(simplify_number(c[SECTIONS]))
     if not is_symbol(x):
         numbers = [float(simplify_number(c[k])) for k in range(HEAD + (1 + SECTION) * count)]
@@ -86,10 +105,13 @@ def evaluate_curve(c: Any, x: Any) -> tuple[Any, Any]:
 def solve_damped_velocity(
     m: Any, active: Any, by_length: Any, elastic: Any, tendon: Any, cos: Any, curves: Any
 ) -> tuple[bool, Any, Any]:
-    """As :func:`osimlite.mechanics.laws.millard2012_equilibrium.damped_velocity`, without that one's tolerance.
+    """Solve for the fiber velocity, as :func:`osimlite.mechanics.laws.millard2012_equilibrium.damped_velocity`.
 
-    What the fibers bear, share * factor + damping * velocity, is a polynomial on each section of
-    the curve too.
+    There is no tolerance: the fiber force ``share * factor + damping * velocity`` is a polynomial
+    on each section of the curve, whose root is found to rounding.
+
+    Returns:
+        Whether it was solved, the velocity, and the force-velocity factor.
     """
     c, share, wanted = curves.velocity, active * by_length, divide(tendon, cos) - elastic
 
@@ -115,7 +137,7 @@ def solve_damped_velocity(
 
 
 def _select_section(c: Any, beyond: Sequence[Any]) -> list[Any]:
-    """Start, scale and coefficients of the section behind the last of the ends that something is beyond."""
+    """Return start, scale and coefficients of the section behind the last knot that is exceeded."""
     first = HEAD + len(beyond) + 1
     places = [START, SCALE, *range(X, Y + 6)]
     result = [c[first + place] for place in places]
@@ -129,18 +151,18 @@ def _select_section(c: Any, beyond: Sequence[Any]) -> list[Any]:
 
 
 def _find_root(c: Sequence[Any], u: Any) -> Any:
-    """The zero of a polynomial that rises from u = 0 to 1.
+    """Return the root of a polynomial that rises from u = 0 to 1.
 
-    The search has no derivatives: what it finds is rounded to a grid as fine as its digits. A last
-    step of Halley's method, whose error is the third power of that before, brings first and second
-    derivatives with it.
+    The search has no derivatives: its result is rounded to a grid of the resolution of numbers. A
+    last step of Halley's method, whose error is the third power of the previous one, brings exact
+    first and second derivatives.
     """
     return _make_root_function()(casadi.vertcat(*c), u)
 
 
 @cache
 def _make_root_function() -> Any:
-    """`_find_root` as a function, which CasADi writes into expressions sooner than Python."""
+    """Return `_find_root` as a CasADi function, which CasADi inserts into expressions faster than Python."""
     given = casadi.SX.sym("c", 6), casadi.SX.sym("u")
     c, u = casadi.vertsplit(given[0]), given[1]
     for _ in range(HALLEY_STEPS):
@@ -151,7 +173,7 @@ def _make_root_function() -> Any:
 
 
 def _apply_halley_step(c: Sequence[Any], u: Any) -> Any:
-    """A step of Halley's method."""
+    """Return the next iterate of Halley's method."""
     value, slope = _evaluate_polynomial(c, u), _evaluate_slope(c, u)
     divisor = slope * slope - value * _evaluate_slope(_differentiate_polynomial(c), u) / 2.0
     return u - casadi.if_else(
@@ -160,11 +182,12 @@ def _apply_halley_step(c: Sequence[Any], u: Any) -> Any:
 
 
 def _clamp_value(x: Any, low: Any, high: Any) -> Any:
-    """x, or the end that it is beyond; the derivative at an end is that within."""
+    """Return a value clamped to a range; the derivative at an end is that inside."""
     return casadi.if_else(x < low, low, casadi.if_else(x > high, high, x))
 
 
 def _evaluate_polynomial(c: Sequence[Any], u: Any) -> Any:
+    """Return the value of a polynomial."""
     result: Any = 0.0
     for coefficient in reversed(c):
         result = result * u + coefficient
@@ -172,8 +195,10 @@ def _evaluate_polynomial(c: Sequence[Any], u: Any) -> Any:
 
 
 def _evaluate_slope(c: Sequence[Any], u: Any) -> Any:
+    """Return the slope of a polynomial."""
     return _evaluate_polynomial(_differentiate_polynomial(c), u)
 
 
 def _differentiate_polynomial(c: Sequence[Any]) -> list[Any]:
+    """Return the coefficients of the derivative of a polynomial."""
     return [k * coefficient for k, coefficient in enumerate(c)][1:]

@@ -1,4 +1,4 @@
-"""A model as it is packed for the kernels, with the names of its states, controls and parameters."""
+"""Packed model with the names of its states, controls and parameters, the base of all derivatives."""
 
 from __future__ import annotations
 
@@ -24,21 +24,26 @@ from osimlite.simulation.states import StateLayout, in_model_order
 
 
 class DifferentiableModel:
-    """What is the same of a model for every way in which its derivatives are found.
+    """Model with named states, controls and parameters, whatever the method of differentiation.
 
     Args:
-        model: what moves.
-        parameters: paths of numbers that its rates are functions of.
-        folder: of the model's file.
-        apart: whether bodies that never move in one another are links of their own.
+        model: model.
+        parameters: paths of numbers that the rates are functions of.
+        folder: folder of the model's file.
+        apart: whether bodies that never move relative to one another remain separate links.
 
-    Attributes: name: of the model. states: the entries of x as in ``states.sto``: values, speeds,
-        and then auxiliary states, each in the order of the model. Coordinates that are locked are
-        none. system_states: the same in the order in which Simbody holds them. controls: the entries of
-        u: paths of the actuators. parameters: the entries of p. p: the values (p,) that the model
-        has for these. x: the state (x,) that the model starts from, where its constraints hold. u:
-        controls (u,) of zero. coordinates: paths of the coordinates whose accelerations are found,
-        in the order of the speeds. constraint_count: how many equations constrain the motion.
+    Attributes:
+        name: name of the model.
+        states: names of the entries of x as in ``states.sto``: values, speeds, auxiliary states,
+            each in the order of the model. Locked coordinates have none.
+        system_states: the same names in the order of Simbody's system.
+        controls: names of the entries of u: paths of the actuators.
+        parameters: names of the entries of p.
+        p: values of the parameters in the model (p,).
+        x: initial state (x,), which fulfils the constraints.
+        u: controls (u,), all zero.
+        coordinates: paths of the coordinates with accelerations, in the order of the speeds.
+        constraint_count: number of constraint equations.
     """
 
     def __init__(
@@ -104,6 +109,7 @@ class DifferentiableModel:
         return self.system_states
 
     def _collect_forces(self, model: Model, mechanism: Mechanism) -> Forces:
+        """Return the forces of a model; probes give their values without their operation over time."""
         forces = force_elements(model, mechanism, folder=self._folder)
         # Probes are outputs, whatever they make of their results over time; some look at more than
         # the kernels.
@@ -118,7 +124,7 @@ class DifferentiableModel:
         return replace(forces, elements=tuple(elements))
 
     def _pack_numbers(self, changed: Model) -> Array:
-        """The numbers that depend on parameters, of the model with others; none if more than numbers are others."""
+        """Return the numbers that may depend on parameters; none if the structure of the model changes."""
         mechanism = build_mechanism(changed)
         packed = pack(mechanism, self._collect_forces(changed, mechanism), apart=self._apart)
         return (

@@ -1,4 +1,4 @@
-"""A model as functions of CasADi: values and exact derivatives for optimisation and analysis."""
+"""CasADi functions of a model: values and exact derivatives for optimization and analysis."""
 
 from __future__ import annotations
 
@@ -31,43 +31,48 @@ if TYPE_CHECKING:
     from osimlite.derivatives.wrapped_paths import WrappedPaths
 
 FUNCTIONS = "dynamics", "residual", "constraints", "outputs", "paths"
-"""Those that `save` writes."""
+"""Names of the functions that `CasadiModel.save` writes."""
 
 
 def casadi(
     model: Model, parameters: Iterable[str] = (), folder: str | Path | None = None
 ) -> CasadiModel:
-    """A model as functions of CasADi, made of the same laws that simulate it.
+    """Return a model as CasADi functions, made of the same laws that simulate it.
 
-    Args: model: what moves. parameters: numbers of the model that stay symbols, by path:
-        ``/bodyset/torso/mass``, ``/forceset/soleus_r/ max_isometric_force``,
-        ``/bodyset/torso/mass_center/1``; one path may stand for several that are the same. folder:
-        where the model's file is, for the files that it names; the folder that the program runs in
-        if None.
+    Args:
+        model: model.
+        parameters: paths of numbers of the model that stay symbols: ``/bodyset/torso/mass``,
+            ``/forceset/soleus_r/max_isometric_force``, ``/bodyset/torso/mass_center/1``. A path may
+            stand for several numbers that are equal.
+        folder: folder of the model's file, for the files that it names; the current folder if None.
 
-    Raises: MissingDependency: casadi is not installed, or cannot be loaded beside what is loaded
-        already. ModelError: the model is not a mechanism. SettingError: there is no such number.
+    Raises:
+        MissingDependency: casadi is not installed, or cannot be loaded beside another library.
+        ModelError: the model is not a mechanism.
+        SettingError: a parameter does not exist.
         UnsupportedError: a part of the model has no formula, or a number cannot stay a symbol; the
-        message names it.
+            message names it.
     """
     expect_model(model)
     return CasadiModel(model, tuple(parameters), Path(folder or "."))
 
 
 class CasadiModel(DifferentiableModel):
-    """Functions of CasADi (``casadi.Function``), each made when it is first asked for.
+    """CasADi functions (``casadi.Function``) of a model, each made when it is first used.
 
     All are functions of columns: time t (s); the state x, named by `states`; its derivative xdot;
-    the controls u of the actuators, named by `controls`, in the place of what the model's
-    controllers say (to which a stretch reflex adds); the parameters p, named by `parameters`. Units
-    are those of OpenSim's files of states: m, rad, s, N. Where a result does not exist (a joint
-    stands where its rates are not defined), it is not a number.
+    the controls u of the actuators, named by `controls`, which replace the outputs of the model's
+    controllers (a stretch reflex adds to them); the parameters p, named by `parameters`. Units are
+    those of OpenSim's state files: m, rad, s, N. Where a result does not exist, for example in a
+    singular pose of a joint, it is NaN.
 
-    The arguments and attributes are those of :class:`osimlite.derivatives.differentiable_model.DifferentiableModel`, and:
+    Arguments and attributes are those of
+    :class:`osimlite.derivatives.differentiable_model.DifferentiableModel`, and:
 
-    Args: loads_given: whether t has, behind the time, what the functions of time of measured and
-        prescribed forces are then (`loads`; of a model with parameters it has none): thousands of
-        knots are no formula to look through.
+    Args:
+        loads_given: whether t also contains the values of the time-dependent loads at that time
+            (`loads`; none for a model with parameters): tables of thousands of rows make large
+            formulas.
     """
 
     def __init__(
@@ -109,7 +114,7 @@ class CasadiModel(DifferentiableModel):
         return self._wrapped_paths.forces
 
     def _find_wrapped_paths(self, model: Model, mechanism: Mechanism) -> WrappedPaths:
-        """The forces, and those of their paths whose way is searched for."""
+        """Return the forces of a model, with symbols for paths around surfaces."""
         from osimlite.derivatives.wrapped_paths import WrappedPaths
 
         infos = mechanism.coordinates
@@ -122,10 +127,11 @@ class CasadiModel(DifferentiableModel):
 
     @property
     def searched(self) -> tuple[str, ...]:
-        """Paths of the forces along paths around surfaces, whose way is searched for."""
+        """Paths of the forces along paths around surfaces, which have no formula."""
         return self._wrapped_paths.names
 
     def _pack_numbers(self, changed: Model) -> Array:
+        """Return all numbers that may depend on parameters; none if the structure of the model changes."""
         mechanism = build_mechanism(changed)
         searched = self._find_wrapped_paths(changed, mechanism)
         packed = pack(mechanism, searched.forces, apart=self._apart)
@@ -141,7 +147,7 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def in_tangents(self) -> TangentModel:
-        """The same in machine code, with the values that the parameters have here."""
+        """Tangents of the same model in machine code, with the values that the parameters have here."""
         result = TangentModel(self._model, self.parameters, self._folder)
         result.take(self.p)
         return result
@@ -149,6 +155,7 @@ class CasadiModel(DifferentiableModel):
     # ----------------------------------------------------------------------------------------------- tracing
     @cached_property
     def _evaluator(self) -> SymbolicEvaluator:
+        """Evaluator of the kernels on the symbols of this model."""
         from osimlite.derivatives.constraints import find_independent_equations
         from osimlite.derivatives.parameters import insert_parameters
         from osimlite.derivatives.symbolic_evaluator import SymbolicEvaluator
@@ -175,23 +182,31 @@ class CasadiModel(DifferentiableModel):
         )
 
     def _list_symbols(self, name: str) -> list[Any]:
+        """Return the entries of a column of symbols."""
         symbol = self._symbols[name]
         return [symbol[k] for k in range(symbol.numel())]
 
     def _sort_by_engine(self, name: str) -> list[Any]:
+        """Return the entries of a state in the order of the kernels."""
         result: list[Any] = [0.0] * len(self.states)
         for place, entry in zip(self.state_indices, self._list_symbols(name), strict=True):
             result[place] = entry
         return result
 
     def _sort_by_model(self, y: Sequence[Any]) -> list[Any]:
+        """Return the entries of a state in the order of `states`."""
         return [y[place] for place in self.state_indices]
 
     @cached_property
     def _evaluation(self) -> SymbolicWorkspace:
+        """Evaluation of the kernels up to the accelerations."""
         return self._evaluator.evaluate(STAGE.ACCELERATION)
 
     def _make_function(self, name: str, given: Sequence[str], results: dict[str, Any]) -> Any:
+        """Return a CasADi function of named symbols and results.
+
+        Paths around surfaces enter as the results of a callback, which an outer function inserts.
+        """
         symbols = [self._symbols[item] for item in given]
         if self._path_function is None or "x" not in given:
             return self._library.Function(name, symbols, [*results.values()], [*given], [*results])
@@ -205,14 +220,14 @@ class CasadiModel(DifferentiableModel):
         )
 
     def _make_arguments(self, given: Sequence[str]) -> list[Any]:
-        """Symbols for the arguments of a function: of expressions, if one of its parts is none."""
+        """Return symbols for the arguments of a function: MX if it contains a callback, else SX."""
         kind = self._library.SX if self._path_function is None else self._library.MX
         return [kind.sym(name, self._symbols[name].numel()) for name in given]
 
     # --------------------------------------------------------------------------------------------- functions
     @cached_property
     def dynamics(self) -> Any:
-        """``dynamics(t, x, u, p) -> xdot``: the derivative of the state."""
+        """``dynamics(t, x, u, p) -> xdot``: derivative of the state."""
         found = self._evaluation
         return self._make_function(
             "dynamics",
@@ -222,7 +237,7 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def linear(self) -> Any:
-        """``linear(t, x, u, p) -> xdot, A, B``: the same with its exact derivatives by the state and the controls."""
+        """``linear(t, x, u, p) -> xdot, A, B``: derivative of the state, with its exact derivatives by state and controls."""
         given = "t", "x", "u", "p"
         symbols = self._make_arguments(given)
         xdot = self.dynamics(*symbols)
@@ -233,12 +248,12 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def residual(self) -> Any:
-        """``residual(t, x, xdot, u, p, multipliers) -> residual``: zero where a motion is one of the model.
+        """``residual(t, x, xdot, u, p, multipliers) -> residual``: zero along each motion of the model.
 
-        In the order of the state: what the rates of values are beyond those that follow from the
-        speeds (rad/s, m/s); the generalized forces M udot + c - f + Gᵀ multipliers (N, N m); what
-        the rates of auxiliary states are beyond those that the laws give. The multipliers (N, N m)
-        are those of the rows of G in `constraints`; none without.
+        The rows are in the order of the state: rates of values less those that follow from the
+        speeds (rad/s, m/s); generalized forces ``M udot + c - f + Gᵀ multipliers`` (N, N m); rates
+        of auxiliary states less those of the force laws. The multipliers (N, N m) belong to the
+        rows of G in `constraints`; there are none without constraints.
         """
         size, xdot = len(self.coordinates), self._sort_by_engine("xdot")
         found = self._evaluator.compute_missing_forces(xdot[size : 2 * size])
@@ -256,17 +271,18 @@ class CasadiModel(DifferentiableModel):
         )
 
     def _find_coordinate(self, k: int) -> int:
-        """Number among `coordinates` of a degree of freedom."""
+        """Return the index among `coordinates` of a degree of freedom."""
         return self.state_indices.index(k)
 
     def generalized_forces(self, pushing: Collection[str]) -> Any:
-        """``generalized_forces(t, x, xdot, u, p) -> missing``: M udot + c less what gravity and some forces push.
+        """Return ``generalized_forces(t, x, xdot, u, p) -> missing``: ``M udot + c`` less gravity and given forces.
 
         Args:
             pushing: paths of the forces.
 
-        Returns: A ``casadi.Function`` whose result (k, 1) is in the order of `coordinates`, N and N
-            m; constraints do not push.
+        Returns:
+            ``casadi.Function`` whose result (k, 1), N and N m, is in the order of `coordinates`;
+            constraint forces are not included.
         """
         size, xdot = len(self.coordinates), self._sort_by_engine("xdot")
         found = self._evaluator.compute_missing_forces(xdot[size : 2 * size], pushing)
@@ -278,17 +294,18 @@ class CasadiModel(DifferentiableModel):
         )
 
     def joint_load(self, path: str, side: str) -> Any:
-        """``joint_load(t, x, xdot, u, p, multipliers) -> force, moment``: what a joint pushes one of its bodies with.
+        """Return ``joint_load(t, x, xdot, u, p, multipliers) -> force, moment``: load of a joint on one of its bodies.
 
-        It is what all that the joint carries lacks for its accelerations; the multipliers are those
-        of `residual`.
+        It is the wrench that the bodies which the joint carries need for their accelerations beyond
+        all other forces. The multipliers are those of `residual`.
 
         Args:
-            path: of the joint.
+            path: path of the joint.
             side: ``child`` or ``parent``.
 
-        Returns: A ``casadi.Function`` of the force (3,), N, and the moment (3,), N m, about the
-            origin of the joint's frame on that side, along the axes of ground.
+        Returns:
+            ``casadi.Function`` of the force (3,), N, and the moment (3,), N m, about the origin of
+            the joint's frame on that side, along the axes of ground.
         """
         from osimlite.derivatives.outputs import compute_joint_load_columns, locate_frames
 
@@ -328,16 +345,17 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def constraints(self) -> Any:
-        """``constraints(t, x, xdot, p) -> position, velocity, acceleration, jacobian``: zero where they hold.
+        """``constraints(t, x, xdot, p) -> position, velocity, acceleration, jacobian``: zero where constraints hold.
 
-        The errors of the equations that bind positions (rad, m), of all in speeds (G u less what it
-        is to be), and in accelerations (likewise G udot); G (m, n) has a row for each equation and
-        a column for each of `coordinates`.
+        The errors of the position equations (rad, m), of all equations in speeds (``G u`` less its
+        target) and in accelerations (``G udot`` less its target). G (m, n) has a row for each
+        equation and a column for each of `coordinates`.
         """
         return self._make_function("constraints", ("t", "x", "xdot", "p"), self._constraint_errors)
 
     @cached_property
     def _constraint_errors(self) -> dict[str, Any]:
+        """Results of `constraints` by name."""
         from osimlite.derivatives.constraints import list_position_equations
 
         size, count, column = len(self.coordinates), self.constraint_count, self._library.vertcat
@@ -381,13 +399,13 @@ class CasadiModel(DifferentiableModel):
     def outputs(self) -> Any:
         """``outputs(t, x, u, p) -> ...``: columns whose entries are named by `output_names`.
 
-        ``stations``, ``station_velocities``: of markers and other stations in ground (m, m/s);
-        ``mass_center``, ``mass_center_velocity``; ``contact_forces``: of each pair the force in
-        ground (N) on the second surface, or on the sphere, and its point (m); ``forces``: what is
-        known of each force, such as ``tension`` (N), ``activation``, ``fiber_length`` (m),
-        ``cos_pennation``, ``active_fiber_force`` (N); ``probes``: what each probe finds times its
-        gain, before it is integrated or compared over time. Probes of energies and of joints are
-        not among them.
+        ``stations``, ``station_velocities``: positions and velocities of markers and other stations
+        in ground (m, m/s); ``mass_center``, ``mass_center_velocity``; ``contact_forces``: for each
+        pair the force in ground (N) on the second surface, or on the sphere, and its point (m);
+        ``forces``: recorded values of each force, such as ``tension`` (N), ``activation``,
+        ``fiber_length`` (m), ``cos_pennation``, ``active_fiber_force`` (N); ``probes``: value of
+        each probe times its gain, before its operation over time. Probes of energies and of joints
+        are not included.
         """
         return self._make_function(
             "outputs",
@@ -397,11 +415,12 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def output_names(self) -> dict[str, tuple[str, ...]]:
-        """By the outputs of `outputs`, the names of their entries."""
+        """Names of the entries of each result of `outputs`."""
         return {name: tuple(labels) for name, (labels, _) in self._outputs.items()}
 
     @cached_property
     def _outputs(self) -> dict[str, tuple[list[str], Any]]:
+        """Labels and column of each result of `outputs`."""
         from osimlite.derivatives.outputs import compute_output_columns
 
         found = self._evaluation
@@ -413,7 +432,7 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def _fixed_numbers(self) -> tuple[list[Any], list[Any]]:
-        """Points of stations, and axes and origins of frames, of which some may be symbols."""
+        """Points of stations, and axes and origins of frames, in their links; some may be symbols."""
         stations, frames = (
             part.tolist() for part in _list_fixed_numbers(self.mechanism, self._packed)
         )
@@ -425,16 +444,17 @@ class CasadiModel(DifferentiableModel):
         return stations, frames
 
     def frames(self, paths: Iterable[str]) -> Any:
-        """``frames(t, x, p) -> position, rotation, velocity, angular_velocity``: of frames, in ground, a column each.
+        """Return ``frames(t, x, p) -> position, rotation, velocity, angular_velocity`` of frames in ground.
 
         Args:
-            paths: of k frames.
+            paths: paths of k frames.
 
-        Returns: A ``casadi.Function``: origins (3, k) in m, rotation matrices (9, k) column by
-            column, velocities of the origins (3, k) in m/s, angular velocities (3, k) in rad/s.
+        Returns:
+            ``casadi.Function``: origins (3, k) in m, rotation matrices (9, k) column by column,
+            velocities of the origins (3, k) in m/s, angular velocities (3, k) in rad/s.
 
         Raises:
-            SettingError: there is no such frame.
+            SettingError: a frame does not exist.
         """
         from osimlite.derivatives.outputs import compute_frame_columns, locate_frames
 
@@ -454,16 +474,15 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def _velocity_evaluation(self) -> SymbolicWorkspace:
-        """The poses and speeds of the links, without forces."""
+        """Evaluation of poses and speeds of the links, without forces."""
         return self._evaluator.evaluate(STAGE.VELOCITY)
 
     @cached_property
     def paths(self) -> Any:
-        """``paths(t, x, p) -> lengths, speeds, moment_arms``: of the paths of `path_names`.
+        """``paths(t, x, p) -> lengths, speeds, moment_arms``: geometry of the paths of `path_names`.
 
-        Lengths (m), lengthening speeds (m/s), and the moment arms (m, or 1 of sliding coordinates)
-        about each of
-        `coordinates` (k, n): the generalized force of a tension of 1 N.
+        Lengths (m), lengthening speeds (m/s), and moment arms (k, n) about each of `coordinates`
+        (m; 1 for sliding coordinates): the generalized force of a tension of 1 N.
         """
         _, lengths, speeds = self._paths
         size = len(self.coordinates)
@@ -474,29 +493,33 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def path_names(self) -> tuple[str, ...]:
-        """Paths of the forces along the paths."""
+        """Paths of the forces that act along paths."""
         return tuple(self._paths[0])
 
     @cached_property
     def _paths(self) -> tuple[list[str], Any, Any]:
+        """Names, lengths and lengthening speeds of the paths."""
         from osimlite.derivatives.outputs import compute_path_columns
 
         return compute_path_columns(self._packed, self.forces, self._evaluation)
 
     # ------------------------------------------------------------------------------------------------- files
     def save(self, folder: str | Path, functions: Iterable[str] = FUNCTIONS) -> list[Path]:
-        """Write the functions into a folder: each as ``NAME.casadi``, and all together as C.
+        """Write functions into a folder: each as ``NAME.casadi``, and all together as C.
 
         ``casadi.Function.load`` reads the former without osimlite; ``model.c`` and ``model.h`` need
         only a compiler. ``model.json`` has the names of the states, controls and parameters, and
-        the numbers to start from.
+        their initial values.
 
         Args:
-            folder: is made.
-            functions: those that are written.
+            folder: folder, which is created.
+            functions: names of the functions.
+
+        Returns:
+            Paths of the files.
 
         Raises:
-            SettingError: there is no such function.
+            SettingError: a function does not exist.
             UnsupportedError: the model has paths around surfaces.
         """
         names, folder = [*functions], Path(folder)
@@ -533,7 +556,11 @@ class CasadiModel(DifferentiableModel):
 
 
 def _list_fixed_numbers(mechanism: Mechanism, packed: Packed) -> tuple[Array, Array]:
-    """Points in their links of all stations (3 k,), and of all frames axes and origins there (12 m,)."""
+    """Return the numbers of stations and frames that do not depend on the state.
+
+    Returns:
+        Points of all stations in their links (3 k,), and axes and origins of all frames (12 m,).
+    """
     from osimlite.derivatives.outputs import locate_frames, locate_stations
 
     stations = [number for _, _, point in locate_stations(mechanism, packed) for number in point]

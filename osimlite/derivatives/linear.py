@@ -1,4 +1,4 @@
-"""A model near one of its states: xdot - f = A (x - x0) + B (u - u0), y - y0 = C (x - x0) + D (u - u0)."""
+"""Linearization of a model: xdot - f = A (x - x0) + B (u - u0), y - y0 = C (x - x0) + D (u - u0)."""
 
 from __future__ import annotations
 
@@ -17,25 +17,26 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 
 NamedValues = Mapping[str, float] | Sequence[float] | None
+"""Values by name, or all values in their order; None for the defaults."""
 
 
 @dataclass(frozen=True, eq=False)
 class Linearization:
-    """The derivative of the state of a model near a state.
+    """Linearization of a model about a state.
 
     Attributes:
-        states: names of the entries of x, as in ``states.sto``; values, speeds, auxiliary states.
+        states: names of the entries of x, as in ``states.sto``: values, speeds, auxiliary states.
         controls: names of the entries of u: paths of the actuators.
-        time: s.
-        x: the state (x,).
-        u: the controls (u,).
-        xdot: derivative of the state there (x,).
-        A: its derivative by the state (x, x), exact.
-        B: that by the controls (x, u), exact.
-        outputs: names of the entries of y, as ``GROUP:ENTRY``, those that were asked for.
-        y: the outputs there (y,).
-        C: their derivative by the state (y, x), exact.
-        D: that by the controls (y, u), exact.
+        time: time, s.
+        x: state (x,).
+        u: controls (u,).
+        xdot: derivative of the state (x,).
+        A: derivative of xdot by the state (x, x), exact.
+        B: derivative of xdot by the controls (x, u), exact.
+        outputs: names of the entries of y, as ``GROUP:ENTRY``.
+        y: outputs (y,).
+        C: derivative of the outputs by the state (y, x), exact.
+        D: derivative of the outputs by the controls (y, u), exact.
     """
 
     states: tuple[str, ...]
@@ -61,23 +62,25 @@ def linearize(
     time: float = 0.0,
     folder: str | Path | None = None,
 ) -> Linearization:
-    """The exact derivatives of the motion of a model by its state and by the controls of its actuators.
+    """Linearize the motion of a model with respect to its state and the controls of its actuators.
 
-    Controllers of the model are left aside: what they do is no part of A. Under constraints,
-    accelerations are those that fulfil them.
+    Controllers of the model are ignored: A contains no feedback of theirs. Under constraints the
+    accelerations fulfil them.
 
-    Args: model: that moves; or what is made of it once for many states: its tangents
-        (:func:`osimlite.tangents`), or its functions (:func:`osimlite.casadi`), whose tangents
-        these are then. state: numbers by the names of states, the others as the model has them, or
-        all (x,) in their order. controls: numbers by the paths of actuators, the others 0, or all
-        (u,). outputs: what is observed, in the order of y: groups of `TangentModel.output_names`
-        (``mass_center``), or single entries of these (``mass_center:y``,
-        ``forces:/forceset/soleus_r|tension``). time: s. folder: where the model's file is, for the
-        files that it names; the folder that the program runs in if None.
+    Args:
+        model: model; or its tangents (:func:`osimlite.tangents`) or functions
+            (:func:`osimlite.casadi`), made once for many states.
+        state: values by the names of states, the others as in the model; or all (x,) in their
+            order.
+        controls: values by the paths of actuators, the others 0; or all (u,).
+        outputs: outputs in the order of y: groups of `TangentModel.output_names` (``mass_center``),
+            or entries of groups (``mass_center:y``, ``forces:/forceset/soleus_r|tension``).
+        time: time, s.
+        folder: folder of the model's file, for the files that it names; the current folder if None.
 
     Raises:
-        SettingError: there is no such state, control or output.
-        SimulationError: a coordinate moves no mass.
+        SettingError: a state, control or output does not exist.
+        SimulationError: a coordinate moves no mass, or a derivative is not finite.
 
     Other errors are those of :func:`osimlite.tangents`.
     """
@@ -113,7 +116,7 @@ def linearize(
 def _describe_invalid_entry(
     states: Sequence[str], controls: Sequence[str], xdot: Array, a: Array, b: Array
 ) -> str:
-    """Return which derivative is NaN or infinite, in words."""
+    """Return the message for the first derivative that is NaN or infinite."""
     columns = [("", xdot.reshape(-1, 1), [""]), (" by ", a, states), (" by ", b, controls)]
     for words, matrix, names in columns:
         odd = np.argwhere(~np.isfinite(matrix))
@@ -127,7 +130,7 @@ def _describe_invalid_entry(
 def _find_outputs(
     output_names: Mapping[str, Sequence[str]], names: Sequence[str]
 ) -> list[tuple[str, int]]:
-    """The groups of outputs and the places in these that names stand for."""
+    """Return group and index of each named output."""
     groups = {
         group: [(group, k) for k in range(len(labels))] for group, labels in output_names.items()
     }
@@ -145,6 +148,7 @@ def _find_outputs(
 
 
 def _fill_vector(what: str, names: Sequence[str], default: Array, given: Any) -> Array:
+    """Return the default values with those that are given by name or in order."""
     result = default.copy()
     if isinstance(given, Mapping):
         for name, value in given.items():

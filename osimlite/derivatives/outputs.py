@@ -1,6 +1,7 @@
-"""What is known of a state besides its derivative: where points are, forces, muscles, paths.
+"""Outputs of a state besides its derivative: points, forces, muscles, paths.
 
-As formulas, or as numbers that carry derivatives: `workspace` runs the kernels on whichever it has.
+The workspace holds either formulas or dual numbers; its method `wrap` makes the kernels run on
+them.
 """
 
 from __future__ import annotations
@@ -36,12 +37,13 @@ if TYPE_CHECKING:
     Workspace: TypeAlias = SymbolicWorkspace | DualWorkspace
 
 AXES = "xyz"
+"""Names of the axes."""
 
 
 def locate_stations(
     mechanism: Mechanism, packed: Packed
 ) -> list[tuple[str, int, tuple[float, ...]]]:
-    """Of every station its path, its link, and where in that it is."""
+    """Return path, link and point in the link (3,) of each station."""
     places = Places(mechanism, {}, packed.placements)
     return [
         (path, *places.station(body, point.tolist()))
@@ -50,7 +52,7 @@ def locate_stations(
 
 
 def locate_frames(mechanism: Mechanism, packed: Packed) -> dict[str, tuple[int, list[float]]]:
-    """By the path of every frame its link, and its axes and origin in that (12,)."""
+    """Return link, and axes and origin in the link (12,), of each frame by its path."""
     places = Places(mechanism, {}, packed.placements)
     return {
         path: places.frame(placed.body, placed.transform)
@@ -59,7 +61,7 @@ def locate_frames(mechanism: Mechanism, packed: Packed) -> dict[str, tuple[int, 
 
 
 def list_probe_items(packed: Packed, elements: Sequence[Any]) -> list[int]:
-    """Places of the items of all probes."""
+    """Return the items of all probes."""
     return [
         place
         for place, owner in packed.owners.items()
@@ -70,11 +72,15 @@ def list_probe_items(packed: Packed, elements: Sequence[Any]) -> list[int]:
 def compute_frame_columns(
     workspace: SymbolicWorkspace, frames: Sequence[tuple[int, Sequence[Any]]]
 ) -> dict[str, Any]:
-    """What `CasadiModel.frames` gives of a state.
+    """Compute the results of `CasadiModel.frames`.
 
     Args:
-        workspace: of the state, up to its speeds.
-        frames: link, and axes and origin in the link (12,), which may be symbols.
+        found: workspace of an evaluation up to the speeds.
+        frames: link, and axes and origin in the link (12,), of each frame; the numbers may be
+            symbols.
+
+    Returns:
+        Column of each result by its name.
     """
     from osimlite.derivatives.symbols import casadi
 
@@ -103,14 +109,17 @@ def compute_output_columns(
     workspace: Workspace,
     points: Sequence[Any],
 ) -> dict[str, tuple[list[str], Any]]:
-    """Columns and the names of their entries, as of `CasadiModel.outputs`.
+    """Compute the results of `CasadiModel.outputs`.
 
     Args:
-        mechanism: of the model.
-        packed: the same.
-        forces: of it.
-        workspace: of the state.
-        points: in their links, of all stations (3 k,), which may be symbols.
+        mechanism: mechanism of the model.
+        packed: packed model.
+        forces: forces of the model.
+        workspace: workspace of the evaluation.
+        points: points of all stations in their links (3 k,), which may be symbols.
+
+    Returns:
+        Labels and column of each result by its name.
     """
     at_station, speed_of = workspace.wrap(station), workspace.wrap(velocity)
     labels: list[str] = []
@@ -160,7 +169,11 @@ def compute_output_columns(
 def _compute_mass_center(
     mechanism: Mechanism, packed: Packed, workspace: Workspace
 ) -> tuple[list[Any], list[Any]]:
-    """Where the mass centre of all bodies is, and how it moves."""
+    """Compute position and velocity of the mass centre of all bodies.
+
+    Returns:
+        Position (3,), m, and velocity (3,), m/s.
+    """
     parts = []
     for link in range(int(packed.structure[MODEL.LINKS])):
         first = INERTIA_AT + INERTIA.SIZE * link
@@ -193,7 +206,7 @@ def _compute_mass_center(
 def _list_contact_values(
     packed: Packed, forces: Forces, workspace: Workspace
 ) -> list[tuple[str, Any]]:
-    """Force and point of each contact, which stand at the beginning of what the kernels know of it."""
+    """Return labels and values of force and point of each contact, the first entries of its record."""
     pairs: list[tuple[str, int]] = []
     for element, items in zip(forces.elements, packed.items, strict=True):
         if isinstance(element, PairContact):
@@ -219,7 +232,11 @@ def _list_contact_values(
 def compute_path_columns(
     packed: Packed, forces: Forces, workspace: SymbolicWorkspace
 ) -> tuple[list[str], Any, Any]:
-    """Names, lengths and lengthening speeds of all paths along which something pulls."""
+    """Compute the geometry of all paths with a force.
+
+    Returns:
+        Names, lengths and lengthening speeds.
+    """
     names, lengths, speeds = list[str](), list[Any](), list[Any]()
     for element, items in zip(forces.elements, packed.items, strict=True):
         if (
@@ -241,14 +258,18 @@ def compute_joint_load_columns(
     sign: float,
     pushes: Sequence[tuple[int, Any, Sequence[Any]]],
 ) -> dict[str, Any]:
-    """What `CasadiModel.joint_load` gives of a state.
+    """Compute the results of `CasadiModel.joint_load`.
 
     Args:
-        workspace: what is missing for accelerations.
-        link: that the joint carries.
-        origin: link of the frame at whose origin the load acts, and where that is in the link (3,).
-        sign: 1 if the load acts on what the joint carries, -1 if on what carries the joint.
-        pushes: links that a constraint pushes, its multiplier, and the wrench of a unit of that.
+        found: workspace of inverse dynamics.
+        link: link that the joint carries.
+        origin: link of the frame at whose origin the load acts, and the point in the link (3,).
+        sign: 1 for the load on the carried body, -1 for the load on the carrying body.
+        pushes: link on which a constraint acts, its multiplier, and the wrench of a unit
+            multiplier.
+
+    Returns:
+        Force and moment by name.
     """
     from osimlite.derivatives.symbols import casadi
 

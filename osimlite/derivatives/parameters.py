@@ -1,4 +1,4 @@
-"""Numbers of a model that stay symbols: how the numbers that the kernels work on follow from them."""
+"""Numbers of a model that stay symbols, and the numbers of the kernels as functions of them."""
 
 from __future__ import annotations
 
@@ -14,32 +14,34 @@ from osimlite.schema.model import Model
 from osimlite.simulation.properties import Setter, places, spellings
 
 LINEARITY_TOLERANCE = 1e-11
-"""What the numbers of a model may be off from a straight line, over the largest part of them."""
+"""Largest deviation from a linear function, relative to the largest part of the number."""
 TRIAL_FACTORS = 1.125, 1.375
-"""What the values are multiplied by to find the lines and to test them."""
+"""Factors of the values, with which the linear functions are found and tested."""
 TRIAL_SHIFTS = 0.125, -0.0625
-"""What values of zero are changed by instead."""
+"""Changes of values that are zero."""
 
 
 class Parameters:
-    """Numbers of a model by their paths, and the numbers of the kernels as linear functions of them.
+    """Numbers of a model by path, and the numbers of the kernels as linear functions of them.
 
-    Most parameters are handed on as they are: masses, stiffnesses, strengths, places. What becomes
-    of each is found by changing it, and tested with all of them changed at once; another way in
-    which numbers depend on one is refused.
+    Most parameters enter the kernels unchanged: masses, stiffnesses, strengths, positions. The
+    linear function of each is found by changing it, and tested by changing all at once; any other
+    dependence is an error.
 
     Args:
-        model: of which they are numbers; a copy that may be changed.
-        names: paths, as of sweeps; one may stand for several numbers that are the same.
-        numbers_of: what makes the numbers (k,) of the kernels, of the model as it is then.
+        model: model; a copy, as it is changed.
+        names: paths as in sweeps; a path may stand for several numbers that are equal.
+        numbers_of: function that packs the model into the numbers (k,) of the kernels.
 
-    Attributes: names: as given. values: of the parameters in the model (p,), in the units of the
-        file. base: the numbers (k,) of the kernels where the parameters are zero. slopes: by place
-        in these numbers, for each parameter that it depends on, its number and its factor.
+    Attributes:
+        names: paths of the parameters.
+        values: values of the parameters in the model (p,), in the units of the file.
+        base: numbers (k,) of the kernels for zero parameters.
+        slopes: for each index in these numbers, pairs of a parameter's index and its factor.
 
     Raises:
-        SettingError: there is no such number, or several that differ.
-        UnsupportedError: the numbers of the kernels depend on a parameter in another way.
+        SettingError: a parameter does not exist, or stands for numbers that differ.
+        UnsupportedError: the numbers of the kernels are no linear function of a parameter.
     """
 
     def __init__(
@@ -96,6 +98,7 @@ class Parameters:
             )
 
     def _change_values(self, number: int, which: Sequence[int] | range) -> Array:
+        """Return the values with some of them changed, each by another factor, which quotients would hide otherwise."""
         values = self.values.copy()
         for k in which:
             # Not all by the same factor, which quotients would not notice.
@@ -107,17 +110,23 @@ class Parameters:
         return values
 
     def _set_values(self, values: Array) -> None:
+        """Set the values of all parameters in the model."""
         for setters, value in zip(self._setters, values.tolist(), strict=True):
             for setter in setters:
                 setter.put(value)
 
 
 def read_parameter(model: Model, name: str) -> float:
-    """The value that a parameter has in a model; errors as those of `Parameters`."""
+    """Return the value of a parameter in a model.
+
+    Raises:
+        SettingError: the parameter does not exist, or stands for numbers that differ.
+    """
     return _read_value(name, _find_setters(model, name))
 
 
 def _find_setters(model: Model, name: str) -> list[Setter]:
+    """Return the setters of all numbers that a path stands for."""
     setters = [place.setter(model) for place in places(model, name)]
     if not setters:
         raise SettingError(
@@ -127,6 +136,7 @@ def _find_setters(model: Model, name: str) -> list[Setter]:
 
 
 def _read_value(name: str, setters: Sequence[Setter]) -> float:
+    """Return the common value of the numbers that a path stands for."""
     values = {setter.get() for setter in setters}
     if len(values) > 1:
         raise SettingError(f"'{name}' stands for numbers that differ; name them one by one")
@@ -134,13 +144,13 @@ def _read_value(name: str, setters: Sequence[Setter]) -> float:
 
 
 def _subtract_base(found: Array, base: Array) -> Array:
-    """How much numbers have changed; one without end has not."""
+    """Return the changes of numbers; an unchanged infinite number has not changed."""
     same = found == base
     return np.where(same, 0.0, found - np.where(same, 0.0, base))
 
 
 def _check_linear(found: Array, base: Array, columns: Array, change: Array, what: str) -> None:
-    """Refuse what does not lie on the lines."""
+    """Check that changes of numbers lie on the linear functions."""
     parts = columns * change
     size = np.abs(base) + np.abs(parts).sum(axis=1)
     if not np.all(
@@ -155,7 +165,13 @@ def _check_linear(found: Array, base: Array, columns: Array, change: Array, what
 def insert_parameters(
     numbers: Sequence[float], slopes: Mapping[int, Sequence[tuple[int, float]]], p: Sequence[Any]
 ) -> list[Any]:
-    """The numbers of the kernels with symbols in them."""
+    """Return the numbers of the kernels with symbols for the parameters.
+
+    Args:
+        numbers: numbers for zero parameters.
+        slopes: see `Parameters.slopes`.
+        p: symbols of the parameters.
+    """
     result: list[Any] = list(numbers)
     for place, parts in slopes.items():
         for number, factor in parts:

@@ -1,10 +1,10 @@
-"""How a simulated motion depends on numbers of the model and on where it starts: dS/dt = (df/dx) S + df/dp.
+"""Sensitivities of a simulated motion to numbers of the model and to its start: dS/dt = (df/dx) S + df/dp.
 
-The equation is integrated by Merson's formula over the very steps that `simulate` took, from the
-states that it found: what comes out is the exact derivative of these steps, their lengths held (H.
-G. Bock, "Numerical treatment of inverse problems in chemical reaction kinetics", Springer 1981).
-Where the laws have a bend (Thelen's muscles have several), a derivative is off by the length of a
-step although the motion is not: such steps are halved until it is accurate too.
+The equation is integrated by Merson's formula over the same steps that `simulate` took, from the
+same states: the result is the exact derivative of these steps with their lengths fixed (H. G. Bock,
+"Numerical treatment of inverse problems in chemical reaction kinetics", Springer 1981). Where the
+laws have a kink (Thelen's muscles have several), a derivative is wrong by the length of a step
+although the motion is accurate; such steps are halved until the derivative is accurate too.
 """
 
 from __future__ import annotations
@@ -33,31 +33,38 @@ from osimlite.simulation.run import Simulation
 from osimlite.simulation.trajectory import Trajectory
 
 OPTIONS = {*PER_RUN, "folder"} - {"fixed_step", "integrator", "controller", "resume"}
-"""Options of `simulate` that leave the motion one of the rates as they are, in steps of Merson's method."""
+"""Options of `simulate` that keep the motion one of the model's rates, in steps of Merson's method."""
 DEFAULT_ACCURACY = 1e-6
-"""That is taken where none is chosen."""
+"""Accuracy if the caller sets none."""
 DERIVATIVE_ERROR_FACTOR = 10.0
-"""So many times the accuracy is what the error of a derivative may be in a step, over the largest
-by that number: less makes them no better, for the motion is not.
+"""Error of a derivative in a step, as a multiple of the accuracy, relative to the largest by that number.
+
+A smaller factor does not improve the derivatives, as the motion itself has that error.
 """
 RATE_TOLERANCE = 1e-6
-"""What rates of the tangents may be off from those of the motion, over the largest of a state or 1."""
-YIELDING_FACTOR, RANK_TOLERANCE = 1e5, 1e-9
-"""How much more readily coordinates move that do not count; what an equation says beyond others if it counts."""
+"""Largest difference of the rates of tangents and simulation, relative to the largest of a state or 1."""
+YIELDING_FACTOR = 1e5
+"""Compliance of coordinates that yield to constraints, relative to others."""
+RANK_TOLERANCE = 1e-9
+"""Relative singular value below which a constraint equation is redundant."""
 MIN_STEP_S = 1e-9
-"""Part of a step, s, to which a bend of the equations is narrowed down."""
+"""Length of a step, s, that is not halved further at a kink."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity(Tabular):
-    """The derivatives of a motion by numbers of its model and by its start.
+    """Derivatives of a motion by numbers of its model and by its start.
 
-    Attributes: trajectory: the motion, as `simulate` gives it. times: of its rows (n,), s. states:
-        names of the x states as in ``states.sto``: values, speeds, auxiliary states; locked
-        coordinates are none. numbers: what the derivatives are by (k,): paths of parameters, then
-        names of states, which stand for their values at the start. motion: the states (n, x) at the
-        times; m, rad, s. derivatives: of each state by each number (n, x, k), in units of the state
-        over those of the number.
+    Attributes:
+        trajectory: motion, as `simulate` returns it.
+        times: times of the rows (n,), s.
+        states: names of the x states as in ``states.sto``: values, speeds, auxiliary states; locked
+            coordinates have none.
+        numbers: names of the k numbers: paths of parameters, then names of states, which stand for
+            their initial values.
+        motion: states (n, x) at the times; m, rad, s.
+        derivatives: derivative of each state by each number (n, x, k), in units of the state per
+            unit of the number.
     """
 
     trajectory: Trajectory
@@ -68,10 +75,10 @@ class Sensitivity(Tabular):
     derivatives: Array
 
     def of(self, state: str, number: str) -> Array:
-        """The derivative (n,) of a state by a number.
+        """Return the derivative (n,) of a state by a number.
 
         Raises:
-            SettingError: there is no such state, or no such number.
+            SettingError: the state or the number does not exist.
         """
         at = [
             _find_index(*names)
@@ -99,25 +106,31 @@ def sensitivity(
     states: Iterable[str] = (),
     **choices: Any,
 ) -> Sensitivity:
-    """The derivatives of all states along a simulated motion by numbers of the model and by states at its start.
+    """Compute the derivatives of all states along a simulated motion by numbers of the model and initial states.
 
-    The motion is that of :func:`osimlite.simulate` by Merson's steps. Its start is held: what of it
-    follows from parameters, as where muscles are in equilibrium (`equilibrate`), counts as given.
-    Where constraints bind the motion the start goes with them, as little as they need.
+    The motion is that of :func:`osimlite.simulate` with Merson's steps. Initial states are fixed:
+    parts of them that follow from parameters, such as muscles in equilibrium (`equilibrate`), do
+    not change with the parameters. Under constraints the initial state changes as little as they
+    require.
 
-    Args: model: what moves. parameters: numbers of the model, by paths as :func:`osimlite.tangents`
-        takes them; or its tangents, so that they are tangent_model once for many motions; or its functions
-        (:func:`osimlite.casadi`), for their parameters. Their values are those in the model now.
-        to: how long, s. states: names of states (``/jointset/knee/flexion/value``) that the
-        derivatives are by, too, at the start. choices: `accuracy`, `report_interval`, `initial`,
-        `initial_speeds`, `equilibrate`, `controls`, `progress` and `folder` of
-        :class:`osimlite.simulation.Options`. The accuracy is 1e-6 if left out, with which the
-        derivatives of a second of muscles with tendons are good to 1e-3 of the largest, of smooth
-        motions to 1e-5; take less for more.
+    Args:
+        model: model.
+        parameters: paths of numbers of the model, as for :func:`osimlite.tangents`; or its
+            tangents, made once for many motions; or its functions (:func:`osimlite.casadi`), for
+            their parameters. The values are those in the model now.
+        to: end of the motion, s.
+        states: names of states (``/jointset/knee/flexion/value``) whose initial values count as
+            numbers too.
+        choices: `accuracy`, `report_interval`, `initial`, `initial_speeds`, `equilibrate`,
+            `controls`, `progress` and `folder` of :class:`osimlite.simulation.Options`. The default
+            accuracy of 1e-6 gives derivatives of a second of muscles with tendons to 1e-3 of the
+            largest, and of smooth motions to 1e-5.
 
-    Raises: SettingError: there is no such number or state, or an option that does not go with this;
-        the tangents are those of another model. UnsupportedError: a force is computed in Python.
-        SimulationError: the motion ended, or a derivative of it is no finite number.
+    Raises:
+        SettingError: a number or state does not exist, an option is not possible here, or the
+            tangents are those of another model.
+        UnsupportedError: a force is computed in Python.
+        SimulationError: the motion ended early, or a derivative is not finite.
 
     Other errors are those of :func:`osimlite.tangents` and :func:`osimlite.simulate`.
     """
@@ -169,12 +182,14 @@ def sensitivity(
 
 
 class _SensitivityRun:
-    """The derivatives along the steps of a motion.
+    """Derivatives along the steps of one motion.
 
-    Args: tangent_model: tangents of the model, with the parameters that it has. simulation: of it, with the
-        controls of the motion. initial: places of the states of which the start counts. held:
-        places in the mechanism of the coordinates whose values, and of those whose speeds, were
-        given.
+    Args:
+        tangent_model: tangents of the model with its parameters.
+        simulation: simulation of the model with the controls of the motion.
+        initial: indices of the states whose initial values count.
+        held: indices in the mechanism of the coordinates with prescribed initial values, and of
+            those with prescribed initial speeds.
     """
 
     def __init__(
@@ -208,15 +223,16 @@ class _SensitivityRun:
         self._steps = tangent_model.steps(engine.driving, np.eye(count, count + len(initial)))
 
     def sort_states(self, trajectory: Trajectory) -> Array:
-        """The motion (n, x), in the order of the tangents."""
+        """Return the motion (n, x) in the order of the tangents."""
         return self._pack_rows(trajectory)[:, self._places]
 
     def _pack_rows(self, trajectory: Trajectory) -> Array:
+        """Return the motion (n, x) in the order of the simulation."""
         auxiliary = trajectory.auxiliary
         return self._simulation.state.rows(trajectory.values, trajectory.speeds, auxiliary)
 
     def compute_rows(self, trajectory: Trajectory, accuracy: float) -> Array:
-        """The derivatives (n, x, k) at the times of the motion."""
+        """Compute the derivatives (n, x, k) at the times of the motion."""
         start = self._pack_rows(trajectory)[0].tolist()
         wanted = trajectory.times.tolist()
         times, states, ended = self._simulation.every_step(
@@ -237,10 +253,10 @@ class _SensitivityRun:
         )
 
     def _project_start(self, x: Array, slopes: Array) -> None:
-        """Have the start (x,) go with the constraints along all directions, by derivatives (x, m) of it.
+        """Project the derivatives (x, m) of the initial state (x,) onto the constraints, in place.
 
-        As it was found: of what is not held, values that do not count give way, then all as little
-        as can be, and speeds relative to themselves where they are above 1.
+        The projection repeats that of the initial state: of free values, yielding coordinates
+        change first, then all as little as possible; speeds above 1 change relative to their size.
         """
         tangent_model, size = self._tangent_model, len(self._tangent_model.coordinates)
         infos = {info.path: info for info in tangent_model.mechanism.coordinates}
@@ -265,7 +281,11 @@ class _SensitivityRun:
             slopes[places] -= scales[:, None] * change
 
     def _check_same_rates(self, t: float, y: Sequence[float]) -> None:
-        """SettingError where the tangents say another derivative of the state than the motion has."""
+        """Check that the tangents have the same rates as the simulation.
+
+        Raises:
+            SettingError: they differ.
+        """
         wanted = np.array(self._engine.derivative(t, y))[self._places]
         state = np.asarray(y)[self._places]
         found, _ = self._tangent_model.along(
@@ -291,19 +311,19 @@ def integrate_sensitivities(
     accuracy: float,
     names: Sequence[str],
 ) -> Array:
-    """The derivatives (n, x, m) of a motion along m directions at some of its times.
+    """Integrate the derivatives (n, x, m) of a motion along m directions, and return them at some of its times.
 
     Args:
-        steps: of the model, with the numbers and the directions that are meant.
-        times: of the ends of all steps, s.
-        states: there (s, x).
-        slopes: of the start along the directions (x, m).
-        wanted: the times (n,), from the start on, s.
-        accuracy: of the motion.
-        names: of the states, for messages.
+        steps: steps of the model with its numbers and directions.
+        times: times of the ends of all steps, s.
+        states: states at these times (s, x).
+        slopes: derivatives of the initial state along the directions (x, m).
+        wanted: times of the result (n,), from the start on, s.
+        accuracy: accuracy of the motion.
+        names: names of the states, for messages.
 
     Raises:
-        SimulationError: a derivative is no finite number.
+        SimulationError: a derivative is not finite.
     """
 
     def stepped(t0: float, t1: float, y0: Array) -> Array:
@@ -342,7 +362,11 @@ def integrate_sensitivities(
 
 
 def _check_not_initial(model: Model, tangent_model: TangentModel, name: str) -> None:
-    """SettingError for a number that says where a state starts."""
+    """Check that a parameter is not an initial value of a state.
+
+    Raises:
+        SettingError: it is one.
+    """
     for place in places(model, name):
         what = str(place.steps[0])
         state = f"{place.component}/{what.removeprefix('default_').removesuffix('_value')}"
@@ -355,7 +379,7 @@ def _check_not_initial(model: Model, tangent_model: TangentModel, name: str) -> 
 def _select_coordinate_values(
     simulation: Simulation, choices: Mapping[str, Any]
 ) -> dict[str, float]:
-    """What was given of the values of coordinates at the start, and not of auxiliary states."""
+    """Return the prescribed initial values of coordinates, without those of auxiliary states."""
     auxiliary = simulation.state.paths
     return {
         name: value
@@ -365,6 +389,11 @@ def _select_coordinate_values(
 
 
 def _find_index(what: str, names: Sequence[str], name: str) -> int:
+    """Return the index of a name.
+
+    Raises:
+        SettingError: the name does not exist.
+    """
     if name not in names:
         raise SettingError(f"there is no {what} '{name}'{suggest_path(name, names)}")
     return names.index(name)

@@ -1,4 +1,4 @@
-"""Kernels as Python that runs on symbols: the same text, in which what branches does so by `branches`."""
+"""Kernels as Python functions that run on symbols: the same code with its branches rewritten."""
 
 from __future__ import annotations
 
@@ -39,9 +39,10 @@ HELPERS = {
     "fails_": branches.record_failure,
     "unset_": UNSET,
 }
-"""What the rewritten text calls."""
+"""Helper functions that the rewritten code calls."""
 
 EXIT_STATEMENTS = ast.Return, ast.Break, ast.Continue
+"""Statements that leave a function or a loop."""
 OPERATOR_HELPERS: dict[type, str] = {
     ast.Add: "plus_",
     ast.Sub: "minus_",
@@ -49,13 +50,16 @@ OPERATOR_HELPERS: dict[type, str] = {
     ast.Div: "divide_",
     ast.Pow: "power_",
 }
+"""Helper function of each arithmetic operator."""
 
 
 def _slice_vector(vector: Any, place: int) -> Any:
+    """Return the vector from an index on."""
     return vector.rest(place) if isinstance(vector, Vector) else vector[place:]
 
 
 def _call_law(address: int, *given: Any) -> int:
+    """Run the law at an address on symbols; errors collect the items of the calls."""
     law = pointers.laws[address]
     try:
         result: int = branches.run_all_branches(
@@ -76,14 +80,14 @@ _counterparts: dict[Any, Any] = {
     damped_velocity: solve_damped_velocity,
     pieces_at: evaluate_pieces,
 }
-"""The counterparts of functions that have been asked for."""
+"""Symbolic counterparts of the functions that were used so far."""
 
 
 def make_symbolic(function: Any) -> Any:
-    """A kernel or a law as a function that takes symbols too.
+    """Return a kernel or law as a function that takes symbols too.
 
     Raises:
-        NotImplementedError: there is something in it that has no meaning for symbols.
+        NotImplementedError: the code contains something that has no meaning for symbols.
     """
     if function not in _counterparts:
         writer = _KernelRewriter(function, "formula")
@@ -94,7 +98,7 @@ def make_symbolic(function: Any) -> Any:
 
 @contextmanager
 def replace_kernel(function: Any, twin: Any) -> Iterator[None]:
-    """While this is open, another function is called on symbols in the place of a kernel."""
+    """Call another function instead of a kernel on symbols within a block."""
     before = make_symbolic(function)
     _counterparts[function] = twin
     try:
@@ -104,13 +108,13 @@ def replace_kernel(function: Any, twin: Any) -> Iterator[None]:
 
 
 def register_symbolic(function: Any) -> Any:
-    """A function that takes symbols as it is, known as such from then on."""
+    """Register a function that takes symbols as it is, and return it."""
     _counterparts[function] = function
     return function
 
 
 class _KernelScope(dict[str, Any]):
-    """The names of a module, each with its counterpart; these are made when they are first asked for."""
+    """Names of a module with their symbolic counterparts, which are made when they are first called."""
 
     def __init__(self, function: Any) -> None:
         super().__init__(HELPERS, __builtins__=builtins)
@@ -125,7 +129,7 @@ class _KernelScope(dict[str, Any]):
 
 
 class _LazyFunction:
-    """A function of ours that is written when it is first called."""
+    """Function of the package whose counterpart is made when it is first called."""
 
     def __init__(self, function: Any) -> None:
         self.function = function
@@ -135,11 +139,12 @@ class _LazyFunction:
 
 
 def _is_own_function(value: Any) -> bool:
+    """Return whether a value is a function of this package."""
     return isinstance(value, FunctionType) and value.__module__.startswith("osimlite.")
 
 
 class _KernelRewriter(Kernel, ast.NodeTransformer):
-    """Rewrites one function."""
+    """Rewriter of one function."""
 
     def __init__(self, function: Function, language: str) -> None:
         super().__init__(function, language)
@@ -147,11 +152,11 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         self.branch_variables: set[str] = set()
 
     def parse(self, function: Function) -> ast.FunctionDef:
-        """Return a tree that can be rewritten."""
+        """Return a syntax tree that may be changed."""
         return copy_tree(super().parse(function))
 
     def compile_function(self) -> Any:
-        """The function."""
+        """Return the rewritten function."""
         tree = self.tree
         body = [part for item in self.body for part in self._as_list(self.visit(item))]
         clear = [
@@ -175,11 +180,12 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
 
     @staticmethod
     def _as_list(node: Any) -> list[ast.stmt]:
+        """Return one statement or several as a list."""
         return node if isinstance(node, list) else [node]
 
     # ------------------------------------------------------------------------------------------- expressions
     def _number_part(self, node: ast.AST) -> ast.Constant:
-        """A part of the code, for messages and to tell it from others."""
+        """Return the name of the next part of the code, for messages and identity."""
         self.number += 1
         return ast.Constant(f"{self.name} {self.number}")
 
@@ -276,7 +282,7 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         ]
 
     def _is_failure(self, node: ast.If) -> bool:
-        """Whether all that is done is to return what went wrong: anything but OK of a function that returns that."""
+        """Return whether a branch only returns an error code: anything but OK from a function that returns an outcome."""
         match node:
             case ast.If(body=[ast.Return(value=ast.expr() as value)], orelse=[]):
                 returns = self.tree.returns
@@ -290,7 +296,7 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
 
 
 def _exits_block(node: ast.AST) -> bool:
-    """Whether a statement returns, or leaves a loop that it is not the whole of."""
+    """Return whether a statement returns, or leaves a loop around it."""
     if isinstance(node, EXIT_STATEMENTS):
         return True
     if isinstance(node, ast.For | ast.While):
@@ -300,24 +306,30 @@ def _exits_block(node: ast.AST) -> bool:
 
 
 def _load_name(name: str) -> ast.Name:
+    """Return a name that is read."""
     return ast.Name(name, ast.Load())
 
 
 def _store_name(name: str) -> ast.Name:
+    """Return a name that is assigned."""
     return ast.Name(name, ast.Store())
 
 
 def _load_tuple(names: list[str]) -> ast.Tuple:
+    """Return a tuple of names that are read."""
     return ast.Tuple([_load_name(name) for name in names], ast.Load())
 
 
 def _assign_names(names: list[str], value: ast.expr) -> ast.Assign:
+    """Return the assignment of a tuple to names."""
     return ast.Assign([ast.Tuple([_store_name(name) for name in names], ast.Store())], value)
 
 
 def _wrap_lambda(node: ast.expr) -> ast.Lambda:
+    """Return an expression as a function without arguments."""
     return ast.Lambda(ast.arguments([], [], None, [], [], None, []), node)
 
 
 def _make_call(function: str, *given: ast.expr) -> ast.Call:
+    """Return a call of a helper function."""
     return ast.Call(_load_name(function), list(given), [])

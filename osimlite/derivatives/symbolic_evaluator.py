@@ -1,4 +1,4 @@
-"""A packed model evaluated on symbols: the kernels themselves, run on numbers of which some are symbols."""
+"""Evaluation of a packed model on symbols: the kernels themselves, run on numbers some of which are symbols."""
 
 from __future__ import annotations
 
@@ -27,9 +27,13 @@ from osimlite.simulation.pack import Packed
 WRAPPED_PATH_REASON = (
     "its path bends around surfaces; put a FunctionBasedPath that is fitted to it in its place"
 )
+"""Reason and remedy for paths around surfaces."""
 MESH_REASON = "a mesh is in contact; take spheres and half spaces"
+"""Reason and remedy for contact of meshes."""
 ELLIPSOID_REASON = "the point of an ellipsoid that is in contact is searched for; take spheres"
+"""Reason and remedy for contact of ellipsoids."""
 EARLY_RETURN_REASON = "what touches is said at the sizes of a state that is known only later; leave simbody_early_return out"
+"""Reason and remedy for the option simbody_early_return."""
 UNSUPPORTED_KERNELS = {
     "wrapped_path": WRAPPED_PATH_REASON,
     "geodesic_path": WRAPPED_PATH_REASON,
@@ -40,16 +44,22 @@ UNSUPPORTED_KERNELS = {
     "touch_ellipsoids": ELLIPSOID_REASON,
     "early_return": EARLY_RETURN_REASON,
 }
-"""By the names of kernels, why they have no formula, and what to do instead."""
+"""Reason, and remedy, why a kernel has no formula, by its name."""
 
 
 class SymbolicEvaluator:
-    """What the kernels compute of a state of symbols.
+    """Evaluator of the kernels for a state of symbols.
 
-    Args: packed: the model. forces: of it. numbers: of it, some of which may be symbols. t: time,
-        s. y: the state, in the order of the packed model. controls: of the actuators. equations:
-        numbers of those of the constraints that the others follow from. loads: at this time, one
-        after the other as `list_load_functions` has them; none if they are computed of the time.
+    Args:
+        packed: packed model.
+        forces: forces of the model.
+        numbers: numbers of the packed model, some of which may be symbols.
+        t: time, s.
+        y: state in the order of the packed model.
+        controls: controls of the actuators.
+        equations: indices of independent constraint equations, which imply the others.
+        loads: values of the time-dependent loads in the order of `list_load_functions`; none to
+            compute them from the time.
 
     Raises:
         UnsupportedError: a force has no formula; the message names it.
@@ -94,10 +104,11 @@ class SymbolicEvaluator:
             )
 
     def _path(self, item: int) -> str:
+        """Return the path of the force that an item belongs to."""
         return self._elements[self._packed.owners[item]].path
 
     def evaluate(self, stage: int) -> SymbolicWorkspace:
-        """All that `evaluate` finds up to a stage."""
+        """Evaluate the model up to a stage."""
         return self.run(
             lambda model, reals, data, y, f: make_symbolic(evaluate)(
                 model, reals, data, y, f, stage
@@ -105,7 +116,7 @@ class SymbolicEvaluator:
         )
 
     def evaluate_probes(self) -> SymbolicWorkspace:
-        """All that `evaluate` finds, and after it what the probes do."""
+        """Evaluate the model up to the accelerations, and its probes."""
         places = list_probe_items(self._packed, self._elements)
 
         def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> None:
@@ -118,7 +129,12 @@ class SymbolicEvaluator:
     def compute_missing_forces(
         self, udot: Sequence[Any], pushing: Container[str] | None = None
     ) -> SymbolicWorkspace:
-        """What `inverse` finds for accelerations (n,), if of the forces only those of some paths push."""
+        """Compute by inverse dynamics the generalized forces that accelerations need beyond the model's forces.
+
+        Args:
+            udot: accelerations (n,).
+            pushing: paths of the forces that act; all if None.
+        """
         size, structure = self.structure[MODEL.DOFS], [*self.structure]
         if pushing is not None:
             first, count = structure[MODEL.ITEM_AT], structure[MODEL.ITEMS]
@@ -138,7 +154,7 @@ class SymbolicEvaluator:
         return self.run(law, structure)
 
     def evaluate_constraints(self) -> SymbolicWorkspace:
-        """The equations of the constraints, see `bind`; the result has the wrench of a unit of each on each link."""
+        """Evaluate the constraint equations; the result has the wrench of a unit multiplier of each on each link."""
         first = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS]
         size = self.structure[MODEL.DOFS]
 
@@ -170,7 +186,15 @@ class SymbolicEvaluator:
         law: Callable[[Vector, Vector, Vector, Vector, Vector], Any],
         structure: list[int] | None = None,
     ) -> SymbolicWorkspace:
-        """What a function of the five vectors leaves."""
+        """Run a function of the five vectors of the kernels.
+
+        Args:
+            law: function of structure, numbers, work vector, state and derivative.
+            structure: structure of the model; that of the packed model if None.
+
+        Raises:
+            UnsupportedError: a force has no formula.
+        """
 
         def run() -> SymbolicWorkspace:
             model, reals = (
@@ -198,7 +222,7 @@ class SymbolicEvaluator:
             ) from error
 
     def _find_load(self, g: Vector, gp: Vector, room: Vector, t: Any) -> None:
-        """As :func:`find_load`, of what is given."""
+        """Write the values of loads into the work vector, in the place of the kernel :func:`find_load`."""
         owner = self._packed.owners[max(item for item in self._packed.owners if item <= g.first)]
         element: Any = self._elements[owner]
         first = len(list_load_functions(self._elements[:owner]))
@@ -209,7 +233,7 @@ class SymbolicEvaluator:
 
 
 def list_load_functions(elements: Sequence[Any]) -> list[Function]:
-    """The functions of time of all forces, points and torques that are given."""
+    """Return the functions of time of all measured and prescribed forces, points and torques."""
     loads = (
         element.place for element in elements if isinstance(getattr(element, "place", None), Load)
     )
@@ -217,15 +241,15 @@ def list_load_functions(elements: Sequence[Any]) -> list[Function]:
 
 
 class SymbolicWorkspace:
-    """What an evaluation has left.
+    """Vectors after an evaluation.
 
     Args:
-        model: the structure.
-        reals: the numbers.
-        data: the work vector.
-        f: derivative of the state, or what stands in its place.
-        result: what the function returned.
-        failures: where one of these holds, there is no result.
+        model: structure.
+        reals: numbers.
+        data: work vector.
+        f: derivative of the state, or generalized forces instead of it.
+        result: value that the function returned.
+        failures: conditions under which there is no result.
     """
 
     def __init__(
@@ -244,7 +268,7 @@ class SymbolicWorkspace:
         )
 
     def mask_failures(self, numbers: Sequence[Any]) -> Any:
-        """Numbers as one column, which are none where the evaluation fails."""
+        """Return numbers as one column that is NaN where the evaluation fails."""
         column = casadi.SX(casadi.vertcat(*numbers))
         return (
             column

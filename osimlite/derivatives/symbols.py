@@ -1,8 +1,8 @@
-"""Numbers that may be symbols of CasADi, and what the code of kernels does with them. Only this module imports CasADi.
+"""Numbers that may be CasADi symbols, and the operations of kernels on them. Only this module imports CasADi.
 
-A branch that depends on a symbol becomes a selection: both sides are computed. While one side is, a
-condition says where it counts, and what could be no number elsewhere (a quotient, a root) is
-computed there from 1 instead, so that nothing of it reaches the derivatives of the other side.
+A branch that depends on a symbol becomes a selection, and both sides are computed. While a side is
+computed, a condition says where it is active. An operation that could be NaN elsewhere (a quotient,
+a root) is computed from 1 there, so that no NaN reaches the derivatives of the other side.
 """
 
 from __future__ import annotations
@@ -24,23 +24,25 @@ if "opensim" in sys.modules and "casadi" not in sys.modules:
     )
 casadi: Any = require("casadi", extra="casadi", purpose="a model as functions of CasADi")
 SX: Any = casadi.SX
+"""Type of CasADi's symbolic scalar expressions."""
 
 Number = Any
-"""A float, an integer, or an `SX`."""
+"""Float, integer, or `SX`."""
 
 
 class UnsetVariable:
-    """What a variable is before anything is assigned to it."""
+    """Value of a variable before its first assignment."""
 
 
 UNSET = UnsetVariable()
+"""The only instance of `UnsetVariable`."""
 
 
 class NoFormula(Exception):
-    """There is something in a kernel, or in how it is used, that has no meaning for symbols.
+    """Error for code, or a use of it, that has no meaning for symbols.
 
     Attributes:
-        items: of the calls that led there, the innermost first.
+        items: items of the calls that led there, the innermost first.
     """
 
     def __init__(self, reason: str) -> None:
@@ -49,10 +51,10 @@ class NoFormula(Exception):
 
 
 class WiderBranchNeeded(Exception):
-    """What one part of the code has merged is needed apart by a later one: a wider part has to be run in both ways.
+    """Signal that a merged value is used which cannot be merged: a wider part must be run for both sides.
 
     Attributes:
-        part: that has merged it.
+        part: part of the code that merged the value.
     """
 
     def __init__(self, part: Any) -> None:
@@ -61,7 +63,7 @@ class WiderBranchNeeded(Exception):
 
 
 class UnmergeableValue:
-    """An integer, or something like one, that differs between the two sides of a branch: nobody may ask for it."""
+    """Integer, or similar value, that differs between the sides of a branch; any use of it raises `WiderBranchNeeded`."""
 
     def __init__(self, part: Any) -> None:
         self.part = part
@@ -82,11 +84,11 @@ class UnmergeableValue:
 
 
 class Vector:
-    """The cells of a list from a place on; what is written is remembered while a branch is being computed."""
+    """List from an index on; writes are recorded while a branch is being computed."""
 
     __slots__ = ("cells", "first")
     journals: list[dict[tuple[int, int], tuple[list[Any], int, Any]]] = []  # noqa: RUF012 - one for all
-    """For each branch that is open the cells that were written, with what was there."""
+    """For each open branch, the cells that were written with their previous values."""
 
     def __init__(self, cells: list[Any], first: int = 0) -> None:
         self.cells, self.first = cells, first
@@ -115,12 +117,12 @@ class Vector:
     __hash__ = None  # type: ignore[assignment]
 
     def rest(self, place: int) -> Vector:
-        """The vector from a place on."""
+        """Return the vector from an index on."""
         return Vector(self.cells, self.first + place)
 
 
 class _ActiveCondition:
-    """Where what is being computed counts: None everywhere, else a condition."""
+    """Condition under which the current computation is active; None if always."""
 
     condition: Any = None
 
@@ -129,18 +131,18 @@ where = _ActiveCondition()
 
 
 def is_symbol(value: Any) -> bool:
-    """Whether a number depends on a symbol."""
+    """Return whether a number depends on a symbol."""
     return isinstance(value, SX) and not value.is_constant()
 
 
 def simplify_number(value: Any) -> Any:
-    """A number that depends on no symbol as a float; others as they are."""
+    """Return a number that depends on no symbol as a float, and others unchanged."""
     return float(value) if isinstance(value, SX) and value.is_constant() else value
 
 
 @contextmanager
 def restrict_condition(test: Any) -> Iterator[None]:
-    """While something is computed that counts only where a test holds too."""
+    """Restrict the active condition by a test within a block."""
     before = where.condition
     where.condition = combine_condition(test)
     try:
@@ -150,21 +152,28 @@ def restrict_condition(test: Any) -> Iterator[None]:
 
 
 def combine_condition(test: Any) -> Any:
-    """Where what is being computed counts, and a test holds."""
+    """Return the conjunction of the active condition and a test."""
     return test if where.condition is None else casadi.logic_and(where.condition, test)
 
 
 def guard_value(value: Any, instead: float = 1.0) -> Any:
-    """A symbol, and a number for which all is defined where it does not count."""
+    """Return a value where the active condition holds, and a harmless number elsewhere.
+
+    Args:
+        value: symbol.
+        instead: number for which the next operation is defined.
+    """
     return value if where.condition is None else casadi.if_else(where.condition, value, instead)
 
 
 def merge_values(test: Any, a: Any, b: Any, part: Any) -> Any:
-    """`a` where a test holds, else `b`.
+    """Return `a` where a test holds, else `b`.
 
-    Args: test: a symbol. a: numbers, tuples of them, or what is the same in both. b: likewise.
-        part: of the code, which is run once more for each way if what cannot be merged is asked
-        for.
+    Args:
+        test: symbol.
+        a: number, tuple of numbers, or a value that is equal in both.
+        b: value of the same kind.
+        part: part of the code, which is run for both sides if an unmergeable value is used.
     """
     if a is b or isinstance(b, UnsetVariable):
         return a
@@ -193,7 +202,7 @@ def merge_values(test: Any, a: Any, b: Any, part: Any) -> Any:
 def _make_binary_operation(
     operation: Callable[[Any, Any], Any], number: int
 ) -> Callable[[Any, Any], Any]:
-    """An operation on two numbers; CasADi takes eight times as long to find by its operators what it is given."""
+    """Return an operation on two numbers; CasADi's operators need eight times as long to check their types."""
     binary = SX.binary
 
     def joined(a: Any, b: Any) -> Any:
@@ -208,7 +217,7 @@ times = _make_binary_operation(operator.mul, casadi.OP_MUL)
 
 
 def divide(a: Any, b: Any) -> Any:
-    """a / b; also by zero, as machine code has it."""
+    """Return a / b with the rules of IEEE arithmetic for division by zero."""
     if is_symbol(b):
         return a / guard_value(b)
     a, b = simplify_number(a), simplify_number(b)
@@ -222,7 +231,7 @@ def divide(a: Any, b: Any) -> Any:
 
 
 def power(a: Any, b: Any) -> Any:
-    """a to the power of b."""
+    """Return a to the power of b."""
     a, b = simplify_number(a), simplify_number(b)
     if not (isinstance(a, SX) or isinstance(b, SX)):
         return a**b
@@ -232,16 +241,17 @@ def power(a: Any, b: Any) -> Any:
 
 
 def logical_and(*parts: Callable[[], Any]) -> Any:
-    """`and`."""
+    """Return the conjunction of lazily evaluated parts."""
     return _evaluate_logical(parts, stop=False)
 
 
 def logical_or(*parts: Callable[[], Any]) -> Any:
-    """`or`."""
+    """Return the disjunction of lazily evaluated parts."""
     return _evaluate_logical(parts, stop=True)
 
 
 def _evaluate_logical(parts: Iterable[Callable[[], Any]], *, stop: bool) -> Any:
+    """Evaluate parts in turn, each under the condition that the ones before did not decide."""
     known: Any = None
     before = where.condition
     try:
@@ -263,12 +273,19 @@ def _evaluate_logical(parts: Iterable[Callable[[], Any]], *, stop: bool) -> Any:
 
 
 def logical_not(value: Any) -> Any:
-    """`not`."""
+    """Return the negation of a test."""
     return casadi.logic_not(value) if is_symbol(value) else not simplify_number(value)
 
 
 def select_value(test: Any, a: Callable[[], Any], b: Callable[[], Any], part: Any) -> Any:
-    """`a() if test else b()`."""
+    """Return ``a() if test else b()``.
+
+    Args:
+        test: condition.
+        a: function for the value if the test holds.
+        b: function for the value otherwise.
+        part: part of the code, for messages and identity.
+    """
     if not is_symbol(test):
         return a() if simplify_number(test) else b()
     with restrict_condition(test):
@@ -279,21 +296,22 @@ def select_value(test: Any, a: Callable[[], Any], b: Callable[[], Any], part: An
 
 
 def is_zero(value: Any) -> bool:
-    """Whether a number is 0 whatever the symbols are."""
+    """Return whether a number is 0 for all values of the symbols."""
     return not is_symbol(value) and simplify_number(value) == 0.0
 
 
 def minimum_of(*values: Any) -> Any:
-    """`min`."""
+    """Return the minimum of numbers."""
     return _reduce_values(casadi.fmin, min, values)
 
 
 def maximum_of(*values: Any) -> Any:
-    """`max`."""
+    """Return the maximum of numbers."""
     return _reduce_values(casadi.fmax, max, values)
 
 
 def _reduce_values(symbolic: Any, numeric: Any, values: tuple[Any, ...]) -> Any:
+    """Reduce numbers by a symbolic operation if one of them is a symbol, else by the numeric one."""
     result, *rest = map(simplify_number, values)
     for value in rest:
         take = symbolic if isinstance(result, SX) or isinstance(value, SX) else numeric
@@ -302,19 +320,23 @@ def _reduce_values(symbolic: Any, numeric: Any, values: tuple[Any, ...]) -> Any:
 
 
 def absolute_value(value: Any) -> Any:
-    """`abs`."""
+    """Return the absolute value of a number."""
     return casadi.fabs(value) if is_symbol(value) else abs(simplify_number(value))
 
 
 def truncate_number(value: Any) -> int:
-    """`int`; a kernel that asks for the integer of a symbol has no formula."""
+    """Return the integer part of a number.
+
+    Raises:
+        NoFormula: the number depends on a symbol.
+    """
     if is_symbol(value):
         raise NoFormula("a place in a table depends on the state")
     return int(simplify_number(value))
 
 
 def square_root(value: Any) -> Any:
-    """`sqrt`; its derivative at 0, and at a square that was kept from below zero, is 0."""
+    """Return the square root; its derivative at 0, and at a square clamped at zero, is 0."""
     if not is_symbol(value):
         return math.sqrt(simplify_number(value))
     test = value > 0.0 if value.op() == casadi.OP_FMAX else value != 0.0
@@ -323,18 +345,18 @@ def square_root(value: Any) -> Any:
 
 
 def hypotenuse(*values: Any) -> Any:
-    """`hypot`."""
+    """Return the square root of the sum of squares."""
     if not any(map(is_symbol, values)):
         return math.hypot(*map(simplify_number, values))
     return square_root(sum(value * value for value in values))
 
 
 def _make_counterpart(name: str, instead: float | None = None) -> Callable[..., Any]:
-    """A function of `math` for symbols too.
+    """Return a function of `math` that takes symbols too.
 
     Args:
-        name: of it.
-        instead: argument where it does not count; without, the function is defined everywhere.
+        name: name of the function.
+        instead: argument that replaces inactive ones; None if the function is defined everywhere.
     """
     numeric, symbolic = getattr(math, name), getattr(casadi, name)
 
@@ -352,7 +374,7 @@ def _make_counterpart(name: str, instead: float | None = None) -> Callable[..., 
 
 
 def sine_cosine(angle: Any) -> tuple[Any, Any]:
-    """As in `laws/rotations.py`, whose polynomials are those of a processor's sine."""
+    """Return sine and cosine of an angle, instead of the polynomials of `laws/rotations.py`."""
     return COUNTERPARTS[math.sin](angle), COUNTERPARTS[math.cos](angle)
 
 
@@ -380,3 +402,4 @@ for _name in ("log", "log1p", "atan2"):
 COUNTERPARTS[math.erfc] = lambda value: (
     1.0 - COUNTERPARTS[math.erf](value) if is_symbol(value) else math.erfc(value)
 )
+"""Functions that replace Python's built-in and mathematical functions."""

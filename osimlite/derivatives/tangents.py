@@ -1,4 +1,4 @@
-"""The rates of a model with their exact derivatives along directions, in machine code."""
+"""Rates of a model with their exact derivatives along directions, in machine code."""
 
 from __future__ import annotations
 
@@ -38,33 +38,37 @@ from osimlite.simulation.pack import Packed, pack
 def tangents(
     model: Model, parameters: Iterable[str] = (), folder: str | Path | None = None
 ) -> TangentModel:
-    """The rates of a model with exact derivatives, by the machine code that simulates it.
+    """Return the rates of a model with exact derivatives, by the machine code that simulates it.
 
-    Args: model: what moves. parameters: numbers of the model, by path, that the rates are functions
-        of, as of :func:`osimlite.casadi`. folder: where the model's file is, for the files that it
-        names; the folder that the program runs in if None.
+    Args:
+        model: model.
+        parameters: paths of numbers of the model that the rates are functions of, as for
+            :func:`osimlite.casadi`.
+        folder: folder of the model's file, for the files that it names; the current folder if None.
 
-    Raises: ModelError: the model is not a mechanism. SettingError: there is no such number.
+    Raises:
+        ModelError: the model is not a mechanism.
+        SettingError: a parameter does not exist.
         UnsupportedError: a force is computed in Python, or a number cannot be a parameter; the
-        message names it.
+            message names it.
     """
     expect_model(model)
     return TangentModel(model, tuple(parameters), Path(folder or "."))
 
 
 class DualMachine:
-    """Machine code of a packed model, and the vectors that it works on: rows of numbers and their derivatives.
+    """Machine code of a packed model on dual numbers: rows of a number and its derivatives.
 
     Args:
-        packed: the model.
-        forces: of it.
+        packed: packed model.
+        forces: forces of the model.
         entries: names of the kernels that are called.
-        extra_size: for so many numbers more in the work vector.
+        extra_size: additional size of the work vector.
 
     Attributes:
-        program: the model with the addresses of its code.
-        x: the numbers.
-        w: the work vector.
+        program: model with the addresses of its code.
+        x: numbers of the model (k, 1 + DIRECTIONS).
+        w: work vector (k, 1 + DIRECTIONS).
 
     Raises:
         UnsupportedError: a force is computed in Python.
@@ -87,24 +91,31 @@ class DualMachine:
         self.w = np.zeros((int(packed.structure[MODEL.WORK_SIZE]) + extra_size, 1 + DIRECTIONS))
 
     def bind_kernel(self, name: str, y: Array, f: Array) -> Callable[[int], int]:
-        """A kernel that is called with the last of its arguments."""
+        """Return a kernel that is called with the last of its arguments.
+
+        Args:
+            name: name of the kernel.
+            y: state.
+            f: derivative of the state.
+        """
         return self.program.code.bound(name, self.program.ints, self.x, self.w, y, f)
 
     def begin(self, t: float) -> None:
-        """Set the time, and forget what other directions have left."""
+        """Set the time, and clear the derivatives of an earlier evaluation."""
         self.w[:, 1:] = 0.0
         self.w[WORK.TIME, 0] = t
 
 
 class TangentModel(DifferentiableModel):
-    """A model whose rates xdot = f(t, x, u, p) are found with derivatives along directions of x, u and p.
+    """Model whose rates ``xdot = f(t, x, u, p)`` have derivatives along directions of x, u and p.
 
-    The controls u stand in the place of what the model's controllers say (to which a stretch reflex
-    adds). Units are those of OpenSim's files of states: m, rad, s, N. Where rates do not exist, all
-    is not a number. Where a law bends, or a path touches a surface, the derivative is that of the
-    side that machine code takes there.
+    The controls u replace the outputs of the model's controllers (a stretch reflex adds to them).
+    Units are those of OpenSim's state files: m, rad, s, N. Where rates do not exist, all results
+    are NaN. Where a law has a kink, or a path touches a surface, the derivative is that of the side
+    that the machine code takes.
 
-    The arguments and attributes are those of :class:`osimlite.derivatives.differentiable_model.DifferentiableModel`.
+    Arguments and attributes are those of
+    :class:`osimlite.derivatives.differentiable_model.DifferentiableModel`.
     """
 
     def __init__(self, model: Model, parameters: Sequence[str] = (), folder: Path = Path()) -> None:
@@ -127,19 +138,19 @@ class TangentModel(DifferentiableModel):
         self._evaluate = machine.bind_kernel("evaluate", self._y, self._f)
 
     def take(self, p: Array) -> None:
-        """Have the parameters (p,) be these from now on."""
+        """Set the parameters (p,)."""
         self.p = p
         self.put(self._machine.x[:, 0])
 
     def put(self, numbers: Array) -> None:
-        """Put what depends on the parameters into numbers (k,) of the model."""
+        """Write the numbers (k,) of the model that depend on the parameters."""
         if self._parameters:
             numbers[self._parameter_rows] = (
                 self._parameters.base[self._parameter_rows] + self._slopes @ self.p
             )
 
     def put_along(self, dp: Array, numbers: Array) -> None:
-        """Likewise its derivatives (k, m) along directions of the parameters (p, m)."""
+        """Write the derivatives (k, m) of these numbers along directions (p, m) of the parameters."""
         numbers[self._parameter_rows] = self._slopes @ dp
 
     def along(
@@ -152,12 +163,20 @@ class TangentModel(DifferentiableModel):
         dp: Array | None = None,
         look: Callable[[slice, slice], None] | None = None,
     ) -> tuple[Array, Array]:
-        """The rates (x,), and their derivatives (x, m) along m directions.
+        """Compute the rates and their derivatives along m directions.
 
-        Args: t: time, s. x: state (x,). u: controls (u,). dx: directions of the state (x, m). du:
-            of the controls (u, m); 0 if left out. dp: of the parameters (p, m); 0 if left out.
-            look: called after each evaluation, with the directions that it had and their places
-            behind a number.
+        Args:
+            t: time, s.
+            x: state (x,).
+            u: controls (u,).
+            dx: directions of the state (x, m).
+            du: directions of the controls (u, m); 0 if None.
+            dp: directions of the parameters (p, m); 0 if None.
+            look: function that is called after each evaluation, with the slice of its directions
+                and their columns in a row of dual numbers.
+
+        Returns:
+            Rates (x,), and their derivatives (x, m).
         """
         machine, y, f = self._machine, self._y, self._f
         y[self.state_indices, 0], self._control_rows[:, 0] = x, u
@@ -179,19 +198,22 @@ class TangentModel(DifferentiableModel):
 
     @cached_property
     def output_names(self) -> dict[str, tuple[str, ...]]:
-        """What is known of a state, by groups, and the names of the entries of each; see `CasadiModel.outputs`."""
+        """Names of the entries of each group of outputs; see `CasadiModel.outputs`."""
         return {group: tuple(labels) for group, (labels, _) in self._compute_outputs().items()}
 
     def observed(
         self, t: float, x: Array, u: Array, chosen: Sequence[tuple[str, int]]
     ) -> tuple[Array, Array, Array]:
-        """Outputs (y,), and their derivatives by the state (y, x) and by the controls (y, u).
+        """Compute outputs and their derivatives.
 
         Args:
             t: time, s.
             x: state (x,).
             u: controls (u,).
-            chosen: of each output its group, and its place among `output_names` of that.
+            chosen: group of each output, and its index among `output_names` of the group.
+
+        Returns:
+            Outputs (y,), and their derivatives by the state (y, x) and by the controls (y, u).
         """
         size = len(x)
         both = np.eye(size + len(u))
@@ -212,7 +234,7 @@ class TangentModel(DifferentiableModel):
         return y, slopes[:, :size], slopes[:, size:]
 
     def _compute_outputs(self) -> dict[str, tuple[list[str], list[Any]]]:
-        """Of the state that was evaluated last."""
+        """Compute labels and values of all groups of outputs in the state of the last evaluation."""
         points = [
             axis for _, _, point in locate_stations(self.mechanism, self._packed) for axis in point
         ]
@@ -222,7 +244,7 @@ class TangentModel(DifferentiableModel):
 
     @cached_property
     def _probe_kernels(self) -> list[tuple[int, Callable[[int], int]]]:
-        """Places of the items of probes, and what computes them."""
+        """Items of the probes with their kernels."""
         places, kernels = list_probe_items(self._packed, self.forces.elements), self._packed.kernels
         return [
             (place, self._machine.bind_kernel(str(kernels[place + ITEM.LAW]), self._y, self._f))
@@ -230,10 +252,15 @@ class TangentModel(DifferentiableModel):
         ]
 
     def compute_constraint_slopes(self, t: float, x: Array) -> tuple[Array, Array]:
-        """The derivatives of the errors of constraints at positions (m, x + p) and at speeds (k, x + p).
+        """Compute the derivatives of the constraint errors by the state and the parameters.
 
-        They are by the state and by the parameters; in units of the equations, m and rad, m/s and
-        rad/s.
+        Args:
+            t: time, s.
+            x: state (x,).
+
+        Returns:
+            Derivatives of the position errors (m, x + p), in m and rad, and of the speed errors (k,
+            x + p), in m/s and rad/s.
         """
         s, w, y, size = self._machine.program.ints, self._machine.w, self._y, len(x)
         h, freedoms = s[s[MODEL.CONSTRAINED] :], int(s[MODEL.DOFS])
@@ -266,7 +293,17 @@ class TangentModel(DifferentiableModel):
     def linear(
         self, t: float, x: Array, u: Array, p: Array | None = None
     ) -> tuple[Array, Array, Array]:
-        """The rates (x,), and their derivatives by the state (x, x) and by the controls (x, u)."""
+        """Compute the rates and their derivatives by state and controls.
+
+        Args:
+            t: time, s.
+            x: state (x,).
+            u: controls (u,).
+            p: parameters (p,); those set before if None.
+
+        Returns:
+            Rates (x,), derivatives by the state (x, x), and by the controls (x, u).
+        """
         size = len(x)
         both = np.eye(size + len(u))
         if p is not None:
@@ -275,7 +312,12 @@ class TangentModel(DifferentiableModel):
         return rates, found[:, :size], found[:, size:]
 
     def steps(self, controls: Controls, dp: Array) -> TangentSteps:
-        """What follows a motion that controls drive, along directions of the parameters (p, m) and of the start."""
+        """Return integration steps of a controlled motion with derivatives along directions of the parameters and the start.
+
+        Args:
+            controls: controls of the motion.
+            dp: directions of the parameters (p, m).
+        """
         packed = pack(self.mechanism, replace(self.forces, controls=controls), apart=self._apart)
         result, numbers = (
             TangentSteps(packed, self.forces, self.state_indices),
@@ -289,12 +331,12 @@ class TangentModel(DifferentiableModel):
 
 
 class DualWorkspace:
-    """What an evaluation has left, as numbers that carry derivatives.
+    """Read access to the vectors of an evaluation as dual numbers.
 
     Args:
-        model: the structure.
-        reals: the numbers (k, 1 + DIRECTIONS).
-        data: the work vector (k, 1 + DIRECTIONS).
+        model: structure.
+        reals: numbers (k, 1 + DIRECTIONS).
+        data: work vector (k, 1 + DIRECTIONS).
     """
 
     wrap = staticmethod(carried_by)
@@ -303,20 +345,20 @@ class DualWorkspace:
         self.model, self.reals, self.data = model, DualVector(reals), DualVector(data)
 
     def mask_failures(self, numbers: Sequence[Any]) -> list[Any]:
-        """Numbers as they are: where the evaluation fails, nobody looks."""
+        """Return numbers unchanged: after a failed evaluation they are not read."""
         return [*numbers]
 
 
 class TangentSteps:
-    """Steps of Merson's method, with derivatives of where they lead by where they begin and by numbers of the model.
+    """Steps of Merson's method with derivatives of their end by their start and by numbers of the model.
 
-    They work on blocks (b, x, 1 + DIRECTIONS): for so many directions at once, in the packed order,
-    states and their derivatives.
+    They work on blocks (b, x, 1 + DIRECTIONS) of states and their derivatives in the packed order,
+    one block for each group of directions.
 
     Args:
-        packed: the model with the controls of the motion.
-        forces: of it.
-        places: in the packed order of the states.
+        packed: packed model with the controls of the motion.
+        forces: forces of the model.
+        places: indices of the states in the packed order.
     """
 
     def __init__(self, packed: Packed, forces: Forces, places: Sequence[int]) -> None:
@@ -338,14 +380,14 @@ class TangentSteps:
         )
 
     def take(self, numbers: Array, changes: Array) -> None:
-        """Have the numbers of the model (k,) be these from now on, and change so along all directions (k, m)."""
+        """Set the numbers of the model (k,) and their derivatives along all directions (k, m)."""
         self._count, self._number = changes.shape[1], -1
         self._numbers = [np.zeros(self._machine.x.shape) for _ in split_directions(self._count)]
         for (part, own), block in zip(split_directions(self._count), self._numbers, strict=True):
             block[:, 0], block[:, own] = numbers, changes[:, part]
 
     def blocks(self, y: Array, slopes: Array) -> Array:
-        """Of a state (x,) with its derivatives (x, m), in the order of the model."""
+        """Return the blocks of a state (x,) with its derivatives (x, m), in the order of the model."""
         result = np.zeros((len(self._numbers), len(y), 1 + DIRECTIONS))
         result[:, self.state_indices, 0] = y
         for block, (part, own) in zip(result, split_directions(slopes.shape[1]), strict=True):
@@ -353,7 +395,7 @@ class TangentSteps:
         return result
 
     def slopes(self, blocks: Array) -> Array:
-        """The derivatives (x, m) in blocks."""
+        """Return the derivatives (x, m) in blocks."""
         parts = [
             block[self.state_indices, own]
             for block, (_, own) in zip(blocks, split_directions(self._count), strict=True)
@@ -361,7 +403,16 @@ class TangentSteps:
         return np.hstack(parts)
 
     def step(self, t0: float, t1: float, start: Array) -> tuple[Array, Array]:
-        """The blocks of the end of a step, and of the error there; what does not exist is not a number."""
+        """Compute a step; values that do not exist are NaN.
+
+        Args:
+            t0: start of the step, s.
+            t1: end of the step, s.
+            start: blocks at the start.
+
+        Returns:
+            Blocks at the end, and blocks of the error estimate.
+        """
         end, error, machine, size = (
             np.empty(start.shape),
             np.empty(start.shape),
@@ -385,7 +436,7 @@ class TangentSteps:
 
 
 def split_directions(count: int) -> Iterator[tuple[slice, slice]]:
-    """Directions that are taken at once: which of so many, and their places behind a number."""
+    """Yield the directions that are computed together, and their columns in a row of dual numbers."""
     for first in range(0, max(count, 1), DIRECTIONS):
         size = min(DIRECTIONS, max(count - first, 0))
         yield slice(first, first + size), slice(1, 1 + size)
@@ -393,4 +444,5 @@ def split_directions(count: int) -> Iterator[tuple[slice, slice]]:
 
 @cache
 def _load_tangent_code() -> Tangents:
+    """Return the machine code for `DIRECTIONS` directions."""
     return Tangents(DIRECTIONS)

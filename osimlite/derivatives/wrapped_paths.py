@@ -1,11 +1,11 @@
-"""Paths around surfaces: no formula, but functions whose derivatives CasADi is given.
+"""Paths around surfaces, which have no formula: CasADi callbacks with their derivatives.
 
-Where a path runs is searched for by the kernels, so that its length and moment arms come from
-machine code (`casadi.Callback`). To the rest of the model it is a path of which these are known as
-functions of the coordinates. Their derivatives are differences of what the kernels find,
-extrapolated (L. F. Richardson, Phil. Trans. R. Soc. A 226, 1927): good to some 1e-9 where a path
-does not touch or leave a surface. Where it does there is a derivative on each side, and these are a
-mean of both. Second derivatives are differences of these.
+The kernels search for the course of a path, so that its length and moment arms come from machine
+code (`casadi.Callback`). The rest of the model sees a path whose length and moment arms are known
+functions of the coordinates. Their derivatives are extrapolated differences (L. F. Richardson,
+Phil. Trans. R. Soc. A 226, 1927), accurate to about 1e-9 where a path does not touch or leave a
+surface; there they are a mean of the derivatives on both sides. Second derivatives are differences
+of these.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.path_system import MeasuredPath, PathSystem
 
 DIFFERENCE_STEP = 1e-4
-"""Of the differences, rad or m: where paths jump they do so all at once, and what the search leaves is some 1e-13."""
+"""Step of the differences, rad or m. The search leaves an error of about 1e-13, and paths jump at once."""
 SAMPLED_POSES = 60
-"""In so many poses is looked about which coordinates a path has a moment arm."""
+"""Number of poses in which the coordinates with a moment arm are identified."""
 
 
 class SymbolicPath:
-    """A path of which length, moment arms and speed are symbols.
+    """Path whose length, moment arms and speed are symbols.
 
-    In OpenSim the speed of a path around a surface may be another than its moment arms say.
+    In OpenSim the speed of a path around a surface may differ from that by its moment arms.
 
     Args:
-        coordinates: places in the mechanism of those that it depends on.
+        coordinates: indices in the mechanism of the coordinates that the path depends on.
 
-    Attributes: symbols: the length, a moment arm for each coordinate, and what each of their speeds
-        gives to its own, once they are known.
+    Attributes:
+        symbols: length, moment arm for each coordinate, and path speed for a unit speed of each.
     """
 
     coupled: ClassVar[bool] = False
@@ -55,11 +55,11 @@ class SymbolicPath:
 
     @property
     def size(self) -> int:
-        """How many symbols there are."""
+        """Number of symbols."""
         return 1 + 2 * len(self.coordinates)
 
     def items(self, places: Places) -> list[ForceRecord]:
-        """As of a path that is a function of coordinates; see :mod:`osimlite.mechanics.kernels.function_paths`."""
+        """Return the items of a path that is a function of coordinates; see :mod:`osimlite.mechanics.kernels.function_paths`."""
         freedoms = [places.freedom(coordinate) for coordinate in self.coordinates]
         count = len(freedoms)
 
@@ -90,18 +90,18 @@ class SymbolicPath:
 
 
 class WrappedPaths:
-    """The paths of a model whose way is searched for.
+    """Paths of a model that run around surfaces.
 
     Args:
-        mechanism: of the model.
-        forces: of it.
-        order: places in the mechanism of the coordinates that the functions are of.
+        mechanism: mechanism of the model.
+        forces: forces of the model.
+        order: indices in the mechanism of the coordinates that the functions depend on.
 
     Attributes:
-        forces: with given paths in the place of those.
-        symbolic_paths: these.
-        names: of what acts along these.
-        size: how many numbers they have together.
+        forces: forces with symbolic paths instead of paths around surfaces.
+        symbolic_paths: the symbolic paths.
+        names: paths of the forces along them.
+        size: number of their symbols.
     """
 
     def __init__(self, mechanism: Mechanism, forces: Forces, order: Sequence[int]) -> None:
@@ -135,7 +135,7 @@ class WrappedPaths:
         self.forces = replace(forces, elements=tuple(elements))
 
     def _measure_speeds(self, pose: Array) -> list[Array]:
-        """Of each path what a speed of 1 of each of its coordinates gives to its own."""
+        """Return for each path its speed for a unit speed of each of its coordinates."""
         result = np.zeros((len(self.symbolic_paths), len(pose)))
         for group in self._groups:
             moving = np.zeros(len(pose))
@@ -147,6 +147,7 @@ class WrappedPaths:
         ]
 
     def _sample_poses(self, mechanism: Mechanism) -> Array:
+        """Return random poses within the ranges of the coordinates."""
         rng = np.random.default_rng(0)
         bounds = np.array([info.range for info in mechanism.coordinates]).reshape(-1, 2)
         wide = bounds[:, 1] - bounds[:, 0] > 2.0 * np.pi
@@ -156,14 +157,14 @@ class WrappedPaths:
         )
 
     def set_symbols(self, symbols: Sequence[Any]) -> None:
-        """Have the paths be symbols (size,)."""
+        """Set the symbols (size,) of the paths."""
         first = 0
         for item in self.symbolic_paths:
             item.symbols = [symbols[first + k] for k in range(item.size)]
             first += len(item.symbols)
 
     def measure_paths(self, q: Array) -> Array:
-        """Lengths and moment arms (size,) at values (n,) of the coordinates that the functions are of."""
+        """Return lengths, moment arms and speeds (size,) at values (n,) of the coordinates."""
         pose = self._default.copy()
         pose[self._order] = q
         lengths = self._system.measured(pose, self._still, LENGTH)
@@ -178,7 +179,7 @@ class WrappedPaths:
         )
 
     def compute_slopes(self, q: Array) -> Array:
-        """Derivatives (size, n) of `measure_paths`."""
+        """Return the derivatives (size, n) of `measure_paths`."""
         result = np.zeros((self.size, len(q)))
         owners = np.repeat(
             np.arange(len(self.symbolic_paths)), [item.size for item in self.symbolic_paths]
@@ -197,7 +198,7 @@ class WrappedPaths:
 
     @property
     def pattern(self) -> Any:
-        """Which of `compute_slopes` can be other than 0."""
+        """Sparsity pattern of `compute_slopes`."""
         places = {place: k for k, place in enumerate(self._order)}
         rows, columns, first = list[int](), list[int](), 0
         for item in self.symbolic_paths:
@@ -209,7 +210,7 @@ class WrappedPaths:
         return casadi.Sparsity.triplet(self.size, len(self._order), rows, columns)
 
     def make_function(self) -> Any:
-        """``paths(q)`` as a function of CasADi, with its derivative. It must be kept as long as it is used."""
+        """Return ``paths(q)`` as a CasADi function with its derivative; keep a reference while it is used."""
         slopes = _NumericCallback(
             "path_slopes",
             [len(self._order), self.size],
@@ -223,13 +224,14 @@ class WrappedPaths:
 
 
 def _shift_coordinates(q: Array, places: Sequence[int], by: float) -> Array:
+    """Return values with some of them changed by the same amount."""
     result = q.copy()
     result[places] += by
     return result
 
 
 def _group_coordinates(paths: Sequence[Sequence[int]]) -> list[list[int]]:
-    """The coordinates of some paths in groups of which no path has two, so that all of a group can move at once."""
+    """Return groups of coordinates of which no path has two, so that a group can be moved at once."""
     groups: list[list[int]] = []
     for place in dict.fromkeys(place for own in paths for place in own):
         beside = {other for own in paths if place in own for other in own}
@@ -242,6 +244,7 @@ def _group_coordinates(paths: Sequence[Sequence[int]]) -> list[list[int]]:
 
 
 def _is_wrapped(element: Any) -> bool:
+    """Return whether a force acts along a path around surfaces."""
     if (
         not (isinstance(element, DeclaredForce) and element.force_type.geometry is PATH)
         or element.place is None
@@ -252,14 +255,14 @@ def _is_wrapped(element: Any) -> bool:
 
 
 class _NumericCallback(casadi.Callback):  # type: ignore[misc]
-    """A function in machine code as CasADi calls it.
+    """CasADi callback of a function in machine code.
 
     Args:
-        name: for messages.
-        sizes: of the columns that it takes.
-        out: which numbers it gives.
-        function: of these.
-        slopes: its derivative by the first one, as another of these; differences if left out.
+        name: name, for messages.
+        sizes: sizes of the columns of the arguments.
+        out: sparsity of the result.
+        function: function of the arguments.
+        slopes: derivative by the first argument, as another callback; differences if None.
     """
 
     def __init__(
