@@ -210,13 +210,15 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
         return result
 
     def run_others(first: int, result: Any) -> tuple[Any, Writes]:
-        """With the ways that part from this one after some branches."""
+        """Return result and writes, merged with those of the combinations that differ after `first` branches."""
         written, sides, tests = _undo_writes(), frame.sides, frame.tests
         for k in range(len(sides) - 1, first - 1, -1):
             frame.sides, frame.tests, frame.at = [*sides[:k], False], tests[: k + 1], 0
             frame.count += 1
             if frame.count > MAX_BRANCH_COMBINATIONS:
-                raise NoFormula(f"{part} has more than {MAX_BRANCH_COMBINATIONS} ways through it")
+                raise NoFormula(
+                    f"{part} has more than {MAX_BRANCH_COMBINATIONS} combinations of branches"
+                )
             where.condition = condition
             Vector.journals.append({})
             other, also_written = run_others(k + 1, function(*given))

@@ -45,17 +45,18 @@ def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
     Args:
         table: table of the pieces.
         z: argument.
-        kind: kind of the polynomial.
+        kind: PIECES or PIECES_OF_OPENSIM.
 
     Returns:
-        Value, slope and curvature.
+        Value, first and second derivative; for PIECES_OF_OPENSIM the second one is the first, as in
+        OpenSim 4.6.
     """
     knots, width = int(simplify_number(table[2])), int(simplify_number(table[3]))
     if not is_symbol(z):
         numbers: Any = [simplify_number(number) for number in table[: 4 + knots * (1 + width)]]
         return pieces_at(numbers, float(simplify_number(z)), kind)
     below = [SX.binary(casadi.OP_LT, z, table[4 + k]) for k in range(1, knots)]
-    # Of the tests that something counts one holds.
+    # Exactly one of the tests in `here` holds.
     beyond = [SX(1.0), *(SX.unary(casadi.OP_NOT, test) for test in below)]
     here = [SX.binary(casadi.OP_AND, *pair) for pair in zip(beyond, [*below, SX(1.0)], strict=True)]
 

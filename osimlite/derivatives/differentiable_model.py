@@ -50,7 +50,8 @@ class DifferentiableModel:
         self, model: Model, parameters: Sequence[str], folder: Path, *, apart: bool = False
     ) -> None:
         self._folder, self._model = folder, model
-        # Whether bodies stay apart decides what is linear in masses and places.
+        # Numbers of merged bodies are no linear functions of masses and positions, those of separate
+        # ones are.
         self._apart = apart or bool(parameters)
         self.name = model.name or "model"
         self.parameters = tuple(parameters)
@@ -111,8 +112,8 @@ class DifferentiableModel:
     def _collect_forces(self, model: Model, mechanism: Mechanism) -> Forces:
         """Return the forces of a model; probes give their values without their operation over time."""
         forces = force_elements(model, mechanism, folder=self._folder)
-        # Probes are outputs, whatever they make of their results over time; some look at more than
-        # the kernels.
+        # Probes are outputs without their operation over time. Probes that Python measures after the
+        # kernels have no formula.
         kept = (
             e
             for e in forces.elements

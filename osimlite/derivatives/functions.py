@@ -84,7 +84,7 @@ class CasadiModel(DifferentiableModel):
         apart: bool = False,
         loads_given: bool = False,
     ) -> None:
-        # Before all else: it says what is missing.
+        # Imported first, as its error names the missing package.
         from osimlite.derivatives.symbolic_evaluator import list_load_functions
         from osimlite.derivatives.symbols import casadi as library
 
@@ -106,7 +106,7 @@ class CasadiModel(DifferentiableModel):
         self._path_function = (
             self._wrapped_paths.make_function() if self._wrapped_paths.size else None
         )
-        # What has no formula is refused at once.
+        # Forces without a formula raise an error here, not at the first use.
         self._evaluator  # noqa: B018
 
     def _collect_forces(self, model: Model, mechanism: Mechanism) -> Forces:
@@ -137,7 +137,7 @@ class CasadiModel(DifferentiableModel):
         packed = pack(mechanism, searched.forces, apart=self._apart)
         if not np.array_equal(packed.structure, self._packed.structure):
             return np.zeros(0)
-        # Ways that are searched for may not change: lengths are no lines over anything.
+        # Courses around surfaces must not depend on a parameter: lengths are not linear in it.
         ways = (
             [searched.measure_paths(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)]
             if searched.size
@@ -248,7 +248,7 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def residual(self) -> Any:
-        """``residual(t, x, xdot, u, p, multipliers) -> residual``: zero along each motion of the model.
+        """``residual(t, x, xdot, u, p, multipliers) -> residual``: zero for motions of the model.
 
         The rows are in the order of the state: rates of values less those that follow from the
         speeds (rad/s, m/s); generalized forces ``M udot + c - f + Gᵀ multipliers`` (N, N m); rates
@@ -317,8 +317,8 @@ class CasadiModel(DifferentiableModel):
                 self._model, self.parameters, self._folder, apart=True, loads_given=bool(self.loads)
             )
             return own.joint_load(path, side)
-        # The body that the joint carries in the tree gets what is missing there, the other one the
-        # opposite.
+        # The missing wrench acts on the body that the joint carries in the tree, and its opposite on
+        # the other one.
         sign = 1.0 if (side == "child") != body.mobilizer.reversed else -1.0
         size, xdot = len(self.coordinates), self._sort_by_engine("xdot")
         found = self._evaluator.compute_missing_forces(xdot[size : 2 * size])
@@ -529,8 +529,8 @@ class CasadiModel(DifferentiableModel):
             )
         if self._path_function is not None:
             raise UnsupportedError(
-                "paths around surfaces are searched for by osimlite, which files cannot do; put polynomials in their "
-                "places first (osimlite modify --replace paths=polynomial)"
+                "paths around surfaces have no formula, so that files cannot contain them; replace them by "
+                "polynomials first (osimlite modify --replace paths=polynomial)"
             )
         make_folder(folder)
         written = []
@@ -540,7 +540,7 @@ class CasadiModel(DifferentiableModel):
             written.append(folder / f"{name}.casadi")
             function.save(str(written[-1]))
             generator.add(function)
-        # The generator takes the folder for the beginning of a name.
+        # CasADi's generator prepends the folder to the file name.
         generator.generate(f"{folder}/")
         facts = {
             "model": self.name,

@@ -93,19 +93,19 @@ def linearize(
     xdot, a, b = model.linear(time, x, u)
     if len(xdot) and np.isnan(xdot).all():
         raise SimulationError(
-            "the model has no accelerations in this state; a simulation from it says why"
+            "the model has no accelerations in this state; simulate from it to see the reason"
         )
     chosen = _find_outputs(model.output_names if outputs else {}, outputs)
     if not (np.isfinite(xdot).all() and np.isfinite(a).all() and np.isfinite(b).all()):
         raise SimulationError(_describe_invalid_entry(model.states, model.controls, xdot, a, b))
     y, c, d = (
-        model.observed(time, x, u, chosen)
+        model.compute_outputs(time, x, u, chosen)
         if outputs
         else (np.zeros((0, size)) for size in (1, len(x), len(u)))
     )
     if not all(np.isfinite(part).all() for part in (y, c, d)):
         raise SimulationError(
-            "an output of the model or its derivative is no finite number in this state"
+            "an output of the model or its derivative is not finite in this state"
         )
     names = tuple(f"{group}:{model.output_names[group][k]}" for group, k in chosen)
     return Linearization(
@@ -124,7 +124,7 @@ def _describe_invalid_entry(
             row, column = odd[0]
             place = f"the rate of '{states[row]}'" + (f"{words}'{names[column]}'" if words else "")
             return f"{place} is {matrix[row, column]:g}; look for a number in the model that is far too large or small"
-    return "a derivative is no finite number"
+    return "a derivative is not finite"
 
 
 def _find_outputs(

@@ -197,7 +197,7 @@ def _compute_mass_center(
         total = total + mass
         center = [a + mass * b for a, b in zip(center, place, strict=True)]
         rate = [a + mass * b for a, b in zip(rate, moves, strict=True)]
-    # A symbol is neither.
+    # A symbolic mass is neither a float nor a dual number.
     if isinstance(total, (float, Carrying)) and float(total) == 0.0:
         total = nan
     return [a / total for a in center], [a / total for a in rate]

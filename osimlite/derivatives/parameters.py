@@ -66,7 +66,7 @@ class Parameters:
                 self._set_values(self.values)
             if len(result) != len(base):
                 raise UnsupportedError(
-                    f"{what} cannot be a parameter: more of the model depends on it than numbers"
+                    f"{what} cannot be a parameter: the structure of the model depends on it"
                 )
             return result
 
@@ -101,7 +101,7 @@ class Parameters:
         """Return the values with some of them changed, each by another factor, which quotients would hide otherwise."""
         values = self.values.copy()
         for k in which:
-            # Not all by the same factor, which quotients would not notice.
+            # Different factors, as the same factor would cancel in quotients of parameters.
             values[k] = (
                 values[k] * (TRIAL_FACTORS[number] + k / 64.0)
                 if values[k]
@@ -157,8 +157,8 @@ def _check_linear(found: Array, base: Array, columns: Array, change: Array, what
         np.abs(_subtract_base(found, base) - parts.sum(axis=1)) <= LINEARITY_TOLERANCE * size
     ):
         raise UnsupportedError(
-            f"{what} cannot stay a symbol: what the equations are given is no linear function of it; "
-            "change it in the model and make the functions anew"
+            f"{what} cannot stay a symbol: the numbers of the equations are no linear function of it; "
+            "change it in the model and create the functions again"
         )
 
 

@@ -138,7 +138,7 @@ def sensitivity(
     for name in choices:
         if name not in OPTIONS:
             raise SettingError(
-                f"'{name}' does not go with sensitivities, which follow Merson's steps of the model as it is; "
+                f"'{name}' is not an option of sensitivities, which follow Merson's steps of the model; "
                 f"leave it out ({', '.join(sorted(OPTIONS))} can be chosen)"
             )
     accuracy = choices["accuracy"] = choices.get("accuracy") or DEFAULT_ACCURACY
@@ -216,7 +216,7 @@ class _SensitivityRun:
         if {*known} != {
             *tangent_model.states
         } or tangent_model.controls != simulation.forces.controls.names:
-            raise SettingError("the tangents are of another model; make them of this one")
+            raise SettingError("the tangents are of another model; create them from this one")
         own = [*moving, *simulation.state.paths]
         self._places = [own.index(name) for name in tangent_model.states]
         count = len(tangent_model.parameters)
@@ -297,8 +297,8 @@ class _SensitivityRun:
                 int(np.argmax(np.where(np.isfinite(off), off, np.inf)))
             ]
             raise SettingError(
-                f"at {t:g} s the tangents say another derivative of '{worst}' than the motion has; make them of this "
-                "very model"
+                f"at {t:g} s the tangents have another derivative of '{worst}' than the motion; create them from this "
+                "model"
             )
 
 
@@ -326,38 +326,38 @@ def integrate_sensitivities(
         SimulationError: a derivative is not finite.
     """
 
-    def stepped(t0: float, t1: float, y0: Array) -> Array:
-        """The blocks at the end of a step, in as many parts as the accuracy of the derivatives needs."""
+    def integrate_step(t0: float, t1: float, y0: Array) -> Array:
+        """Return the blocks at the end of a step, which is halved until the derivatives are accurate."""
         h = t1 - t0
         y, error = steps.step(t0, t1, y0)
         size = np.abs(y)
         if not np.isfinite(size.sum()):
             worst = names[int(np.nonzero(~np.isfinite(steps.slopes(y)).all(axis=1))[0][0])]
             raise SimulationError(
-                f"between {t0:g} and {t1:g} s the derivatives of '{worst}' are no finite numbers"
+                f"between {t0:g} and {t1:g} s the derivatives of '{worst}' are not finite"
             )
-        # As the integrator weighs states; of each number, what counts is its largest derivative.
+        # Weights are those of the integrator; errors are relative to the largest derivative by each number.
         before = np.abs(y0)
         weights = 1.0 / np.maximum(1.0, before[:, :, :1])
         sizes = (np.maximum(before, size) * weights).max(axis=1)
         errors = (np.abs(error) * weights).max(axis=1)
         if h > MIN_STEP_S and (errors > DERIVATIVE_ERROR_FACTOR * accuracy * sizes)[:, 1:].any():
             middle = t0 + h / 2.0
-            return stepped(middle, t1, stepped(t0, middle, y0))
+            return integrate_step(middle, t1, integrate_step(t0, middle, y0))
         return y
 
     result, row = np.empty((len(wanted), *slopes.shape)), 1
     result[0] = slopes
     y = steps.blocks(states[0], slopes)
-    # The steps are those of the motion, each from where that was.
+    # Each step starts from the state of the motion, as the steps are those of the motion.
     values = [steps.blocks(state, slopes)[0, :, 0] for state in states]
     for (t, state), (end, _) in pairwise(zip(times, values, strict=True)):
         y[:, :, 0] = state
         while row < len(wanted) and wanted[row] <= end:
-            y, t = stepped(t, wanted[row], y), wanted[row]
+            y, t = integrate_step(t, wanted[row], y), wanted[row]
             result[row], row = steps.slopes(y), row + 1
         if t < end:
-            y = stepped(t, end, y)
+            y = integrate_step(t, end, y)
     return result
 
 
@@ -372,7 +372,7 @@ def _check_not_initial(model: Model, tangent_model: TangentModel, name: str) -> 
         state = f"{place.component}/{what.removeprefix('default_').removesuffix('_value')}"
         if what.startswith("default_") and state in tangent_model.states:
             raise SettingError(
-                f"'{name}' is where a state starts, which is held; take '{state}' among the states"
+                f"'{name}' is an initial value, which is fixed; pass '{state}' in `states`"
             )
 
 

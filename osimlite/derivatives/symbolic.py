@@ -257,8 +257,9 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
             self.returns_early = True
             node.test = _make_call("decide_", part, node.test)
             return node
-        # for side in branch.sides(): the variables as before; if side: ... else: ...;
-        # branch.ends.append(the variables)
+        # The branch becomes a loop over its sides:
+        # for side in branch.sides():
+        #     restore the variables; if side: ... else: ...; branch.ends.append(variables)
         self.branch_variables.update(names)
         branch, side, before = (f"{name}{self.number}_" for name in ("branch", "side", "before"))
         self.number += 1
@@ -300,7 +301,7 @@ def _exits_block(node: ast.AST) -> bool:
     if isinstance(node, EXIT_STATEMENTS):
         return True
     if isinstance(node, ast.For | ast.While):
-        # Its own `break` is none of ours.
+        # A `break` in an inner loop leaves only that loop.
         return any(isinstance(part, ast.Return) for part in ast.walk(node))
     return any(map(_exits_block, ast.iter_child_nodes(node)))
 

@@ -24,15 +24,13 @@ from osimlite.simulation.elements.geometries.load import Load, find_load
 from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.pack import Packed
 
-WRAPPED_PATH_REASON = (
-    "its path bends around surfaces; put a FunctionBasedPath that is fitted to it in its place"
-)
+WRAPPED_PATH_REASON = "its path runs around surfaces; replace it by a fitted FunctionBasedPath"
 """Reason and remedy for paths around surfaces."""
-MESH_REASON = "a mesh is in contact; take spheres and half spaces"
+MESH_REASON = "meshes in contact have none; use spheres and half spaces"
 """Reason and remedy for contact of meshes."""
-ELLIPSOID_REASON = "the point of an ellipsoid that is in contact is searched for; take spheres"
+ELLIPSOID_REASON = "contact points of ellipsoids are found by a search; use spheres"
 """Reason and remedy for contact of ellipsoids."""
-EARLY_RETURN_REASON = "what touches is said at the sizes of a state that is known only later; leave simbody_early_return out"
+EARLY_RETURN_REASON = "simbody_early_return depends on a later state; remove this option"
 """Reason and remedy for the option simbody_early_return."""
 UNSUPPORTED_KERNELS = {
     "wrapped_path": WRAPPED_PATH_REASON,
@@ -95,7 +93,7 @@ class SymbolicEvaluator:
         self.structure: list[int] = Program(packed, PYTHON).ints.tolist()
         for place, law_address in given.items():
             self.structure[place + ITEM.LAW] = law_address
-        # The controls are given, whatever the controllers of the model say.
+        # The controls are arguments, so that the model's controllers are switched off.
         self.structure[MODEL.CONTROLS] = 0
         if self.structure[MODEL.CONSTRAINED]:
             law = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.DYNAMICS]
@@ -218,11 +216,11 @@ class SymbolicEvaluator:
             )
             whose = f"'{named}'" if named else "the model"
             raise UnsupportedError(
-                f"{whose} has no formula for CasADi: {error}; set its appliesForce to false, or take another class"
+                f"{whose} has no formula for CasADi: {error}; set its appliesForce to false, or use another class"
             ) from error
 
     def _find_load(self, g: Vector, gp: Vector, room: Vector, t: Any) -> None:
-        """Write the values of loads into the work vector, in the place of the kernel :func:`find_load`."""
+        """Write the values of loads into the work vector, instead of the kernel :func:`find_load`."""
         owner = self._packed.owners[max(item for item in self._packed.owners if item <= g.first)]
         element: Any = self._elements[owner]
         first = len(list_load_functions(self._elements[:owner]))

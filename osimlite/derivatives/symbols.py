@@ -18,10 +18,8 @@ from osimlite.base.require import require
 from osimlite.errors import MissingDependency
 
 if "opensim" in sys.modules and "casadi" not in sys.modules:
-    # OpenSim has a library of the same name with other contents.
-    raise MissingDependency(
-        "casadi cannot be loaded where opensim is loaded already; take another process"
-    )
+    # OpenSim ships another version of CasADi's library under the same name.
+    raise MissingDependency("casadi cannot be loaded after opensim; use another process")
 casadi: Any = require("casadi", extra="casadi", purpose="a model as functions of CasADi")
 SX: Any = casadi.SX
 """Type of CasADi's symbolic scalar expressions."""
@@ -331,7 +329,7 @@ def truncate_number(value: Any) -> int:
         NoFormula: the number depends on a symbol.
     """
     if is_symbol(value):
-        raise NoFormula("a place in a table depends on the state")
+        raise NoFormula("an index into a table depends on the state")
     return int(simplify_number(value))
 
 

@@ -81,9 +81,9 @@ class DualMachine:
             if place in packed.owners and not isinstance(kernel, str):
                 path = forces.elements[packed.owners[place]].path
                 raise UnsupportedError(
-                    f"'{path}' is computed in Python, which finds no derivatives; set its appliesForce to false"
+                    f"'{path}' is computed in Python, which has no derivatives; set its appliesForce to false"
                 )
-        # Nothing is projected.
+        # States are never projected onto constraints here.
         laws = tuple(name for name in packed.laws if name != "project")
         self.program = Program(replace(packed, laws=laws), _load_tangent_code(), entries)
         self.x = np.zeros((len(packed.numbers), 1 + DIRECTIONS))
@@ -130,7 +130,7 @@ class TangentModel(DifferentiableModel):
             for number, factor in parts:
                 row[number] = factor
         self._machine = machine = DualMachine(packed, self.forces, ("evaluate",))
-        # The controls are given, whatever the controllers of the model say.
+        # The controls are arguments, so that the model's controllers are switched off.
         machine.program.ints[MODEL.CONTROLS] = 0
         first = int(packed.structure[MODEL.WORK_CONTROL])
         self._control_rows = machine.w[first : first + len(self.controls)]
@@ -140,16 +140,16 @@ class TangentModel(DifferentiableModel):
     def take(self, p: Array) -> None:
         """Set the parameters (p,)."""
         self.p = p
-        self.put(self._machine.x[:, 0])
+        self.fill_numbers(self._machine.x[:, 0])
 
-    def put(self, numbers: Array) -> None:
+    def fill_numbers(self, numbers: Array) -> None:
         """Write the numbers (k,) of the model that depend on the parameters."""
         if self._parameters:
             numbers[self._parameter_rows] = (
                 self._parameters.base[self._parameter_rows] + self._slopes @ self.p
             )
 
-    def put_along(self, dp: Array, numbers: Array) -> None:
+    def fill_derivatives(self, dp: Array, numbers: Array) -> None:
         """Write the derivatives (k, m) of these numbers along directions (p, m) of the parameters."""
         numbers[self._parameter_rows] = self._slopes @ dp
 
@@ -187,7 +187,7 @@ class TangentModel(DifferentiableModel):
             if du is not None:
                 self._control_rows[:, own] = du[:, part]
             if dp is not None:
-                self.put_along(dp[:, part], machine.x[:, own])
+                self.fill_derivatives(dp[:, part], machine.x[:, own])
             if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:
                 rates, result[:, part] = f[self.state_indices, 0], f[self.state_indices, own]
                 if look is not None:
@@ -201,7 +201,7 @@ class TangentModel(DifferentiableModel):
         """Names of the entries of each group of outputs; see `CasadiModel.outputs`."""
         return {group: tuple(labels) for group, (labels, _) in self._compute_outputs().items()}
 
-    def observed(
+    def compute_outputs(
         self, t: float, x: Array, u: Array, chosen: Sequence[tuple[str, int]]
     ) -> tuple[Array, Array, Array]:
         """Compute outputs and their derivatives.
@@ -324,8 +324,8 @@ class TangentModel(DifferentiableModel):
             packed.numbers.copy(),
         )
         changes = np.zeros((len(numbers), dp.shape[1]))
-        self.put(numbers)
-        self.put_along(dp, changes)
+        self.fill_numbers(numbers)
+        self.fill_derivatives(dp, changes)
         result.take(numbers, changes)
         return result
 
@@ -367,7 +367,7 @@ class TangentSteps:
             int(packed.structure[MODEL.WORK_SIZE]),
             int(packed.structure[MODEL.WORK_STATE]),
         )
-        # Where constraints bind the motion, no step is good enough to be projected.
+        # With constraints no error is small enough, so that the kernel never projects the end of a step.
         self._accepted = -1.0 if packed.structure[MODEL.CONSTRAINED] else np.inf
         self._machine = machine = DualMachine(
             packed, forces, ("evaluate", MERSON), merson.HEAD + merson.STATES * size

@@ -140,7 +140,7 @@ class WrappedPaths:
         for group in self._groups:
             moving = np.zeros(len(pose))
             moving[group] = 1.0
-            # No path has two of these coordinates.
+            # No path depends on two of these coordinates, so that one evaluation serves all.
             result[:, group] = self._system.measured(pose, moving, SPEED)[:, None]
         return [
             row[[*item.coordinates]] for row, item in zip(result, self.symbolic_paths, strict=True)

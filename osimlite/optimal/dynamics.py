@@ -48,7 +48,7 @@ class Dynamics:
         if self.is_implicit:
             accelerations = point.derivatives[:size]
         else:
-            # M udot = what pushes.
+            # The accelerations remain symbols: M udot = f is solved with the factors of M (see PointFormula).
             accelerations = casadi.SX.sym("udot", size)
             none, others = casadi.SX.zeros(size), casadi.SX.zeros(len(f.states) - 2 * size)
             udot = casadi.vertcat(none, accelerations, others)

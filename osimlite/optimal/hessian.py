@@ -32,7 +32,7 @@ class Hessian:
         inner, outer = np.nonzero(np.triu(pattern[:direct, :direct]))
         inner, outer = np.sort([program.end_columns[inner], program.end_columns[outer]], axis=0)
         self._ends = np.nonzero(np.triu(pattern[:direct, :direct]))
-        # What depends on an end and on an integral together couples that end with all points.
+        # A term that depends on both an end and an integral couples that end with all points.
         self._mixed = [tuple(pair) for pair in np.argwhere(pattern[:direct, direct:])]
         far = [
             np.unique(program._jacobian_columns[program._jacobian_rows == program._row_count + k])
@@ -67,16 +67,16 @@ class Hessian:
         own, at_ends = multipliers[: program._row_count], multipliers[program._row_count :]
         cost, wanted = (part.T for part in program._end_slope(*given))
         of_integrals = factor * cost.ravel()[direct:] + at_ends @ wanted[:, direct:]
-        push = program._b.multiply_transpose(np.concatenate([own, of_integrals]))
+        row_multipliers = program._b.multiply_transpose(np.concatenate([own, of_integrals]))
         parts = []
         for group, first in zip(program.groups, program._offsets, strict=False):
             count = group.rows * len(group.numbers)
             parts.append(
-                group.curvature(*program._point_arguments(group, w), push[first : first + count])[
-                    0
-                ].ravel()
+                group.curvature(
+                    *program._point_arguments(group, w), row_multipliers[first : first + count]
+                )[0].ravel()
             )
-        # It is symmetric.
+        # The Hessian is symmetric, so that its upper triangle is enough.
         (ends,) = program._end_curvature(*given, np.array(factor), at_ends)
         parts.append(ends[self._ends])
         if self._mixed:

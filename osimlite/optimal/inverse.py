@@ -65,7 +65,7 @@ def build_inverse_problem(
         implicit_auxiliary_derivatives_weight=TENDON_RATE_WEIGHT,
         optim_convergence_tolerance=tool.convergence_tolerance,
         optim_constraint_tolerance=tool.constraint_tolerance,
-        # Moco has no such differences; without them a search ends up to 1e-3 above the least cost.
+        # Moco uses limited memory, with which a search ends up to 1e-3 above the optimum.
         optim_hessian_approximation="exact",
         optim_sparsity_detection="random",
         optim_finite_difference_scheme="forward",
@@ -164,7 +164,7 @@ def _read_kinematics(
     infos = mechanism.coordinates
     names = [f"{info.path}/value" for info in infos]
     states = [*names, *(f"{info.path}/speed" for info in infos)]
-    # OpenSim takes names of coordinates, and of states as they once were, for what they mean.
+    # OpenSim accepts names of coordinates, and old names of states, as paths of states.
     processor = tool.kinematics.copy_deep()
     processor.operators.append(TabOpUseAbsoluteStateNames())
     table = process_table(asked, tool.kinematics, processor, states, mechanism)

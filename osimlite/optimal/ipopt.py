@@ -204,18 +204,18 @@ def _make_options(program: Program) -> dict[str, Any]:
     settings, options = program.problem.solver, dict[str, Any]()
     is_exact = _uses_exact_hessian(program)
     options["hessian_approximation"] = "exact" if is_exact else "limited-memory"
-    # The same steps; what the update adds is a part of the one matrix, in the place of a dozen of
-    # solutions for each.
+    # "extended" takes the same steps, but puts the quasi-Newton update into one larger matrix, instead
+    # of a dozen solutions with the smaller one.
     options["limited_memory_aug_solver"] = "extended"
     if len(program.layout.lower) > METIS_MIN_VARIABLES:
-        # METIS orders what hangs together over time in half of what MUMPS takes by its own choice.
+        # The order of METIS suits the band over time: half the time of MUMPS's default.
         options["mumps_pivot_order"] = 5
     if settings.optim_max_iterations != -1:
         options["max_iter"] = settings.optim_max_iterations
     if (tolerance := settings.optim_convergence_tolerance) != -1.0:
         both = ("", "dual_inf_", "compl_inf_")
-        # Newton's last steps are so few that they end where the barrier still costs up to 1e-2 of
-        # the objective.
+        # Newton's method converges so fast at the end that it would stop where the barrier still costs
+        # up to 1e-2 of the objective.
         wanted = (
             min(tolerance, max(EXACT_TOLERANCE_FACTOR * tolerance, MIN_TOLERANCE))
             if is_exact
@@ -274,7 +274,7 @@ class _ArrayCallback(casadi.Callback):  # type: ignore[misc]
         return True
 
     def eval_buffer(self, given: Any, results: Any) -> int:
-        # What is not given, or not asked for, is None.
+        # CasADi passes None for absent arguments and for results that it does not need.
         arrays = [
             np.zeros(0) if item is None else np.frombuffer(item, dtype=float) for item in given
         ]
@@ -310,7 +310,7 @@ class _SearchCallbacks:
         given = {"x": _make_dense_column(width), "p": casadi.Sparsity(0, 0)}
         sizes = {"f": 1, "x": width, "lam_x": width, "g": rows, "lam_g": rows}
         scalar, across = casadi.Sparsity.scalar(), casadi.Sparsity.dense(width, 1)
-        # Ipopt asks for what belongs to one x in parts.
+        # Ipopt evaluates objective and constraints at one x by separate calls.
         self._values_at = cache_last(lambda x: program.compute_values(self.unscale(x)))
         self._slopes_at = cache_last(lambda x: program.compute_slopes(self.unscale(x)))
         self.objective = _ArrayCallback(

@@ -83,7 +83,7 @@ class PrescribedMotion:
         controls: paths of the controls of the actuators.
         bench: CasADi functions of the test bench.
         carriages: index of each actuator's carriage among the coordinates of the bench.
-        moving: paths of the coordinates that the constraints leave free to move.
+        moving: names of the coordinates that can move.
         numbers: cached `_tabulate_numbers`.
     """
 
@@ -108,7 +108,7 @@ class PrescribedMotion:
             _rename_to_model(name, known) for name in self.bench.states[2 * size :]
         )
         self.controls = tuple(_rename_to_model(name, known) for name in self.bench.controls)
-        # CasadiModel orders the coordinates of the carriages by the mechanism, not by actuators.
+        # The coordinates of the bench may have another order than the actuators.
         names = [path.rpartition("/")[2] for path in self.bench.coordinates]
         self.carriages = [names.index(name) for name in own]
         self.path_names = tuple(self._paths)

@@ -107,8 +107,8 @@ class Problem(StudyContext):
         self.check_values(study)
         self.phase = study.problem.phases
         self.time_functions: list[TimeFunction] = []
-        # What programs on other meshes share, by whether it is of points of the mesh, and of such
-        # that are moved.
+        # Formulas that programs on other meshes share; the key says whether they are for mesh points,
+        # and whether for points with projected states.
         self.formulas: dict[tuple[bool, bool], Any] = {}
         if not isinstance(study.solver, MocoCasADiSolver):
             raise self.unsupported_error(study.solver, "only MocoCasADiSolver is supported")
@@ -326,7 +326,7 @@ class Problem(StudyContext):
             ),
         ):
             if wanted:
-                # What Moco makes a cost are the variables as they are scaled.
+                # Moco's costs are squares of the scaled variables.
                 by = (
                     compute_scaling(*(read_range(bounds) or FREE))
                     if solver.scale_variables_using_bounds
@@ -367,7 +367,7 @@ class Problem(StudyContext):
             return []
         if not isinstance(self.functions, PrescribedMotion):
             self._check_constraint_method(count)
-        # OpenSim numbers constraints behind those that lock coordinates.
+        # OpenSim counts the constraints that lock or prescribe coordinates first.
         coordinates = [part for part in self.components.values() if isinstance(part, Coordinate)]
         first = sum(1 + (part.prescribed_function is not None) for part in coordinates)
         return [
@@ -443,7 +443,7 @@ class Problem(StudyContext):
         """Add the scale factors of goals to the parameters."""
         for factor in [factor for goal in self.phase.goals for factor in goal.scale_factors]:
             if factor.name not in self._scaled:
-                # OpenSim's method that adds it is told so, and its files are not.
+                # OpenSim's method addScaleFactor() receives the column, and its files do not store it.
                 message = "a file cannot say which column it scales, and OpenSim ignores scale factors in files"
                 raise self.unsupported_error(
                     factor, f"{message}; in Python, pass `scaled` to osimlite.moco.solve"

@@ -62,7 +62,7 @@ class Program:
         if inside and not problem.has_constraints:
             groups = [[*points]]
         if problem.uses_projection:
-            # Nothing leads to the first point.
+            # No interval ends at the first point, so that it has no projection.
             groups = [[0], groups[0][1:], groups[1]]
         self.groups = [PointGroup(self, numbers) for numbers in groups if numbers]
         self._offsets = np.cumsum([0, *(group.rows * len(group.numbers) for group in self.groups)])
@@ -202,7 +202,7 @@ class Program:
             for k, (own, rate) in enumerate(zip(*pair, strict=True)):
                 places, of = layout.indices["states"][points[:, k]], at
                 if moved and k == len(points[0]) - 1:
-                    # What the interval leads to is moved onto the constraints afterwards.
+                    # The interval ends at the states before projection.
                     ends = layout.indices["projections"][points[:, k]]
                     places, of = (
                         np.hstack([ends, places[:, moved:]]),
@@ -315,7 +315,7 @@ class Program:
             [self._jacobian_rows[self._of_g], self._end_entries[0] + self._row_count]
         )
         columns = np.concatenate([self._jacobian_columns[self._of_g], self._end_entries[1]])
-        # CasADi's columns come one after the other.
+        # CasADi stores sparse matrices column by column.
         self._jacobian_order = np.lexsort((rows, columns))
         self.jacobian_sparsity = casadi.Sparsity.triplet(
             len(self.labels),

@@ -55,7 +55,7 @@ class SparseMatrix:
         order = np.argsort(self.columns, kind="stable")
         starts = np.searchsorted(self.columns[order], np.arange(self.shape[1] + 1))
         counts = (starts[1:] - starts[:-1])[places]
-        # The entries of each column follow one another in the order.
+        # In this order the entries of each column are adjacent.
         first = np.repeat(
             starts[:-1][places] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts
         )

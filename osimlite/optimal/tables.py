@@ -116,8 +116,8 @@ def _filter_lowpass(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
     times, rows = table.times, table.rows
     step = float(np.diff(times).min())
     if float(times[-1] - times[0]) / (len(times) - 1) - step > np.finfo(float).eps:
-        # Made even before it is continued at both ends: OpenSim's tools for storage files do the
-        # one after the other.
+        # Resample at equal steps before the table is padded at both ends, in the order of OpenSim's
+        # Storage.
         even = times[0] + step * np.arange(int((times[-1] - times[0]) / step + 1e-9) + 1)
         (rows,) = SampledCurves(times, rows).derivatives(even, (0,))
         times = even

@@ -62,7 +62,7 @@ def set_time_range(
         message = f"the tables cover {first:g} s to {last:g} s, not the motion from {start:g} s to {end:g} s"
         raise asked.invalid_error(tool, message)
     assert isinstance(study.solver, MocoCasADiSolver)
-    # The quotient of a tiny interval is no integer any more, or infinite.
+    # For a tiny interval the quotient below would overflow.
     if (
         not 0.0 < tool.mesh_interval < np.inf
         or (end - start) / MAX_MESH_INTERVALS > tool.mesh_interval

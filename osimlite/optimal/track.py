@@ -61,7 +61,7 @@ def build_track_problem(
     )
     study = make_study(tool, process_model(tool.model, place), solver)
     phase = study.problem.phases
-    # The names of states and where errors are told of are those of a problem that has no goals yet.
+    # A problem without goals gives the names of states, and errors with their line.
     bare = Problem(study, file, place)
     tables: dict[str, StoTable] = {}
     states, mechanism = bare.functions.states, bare.functions.mechanism
@@ -106,8 +106,7 @@ def build_track_problem(
     problem = Problem(study, file, place, tables, scaled=scaled)
     if tool.apply_tracked_states_to_guess and "state_tracking" in tables:
         table = tables["state_tracking"]
-        # Moco takes the rows one after the other from the first time to the last, whenever they
-        # were measured.
+        # Moco spreads the rows evenly from the first time to the last, whatever their own times.
         times = np.linspace(first, last, len(table.times))
         states = {name: table[name] for name in table.columns if name in problem.states}
         if guess is not None:

@@ -61,7 +61,7 @@ class MocoTrajectory:
         """
         times = w[0] + layout.problem.grid.fractions * (w[1] - w[0])
         columns: dict[str, Array] = {}
-        # Files of Moco do not have where intervals lead to before states are moved.
+        # Moco's files do not contain the states before projection.
         for kind in (kind for kind in COLUMN_KINDS if kind in layout.names):
             for number, name in enumerate(layout.names[kind]):
                 places = layout.indices[kind][:, number]
@@ -69,7 +69,7 @@ class MocoTrajectory:
                 if len(own) < len(times):
                     own = np.interp(times, np.linspace(times[0], times[-1], len(own)), own)
                 columns[name] = own
-        # Of a guess Moco takes the columns as they come, whatever their names.
+        # Moco reads the columns of a guess by their order, not by their names.
         rank = {
             name.removesuffix("/value"): k
             for k, name in enumerate(layout.problem.functions.system_states)
@@ -130,7 +130,7 @@ class MocoTrajectory:
         )
         header = {}
         if not kind:
-            # OpenSim has the values of parameters in the first row.
+            # OpenSim writes the values of parameters into the first row only.
             first = np.full((len(self.times), len(self.parameters)), np.nan)
             first[0] = [*self.parameters.values()]
             rows, counted = (

@@ -47,8 +47,8 @@ from tests.simulation.elements.muscle_rows import CONFIGURATIONS, hung, muscle
 from tests.simulation.force_cases import FORCES, straight, with_force
 
 REFUSED = {
-    "ellipsoid": "the point of an ellipsoid that is in contact is searched for; take spheres",
-    "ellipsoids on each other and a sphere": "the point of an ellipsoid that is in contact is searched for",
+    "ellipsoid": "contact points of ellipsoids are found by a search; use spheres",
+    "ellipsoids on each other and a sphere": "contact points of ellipsoids are found by a search",
 }
 SEARCHED = {"path around surfaces": 1e-8}
 """Their derivatives are differences."""

@@ -263,7 +263,7 @@ def test_what_has_no_formula_is_refused_by_name():
     egg.socket_frame, egg.location = foot.socket_frame, foot.location
     model.contact_geometry_set.objects[model.contact_geometry_set.objects.index(foot)] = egg
     with pytest.raises(
-        osimlite.OsimliteError, match=r"'/forceset/RFootForce' has no formula .* take spheres"
+        osimlite.OsimliteError, match=r"'/forceset/RFootForce' has no formula .* use spheres"
     ):
         osimlite.casadi(model)
 

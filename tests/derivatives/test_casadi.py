@@ -27,5 +27,5 @@ def test_beside_opensim_another_process_is_advised(monkeypatch):
     ]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "opensim", sys)
-    with pytest.raises(osimlite.OsimliteError, match="take another process"):
+    with pytest.raises(osimlite.OsimliteError, match="use another process"):
         osimlite.casadi(furthest_walker())
