@@ -65,7 +65,7 @@ class Controller(Protocol):
     def par(self) -> str:
         """The values of gains that are given, as a file (.par)."""
 
-    def held(self, model: Model, engine: Any) -> Held:
+    def compile_for(self, model: Model, engine: Any) -> Held:
         """What the kernels go by, for a model with its engine."""
 
 
