@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
 import subprocess
@@ -66,7 +67,7 @@ def _served(words: list[str], folder: str, text: str, environment: dict[str, str
 
 @cache
 def _server() -> tuple[Any, list[Any]]:
-    """What makes processes of commands, and the files that they read and write; it ends with this process."""
+    """Return the process that starts commands, and the files that they read and write."""
     files = [tempfile.TemporaryFile(buffering=0) for _ in range(3)]  # noqa: SIM115
     numbers = [file.fileno() for file in files]
     server = subprocess.Popen(
@@ -74,4 +75,13 @@ def _server() -> tuple[Any, list[Any]]:
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1, pass_fds=numbers,
         env={**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"},
     )  # fmt: skip
+    atexit.register(_stop, server, files)
     return server, files
+
+
+def _stop(server: Any, files: list[Any]) -> None:
+    """End the process, and close what this one has open for it."""
+    with server:
+        server.stdin.close()
+    for file in files:
+        file.close()
