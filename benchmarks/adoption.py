@@ -25,7 +25,7 @@ import numpy as np
 from osimlite.base.files import TABLE_SUFFIXES
 from osimlite.lint import Config, Finding
 from osimlite.lint.many import check_files
-from osimlite.lint.project_files import project_files
+from osimlite.lint.project_files import find_project_files
 
 KITS = Path(__file__).resolve().parents[1] / "docs" / "adoption"
 AS_BEFORE = "OpenSim 4.6 reads: as before"
@@ -45,7 +45,9 @@ def findings_of(kit: Path) -> list[Finding]:
     paths = re.findall(
         r"^ +paths: (.+)$", (kit / "models.yml").read_text(encoding="utf-8"), re.MULTILINE
     )
-    return list(check_files(project_files(paths[0].split(), only_ours=True), Config()).findings)
+    return list(
+        check_files(find_project_files(paths[0].split(), only_ours=True), Config()).findings
+    )
 
 
 def counted(findings: Iterable[Finding]) -> Counter[str]:

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from osimlite.lint import Finding, validate
-from osimlite.lint.project_files import TABLE_SUFFIXES, project_files
+from osimlite.lint.project_files import TABLE_SUFFIXES, find_project_files
 
 KINDS = ("models", "setups", "tables")
 
@@ -71,7 +71,7 @@ def main(folders: list[str]) -> None:
         report = validate(folder)
         found[folder.resolve().name] = (
             commit_of(folder),
-            kinds_of(project_files([folder])),
+            kinds_of(find_project_files([folder])),
             list(report.findings),
         )
     print("\n".join([*by_project(found), "", *by_rule(found)]))

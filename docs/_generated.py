@@ -16,8 +16,8 @@ from mkdocs.structure.pages import Page
 from typer.testing import CliRunner
 
 from osimlite.cli import COMMANDS, app
-from osimlite.lint.pages import group_page
-from osimlite.lint.registry import all_rules, groups
+from osimlite.lint.pages import format_group_page
+from osimlite.lint.registry import all_rules, rule_groups
 from osimlite.schema.base import Object
 from osimlite.schema.descriptions import described, meaning_of, value_of
 from osimlite.schema.fields import Held, Value
@@ -49,12 +49,12 @@ def pages() -> Iterator[tuple[str, str]]:
     for rule in all_rules():
         head = f"# {rule.name}\n\n`{rule.code}`, {rule.severity.value} ([all rules](../rules.md#{rule.family}))"
         yield f"rules/{rule.code}.md", f"{head}\n\n{rule.page}\n"
-    for group in groups():
+    for group in rule_groups():
         members = [rule for rule in all_rules() if rule.group == group.name]
         listed = "".join(
             f"- [{rule.code}]({rule.code}.md) {rule.name}: {rule.summary}\n" for rule in members
         )
-        yield f"rules/{group.code}.md", f"{group_page(group)}\n\n{listed}"
+        yield f"rules/{group.code}.md", f"{format_group_page(group)}\n\n{listed}"
 
 
 def commands() -> str:

@@ -23,9 +23,9 @@ if str(ROOT) not in sys.path:
 
 def make_rules_page() -> str:
     """Return the index of all rules and thresholds."""
-    from osimlite.lint.pages import index
+    from osimlite.lint.pages import format_index
 
-    return index()
+    return format_index()
 
 
 def make_json_schema() -> str:

@@ -14,7 +14,7 @@ from osimlite.base.files import read_file
 from osimlite.base.pruning import mark_used
 from osimlite.base.writing import user_cache_folder, write_cached
 from osimlite.errors import OsimliteError
-from osimlite.lint.cache import key_of
+from osimlite.lint.cache import make_key
 from osimlite.lint.config import Config
 
 
@@ -27,7 +27,7 @@ def answered(question: str, file: str, data: bytes, find: Callable[[], tuple[str
         data: the text.
         find: finds the answer, and whether it follows from the text alone.
     """
-    key = [question, key_of(file, Config()), blake2b(data).hexdigest()]
+    key = [question, make_key(file, Config()), blake2b(data).hexdigest()]
     place = crc32(f"{question} {os.path.abspath(file)}".encode(errors="surrogateescape"))
     folder = user_cache_folder()
     if folder is None:

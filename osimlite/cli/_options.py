@@ -361,9 +361,9 @@ def mesh_folders(file: Path, geometry: Sequence[Path] | None) -> list[Path]:
         MissingFolderError: a folder that is named on the command line is not there.
         OsimliteError: the settings cannot be read.
     """
-    from osimlite.lint.settings import settings_for
+    from osimlite.lint.settings import load_settings
 
-    return [*named_folders(geometry), *map(Path, settings_for(file.resolve().parent).mesh_paths)]
+    return [*named_folders(geometry), *map(Path, load_settings(file.resolve().parent).mesh_paths)]
 
 
 def checked_numbers(numbers: str) -> NumberStyle:

@@ -13,10 +13,10 @@ from osimlite.cli._console import complain, hand_over, print_diff, say, show, wa
 from osimlite.cli._options import named_folders
 from osimlite.cli._progress import progress_bar
 from osimlite.errors import MissingFileError, OsimliteError
-from osimlite.lint.config import Config, checked_words
+from osimlite.lint.config import Config, parse_codes
 from osimlite.lint.diagnostic import Report, Severity
-from osimlite.lint.many import check_files, settings_of
-from osimlite.lint.project_files import project_files
+from osimlite.lint.many import check_files, find_settings
+from osimlite.lint.project_files import find_project_files
 from osimlite.lint.reporters import FOR_PEOPLE, FORMATS, render
 
 if TYPE_CHECKING:
@@ -50,8 +50,8 @@ def run(
     folders = named_folders(geometry)
     expect_known(format, fail_on)
     given = Config(
-        checked_words(select),
-        checked_words(ignore),
+        parse_codes(select),
+        parse_codes(ignore),
         mesh_paths=tuple(str(path.resolve()) for path in folders),
         classes=tuple(map(os.path.abspath, classes or ())),
         target_version=target_version,
@@ -63,7 +63,7 @@ def run(
         unsaved[os.path.realpath(stdin_filename)] = read_standard_input()
         paths = [stdin_filename if path == "-" else path for path in paths]
     passed: list[str] = []
-    files = project_files(paths, only_ours=only_ours, passed=passed)
+    files = find_project_files(paths, only_ours=only_ours, passed=passed)
     failed = False
     if diff:
         shown = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
@@ -83,9 +83,9 @@ def run(
         say(f"{write_baseline}: {format_count(count, 'finding')}")
         return 0
     if baseline is not None:
-        from osimlite.lint.baseline import without_baseline
+        from osimlite.lint.baseline import subtract_baseline
 
-        report = without_baseline(baseline, report)
+        report = subtract_baseline(baseline, report)
     if statistics:
         show(_statistics(report, everything))
     else:
@@ -120,18 +120,19 @@ def _source(path: str) -> Source:
 
 def _check(source: Source, given: Config) -> Report:
     """Check one file by the settings of its folder and of the command line."""
-    from osimlite.lint.engine import run, subject_in
+    from osimlite.lint.engine import make_subject, run_rules
 
     assert source.file is not None
     # No rule that is about measures mends anything.
-    return run(
-        subject_in(source, settings_of(source.file).config_for(source.file, given)), measure=False
+    return run_rules(
+        make_subject(source, find_settings(source.file).config_for(source.file, given)),
+        measure=False,
     )
 
 
 def _fail_on_of(files: list[str]) -> Severity:
     """The threshold that the settings of the first file ask for."""
-    return settings_of(files[0]).fail_on or Severity.ERROR if files else Severity.ERROR
+    return find_settings(files[0]).fail_on or Severity.ERROR if files else Severity.ERROR
 
 
 def _mended(
@@ -141,13 +142,13 @@ def _mended(
 
     `put` makes of the pieces of each round the source of the next.
     """
-    from osimlite.lint.fixes import mended_pieces
+    from osimlite.lint.fixes import apply_fixes_in_pieces
 
     total = left = 0
     # A mend may bring another to light, as a misspelt set does with all that is in it.
     for _ in range(10):
         report = _check(source, given)
-        pieces, count = mended_pieces(source, report, unsafe=unsafe)
+        pieces, count = apply_fixes_in_pieces(source, report, unsafe=unsafe)
         if not count:
             left = sum(finding.fix is not None for finding in report.findings)
             break

@@ -241,7 +241,7 @@ def _show_places(model: Path | None) -> None:
     """Settings and mesh folders, as `validate` and `translate` find them for this model, or in this folder."""
     from osimlite.base.files import GEOMETRY_VARIABLE
     from osimlite.io.meshes.folders import MeshFolders
-    from osimlite.lint.settings import settings_for
+    from osimlite.lint.settings import load_settings
 
     folder = (
         Path.cwd()
@@ -250,7 +250,7 @@ def _show_places(model: Path | None) -> None:
         if model.is_dir()
         else model.resolve().parent
     )
-    settings = settings_for(folder)
+    settings = load_settings(folder)
     where = (
         settings.file
         or "none (they stand in pyproject.toml under tool.osimlite, or in osimlite.toml)"

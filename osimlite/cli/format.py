@@ -34,10 +34,10 @@ def format(
     from osimlite.errors import OsimliteError
     from osimlite.io.document.printer import formatted
     from osimlite.io.document.source import Source
-    from osimlite.lint.project_files import DOCUMENTS, project_files
+    from osimlite.lint.project_files import DOCUMENTS, find_project_files
 
     changed, same, worst = 0, 0, 0
-    for path in project_files(paths, (".osim", *DOCUMENTS), only_ours=only_ours):
+    for path in find_project_files(paths, (".osim", *DOCUMENTS), only_ours=only_ours):
         try:
             source = Source.of_file(path)
             after = formatted(source)

@@ -15,7 +15,7 @@ def rule(
     code: Annotated[
         str | None,
         Argument(
-            help="Code or name of a rule; the beginning of codes (OSIM8) or a family (data) lists several.",
+            help="Code or name of a rule; the read_beginning of codes (OSIM8) or a family (data) lists several.",
             show_default=False,
         ),
     ] = None,
@@ -27,20 +27,20 @@ def rule(
     from osimlite.base.text import suggest_name
     from osimlite.cli._console import show
     from osimlite.errors import OsimliteError
-    from osimlite.lint.registry import all_rules, groups
+    from osimlite.lint.registry import all_rules, rule_groups
 
     rules = all_rules()
     columns = max(shutil.get_terminal_size().columns, 60) if sys.stdout.isatty() else 80
     result = [known for known in rules if code is None or known.matches(code)]
     if code is not None and not result:
-        names = [word for known in (*rules, *groups()) for word in (known.code, known.name)]
+        names = [word for known in (*rules, *rule_groups()) for word in (known.code, known.name)]
         near = suggest_name(code, names) or "; 'osimlite rule' lists all rules"
         raise OsimliteError(f"there is no rule '{code}'{near}")
-    from osimlite.lint.pages import group_page, page_of
+    from osimlite.lint.pages import format_group_page, format_rule_page
 
-    for group in groups():
+    for group in rule_groups():
         if code is not None and (code == group.name or code.upper() == group.code):
-            show(_wrapped(group_page(group), columns) + "\n\n")
+            show(_wrapped(format_group_page(group), columns) + "\n\n")
     if len(result) > 1:
         width = max(len(known.name) for known in result)
         for known in result:
@@ -52,7 +52,7 @@ def rule(
                 + "\n"
             )
         return
-    show(_wrapped(page_of(result[0]), columns) + "\n")
+    show(_wrapped(format_rule_page(result[0]), columns) + "\n")
 
 
 def _wrapped(page: str, columns: int) -> str:

@@ -6,9 +6,9 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from osimlite.base.files import list_mesh_folders
-from osimlite.lint.config import Config, checked_words
+from osimlite.lint.config import Config, parse_codes
 from osimlite.lint.diagnostic import Finding, Report, Severity
-from osimlite.lint.project_files import project_files
+from osimlite.lint.project_files import find_project_files
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,7 +25,7 @@ __all__ = [
     "Severity",
     "all_rules",
     "assert_valid",
-    "checked_words",
+    "parse_codes",
     "validate",
 ]
 
@@ -53,7 +53,7 @@ def validate(
     from osimlite.io.document.plugins import used
     from osimlite.io.document.reader import collector_paused
     from osimlite.io.document.source import Source
-    from osimlite.lint.engine import check_source, run
+    from osimlite.lint.engine import check_source, run_rules
     from osimlite.lint.subject import Subject
     from osimlite.schema.model import Model
 
@@ -61,19 +61,17 @@ def validate(
         meshes = tuple(map(str, list_mesh_folders()))
         named = [classes] if isinstance(classes, str | os.PathLike) else classes
         files = tuple(map(os.path.abspath, named))
-        config = Config(
-            checked_words(select), checked_words(ignore), mesh_paths=meshes, classes=files
-        )
+        config = Config(parse_codes(select), parse_codes(ignore), mesh_paths=meshes, classes=files)
     with used(config.classes):
         if isinstance(model, Model):
-            return run(Subject(model, config))
+            return run_rules(Subject(model, config))
         if not isinstance(model, Source) and os.path.isdir(model):
             from osimlite.lint.many import check_files
 
             # Processes that are not forked would run the caller's script anew.
             passed: list[str] = []
             report = check_files(
-                project_files([model], passed=passed), config, cached=False, processes=1
+                find_project_files([model], passed=passed), config, cached=False, processes=1
             )
             report.passed = passed
             return report

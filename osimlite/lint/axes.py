@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from osimlite.lint.subject import Subject, once
+from osimlite.lint.subject import Subject, cached_per_subject
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.tree import ILLEGAL_CHARACTERS
 
@@ -13,40 +13,40 @@ if TYPE_CHECKING:
     from osimlite.schema.joints import Joint
 
 
-def axes_of(joint: CustomJoint) -> list[TransformAxis]:
+def list_axes(joint: CustomJoint) -> list[TransformAxis]:
     """The six axes in order: three rotations, three translations."""
     return [*joint.spatial_transform.axes().values()]
 
 
-def coordinates_of(joint: Joint) -> list[Coordinate]:
+def list_coordinates(joint: Joint) -> list[Coordinate]:
     """The coordinates a joint declares. OpenSim leaves out what stands among them and is none."""
     return [item for item in joint.coordinates if isinstance(item, Coordinate)]
 
 
-def names_on_axes(joint: CustomJoint) -> list[str]:
+def list_axis_names(joint: CustomJoint) -> list[str]:
     """The coordinates that the axes name, each once, in the order in which they are met."""
-    return list(dict.fromkeys(name for axis in axes_of(joint) for name in axis.names))
+    return list(dict.fromkeys(name for axis in list_axes(joint) for name in axis.names))
 
 
-def axes_refused(joint: CustomJoint) -> bool:
-    """Whether OpenSim refuses the joint for the coordinates its axes name.
+def refuses_axes(joint: CustomJoint) -> bool:
+    """Whether OpenSim rejects the joint for the coordinates its axes name.
 
-    OpenSim goes through the names in the order of :func:`names_on_axes` and makes up a coordinate
+    OpenSim goes through the names in the order of :func:`list_axis_names` and makes up a coordinate
     for each that the joint does not declare. It fails if the one made up does not come right after
     those declared, if no axis names any, and if it would have to put declared coordinates in
     another order while their number is not that of the names. Measured on 1,200 random joints. A
-    name that no component may have is refused as well, and one that a frame of the joint has:
+    name that no component may have is rejected as well, and one that a frame of the joint has:
     OpenSim calls the frame otherwise then and does not find it.
     """
     # OpenSim has renamed the second of a name by then, so that no axis names it.
     declared: list[str] = []
-    for coordinate in coordinates_of(joint):
+    for coordinate in list_coordinates(joint):
         declared.append(
             coordinate.name
             if coordinate.name not in declared
             else f"{coordinate.name}_{len(declared)}/"
         )
-    names = names_on_axes(joint)
+    names = list_axis_names(joint)
     if any(frame.name in names and frame.name not in declared for frame in joint.frames):
         # The coordinate that is made up takes the name of the frame.
         return True
@@ -62,13 +62,13 @@ def axes_refused(joint: CustomJoint) -> bool:
     return moved and len(declared) != len(names)
 
 
-@once
-def made_up_paths(subject: Subject) -> set[str]:
+@cached_per_subject
+def find_made_up_paths(subject: Subject) -> set[str]:
     """The paths of the coordinates that OpenSim makes up because only an axis names them."""
     return {
         f"{subject.path(joint)}/{name}"
-        for joint in subject.named("CustomJoint")
-        if not axes_refused(joint)
-        for name in set(names_on_axes(joint))
-        - {coordinate.name for coordinate in coordinates_of(joint)}
+        for joint in subject.find_by_class("CustomJoint")
+        if not refuses_axes(joint)
+        for name in set(list_axis_names(joint))
+        - {coordinate.name for coordinate in list_coordinates(joint)}
     }

@@ -17,14 +17,14 @@ _FORMAT = 1
 
 def write_baseline(path: str | Path, report: Report) -> int:
     """Write the findings of a report as the baseline, and return how many there are."""
-    counts = Counter(map(_key, report.findings))
+    counts = Counter(map(_make_key, report.findings))
     findings = [[*key, count] for key, count in sorted(counts.items())]
     text = json.dumps({"format": _FORMAT, "findings": findings}, indent=1) + "\n"
     write_atomically(path, text)
     return len(report.findings)
 
 
-def without_baseline(path: str | Path, report: Report) -> Report:
+def subtract_baseline(path: str | Path, report: Report) -> Report:
     """The report without what the baseline has, each as often as it has it. Lines may have moved since.
 
     Raises:
@@ -35,11 +35,11 @@ def without_baseline(path: str | Path, report: Report) -> Report:
         counts = Counter({tuple(key): int(count) for *key, count in data["findings"]})
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         raise OsimliteError(
-            "this is no baseline; write one with --write-baseline", file=str(path)
+            "this is not a baseline; write one with --write-baseline", file=str(path)
         ) from None
     kept = []
     for finding in report.findings:
-        key = _key(finding)
+        key = _make_key(finding)
         # An older baseline has the code of the group.
         known = next((code for code in (key[0], key[0][:7]) if counts[(code, *key[1:])] > 0), None)
         if known is not None:
@@ -49,7 +49,7 @@ def without_baseline(path: str | Path, report: Report) -> Report:
     return replace(report, findings=kept, known=len(report.findings) - len(kept))
 
 
-def _key(finding: Finding) -> tuple[str, str, str, str]:
+def _make_key(finding: Finding) -> tuple[str, str, str, str]:
     file = Path(finding.file).as_posix() if finding.file is not None else ""
     # Where the project lies on this machine is not what another is to know it by.
     return (

@@ -8,7 +8,7 @@ from pathlib import Path
 from osimlite.base.files import read_at_most, read_file
 from osimlite.errors import OsimliteError
 from osimlite.io.document.cache import top_at, while_unchanged
-from osimlite.lint.project_files import DOCUMENTS, begins_as_ours
+from osimlite.lint.project_files import DOCUMENTS, is_opensim_file
 from osimlite.lint.table import Table
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
@@ -17,14 +17,14 @@ _LARGEST_NEIGHBOUR = 2_000_000
 
 
 @while_unchanged(4)
-def tree_at(path: str) -> Tree | None:
+def read_tree(path: str) -> Tree | None:
     """The component tree of a model; None if it cannot be read."""
     top = top_at(path)
     return Tree(top) if isinstance(top, Model) else None
 
 
 @while_unchanged(8)
-def table_at(path: str) -> Table | None:
+def read_table(path: str) -> Table | None:
     """A table; None if it cannot be read."""
     try:
         return Table(read_file(path), path)
@@ -32,7 +32,7 @@ def table_at(path: str) -> Table | None:
         return None
 
 
-def folders_in(folder: Path) -> list[Path]:
+def list_folders(folder: Path) -> list[Path]:
     """The folders in a folder."""
     try:
         with os.scandir(folder) as entries:
@@ -46,7 +46,7 @@ def folders_in(folder: Path) -> list[Path]:
 
 
 @while_unchanged(256)
-def documents_of(folder: str) -> list[str]:
+def list_documents(folder: str) -> list[str]:
     """The documents in a folder that may be OpenSim's, other than models."""
     try:
         with os.scandir(folder) as entries:
@@ -56,13 +56,13 @@ def documents_of(folder: str) -> list[str]:
                 if entry.name.lower().endswith(DOCUMENTS)
                 and entry.is_file()
                 and entry.stat().st_size < _LARGEST_NEIGHBOUR
-                and begins_as_ours(entry.path)
+                and is_opensim_file(entry.path)
             )
     except OSError:
         return []
 
 
-def beginning(file: str) -> bytes:
+def read_beginning(file: str) -> bytes:
     """The first bytes of a file."""
     try:
         return read_at_most(file, 2000)

@@ -52,27 +52,27 @@ class Cache:
                     "unmeasured": [*why_not],
                     **rest,
                 }:
-                    stamps = dict(map(_outside, outside))
+                    stamps = dict(map(_parse_outside, outside))
                     if kept != key or any(
                         self._stamp(path) != stamp for path, stamp in stamps.items()
                     ):
                         return None
-                    why_not = _of(why_not, *[_TEXT] * len(why_not))
+                    why_not = _check_types(why_not, *[_TEXT] * len(why_not))
                     known = Report(
-                        [_finding(file, values) for values in findings], unmeasured=why_not
+                        [_parse_finding(file, values) for values in findings], unmeasured=why_not
                     )
                     now = time_ns()
-                    if rest.get("file") != _own_stamp(file):
-                        if text != text_of(read_file(file)):
+                    if rest.get("file") != _stamp_file(file):
+                        if text != fingerprint_text(read_file(file)):
                             return None
-                        self.put(file, key, text, known, stamps, now)
+                        self.store(file, key, text, known, stamps, now)
                     mark_used(self._entry(file))
                     return known
         except (OsimliteError, OSError, ValueError, TypeError, RecursionError):
             pass
         return None
 
-    def put(
+    def store(
         self,
         file: str,
         key: str,
@@ -95,10 +95,10 @@ class Cache:
         try:
             entry = {
                 "key": key,
-                "file": _stamp_since(file, since),
+                "file": _stamp_if_settled(file, since),
                 "text": text,
                 "outside": [(path, self._stamp(path)) for path in outside],
-                "findings": [_values(finding) for finding in report],
+                "findings": [_dump_finding(finding) for finding in report],
                 "unmeasured": report.unmeasured,
             }
         except (OSError, OsimliteError):
@@ -121,12 +121,12 @@ class Cache:
         return self._stamps[path]
 
 
-def key_of(file: str, config: Config) -> str:
+def make_key(file: str, config: Config) -> str:
     """What an entry holds for: the path as it was given, the configuration, and the code that checks."""
     severity = sorted((word, str(level)) for word, level in config.severity.items())
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
     setting = (
-        digest_of_code(),
+        describe_code_version(),
         file,
         os.getcwd(),
         config.select,
@@ -141,27 +141,27 @@ def key_of(file: str, config: Config) -> str:
     return ascii(setting)
 
 
-def text_of(data: bytes) -> list[object]:
+def fingerprint_text(data: bytes) -> list[object]:
     """What tells a text from that of an earlier day: its size and its sum."""
     return [len(data), crc32(data)]
 
 
-def _own_stamp(file: str) -> list[int]:
+def _stamp_file(file: str) -> list[int]:
     """What is another when a file has changed: its times, its size, and where it is on the disk."""
     result = os.stat(file)
     return [result.st_mtime_ns, result.st_ctime_ns, result.st_size, result.st_ino]
 
 
-def _stamp_since(file: str, moment: int) -> list[int] | None:
+def _stamp_if_settled(file: str, moment: int) -> list[int] | None:
     """The stamp of a file, None if it may have changed after a moment (ns): clocks of file systems tick slowly."""
-    stamp = _own_stamp(file)
+    stamp = _stamp_file(file)
     changed = max(stamp[:2])
     tick = 100_000_000 if changed % 1_000_000_000 else 2_000_000_000
     return stamp if changed + tick < moment else None
 
 
 @cache
-def digest_of_code() -> str:
+def describe_code_version() -> str:
     """Which code this is. In a working copy the version stays the same while rules change: the files then tell.
 
     What is installed changes as a whole.
@@ -176,8 +176,8 @@ def digest_of_code() -> str:
     return f"{__version__} {max(times)} {len(times)}"
 
 
-def _of(values: Any, *kinds: tuple[type, ...]) -> Any:
-    """A list with one item of each of these kinds; TypeError for anything else. True and False are no numbers."""
+def _check_types(values: Any, *kinds: tuple[type, ...]) -> Any:
+    """A list with one item of each of these kinds; TypeError for anything else. True and False are not numbers."""
     if type(values) is not list or len(values) != len(kinds):
         raise TypeError
     if not all(type(value) in kind for value, kind in zip(values, kinds, strict=True)):
@@ -192,13 +192,13 @@ _FINDING = (
 )  # fmt: skip
 
 
-def _outside(values: Any) -> tuple[str, Stamp]:
+def _parse_outside(values: Any) -> tuple[str, Stamp]:
     """A path and its stamp as an entry has them; TypeError for anything else."""
-    path, stamp = _of(values, _TEXT, _MAYBE_LIST)
-    return path, None if stamp is None else tuple(_of(stamp, _NUMBER, _NUMBER))
+    path, stamp = _check_types(values, _TEXT, _MAYBE_LIST)
+    return path, None if stamp is None else tuple(_check_types(stamp, _NUMBER, _NUMBER))
 
 
-def _values(finding: Finding) -> list[object]:
+def _dump_finding(finding: Finding) -> list[object]:
     fix = finding.fix
     return [
         finding.code,
@@ -216,9 +216,9 @@ def _values(finding: Finding) -> list[object]:
     ]
 
 
-def _finding(file: str, values: Any) -> Finding:
-    """The finding that `_values` made a list of; TypeError for anything else."""
-    code, name, severity, message, line, column, length, component, suggestion, fix = _of(
+def _parse_finding(file: str, values: Any) -> Finding:
+    """The finding that `_dump_finding` made a list of; TypeError for anything else."""
+    code, name, severity, message, line, column, length, component, suggestion, fix = _check_types(
         values, *_FINDING
     )
     place = [number for number in (line, column) if number is not None]
@@ -226,12 +226,22 @@ def _finding(file: str, values: Any) -> Finding:
         raise TypeError
     level = Severity(severity)
     return Finding(
-        code, name, level, message, file, line, column, length, component, suggestion, _fix(fix)
+        code,
+        name,
+        level,
+        message,
+        file,
+        line,
+        column,
+        length,
+        component,
+        suggestion,
+        _parse_fix(fix),
     )
 
 
-def _fix(values: Any) -> Fix | None:
+def _parse_fix(values: Any) -> Fix | None:
     if values is None:
         return None
-    safe, edits = _of(values, _FLAG, _LIST)
-    return Fix(tuple(Edit(*_of(edit, _NUMBER, _NUMBER, _TEXT)) for edit in edits), safe)
+    safe, edits = _check_types(values, _FLAG, _LIST)
+    return Fix(tuple(Edit(*_check_types(edit, _NUMBER, _NUMBER, _TEXT)) for edit in edits), safe)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar, TypedDict, Unpack
 
 from osimlite.lint.config import Config
-from osimlite.lint.fixes import suggested
-from osimlite.lint.suppressions import Suppression, suppressions
+from osimlite.lint.fixes import replace_name
+from osimlite.lint.suppressions import Suppression, read_suppressions
 
 if TYPE_CHECKING:
     from osimlite.io.document.source import Position, Source
@@ -25,7 +25,7 @@ class Where(TypedDict, total=False):
     number: int | None
 
 
-class Checked:
+class CheckTarget:
     """Something under check, its file and its bytes. `about` says which rules speak of it (:attr:`Rule.about`)."""
 
     about: ClassVar[str] = "model"
@@ -48,7 +48,7 @@ class Checked:
         """Whether a rule has anything to look at."""
         return rule.about == self.about
 
-    def unmeasured(self, *, anew: bool = True) -> str:
+    def measure(self, *, anew: bool = True) -> str:
         """Measure what rules about measures speak of, or recall it; why that cannot be done, if it cannot."""
         return ""
 
@@ -64,14 +64,20 @@ class Checked:
         """Where something is in the text."""
         return None
 
-    def replacing(self, at: Position, named: object, text: str, *, certain: bool) -> Fix | None:
-        """The mend that puts a text in a place where the words `named` stand; None if something else does."""
-        return suggested(self.source, at, named, text, certain=certain)
+    def make_replacement(
+        self, at: Position, named: object, text: str, *, certain: bool
+    ) -> Fix | None:
+        """The fix that puts a text in a place where the words `named` stand; None if something else does."""
+        return replace_name(self.source, at, named, text, certain=certain)
 
     def suppressions(self) -> list[Suppression]:
         """The comments that ignore findings."""
-        return suppressions(self.source) if self.source is not None and self.source.remarks else []
+        return (
+            read_suppressions(self.source)
+            if self.source is not None and self.source.remarks
+            else []
+        )
 
-    def outside(self) -> list[str] | None:
+    def list_outside_paths(self) -> list[str] | None:
         """Every path outside the text that findings may depend on; None if nobody can say."""
         return []

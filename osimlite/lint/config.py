@@ -37,13 +37,13 @@ class Config:
     def __post_init__(self) -> None:
         """Check the thresholds and the version; OsimliteError if one makes no sense."""
         if self.target_version:
-            from osimlite.lint.history import later_than
+            from osimlite.lint.history import load_later_changes
 
-            later_than(self.target_version)
+            load_later_changes(self.target_version)
         if self.thresholds:
             _check_thresholds(self.thresholds)
 
-    def wants(self, rule: Rule) -> bool:
+    def includes(self, rule: Rule) -> bool:
         """Whether a rule runs."""
         if not self.select and not self.ignore:
             return True
@@ -74,7 +74,8 @@ def _check_thresholds(given: Mapping[str, float]) -> None:
     for name, number in given.items():
         if name not in known:
             raise OsimliteError(
-                f"no rule has a threshold '{name}'{suggest_name(name, known)} `osimlite rule CODE` shows what there is"
+                f"no rule has a threshold '{name}'{suggest_name(name, known)} `osimlite rule CODE` "
+                "shows the thresholds of a rule"
             )
         if (
             isinstance(number, bool)
@@ -86,7 +87,7 @@ def _check_thresholds(given: Mapping[str, float]) -> None:
             )
 
 
-def checked_words(words: tuple[str, ...] | list[str] | str | None) -> tuple[str, ...]:
+def parse_codes(words: tuple[str, ...] | list[str] | str | None) -> tuple[str, ...]:
     """Codes or names as a tuple; a text may hold several with commas between.
 
     Raises:
@@ -100,13 +101,15 @@ def checked_words(words: tuple[str, ...] | list[str] | str | None) -> tuple[str,
     cleaned = tuple(word.strip() for word in given if word.strip())
     if not cleaned:
         return ()
-    from osimlite.lint.registry import all_rules, groups
+    from osimlite.lint.registry import all_rules, rule_groups
 
     for word in cleaned:
         if not any(rule.matches(word) for rule in all_rules()):
             from osimlite.base.text import suggest_name
 
-            known = [name for rule in (*all_rules(), *groups()) for name in (rule.code, rule.name)]
+            known = [
+                name for rule in (*all_rules(), *rule_groups()) for name in (rule.code, rule.name)
+            ]
             near = suggest_name(word, known) or "; 'osimlite rule' lists all rules"
             raise OsimliteError(f"no rule has the code or name '{word}'{near}")
     return cleaned

@@ -110,10 +110,11 @@ def may_fail(subject: Subject) -> bool:
     """
     if any(cls.__name__ not in SIMPLE_CLASSES for cls in subject.by_class):
         return True
-    if any(item.prescribed for item in subject.named("Coordinate")):
+    if any(item.prescribed for item in subject.find_by_class("Coordinate")):
         return True
     return any(
-        not body.mass > 0.0 or not min(body.inertia[:3]) > 0.0 for body in subject.named("Body")
+        not body.mass > 0.0 or not min(body.inertia[:3]) > 0.0
+        for body in subject.find_by_class("Body")
     )
 
 
@@ -127,17 +128,20 @@ def find_obstacles(subject: Subject, *, anew: bool = True) -> str:
     Returns:
         Why the model was not built; empty if it was, or if there was no need to.
     """
-    if CONSTRUCTION in subject.kept:
+    if CONSTRUCTION in subject.cache:
         return ""
     if missing := find_missing_packages("numpy"):
-        return f"{NEEDS_SIM} ({' and '.join(missing)} is not installed); run: pip install 'osimlite[sim]'"
+        return (
+            f"{NEEDS_SIM} ({' and '.join(missing)} is not installed); run: pip install "
+            "'osimlite[sim]'"
+        )
     key = None if subject.source is None else _digest(subject)
     obstacles = _memory.get(key) if key is not None else None
     if obstacles is None:
         if not anew:
-            return "nobody asked"
+            return "not requested"
         obstacles = _try_construction(subject)
-    subject.kept[CONSTRUCTION] = obstacles
+    subject.cache[CONSTRUCTION] = obstacles
     if key is not None:
         _memory[key] = obstacles
         _memory.move_to_end(key)
@@ -148,7 +152,7 @@ def find_obstacles(subject: Subject, *, anew: bool = True) -> str:
 
 def obstacles_of(subject: Subject, *stages: Stage) -> list[Obstacle]:
     """Return the obstacles of a model that were found in some stages."""
-    known = cast("list[Obstacle]", subject.kept.get(CONSTRUCTION, []))
+    known = cast("list[Obstacle]", subject.cache.get(CONSTRUCTION, []))
     return [obstacle for obstacle in known if obstacle.stage in stages]
 
 
@@ -166,7 +170,7 @@ def _try_construction(subject: Subject) -> list[Obstacle]:
     with lent(subject.tree):
         try:
             result: list[Obstacle]
-            result, subject.kept[MECHANISM] = try_construction(subject.model, subject.folder)
+            result, subject.cache[MECHANISM] = try_construction(subject.model, subject.folder)
         except (ArithmeticError, ValueError, OsimliteError) as error:
             # Other rules report numbers that are too large to compute with.
             result = [Obstacle(Stage.MECHANISM, "", str(getattr(error, "message", error)))]

@@ -15,7 +15,7 @@ from osimlite.base.text import escape_unprintable
 class Severity(StrEnum):
     """How bad a finding is.
 
-    ERROR: OpenSim refuses the model, crashes, computes NaN, or does something other than what the
+    ERROR: OpenSim rejects the model, crashes, computes NaN, or does something other than what the
         text says.
     WARNING: physically or numerically doubtful. INFO: tidiness, or something worth knowing.
     """
@@ -44,7 +44,7 @@ class Edit:
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """A mend as text edits; `safe` if OpenSim then reads the same model, or certainly the one that was meant."""
+    """A fix as text edits; `safe` if OpenSim then reads the same model, or certainly the one that was meant."""
 
     edits: tuple[Edit, ...]
     safe: bool = True
@@ -73,7 +73,7 @@ class Finding:
 
     @property
     def fixable(self) -> bool:
-        """Whether the finding comes with a mend that is certainly right."""
+        """Whether the finding comes with a fix that is certainly right."""
         return self.fix is not None and self.fix.safe
 
     @property
@@ -107,7 +107,7 @@ NOT_MEASURED = " not measured: "
 """Stands between file and rules, and the reason, in `Report.unmeasured`."""
 
 
-class NotMeasured(NamedTuple):
+class MissingPackageNote(NamedTuple):
     """Note on a file for which some rules did not run, because numeric packages are missing."""
 
     file: str
@@ -138,17 +138,17 @@ class Report:
     @property
     def errors(self) -> list[Finding]:
         """The findings that are errors."""
-        return self._of(Severity.ERROR)
+        return self._select_severity(Severity.ERROR)
 
     @property
     def warnings(self) -> list[Finding]:
         """The findings that are warnings."""
-        return self._of(Severity.WARNING)
+        return self._select_severity(Severity.WARNING)
 
     @property
     def infos(self) -> list[Finding]:
         """The findings that are for information."""
-        return self._of(Severity.INFO)
+        return self._select_severity(Severity.INFO)
 
     @property
     def ok(self) -> bool:
@@ -160,7 +160,7 @@ class Report:
         """How often each code was found."""
         return Counter(finding.code for finding in self.findings)
 
-    def missing_package_notes(self) -> list[NotMeasured]:
+    def missing_package_notes(self) -> list[MissingPackageNote]:
         """Return a note for each file that was not measured for want of the numeric packages.
 
         Reports for programs contain these notes; other reasons follow from findings, which they
@@ -172,7 +172,9 @@ class Report:
             file, _, families = before.rpartition(": rules ")
             if reason.startswith("needs osimlite["):
                 notes.append(
-                    NotMeasured(file, families[:6], f"rules {families}{NOT_MEASURED}{reason}")
+                    MissingPackageNote(
+                        file, families[:6], f"rules {families}{NOT_MEASURED}{reason}"
+                    )
                 )
         return notes
 
@@ -189,11 +191,11 @@ class Report:
     def __str__(self) -> str:
         return "\n".join(map(str, self.findings)) or "nothing found"
 
-    def _of(self, severity: Severity) -> list[Finding]:
+    def _select_severity(self, severity: Severity) -> list[Finding]:
         return [finding for finding in self.findings if finding.severity is severity]
 
 
-def merged(reports: Iterable[Report]) -> Report:
+def merge_reports(reports: Iterable[Report]) -> Report:
     """One report of several, in the order given."""
     whole = Report(checked=0)
     for report in reports:

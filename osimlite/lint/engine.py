@@ -9,13 +9,13 @@ from osimlite.errors import SpecialFileError
 from osimlite.io.document.reader import collector_paused
 from osimlite.io.document.source import Source
 from osimlite.io.document.survey import Survey, survey
-from osimlite.lint.checked import Checked
+from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
 from osimlite.lint.construction import CONSTRUCTION
 from osimlite.lint.diagnostic import NOT_MEASURED, Finding, Report
 from osimlite.lint.measures import MEASURES
 from osimlite.lint.project_files import is_document, is_table
-from osimlite.lint.registry import Check, FindingSink, Rule, all_rules, get_rule
+from osimlite.lint.registry import Check, FindingCollector, Rule, all_rules, get_rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.suppressions import Suppression
 from osimlite.schema.base import Object
@@ -25,30 +25,32 @@ from osimlite.schema.registry import let_count
 
 def check_source(source: Source, config: Config | None = None) -> Report:
     """Check a text: a table if its file is called so, else a document."""
-    subject = subject_in(source, config)
-    report = run(subject)
+    subject = make_subject(source, config)
+    report = run_rules(subject)
     if report.findings and source.file is not None:
         report.texts[source.file] = subject.text
     return report
 
 
 @collector_paused()
-def subject_in(source: Source, config: Config | None = None) -> Checked:
+def make_subject(source: Source, config: Config | None = None) -> CheckTarget:
     """A text to check; what it is, the name of its file tells."""
     use_classes(config)
     if source.file is not None and is_table(source.file):
         from osimlite.lint.table import Table
 
         return Table(source.data, source.file, config)
-    return _subject_of(survey(source, of=Object if is_document(source.file) else Model), config)
+    return _make_document_subject(
+        survey(source, of=Object if is_document(source.file) else Model), config
+    )
 
 
-def subject_of(file: str, config: Config | None = None) -> Checked:
+def load_subject(file: str, config: Config | None = None) -> CheckTarget:
     """A file to check; MissingFileError if there is none. What it is, its name tells."""
     try:
-        return subject_in(Source.of_file(file), config)
+        return make_subject(Source.of_file(file), config)
     except SpecialFileError as fault:
-        return _subject_of(Survey(Source(b"", file), None, [fault]), config)
+        return _make_document_subject(Survey(Source(b"", file), None, [fault]), config)
 
 
 def use_classes(config: Config | None) -> None:
@@ -61,7 +63,7 @@ def use_classes(config: Config | None) -> None:
     use(config.classes)
 
 
-def _subject_of(found: Survey, config: Config | None) -> Subject:
+def _make_document_subject(found: Survey, config: Config | None) -> Subject:
     if not is_document(found.source.file) or (
         found.document and isinstance(found.document.top, Model)
     ):
@@ -72,7 +74,7 @@ def _subject_of(found: Survey, config: Config | None) -> Subject:
 
 
 @collector_paused()
-def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Report:
+def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = False) -> Report:
     """Run every rule that is wanted, and return all findings sorted by place.
 
     Args: subject: what is checked. measure: whether rules run that are about what is measured of
@@ -83,15 +85,15 @@ def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Repo
     wanted = [
         known
         for known in all_rules(subject.about)
-        if subject.config.wants(known) and subject.is_for(known)
+        if subject.config.includes(known) and subject.is_for(known)
     ]
     measuring = [known for known in wanted if known.about == MEASURES]
     building = [known for known in wanted if known.about == CONSTRUCTION]
     why_not = unbuilt = ""
     if building:
-        unbuilt = subject.find_obstacles(anew=measure) if measure or recall else "nobody asked"
+        unbuilt = subject.find_obstacles(anew=measure) if measure or recall else "not requested"
     if measuring:
-        why_not = subject.unmeasured(anew=measure) if measure or recall else "nobody asked"
+        why_not = subject.measure(anew=measure) if measure or recall else "not requested"
     left_out = [*(measuring if why_not else []), *(building if unbuilt else [])]
     # What stops a computation is not reported where another rule has reported its cause.
     wanted.sort(key=lambda known: known.about == CONSTRUCTION)
@@ -100,7 +102,7 @@ def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Repo
         if known not in left_out:
             checks.setdefault(known.check, {})[known.name if known.group else ""] = known
     for check, told_apart in checks.items():
-        check(subject, FindingSink(told_apart, subject, findings))
+        check(subject, FindingCollector(told_apart, subject, findings))
     if subject.sure_until is not None:
         limit = subject.sure_until
         findings = [
@@ -108,7 +110,7 @@ def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Repo
         ]
     comments = subject.suppressions()
     if comments:
-        findings = _not_ignored(subject, comments, findings, left_out)
+        findings = _apply_suppressions(subject, comments, findings, left_out)
     unique = list(dict.fromkeys(findings))
     unique.sort(key=lambda finding: (finding.line or 0, finding.column or 0, finding.code))
     why_not = why_not or unbuilt
@@ -137,32 +139,29 @@ def _make_ignore_test(comments: list[Suppression]) -> Callable[[Finding], bool]:
     def is_ignored(finding: Finding) -> bool:
         near = by_line.get(finding.line or 0, [])
         return any(
-            [
-                comment.covers(finding, get_rule(finding.code).is_called)
-                for comment in (*long, *near)
-            ]
+            [comment.covers(finding, get_rule(finding.code).has_name) for comment in (*long, *near)]
         )
 
     return is_ignored
 
 
-def _not_ignored(
-    subject: Checked, comments: list[Suppression], findings: list[Finding], left_out: list[Rule]
+def _apply_suppressions(
+    subject: CheckTarget, comments: list[Suppression], findings: list[Finding], left_out: list[Rule]
 ) -> list[Finding]:
     """The findings without those that a comment of the file ignores, and with one for each comment without use."""
     is_ignored = _make_ignore_test(comments)
     kept = [finding for finding in findings if not is_ignored(finding)]
     unused = next(known for known in all_rules() if known.name == "unused-ignore")
-    if subject.config.wants(unused):
-        result = FindingSink({"": unused}, subject, kept)
+    if subject.config.includes(unused):
+        result = FindingCollector({"": unused}, subject, kept)
         for comment in comments:
             for code in comment.codes:
                 named = [known for known in all_rules() if known.matches(code)]
                 # Of a rule that did not run nobody can say that nothing was found.
                 is_silent = any(known in left_out for known in named)
-                ran = not named or (any(map(subject.config.wants, named)) and not is_silent)
+                ran = not named or (any(map(subject.config.includes, named)) and not is_silent)
                 if code not in comment.used and ran:
-                    result(f"nothing is found here that '{code}' would ignore", at=comment.place)
+                    result(f"'{code}' ignores nothing here; delete it", at=comment.place)
             if not comment.codes:
                 result("this comment names no code to ignore", at=comment.place)
     return kept

@@ -8,7 +8,7 @@ They are listed beside the rule::
 
 The code of a fault is that of its rule and two digits more, so that whatever names the rule
 (`--select`, a comment, a setting, a baseline) means all its faults. `ik` is the document around the
-lines of the example, and a fault that has mends says of what kind: ``error, mends safe, in ik``.
+lines of the example, and a fault that has fixes says of what kind: ``error, fix safe, in ik``.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 
-class Fault(NamedTuple):
-    """One fault as its rule lists it: the end of its code, name, severity, mends, example.
+class RuleFault(NamedTuple):
+    """One fault as its rule lists it: the end of its code, name, severity, fixes, example.
 
     In the `frame` a line with {} stands for the `lines` of the example.
     """
@@ -26,7 +26,7 @@ class Fault(NamedTuple):
     number: str
     name: str
     severity: str
-    mends: str
+    fixes: str
     frame: str
     text: str
     lines: tuple[str, ...]
@@ -40,9 +40,9 @@ class Fault(NamedTuple):
         """Its page; `group` is the code and the name of its rule."""
         why = self.text.partition(". ")[2] or self.text
         return (
-            f"{self.summary}\n\n## What it does\nReports each place where this is so. The rule is one of the group "
-            f"`{group}`.\n\n## Why is this bad\n{why}\n\n## Example\n{self._example('+')}\n\n"
-            f"## Use instead\n{self._example('-')}"
+            f"{self.summary}\n\n## What it does\nReports each place where this is so. The rule is "
+            f"one of the group `{group}`.\n\n## Why is this bad\n{why}\n\n## "
+            f"Example\n{self._example('+')}\n\n## Use instead\n{self._example('-')}"
         )
 
     def _example(self, left_out: str) -> str:
@@ -52,7 +52,7 @@ class Fault(NamedTuple):
         return before + start + "".join(f"{margin}{line}\n" for line in lines) + after
 
 
-def faults_in(listed: str, frames: Mapping[str, str]) -> Iterator[Fault]:
+def parse_faults(listed: str, frames: Mapping[str, str]) -> Iterator[RuleFault]:
     """The faults that a rule lists; `frames` are the documents of their examples by name."""
     parts: list[tuple[str, list[str], list[str]]] = []
     for line in listed.splitlines():
@@ -63,9 +63,9 @@ def faults_in(listed: str, frames: Mapping[str, str]) -> Iterator[Fault]:
             _, words, lines = parts[-1]
             (lines if line[:2] in ("- ", "+ ", "  ") else words).append(line)
     for head, words, lines in parts:
-        name, severity, *mends, frame = head[3:].split(", ")
-        kind = mends[0].removeprefix("mends ") if mends else ""
-        yield Fault(
+        name, severity, *fixes, frame = head[3:].split(", ")
+        kind = fixes[0].removeprefix("fix ") if fixes else ""
+        yield RuleFault(
             head[:2],
             name,
             severity,

@@ -12,7 +12,7 @@ from osimlite.lint.diagnostic import Edit, Finding, Fix, Report
 from osimlite.lint.project_files import is_table
 
 
-def replaced(
+def replace_text(
     source: Source | None, place: Position | None, text: str | None, *, safe: bool = True
 ) -> Fix | None:
     """Put another text in a place."""
@@ -22,7 +22,7 @@ def replaced(
     return Fix((Edit(start, start + place.length, text),), safe)
 
 
-def suggested(
+def replace_name(
     source: Source | None, place: Position, named: object, text: str, *, certain: bool
 ) -> Fix | None:
     """Put what is meant in the place of a name; None if that name is not what stands there."""
@@ -31,10 +31,10 @@ def suggested(
     start = source.line_start(place.line) + place.column - 1
     if source.text[start : start + place.length] != escape(named.strip()):
         return None
-    return replaced(source, place, escape(text), safe=certain or text.lower() == named.lower())
+    return replace_text(source, place, escape(text), safe=certain or text.lower() == named.lower())
 
 
-def renamed(
+def rename_tag(
     source: Source | None, number: int, tag: str | None, *, safe: bool = True
 ) -> Fix | None:
     """Give an element another tag."""
@@ -47,15 +47,15 @@ def renamed(
     return Fix(tuple(edits), safe)
 
 
-def without_element(source: Source | None, number: int) -> Fix | None:
+def remove_element(source: Source | None, number: int) -> Fix | None:
     """Take an element out, and its line with it if nothing else stands there."""
     if source is None:
         return None
     span = source.spans[number]
-    return Fix((_whole_line(source.text, span.start, span.end),), True)
+    return Fix((_delete_range(source.text, span.start, span.end),), True)
 
 
-def as_comment(source: Source | None, number: int) -> Fix | None:
+def comment_out(source: Source | None, number: int) -> Fix | None:
     """Return the fix that makes an element of text an XML comment, or deletes it if it is empty.
 
     A text that a comment cannot hold is left as it is: there is no fix then.
@@ -67,13 +67,13 @@ def as_comment(source: Source | None, number: int) -> Fix | None:
         return None
     text = source.text[span.tag_end : span.inner_end].strip() if span.inner_end < span.end else ""
     if not text:
-        return without_element(source, number)
+        return remove_element(source, number)
     if "--" in text or text.endswith("-") or "<" in text:
         return None
     return Fix((Edit(span.start, span.end, f"<!-- {text} -->"),), True)
 
 
-def without_attribute(source: Source | None, number: int, name: str) -> Fix | None:
+def remove_attribute(source: Source | None, number: int, name: str) -> Fix | None:
     """Take an attribute out."""
     if source is None:
         return None
@@ -81,13 +81,13 @@ def without_attribute(source: Source | None, number: int, name: str) -> Fix | No
     return Fix((Edit(result.before, result.end, ""),), True) if result else None
 
 
-def without_text(source: Source, start: int, end: int) -> Fix:
+def remove_text(source: Source, start: int, end: int) -> Fix:
     """Take a text out that means nothing."""
-    return Fix((_whole_line(source.text, start, end),), True)
+    return Fix((_delete_range(source.text, start, end),), True)
 
 
-def edits_of(findings: Iterable[Finding], *, unsafe: bool = False) -> tuple[list[Edit], int]:
-    """The edits of every mend that does not touch another before it, by place, and how many mends these are."""
+def select_edits(findings: Iterable[Finding], *, unsafe: bool = False) -> tuple[list[Edit], int]:
+    """The edits of every fix that does not touch another before it, by place, and how many fixes these are."""
     chosen: list[Edit] = []
     count = 0
     for finding in findings:
@@ -97,28 +97,28 @@ def edits_of(findings: Iterable[Finding], *, unsafe: bool = False) -> tuple[list
         if any(_touches(edit, chosen) for edit in fix.edits):
             continue
         for edit in fix.edits:
-            insort(chosen, edit, key=_start)
+            insort(chosen, edit, key=_get_start)
         count += 1
     return chosen, count
 
 
-def _start(edit: Edit) -> int:
+def _get_start(edit: Edit) -> int:
     return edit.start
 
 
 def _touches(edit: Edit, chosen: list[Edit]) -> bool:
     """Whether an edit changes what one of some others does, which are sorted and touch none of each other."""
-    before = bisect_left(chosen, edit.end, key=_start)
+    before = bisect_left(chosen, edit.end, key=_get_start)
     return before > 0 and chosen[before - 1].end > edit.start
 
 
-def mended(source: Source, report: Report, *, unsafe: bool = False) -> tuple[bytes, int]:
-    """The bytes of a file with its mends, and how many there are; raises as `mended_pieces` does."""
-    pieces, count = mended_pieces(source, report, unsafe=unsafe)
+def apply_fixes(source: Source, report: Report, *, unsafe: bool = False) -> tuple[bytes, int]:
+    """The bytes of a file with its fixes, and how many there are; raises as `apply_fixes_in_pieces` does."""
+    pieces, count = apply_fixes_in_pieces(source, report, unsafe=unsafe)
     return b"".join(pieces), count
 
 
-def mended_pieces(
+def apply_fixes_in_pieces(
     source: Source, report: Report, *, unsafe: bool = False
 ) -> tuple[list[bytes | memoryview], int]:
     """The same in pieces, which of a table are no copies; a document keeps its encoding.
@@ -126,7 +126,7 @@ def mended_pieces(
     Raises: OsimliteError: the bytes are in no single encoding, so that they cannot be written back
         as they were.
     """
-    edits, count = edits_of(report.findings, unsafe=unsafe)
+    edits, count = select_edits(report.findings, unsafe=unsafe)
     ends = [0, *(edit.end for edit in edits)]
     if not count or is_table(source.file):
         data = memoryview(source.data)
@@ -136,7 +136,7 @@ def mended_pieces(
         return [*pieces, data[ends[-1] :]], count
     if source.text.encode(source.encoding, "replace") != source.data:
         raise OsimliteError(
-            "the file mixes encodings and cannot be mended; save it as UTF-8 first",
+            "the file mixes encodings and cannot be fixed; save it as UTF-8 first",
             file=source.file,
         )
     parts = (
@@ -146,12 +146,12 @@ def mended_pieces(
         return ["".join([*parts, source.text[ends[-1] :]]).encode(source.encoding)], count
     except UnicodeEncodeError:
         raise OsimliteError(
-            f"a mend cannot be written in {source.encoding}; save the file as UTF-8 first",
+            f"a fix cannot be written in {source.encoding}; save the file as UTF-8 first",
             file=source.file,
         ) from None
 
 
-def _whole_line(text: str, start: int, end: int) -> Edit:
+def _delete_range(text: str, start: int, end: int) -> Edit:
     before = text.rfind("\n", 0, start) + 1
     after = text.find("\n", end)
     if after >= 0 and not text[before:start].strip() and not text[end:after].strip():

@@ -16,7 +16,7 @@ NEWEST = "4.6"
 """The release whose classes osimlite has."""
 
 
-class Later(NamedTuple):
+class LaterChanges(NamedTuple):
     """What came after a release.
 
     `format` is the newest version of documents that the release writes. `classes` has the first
@@ -38,10 +38,10 @@ class NewProperty(NamedTuple):
 
 
 @cache
-def later_than(release: str) -> Later:
+def load_later_changes(release: str) -> LaterChanges:
     """What came after a release; OsimliteError if nothing is known of it."""
     if release == NEWEST:
-        return Later(CURRENT_VERSION, {}, {})
+        return LaterChanges(CURRENT_VERSION, {}, {})
     import json
 
     known: dict[str, dict[str, Any]] = json.loads(
@@ -49,20 +49,24 @@ def later_than(release: str) -> Later:
     )
     if release not in known["formats"]:
         raise OsimliteError(
-            f"of OpenSim '{release}' nothing is known; known are {join_words(known['formats'], most=20)}"
+            f"unknown release of OpenSim '{release}'; known are {join_words(known['formats'], most=20)}"
         )
-    numbers = _numbers(release)
-    return Later(
+    numbers = _parse_release(release)
+    return LaterChanges(
         known["formats"][release],
-        {tag: first for tag, first in known["classes"].items() if _numbers(first) > numbers},
-        {name: told for name, told in known["properties"].items() if _numbers(told[0]) > numbers},
+        {tag: first for tag, first in known["classes"].items() if _parse_release(first) > numbers},
+        {
+            name: told
+            for name, told in known["properties"].items()
+            if _parse_release(told[0]) > numbers
+        },
     )
 
 
 @cache
-def new_properties(cls: type[Object], release: str) -> list[NewProperty]:
+def find_new_properties(cls: type[Object], release: str) -> list[NewProperty]:
     """The properties of a class that came after a release."""
-    later = later_than(release).properties
+    later = load_later_changes(release).properties
     names = {
         spec: (f"{spec.declared_in.tag}.{tag}", f"{cls.tag}.{tag}")
         for tag, spec in field_specs(cls).items()
@@ -75,5 +79,5 @@ def new_properties(cls: type[Object], release: str) -> list[NewProperty]:
     ]
 
 
-def _numbers(release: str) -> tuple[int, ...]:
+def _parse_release(release: str) -> tuple[int, ...]:
     return tuple(map(int, release.split(".")))

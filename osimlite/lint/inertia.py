@@ -11,14 +11,14 @@ _EDGES = ((0.0, 1.0, 1.0), (1.0, 0.0, 1.0), (1.0, 1.0, 0.0))
 """Principal moments of mass that lies on one principal axis: every possible inertia is a mixture of these."""
 
 
-def possible_inertia(inertia: Sequence[float]) -> Inertia:
+def find_possible_inertia(inertia: Sequence[float]) -> Inertia:
     """The inertia nearest to `inertia` (xx yy zz xy xz yz) whose principal moments obey the triangle inequality.
 
     Nearest in the Frobenius norm: the principal axes stay, and the principal moments are projected
     onto the cone of those that some distribution of mass has.
     """
-    moments, axes = principal_axes(inertia)
-    nearest = _on_cone(moments)
+    moments, axes = compute_principal_axes(inertia)
+    nearest = _project_onto_cone(moments)
 
     def entry(row: int, column: int) -> float:
         return sum(nearest[k] * axes[row][k] * axes[column][k] for k in range(3))
@@ -26,7 +26,7 @@ def possible_inertia(inertia: Sequence[float]) -> Inertia:
     return entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(0, 2), entry(1, 2)
 
 
-def principal_axes(inertia: Sequence[float]) -> tuple[list[float], list[list[float]]]:
+def compute_principal_axes(inertia: Sequence[float]) -> tuple[list[float], list[list[float]]]:
     """Principal moments, and a matrix whose columns are their axes, by Jacobi rotations (J. reine angew. Math. 30)."""
     xx, yy, zz, xy, xz, yz = inertia
     a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
@@ -50,12 +50,12 @@ def principal_axes(inertia: Sequence[float]) -> tuple[list[float], list[list[flo
     return [a[k][k] for k in range(3)], v
 
 
-def _on_cone(moments: Sequence[float]) -> list[float]:
+def _project_onto_cone(moments: Sequence[float]) -> list[float]:
     """The point nearest to `moments` that is a mixture of the edges, by looking at every face of the cone."""
     best, least = [0.0, 0.0, 0.0], math.inf
     faces = [face for count in range(4) for face in combinations(_EDGES, count)]
     for face in faces:
-        weights = _weights(face, moments)
+        weights = _solve_weights(face, moments)
         if min(weights, default=0.0) < -1e-15 * max(map(abs, moments)):
             continue
         point = [
@@ -68,7 +68,7 @@ def _on_cone(moments: Sequence[float]) -> list[float]:
     return best
 
 
-def _weights(face: Sequence[Sequence[float]], moments: Sequence[float]) -> list[float]:
+def _solve_weights(face: Sequence[Sequence[float]], moments: Sequence[float]) -> list[float]:
     """The mixture of some edges that comes nearest to `moments`; the weights may be negative."""
     # Any two edges have the scalar product 1, and each has 2 with itself: the normal equations are
     # solved at once.

@@ -15,10 +15,10 @@ from osimlite.base.files import read_standard_input
 from osimlite.base.records import replace
 from osimlite.base.writing import user_cache_folder
 from osimlite.errors import MissingFileError
-from osimlite.lint.cache import Cache, key_of, text_of
+from osimlite.lint.cache import Cache, fingerprint_text, make_key
 from osimlite.lint.config import Config
-from osimlite.lint.diagnostic import Report, merged
-from osimlite.lint.settings import Settings, settings_for
+from osimlite.lint.diagnostic import Report, merge_reports
+from osimlite.lint.settings import Settings, load_settings
 
 WORTH_SHARING = 4_000_000
 """Bytes of models from which on further processes are started; checking takes about a second for 15 MB."""
@@ -26,12 +26,12 @@ WORTH_SHARING = 4_000_000
 Progress = Callable[[int, int], None]
 
 
-class Job(NamedTuple):
+class CheckJob(NamedTuple):
     """One file to check, by which configuration, and the folder its findings are kept in (None: nowhere)."""
 
     file: str
     config: Config
-    kept_in: Path | None
+    cache_folder: Path | None
 
 
 def check_files(
@@ -54,33 +54,33 @@ def check_files(
         OsimliteError: the settings make no sense.
     """
     result: dict[str, Report] = {}
-    texts = Texts()
-    jobs: list[Job] = []
+    texts = SourceTexts()
+    jobs: list[CheckJob] = []
     caches: dict[Path, Cache] = {}
     for file in dict.fromkeys(files):
-        settings = settings_of(file)
+        settings = find_settings(file)
         config = settings.config_for(file, given)
         if file == "-":
-            result[file] = _standard_input(config, texts)
+            result[file] = _check_standard_input(config, texts)
             continue
-        job = Job(file, config, user_cache_folder() if cached else None)
+        job = CheckJob(file, config, user_cache_folder() if cached else None)
         known = None
-        if job.kept_in is not None:
-            kept = caches.setdefault(job.kept_in, Cache(job.kept_in))
-            known = kept.get(file, key_of(file, config))
+        if job.cache_folder is not None:
+            kept = caches.setdefault(job.cache_folder, Cache(job.cache_folder))
+            known = kept.get(file, make_key(file, config))
         if known is None:
             jobs.append(job)
         else:
             result[file] = known
-    for count, (job, report) in enumerate(_checked(jobs, processes), len(result) + 1):
+    for count, (job, report) in enumerate(_check_jobs(jobs, processes), len(result) + 1):
         result[job.file] = report
         if progress is not None:
             progress(count, len(files))
-    whole = merged(result[file] for file in files)
+    whole = merge_reports(result[file] for file in files)
     return replace(whole, texts=texts, checked=len(files))
 
 
-class Texts(dict[str, str]):
+class SourceTexts(dict[str, str]):
     """The text of each file, read again when it is asked for: a thousand models are not kept in memory."""
 
     def __missing__(self, file: str) -> str:
@@ -92,9 +92,9 @@ class Texts(dict[str, str]):
             return ""
 
 
-def settings_of(file: str) -> Settings:
+def find_settings(file: str) -> Settings:
     """The settings that hold for a file; for standard input those of the working folder."""
-    return settings_for(
+    return load_settings(
         Path.cwd() if file in ("-", "<stdin>") else resolve_folder(os.path.dirname(file))
     )
 
@@ -105,13 +105,13 @@ def resolve_folder(folder: str) -> Path:
     return Path(folder).resolve()
 
 
-def _checked(jobs: list[Job], processes: int | None) -> Iterator[tuple[Job, Report]]:
+def _check_jobs(jobs: list[CheckJob], processes: int | None) -> Iterator[tuple[CheckJob, Report]]:
     if not jobs:
         return
     if processes is None:
         processes = count_processes(jobs)
     if processes < 2:
-        yield from ((job, check_one(job)) for job in jobs)
+        yield from ((job, check_job(job)) for job in jobs)
         return
     import gc
     import multiprocessing
@@ -125,10 +125,10 @@ def _checked(jobs: list[Job], processes: int | None) -> Iterator[tuple[Job, Repo
     context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
     share = max(1, min(16, len(jobs) // (4 * processes)))
     with ProcessPoolExecutor(processes, context) as pool:
-        yield from zip(jobs, pool.map(check_one, jobs, chunksize=share), strict=True)
+        yield from zip(jobs, pool.map(check_job, jobs, chunksize=share), strict=True)
 
 
-def count_processes(jobs: list[Job]) -> int:
+def count_processes(jobs: list[CheckJob]) -> int:
     """Return how many processes are worth starting for files of these sizes."""
     size = 0
     for job in jobs:
@@ -141,25 +141,25 @@ def count_processes(jobs: list[Job]) -> int:
     return min(count_cores(), len(jobs), 61)
 
 
-def check_one(job: Job) -> Report:
+def check_job(job: CheckJob) -> Report:
     """Check one file, and keep what was found."""
-    from osimlite.lint.engine import run, subject_of
+    from osimlite.lint.engine import load_subject, run_rules
     from osimlite.lint.subject import Subject
 
     began = time_ns()
-    subject = subject_of(job.file, job.config)
-    if isinstance(subject, Subject) and job.kept_in is not None:
-        subject.kept_in = Cache(job.kept_in).folder
-    report = run(subject)
-    outside = subject.outside() if job.kept_in is not None else None
-    if job.kept_in is not None and outside is not None:
+    subject = load_subject(job.file, job.config)
+    if isinstance(subject, Subject) and job.cache_folder is not None:
+        subject.cache_folder = Cache(job.cache_folder).folder
+    report = run_rules(subject)
+    outside = subject.list_outside_paths() if job.cache_folder is not None else None
+    if job.cache_folder is not None and outside is not None:
         # A file that changes while it is checked must not be taken for one that was checked after.
-        key, text = key_of(job.file, job.config), text_of(subject.data)
-        Cache(job.kept_in).put(job.file, key, text, report, outside, began)
+        key, text = make_key(job.file, job.config), fingerprint_text(subject.data)
+        Cache(job.cache_folder).store(job.file, key, text, report, outside, began)
     return report
 
 
-def _standard_input(config: Config, texts: dict[str, str]) -> Report:
+def _check_standard_input(config: Config, texts: dict[str, str]) -> Report:
     from osimlite.io.document.source import Source
     from osimlite.lint.engine import check_source
 

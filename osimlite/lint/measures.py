@@ -41,7 +41,7 @@ MEASURES = "measures"
 NEEDS_SIM = "needs osimlite[sim]"
 """Begins the reason why nothing is measured where the numeric packages are not installed."""
 
-FEW = 12
+MAX_WRAPS_UNCOMPILED = 12
 """Wraps of a model; with more it is worth to compile."""
 
 _MEASURED = ("Muscle", "PathWrap", "ConditionalPathPoint", "MovingPathPoint")
@@ -55,9 +55,9 @@ class Value(NamedTuple):
     unit: str
 
     def __str__(self) -> str:
-        return f"'{self.coordinate}' = {self.sized(self.value, 4)}"
+        return f"'{self.coordinate}' = {self.format_value(self.value, 4)}"
 
-    def sized(self, value: float, digits: int) -> str:
+    def format_value(self, value: float, digits: int) -> str:
         """Another value of the coordinate as people read it; angles in degrees."""
         shown, unit = (degrees(value), "deg") if self.unit == "rad" else (value, self.unit)
         return f"{shown:.{digits}g} {unit}".rstrip()
@@ -72,7 +72,7 @@ class Pose(NamedTuple):
         return f"at {join_words(map(str, self.values))}" if self.values else "in the default pose"
 
 
-class Wrapping(NamedTuple):
+class WrappingError(NamedTuple):
     """A path around surfaces in OpenSim's way, beside the same along geodesics."""
 
     owner: str  # path of what has it
@@ -82,7 +82,7 @@ class Wrapping(NamedTuple):
     pose: Pose  # there
 
 
-class Jump(NamedTuple):
+class PathJump(NamedTuple):
     """A length of a path that jumps: by how much (m), where, and which points or surfaces come or go there."""
 
     owner: str
@@ -110,11 +110,11 @@ class MovingPoint(NamedTuple):
     # inside
     beyond: float
     moved: float  # how far they let the point move on that way, m
-    # of the place over the coordinate that OpenSim goes on with outside the range, m/rad or 1
+    # of the place over the coordinate that OpenSim continues with outside the range, m/rad or 1
     rate: float
 
 
-class Start(NamedTuple):
+class MuscleStart(NamedTuple):
     """A muscle in the state that it starts with, and in equilibrium at the same activation, in the default pose."""
 
     owner: str  # its path
@@ -123,7 +123,7 @@ class Start(NamedTuple):
     tensions: tuple[float, float]  # of the tendon, in max_isometric_force
 
 
-class Reach(NamedTuple):
+class FiberReach(NamedTuple):
     """The fibers of a muscle in equilibrium, fully active where its path is shortest, at rest where it is longest."""
 
     owner: str  # path of the muscle
@@ -139,28 +139,28 @@ class Measures(NamedTuple):
     # for each path the places in the mechanism of the coordinates that change its length; in what
     # poses a path is looked at, those of all paths say
     swept: dict[str, tuple[int, ...]]
-    wrappings: list[Wrapping]
-    jumps: list[Jump]
+    wrappings: list[WrappingError]
+    jumps: list[PathJump]
     on_surfaces: list[LengthOnSurface]
     moving_points: list[MovingPoint]
-    starts: list[Start]
-    reaches: list[Reach]
+    starts: list[MuscleStart]
+    reaches: list[FiberReach]
 
 
-def of_owners(measures: Measures, owners: Container[str]) -> Measures:
+def select_owners(measures: Measures, owners: Container[str]) -> Measures:
     """What is measured of some paths."""
     lists: Any = measures[1:]
     kept = {owner: places for owner, places in measures.swept.items() if owner in owners}
     return Measures(kept, *([item for item in items if item.owner in owners] for items in lists))
 
 
-def together(one: Measures, two: Measures) -> Measures:
+def merge_measures(one: Measures, two: Measures) -> Measures:
     """What is measured of these paths and of those."""
     lists: Any = zip(one[1:], two[1:], strict=True)
     return Measures(one.swept | two.swept, *([*items, *others] for items, others in lists))
 
 
-def swept_places(measures: Measures) -> set[int]:
+def find_swept_coordinates(measures: Measures) -> set[int]:
     """Places of the coordinates that change the length of a path."""
     return {place for places in measures.swept.values() for place in places}
 
@@ -171,10 +171,10 @@ class NoMachineCodeError(OsimliteError):
 
 def has_measures(subject: Subject) -> bool:
     """Whether a model has muscles, or paths whose lengths do not follow from fixed points."""
-    return any(next(subject.named(name), None) is not None for name in _MEASURED)
+    return any(next(subject.find_by_class(name), None) is not None for name in _MEASURED)
 
 
-def unmeasured(subject: Subject, *, anew: bool = True) -> str:
+def measure_subject(subject: Subject, *, anew: bool = True) -> str:
     """Measure a model; why that cannot be done, if it cannot.
 
     Args:
@@ -183,81 +183,88 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
     """
     from osimlite.schema.tree import lent
 
-    compiles = sum(1 for _ in subject.named("PathWrap")) > FEW
+    compiles = sum(1 for _ in subject.find_by_class("PathWrap")) > MAX_WRAPS_UNCOMPILED
     missing = find_missing_packages("numpy")
     if missing:
         verb = "is" if len(missing) == 1 else "are"
-        return f"{NEEDS_SIM} ({join_words(missing)} {verb} not installed); run: pip install 'osimlite[sim]'"
-    mechanism = subject.kept.pop(MECHANISM, None)
-    parts = parts_of(subject)
-    known = None if parts is None else recall(parts, subject.kept_in)
+        return (
+            f"{NEEDS_SIM} ({join_words(missing)} {verb} not installed); run: pip install "
+            "'osimlite[sim]'"
+        )
+    mechanism = subject.cache.pop(MECHANISM, None)
+    parts = digest_parts(subject)
+    known = None if parts is None else recall_measures(parts, subject.cache_folder)
     if parts is not None and known is not None:
-        still = known.of(parts)
-        if still.swept.keys() == parts.paths.keys() and swept_places(still) == swept_places(
-            known.measures
-        ):
-            subject.kept[MEASURES] = still
+        still = known.select_unchanged(parts)
+        if still.swept.keys() == parts.paths.keys() and find_swept_coordinates(
+            still
+        ) == find_swept_coordinates(known.measures):
+            subject.cache[MEASURES] = still
             return ""
     if not anew:
-        return "nobody asked"
+        return "not requested"
     try:
-        measured = import_module("osimlite.lint.measuring").measured
+        measured = import_module("osimlite.lint.measuring").measure_model
         assert subject.model is not None
-        known_of = None if parts is None or known is None else (known.measures, known.of(parts))
+        known_of = (
+            None
+            if parts is None or known is None
+            else (known.measures, known.select_unchanged(parts))
+        )
         with lent(subject.tree):
             result = measured(subject.model, compiles=compiles, known=known_of, mechanism=mechanism)
     except NoMachineCodeError as error:
-        subject.is_unsettled = True
+        subject.needs_remeasuring = True
         return error.message
     except (ArithmeticError, ValueError, OsimliteError) as error:
         fault = error.__context__ if isinstance(error, OsimliteError) else error
         if not isinstance(fault, ArithmeticError | ValueError):
             return str(getattr(error, "message", error))
         # Numbers that other rules have something to say of.
-        return f"a number of it is beyond what can be computed with ({fault})"
-    subject.kept[MEASURES] = result
+        return f"a number is too large to compute with ({fault})"
+    subject.cache[MEASURES] = result
     if parts is not None:
-        remember(parts, result, subject.kept_in)
+        remember_measures(parts, result, subject.cache_folder)
     return ""
 
 
-def measures_of(subject: Subject) -> Measures:
+def get_measures(subject: Subject) -> Measures:
     """What was measured of a model."""
-    return cast("Measures", subject.kept[MEASURES])
+    return cast("Measures", subject.cache[MEASURES])
 
 
-KEPT = 16
+MAX_REMEMBERED_MODELS = 16
 """So many models are remembered."""
 
-_ASIDE = {"Geometry", "Marker", "Controller", "Probe", "ContactGeometry"}
+_INDEPENDENT_CLASSES = {"Geometry", "Marker", "Controller", "Probe", "ContactGeometry"}
 """Classes of what no path depends on."""
 
 
-class Parts(NamedTuple):
+class TextParts(NamedTuple):
     """Digests of the parts of a text."""
 
     rest: str  # of all that paths move with
     paths: dict[str, str]  # of the element of each path's owner, by its path
 
 
-class Known(NamedTuple):
+class RememberedMeasures(NamedTuple):
     """What was measured, and of which elements by the paths of their owners."""
 
     paths: dict[str, str]
     measures: Measures
 
-    def of(self, parts: Parts) -> Measures:
+    def select_unchanged(self, parts: TextParts) -> Measures:
         """What still holds of it: of the paths that are as they were."""
-        return of_owners(
+        return select_owners(
             self.measures,
             {path for path, own in self.paths.items() if parts.paths.get(path) == own},
         )
 
 
-remembered: OrderedDict[str, Known] = OrderedDict()
+remembered: OrderedDict[str, RememberedMeasures] = OrderedDict()
 
 
-def parts_of(subject: Subject) -> Parts | None:
+def digest_parts(subject: Subject) -> TextParts | None:
     """The parts of a text; None of what is no text, or does not stand in one file alone."""
     source = subject.source
     if (
@@ -270,7 +277,7 @@ def parts_of(subject: Subject) -> Parts | None:
     places: list[tuple[int, int, str]] = []
     for cls, items in subject.by_class.items():
         has_path = "geometry_path" in cls.model_fields
-        if not has_path and _ASIDE.isdisjoint(lineage(cls)):
+        if not has_path and _INDEPENDENT_CLASSES.isdisjoint(lineage(cls)):
             continue
         for item in items:
             if item._index is not None:
@@ -290,10 +297,10 @@ def parts_of(subject: Subject) -> Parts | None:
                 source.text[start:end].encode("utf-8", "replace"), digest_size=16
             ).hexdigest()
     rest.update(source.text[seen:].strip().encode("utf-8", "replace"))
-    return Parts(rest.hexdigest(), paths)
+    return TextParts(rest.hexdigest(), paths)
 
 
-def recall(parts: Parts, folder: Path | None) -> Known | None:
+def recall_measures(parts: TextParts, folder: Path | None) -> RememberedMeasures | None:
     """What was measured of a model with these parts, but perhaps for those of some paths.
 
     Args:
@@ -305,15 +312,17 @@ def recall(parts: Parts, folder: Path | None) -> Known | None:
         from pydantic import TypeAdapter, ValidationError
 
         try:
-            known = TypeAdapter(Known).validate_json(read_file(_file(folder, parts)), strict=True)
+            known = TypeAdapter(RememberedMeasures).validate_json(
+                read_file(_cache_file(folder, parts)), strict=True
+            )
         except (OsimliteError, ValidationError):
             return None
-        mark_used(_file(folder, parts))
+        mark_used(_cache_file(folder, parts))
         remembered[parts.rest] = known
     return known
 
 
-def remember(parts: Parts, measures: Measures, folder: Path | None) -> None:
+def remember_measures(parts: TextParts, measures: Measures, folder: Path | None) -> None:
     """Keep what was measured.
 
     Args:
@@ -321,16 +330,16 @@ def remember(parts: Parts, measures: Measures, folder: Path | None) -> None:
         measures: of its model.
         folder: where it is kept; in memory alone if None.
     """
-    known = remembered[parts.rest] = Known(parts.paths, measures)
+    known = remembered[parts.rest] = RememberedMeasures(parts.paths, measures)
     remembered.move_to_end(parts.rest)
-    while len(remembered) > KEPT:
+    while len(remembered) > MAX_REMEMBERED_MODELS:
         remembered.popitem(last=False)
     if folder is not None:
         from pydantic import ConfigDict, TypeAdapter
 
-        adapter = TypeAdapter(Known, config=ConfigDict(ser_json_inf_nan="constants"))
-        write_cached(_file(folder, parts), adapter.dump_json(known))
+        adapter = TypeAdapter(RememberedMeasures, config=ConfigDict(ser_json_inf_nan="constants"))
+        write_cached(_cache_file(folder, parts), adapter.dump_json(known))
 
 
-def _file(folder: Path, parts: Parts) -> Path:
+def _cache_file(folder: Path, parts: TextParts) -> Path:
     return folder / "measured" / f"{parts.rest}.json"

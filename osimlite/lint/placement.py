@@ -16,9 +16,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from osimlite.errors import OsimliteError
-from osimlite.lint.axes import axes_of, coordinates_of
-from osimlite.lint.skeleton import skeleton
-from osimlite.lint.subject import Subject, once
+from osimlite.lint.axes import list_axes, list_coordinates
+from osimlite.lint.skeleton import build_skeleton
+from osimlite.lint.subject import Subject, cached_per_subject
 from osimlite.mechanics.laws.rotations import (
     Axes,
     X,
@@ -51,81 +51,87 @@ if TYPE_CHECKING:
     from osimlite.schema.custom_joint import CustomJoint, TransformAxis
 
 
-class Pose(NamedTuple):
+class FramePose(NamedTuple):
     """A frame in another: its axes, and its origin (m)."""
 
     axes: Axes = (X, Y, Z)
     position: Vector = ZERO
 
-    def turned(self, vector: Vector) -> Vector:
+    def rotate(self, vector: Vector) -> Vector:
         """A vector of the inner frame, expressed in the outer one."""
         return along_axes(self.axes, vector)
 
-    def of(self, point: Vector) -> Vector:
+    def transform_point(self, point: Vector) -> Vector:
         """A point of the inner frame, in the outer one."""
         return plus(along_axes(self.axes, point), self.position)
 
-    def then(self, inner: Pose) -> Pose:
+    def compose(self, inner: FramePose) -> FramePose:
         """A frame within this one, seen from outside."""
-        return Pose(turned_axes(self.axes, inner.axes), self.of(inner.position))
+        return FramePose(turned_axes(self.axes, inner.axes), self.transform_point(inner.position))
 
-    def inverse(self) -> Pose:
+    def inverse(self) -> FramePose:
         """The outer frame, seen from the inner one."""
         back = transposed(self.axes)
-        return Pose(back, times(-1.0, along_axes(back, self.position)))
+        return FramePose(back, times(-1.0, along_axes(back, self.position)))
 
 
-End = tuple[Component, Pose] | None
+FrameLocation = tuple[Component, FramePose] | None
 """The body or ground that a frame is fixed to, and where it is on it."""
 
 
-def fixed(angles: Vector, position: Vector) -> Pose:
+def make_offset(angles: Vector, position: Vector) -> FramePose:
     """A frame displaced, and turned by body-fixed X-Y-Z angles."""
     (s1, c1), (s2, c2), (s3, c3) = map(_sine_cosine, angles)
-    return Pose(body_fixed(s1, c1, s2, c2, s3, c3), position)
+    return FramePose(body_fixed(s1, c1, s2, c2, s3, c3), position)
 
 
 def _sine_cosine(angle: float) -> tuple[float, float]:
     return (math.sin(angle), math.cos(angle)) if math.isfinite(angle) else (math.nan, math.nan)
 
 
-def on_base(subject: Subject, frame: Component | None) -> End:
+def locate_frame(subject: Subject, frame: Component | None) -> FrameLocation:
     """The body or ground that a frame is fixed to, and where it is on it; None if that is not known."""
-    pose, seen = Pose(), 0
+    pose, seen = FramePose(), 0
     while isinstance(frame, PhysicalOffsetFrame) and seen < 100:
-        pose = fixed(frame.orientation, frame.translation).then(pose)
+        pose = make_offset(frame.orientation, frame.translation).compose(pose)
         frame, seen = subject.target_of(frame, "socket_parent"), seen + 1
     return (frame, pose) if isinstance(frame, (Body, Ground)) else None
 
 
-@once
-def default_poses(subject: Subject) -> dict[int, Pose]:
+@cached_per_subject
+def compute_default_poses(subject: Subject) -> dict[int, FramePose]:
     """The pose in ground of each body (by identity) whose place is known."""
-    return poses_at(subject)
+    return compute_poses(subject)
 
 
-@once
-def _ends(subject: Subject) -> dict[int, tuple[End, End]]:
+@cached_per_subject
+def _locate_joint_frames(subject: Subject) -> dict[int, tuple[FrameLocation, FrameLocation]]:
     """Where the frames of the joints are, by the identities of these."""
-    links = skeleton(subject).links
+    links = build_skeleton(subject).links
     return {
-        id(link.joint): (on_base(subject, link.parent), on_base(subject, link.child))
+        id(link.joint): (locate_frame(subject, link.parent), locate_frame(subject, link.child))
         for link in links
     }
 
 
-def poses_at(subject: Subject, values: Mapping[str, float] | None = None) -> dict[int, Pose]:
+def compute_poses(
+    subject: Subject, values: Mapping[str, float] | None = None
+) -> dict[int, FramePose]:
     """The pose in ground of each body (by identity) whose place is known.
 
     Args: subject: the model. values: those of coordinates, rad or m; others have their default
         values. Given, places may be off by some centimetres.
     """
-    bones, ends, ways = skeleton(subject), _ends(subject), _ways(subject, values is not None)
-    poses: dict[int, Pose] = {id(bones.ground): Pose()}
+    bones, ends, motions = (
+        build_skeleton(subject),
+        _locate_joint_frames(subject),
+        _find_joint_motions(subject, values is not None),
+    )
+    poses: dict[int, FramePose] = {id(bones.ground): FramePose()}
     pending: list[Component] = [bones.ground]
     while pending:
         base = pending.pop(0)
-        for link in bones.of(base):
+        for link in bones.find_joints(base):
             parent, child = ends[id(link.joint)]
             if (
                 parent is None
@@ -133,23 +139,23 @@ def poses_at(subject: Subject, values: Mapping[str, float] | None = None) -> dic
                 or (id(parent[0]) in poses and id(child[0]) in poses)
             ):
                 continue
-            if id(link.joint) not in ways or any(
+            if id(link.joint) not in motions or any(
                 isinstance(item, Unknown) or (item.prescribed and values is None)
                 for item in link.joint.coordinates
             ):
                 continue
             across = (
                 parent[1]
-                .then(_motion(link.joint, ways[id(link.joint)], values))
-                .then(child[1].inverse())
+                .compose(_compute_joint_pose(link.joint, motions[id(link.joint)], values))
+                .compose(child[1].inverse())
             )
             end, step = (child[0], across) if parent[0] is base else (parent[0], across.inverse())
-            poses[id(end)] = poses[id(base)].then(step)
+            poses[id(end)] = poses[id(base)].compose(step)
             pending.append(end)
     return poses
 
 
-class _Way(NamedTuple):
+class _JointMotion(NamedTuple):
     """What a joint turns about or shifts along, and by which function of coordinates; None is the coordinate itself."""
 
     turns: bool
@@ -163,19 +169,19 @@ class _Way(NamedTuple):
         return arguments[0] if self.function is None else self.function.evaluate(arguments)[0]
 
 
-@once
-def _ways(subject: Subject, rough: bool) -> dict[int, list[_Way]]:
-    """The ways of the joints (by identity) whose motion is known; a turn is about an axis that those before turned."""
-    result: dict[int, list[_Way]] = {}
-    for link in skeleton(subject).links:
+@cached_per_subject
+def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointMotion]]:
+    """The motions of the joints (by identity) whose motion is known; a turn is about an axis that those before turned."""
+    result: dict[int, list[_JointMotion]] = {}
+    for link in build_skeleton(subject).links:
         joint, names = link.joint, [item.name for item in link.joint.coordinates]
         if is_a(joint, "CustomJoint"):
-            axes = [*enumerate(axes_of(cast("CustomJoint", joint)))]
-            functions = [_function(axis, rough) for _, axis in axes]
+            axes = [*enumerate(list_axes(cast("CustomJoint", joint)))]
+            functions = [_make_function(axis, rough) for _, axis in axes]
             known = [function for function in functions if function is not None]
             if len(known) == len(axes):
                 result[id(joint)] = [
-                    _Way(
+                    _JointMotion(
                         place < 3,
                         over(axis.axis, norm(axis.axis) or 1.0),
                         [] if isinstance(axis.function, Constant) else axis.names,
@@ -189,13 +195,13 @@ def _ways(subject: Subject, rough: bool) -> dict[int, list[_Way]]:
             and "r" not in words
         ):
             result[id(joint)] = [
-                _Way(word[0] == "r", (X, Y, Z)["xyz".index(word[1])], [name])
+                _JointMotion(word[0] == "r", (X, Y, Z)["xyz".index(word[1])], [name])
                 for word, name in zip(words, names, strict=True)
             ]
     return result
 
 
-def _function(axis: TransformAxis, rough: bool) -> Function | None:
+def _make_function(axis: TransformAxis, rough: bool) -> Function | None:
     """What an axis moves by; None if that is not known."""
     from osimlite.mechanics.multibody.schema_functions import convert_function
 
@@ -215,40 +221,42 @@ def _function(axis: TransformAxis, rough: bool) -> Function | None:
         return None
 
 
-def _motion(joint: Joint, ways: list[_Way], given: Mapping[str, float] | None) -> Pose:
+def _compute_joint_pose(
+    joint: Joint, motions: list[_JointMotion], given: Mapping[str, float] | None
+) -> FramePose:
     """The child frame of a joint in its parent frame."""
     values = {
         item.name: (given or {}).get(item.name, item.default_value) for item in joint.coordinates
     }
     axes, place = (X, Y, Z), ZERO
-    for way in ways:
-        amount = way.amount(values)
-        if way.turns and amount:
-            axes = turned_axes(axes, about_axis(way.axis, *_sine_cosine(amount)))
+    for motion in motions:
+        amount = motion.amount(values)
+        if motion.turns and amount:
+            axes = turned_axes(axes, about_axis(motion.axis, *_sine_cosine(amount)))
         elif amount:
-            place = along(place, amount, way.axis)
+            place = along(place, amount, motion.axis)
     if isinstance(joint, EllipsoidJoint):
         place = elementwise(joint.radii_x_y_z, axes[2])
-    return Pose(axes, place)
+    return FramePose(axes, place)
 
 
-def turning_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector]]:
+def find_rotation_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector]]:
     """What the rotations of a gimbal or custom joint turn about in the default pose.
 
     Returns: The coordinate of each rotation and its axis, a unit vector in the parent frame.
         Nothing for a joint of another class, and where a rotation does not follow one coordinate of
         its own or cannot be computed.
     """
-    values = {item.name: item.default_value for item in coordinates_of(joint)}
+    values = {item.name: item.default_value for item in list_coordinates(joint)}
     result: dict[str, Vector] = {}
     axes = X, Y, Z
-    for way in _ways(subject, False).get(id(joint), []):
-        if not way.turns or len(way.names) != 1:
+    for motion in _find_joint_motions(subject, False).get(id(joint), []):
+        if not motion.turns or len(motion.names) != 1:
             continue
-        if way.names[0] not in values or way.axis == ZERO:
+        if motion.names[0] not in values or motion.axis == ZERO:
             return []
-        result[way.names[0]] = along_axes(axes, way.axis)
-        axes = turned_axes(axes, about_axis(way.axis, *_sine_cosine(way.amount(values))))
+        result[motion.names[0]] = along_axes(axes, motion.axis)
+        axes = turned_axes(axes, about_axis(motion.axis, *_sine_cosine(motion.amount(values))))
     return (
         list(result.items()) if isinstance(joint, GimbalJoint) or is_a(joint, "CustomJoint") else []
     )

@@ -6,16 +6,16 @@ import math
 from typing import Any
 
 from osimlite.io.tables.headers import StorageHeader
-from osimlite.lint.placement import Pose, on_base, poses_at
+from osimlite.lint.placement import FramePose, compute_poses, locate_frame
 from osimlite.lint.setup import Setup
-from osimlite.lint.subject import Subject, once
+from osimlite.lint.subject import Subject, cached_per_subject
 from osimlite.lint.table import Table
 from osimlite.mechanics.laws.vectors import Vector
 from osimlite.schema.states import motions_of
 from osimlite.schema.tree import is_a
 
 
-def angles_of(setup: Setup) -> set[str]:
+def find_angles(setup: Setup) -> set[str]:
     """The coordinates of the model that are angles."""
     joints: Any = [] if setup.tree is None else setup.tree.of_class("Joint").values()
     return {
@@ -26,15 +26,15 @@ def angles_of(setup: Setup) -> set[str]:
     }
 
 
-def coordinate_of(column: str) -> str:
+def coordinate_name(column: str) -> str:
     """The name of the coordinate whose values a column has."""
     return column.removesuffix("/value").rpartition("/")[2]
 
 
-@once
-def poses_in(setup: Setup, motion: Table, time: float) -> dict[int, Pose]:
+@cached_per_subject
+def compute_poses_of_motion(setup: Setup, motion: Table, time: float) -> dict[int, FramePose]:
     """The pose in ground of each body (by identity), at a time of a motion given as coordinates."""
-    angles = angles_of(setup)
+    angles = find_angles(setup)
     turn = (
         math.pi / 180.0
         if isinstance(motion.header, StorageHeader) and motion.header.in_degrees
@@ -43,31 +43,33 @@ def poses_in(setup: Setup, motion: Table, time: float) -> dict[int, Pose]:
     values = {
         name: value * turn if name in angles else value
         for name, value in zip(
-            map(coordinate_of, motion.columns), motion.row_at(time)[1:], strict=False
+            map(coordinate_name, motion.columns), motion.read_row(time)[1:], strict=False
         )
     }
-    return poses_at(model_subject(setup), values)
+    return compute_poses(make_model_subject(setup), values)
 
 
-@once
-def marker_places(setup: Setup) -> dict[str, Vector]:
+@cached_per_subject
+def locate_markers(setup: Setup) -> dict[str, Vector]:
     """Where the markers of the model are in the default pose, in ground, m."""
-    model = model_subject(setup)
-    poses = poses_at(model, {})
+    model = make_model_subject(setup)
+    poses = compute_poses(model, {})
     result: dict[str, Vector] = {}
     # What a set of markers adds has absolute paths.
-    added = [item for _, top in setup.added for item in top.walk() if is_a(item, "Marker")]
-    for marker in (*model.named("Marker"), *added):
-        frame = on_base(
+    added = [item for _, top in setup.added_sets for item in top.walk() if is_a(item, "Marker")]
+    for marker in (*model.find_by_class("Marker"), *added):
+        frame = locate_frame(
             model, model.tree.walk(str(marker.socket_parent_frame), "/markerset", "Frame").target
         )
         if frame is not None and id(frame[0]) in poses:
-            result[marker.name] = poses[id(frame[0])].then(frame[1]).of(marker.location)
+            result[marker.name] = (
+                poses[id(frame[0])].compose(frame[1]).transform_point(marker.location)
+            )
     return result
 
 
-@once
-def model_subject(setup: Setup) -> Subject:
+@cached_per_subject
+def make_model_subject(setup: Setup) -> Subject:
     """Return the model that the tool of a setup works on, as rules on models see it."""
     assert setup.tree is not None
     return Subject(setup.tree.model)

@@ -26,7 +26,7 @@ _TOP = re.compile(
 _COMPOUND = re.compile(r"[a-z][A-Z]|[A-Z]{2}|_|\d")
 
 
-def is_ours(beginning: bytes) -> bool:
+def is_opensim_xml(beginning: bytes) -> bool:
     """Whether XML that begins so is OpenSim's: by its root, also if that is misspelt, or by what it holds.
 
     What it holds is OpenSim's if two elements at least are properties of the class that they stand
@@ -57,7 +57,7 @@ def is_ours(beginning: bytes) -> bool:
     return False
 
 
-def misspelt(word: str, known: Iterable[str]) -> str | None:
+def find_misspelt_name(word: str, known: Iterable[str]) -> str | None:
     """The known name that a word is but for letter case and two letters, None if there is none."""
     from rapidfuzz.distance import OSA
     from rapidfuzz.process import extractOne
@@ -70,7 +70,7 @@ def misspelt(word: str, known: Iterable[str]) -> str | None:
 
 def is_root(tag: str) -> bool:
     """Whether a root is OpenSim's: of a document, or of a setup as old releases wrote them."""
-    if misspelt(tag, ["OpenSimDocument"]) is not None:
+    if find_misspelt_name(tag, ["OpenSimDocument"]) is not None:
         return True
     name = _class_name(tag)
     return name is not None and _TOP.fullmatch(name) is not None
@@ -83,7 +83,7 @@ def _class_name(tag: str) -> str | None:
     from osimlite.schema.registry import MODULES
 
     known = {**{name: name for name in MODULES}, **RENAMED}
-    result = tag if tag in known else misspelt(tag, known)
+    result = tag if tag in known else find_misspelt_name(tag, known)
     return None if result is None else known[result]
 
 
@@ -116,7 +116,7 @@ def is_document(file: str | None) -> bool:
     return file is not None and (file == "<stdin>" or file.lower().endswith(DOCUMENTS))
 
 
-def project_files(
+def find_project_files(
     paths: Iterable[str | Path],
     suffixes: tuple[str, ...] = PROJECT,
     *,
@@ -137,10 +137,11 @@ def project_files(
         if os.path.isdir(path):
             named = (file for file in Path(path).rglob("*.*") if file.suffix.lower() in suffixes)
             inside = sorted(str(file) for file in named if not file.is_dir())
-            below = [file for file in inside if begins_as_ours(file)]
+            below = [file for file in inside if is_opensim_file(file)]
             if not below:
                 raise OsimliteError(
-                    f"there is no file of OpenSim in this folder: no {', '.join(suffixes[:-1])} or {suffixes[-1]}",
+                    f"no OpenSim file in this folder: no {', '.join(suffixes[:-1])} or "
+                    f"{suffixes[-1]}",
                     file=str(path),
                 )
             result += below
@@ -149,18 +150,18 @@ def project_files(
             str(path) != "-" and not os.path.lexists(path) and os.path.realpath(path) not in unsaved
         ):
             raise make_missing_error(path, may_be_folder=True)
-        elif not only_ours or begins_as_ours(str(path)):
+        elif not only_ours or is_opensim_file(str(path)):
             result.append(str(path))
         else:
             others.append(str(path))
     return list({os.path.abspath(file): file for file in reversed(result)}.values())[::-1]
 
 
-def begins_as_ours(file: str) -> bool:
+def is_opensim_file(file: str) -> bool:
     """Whether a file is OpenSim's, as far as its name and its beginning tell: other programs write XML too."""
     if not file.lower().endswith(".xml"):
         return True
     try:
-        return is_ours(read_at_most(file, BEGINNING))
+        return is_opensim_xml(read_at_most(file, BEGINNING))
     except OsimliteError:
         return True

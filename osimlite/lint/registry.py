@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack
 from osimlite.base.records import dataclass, replace
 from osimlite.base.text import shorten_message
 from osimlite.lint.diagnostic import Finding, Fix, Severity
-from osimlite.lint.faults import Fault, faults_in
+from osimlite.lint.faults import RuleFault, parse_faults
 
 if TYPE_CHECKING:
     from osimlite.io.document.source import Position
-    from osimlite.lint.checked import Checked, Where
+    from osimlite.lint.checked import CheckTarget, Where
     from osimlite.schema.base import Object
 
 ERROR, WARNING, INFO = Severity.ERROR, Severity.WARNING, Severity.INFO
@@ -52,11 +52,11 @@ class Threshold(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class FindingSink:
+class FindingCollector:
     """What a rule calls for each finding of a subject."""
 
     rules: dict[str, Rule]
-    subject: Checked
+    subject: CheckTarget
     findings: list[Finding]
 
     def __call__(
@@ -77,7 +77,7 @@ class FindingSink:
         A rule that tells faults apart says which it is, by its name; what nobody wants to hear of
         is passed over.
 
-        Of a rule about tables or documents that mends, a suggestion is a mend: safe if it is
+        Of a rule about tables or documents that fixes, a suggestion is a fix: safe if it is
         `certain` or differs in letter case alone.
         """
         rule, subject = self.rules.get(fault), self.subject
@@ -86,11 +86,11 @@ class FindingSink:
         if at is None and (item is not None or where.get("number") is not None):
             at = subject.position(item, **where)
         line, column, length = at if at is not None else (None, None, 1)
-        if rule.mends and rule.about != "model" and suggestion is not None and at is not None:
+        if rule.fixes and rule.about != "model" and suggestion is not None and at is not None:
             named = where.get("word") or (
                 item and getattr(item, where.get("attribute") or where.get("tag") or "name")
             )
-            fix = fix or subject.replacing(at, named, suggestion, certain=certain)
+            fix = fix or subject.make_replacement(at, named, suggestion, certain=certain)
         elif subject.upgraded:
             # What is said of an upgraded document need not be said of its text.
             fix = None
@@ -112,8 +112,8 @@ class FindingSink:
         )
 
 
-Check = Callable[[Any, FindingSink], None]
-Mends = Literal["", "safe", "unsafe", "both"]
+Check = Callable[[Any, FindingCollector], None]
+FixKinds = Literal["", "safe", "unsafe", "both"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +121,8 @@ class Rule:
     """One registered rule.
 
     `severity` is that of its findings unless it says otherwise of one; `before` has another for
-    documents older than a version, where OpenSim does something else with them. `mends` says of
-    what kind its mends are, `about` what it looks
+    documents older than a version, where OpenSim does something else with them. `fixes` says of
+    what kind its fixes are, `about` what it looks
     at: ``model``, ``table``, ``document`` (a setup, or a part of one), ``measures`` (of the model's
     paths and muscles), ``construction`` (what stops the computation of a model), ``trial`` (what
     was measured of a finished one). A rule that tells faults apart is a `group`: there is a rule
@@ -135,9 +135,9 @@ class Rule:
     check: Check
     before: tuple[int, Severity] | None = None
     thresholds: tuple[Threshold, ...] = ()
-    mends: Mends = ""
+    fixes: FixKinds = ""
     about: str = "model"
-    fault: Fault | None = None
+    fault: RuleFault | None = None
     group: str = ""
 
     @property
@@ -147,21 +147,21 @@ class Rule:
 
     @property
     def page(self) -> str:
-        """What it does, why that is bad, an example and the same mended: the paragraphs of the docstring.
+        """What it does, why that is bad, an example and the same fixed: the paragraphs of the docstring.
 
-        The example stands there once, its lines marked as in a diff: `-` what fails, `+` what mends
+        The example stands there once, its lines marked as in a diff: `-` what fails, `+` what fixes
         it.
         """
         if self.fault is not None:
             return self.fault.page(f"{self.code[:-2]} {self.group}")
         summary, what, why, example = cleandoc(self.check.__doc__ or "").split("\n\n", 3)
         fence, *lines, end = example.splitlines()
-        fails, mended = (
+        fails, fixed = (
             "\n".join(line[2:] for line in lines if line[:1] != left_out) for left_out in "+-"
         )
         return (
-            f"{summary}\n\n## What it does\n{what}\n\n## Why is this bad\n{why}\n\n"
-            f"## Example\n{fence}\n{fails}\n{end}\n\n## Use instead\n{fence}\n{mended}\n{end}"
+            f"{summary}\n\n## What it does\n{what}\n\n## Why is this bad\n{why}\n\n## "
+            f"Example\n{fence}\n{fails}\n{end}\n\n## Use instead\n{fence}\n{fixed}\n{end}"
         )
 
     @property
@@ -180,7 +180,7 @@ class Rule:
             return self.before[1]
         return self.severity
 
-    def is_called(self, word: str) -> bool:
+    def has_name(self, word: str) -> bool:
         """Whether `word` is this rule's code, the beginning of it, its name or that of its group."""
         return bool(word) and (
             self.code.startswith(word.upper()) or word in (self.name, self.group)
@@ -188,7 +188,7 @@ class Rule:
 
     def matches(self, word: str) -> bool:
         """Whether the rule is called so, or `word` is its family."""
-        return self.is_called(word) or word in (self.family, "ALL")
+        return self.has_name(word) or word in (self.family, "ALL")
 
 
 _RULES: dict[str, Rule] = {}
@@ -203,7 +203,7 @@ def rule(
     severity: Severity,
     before: tuple[int, Severity] | None = None,
     thresholds: tuple[Threshold, ...] = (),
-    mends: Mends = "",
+    fixes: FixKinds = "",
     about: str = "model",
     faults: str = "",
     frames: Mapping[str, str] | None = None,
@@ -215,25 +215,27 @@ def rule(
     """
 
     def register(check: Check) -> Check:
-        whole = Rule(code, name, severity, check, before, thresholds, mends, about)
+        whole = Rule(code, name, severity, check, before, thresholds, fixes, about)
         if not faults:
-            _add(_RULES, whole)
+            _register_rule(_RULES, whole)
             return check
-        _add(_GROUPS, whole)
-        for fault in faults_in(faults, frames or {}):
+        _register_rule(_GROUPS, whole)
+        for fault in parse_faults(faults, frames or {}):
             own: Any = {
                 "code": code + fault.number,
                 "name": fault.name,
-                "mends": fault.mends,
+                "fixes": fault.fixes,
                 "group": name,
             }
-            _add(_RULES, replace(whole, severity=Severity(fault.severity), fault=fault, **own))
+            _register_rule(
+                _RULES, replace(whole, severity=Severity(fault.severity), fault=fault, **own)
+            )
         return check
 
     return register
 
 
-def _add(table: dict[str, Rule], rule: Rule) -> None:
+def _register_rule(table: dict[str, Rule], rule: Rule) -> None:
     if not _NAMES.isdisjoint((rule.code, rule.name)):
         raise ValueError(f"rule {rule.code} {rule.name} is registered twice")
     _NAMES.update((rule.code, rule.name))
@@ -313,7 +315,7 @@ def all_rules(about: str = "") -> tuple[Rule, ...]:
     return tuple(_RULES[code] for code in sorted(_RULES))
 
 
-def groups() -> tuple[Rule, ...]:
+def rule_groups() -> tuple[Rule, ...]:
     """What rules with one beginning of their codes have in common, by code."""
     all_rules()
     return tuple(_GROUPS[code] for code in sorted(_GROUPS))

@@ -17,13 +17,13 @@ from typing import NamedTuple
 
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_count
-from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, shapes
+from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, compute_shapes
 
-_TOLD = 50
+_MAX_FAULTS = 50
 """Faults of a kind that are told, one for each column."""
 
 
-class Fault(NamedTuple):
+class RowFault(NamedTuple):
     """Something wrong in the rows: of what kind, in which column of the table, where it is met first, and how often.
 
     `kind` is ``cell`` (no number), ``row`` (`number` says how many cells, `text` more),
@@ -41,23 +41,19 @@ class Fault(NamedTuple):
     times: int = 1
     others: int = 0
 
-    def more(self, noun: str = "row") -> str:
+    def describe_rest(self, noun: str = "row") -> str:
         """What to say of further rows, and of further columns."""
         rows = (
-            [f"; so it is in {format_count(self.times - 1, f'more {noun}')}"]
+            [f"; the same in {format_count(self.times - 1, f'more {noun}')}"]
             if self.times > 1
             else []
         )
-        columns = (
-            [f"; there is such in {format_count(self.others, 'more column')}"]
-            if self.others
-            else []
-        )
+        columns = [f"; also in {format_count(self.others, 'more column')}"] if self.others else []
         return "".join(rows + columns)
 
 
 @dataclass(slots=True)
-class Rows:
+class TableRows:
     """What is known of the rows of a table.
 
     `cells` is how many cells a row should have, `samples` are the numbers of a few rows (NaN for
@@ -68,22 +64,24 @@ class Rows:
     count: int = 0
     times: array[float] = field(default_factory=lambda: array("d"))
     lines: list[tuple[int, int]] = field(default_factory=list)
-    faults: dict[tuple[str, int], Fault] = field(default_factory=dict)
+    faults: dict[tuple[str, int], RowFault] = field(default_factory=dict)
     samples: list[list[float]] = field(default_factory=list)
     unseen: set[int] = field(default_factory=set)
 
-    def of(self, *kinds: str) -> list[Fault]:
+    def select(self, *kinds: str) -> list[RowFault]:
         """The faults of some kinds, by place; of very many the first."""
         result = sorted(
             (fault for fault in self.faults.values() if fault.kind in kinds),
             key=lambda fault: fault.line,
         )
-        if len(result) > _TOLD:
-            result[_TOLD - 1 :] = [result[_TOLD - 1]._replace(others=len(result) - _TOLD)]
+        if len(result) > _MAX_FAULTS:
+            result[_MAX_FAULTS - 1 :] = [
+                result[_MAX_FAULTS - 1]._replace(others=len(result) - _MAX_FAULTS)
+            ]
         return result
 
     def line_of(self, row: int) -> int:
-        """The line of the file that holds a row, as both are counted from 0 and 1."""
+        """The line of the file that holds a row, as both are format_count from 0 and 1."""
         first = next((place for place in reversed(self.lines) if place[0] <= row), (0, 0))
         return first[1] + row - first[0]
 
@@ -103,7 +101,7 @@ _FRAME = re.compile(rb"^[^\t\r\n ]", re.MULTILINE)
 
 
 @dataclass(slots=True)
-class Scan:
+class RowScanner:
     """Goes once through the rows of a table.
 
     Args: cells: how many numbers a row has; of a marker table with the number of the frame. parts:
@@ -115,10 +113,10 @@ class Scan:
     cells: int
     parts: int = 1
     markers: bool = False
-    rows: Rows = field(default_factory=Rows)
+    rows: TableRows = field(default_factory=TableRows)
     _frame: int = 0
 
-    def run(self, data: bytes, start: int, line: int) -> Rows:
+    def scan(self, data: bytes, start: int, line: int) -> TableRows:
         """Look at the rows from an offset on, which is in this line of the file."""
         self.rows.cells = self.cells
         if self.markers:
@@ -131,30 +129,35 @@ class Scan:
         # The time is one number, also of vectors.
         cells = [b"0", *[b",".join([b"0"] * self.parts)] * (self.cells - 1)]
         whole = (b"\t" if self.markers else b"").join(cells)
-        for block in _blocks(data, start):
+        for block in _split_blocks(data, start):
             lines = block.split(b"\n")
             lines.pop()
             looks, zeros = (
-                _looks(block, layout) if len(block) < _LONGEST else (b"!\n" * len(lines), False)
+                _compute_shapes(block, layout)
+                if len(block) < _LONGEST
+                else (b"!\n" * len(lines), False)
             )
             if looks == (whole + b"\n") * len(lines):
-                self._take(lines, [whole] * len(lines), line, zeros)
+                self._note_rows(lines, [whole] * len(lines), line, zeros)
             else:
                 forms = looks.split(b"\n")
                 # Where markers were not seen, a good row has another form than a whole one.
                 kinds = [
                     form
-                    and (form == whole or (self.markers and _seen(form, self.cells) is not None))
+                    and (
+                        form == whole
+                        or (self.markers and _find_seen_markers(form, self.cells) is not None)
+                    )
                     for form in forms
                 ]
                 for kind, group in groupby(range(len(lines)), kinds.__getitem__):
                     places = list(group)
                     if kind:
                         part = slice(places[0], places[-1] + 1)
-                        self._take(lines[part], forms[part], line + places[0], zeros)
+                        self._note_rows(lines[part], forms[part], line + places[0], zeros)
                     elif kind is False:
                         for place in places:
-                            self.report_odd_line(lines[place], line + place)
+                            self.examine_odd_line(lines[place], line + place)
                     elif self.rows.count:
                         self._note("blank", 0, line + places[0], 0, b"", times=len(places))
             line += len(lines)
@@ -162,34 +165,36 @@ class Scan:
             self.rows.unseen.clear()
         return self.rows
 
-    def _take(self, lines: list[bytes], forms: list[bytes], line: int, zeros: bool) -> None:
+    def _note_rows(self, lines: list[bytes], forms: list[bytes], line: int, zeros: bool) -> None:
         """Note times and samples of good rows."""
         rows = self.rows
-        self._begin(line)
+        self._note_line_of_row(line)
         if self.markers:
-            times = self._marker_times(lines, line)
+            times = self._read_marker_times(lines, line)
             looks = set(forms)
             rows.unseen.difference_update(
-                *(_seen(form, self.cells) or () for form in looks if rows.unseen)
+                *(_find_seen_markers(form, self.cells) or () for form in looks if rows.unseen)
             )
             if zeros or any(b"\t\t" in form for form in looks):
                 for number, (text, form) in enumerate(zip(lines, forms, strict=True)):
                     if b"\t\t" in form or b"\t\t\t" in text.translate(None, b"0.-+"):
-                        self._look_at_markers(text, line + number)
+                        self._examine_markers(text, line + number)
         else:
             times = [float(text.split(None, 1)[0]) for text in lines]
-        if not times[0] > self._last() or not all(map(lt, times, islice(times, 1, None))):
-            for number, (before, now) in enumerate(pairwise([self._last(), *times])):
+        if not times[0] > self._get_last_time() or not all(map(lt, times, islice(times, 1, None))):
+            for number, (before, now) in enumerate(pairwise([self._get_last_time(), *times])):
                 if not now > before:
-                    self._order(lines[number], line + number, now, before)
+                    self._note_order(lines[number], line + number, now, before)
         rows.times.extend(times)
         rows.count += len(lines)
-        if self._samples() > 0:
-            rows.samples += [self._numbers(text, float) for text in lines[: self._samples()]]
+        if self._count_missing_samples() > 0:
+            rows.samples += [
+                self._read_numbers(text, float) for text in lines[: self._count_missing_samples()]
+            ]
         elif len(rows.samples) ** 2 < 2 * rows.count:
-            rows.samples.append(self._numbers(lines[0], float))
+            rows.samples.append(self._read_numbers(lines[0], float))
 
-    def _marker_times(self, lines: list[bytes], line: int) -> list[float]:
+    def _read_marker_times(self, lines: list[bytes], line: int) -> list[float]:
         """The times of frames, which are looked at; of one without a time the next number after that before."""
         heads = [text.split(b"\t", 2)[:2] for text in lines]
         if [frame for frame, _ in heads] != [
@@ -203,10 +208,12 @@ class Scan:
         for number, time in enumerate(times):
             if time != time:
                 self._note("time", 1, line + number, len(heads[number][0]) + 1, heads[number][1])
-                times[number] = nextafter(times[number - 1] if number else self._last(), inf)
+                times[number] = nextafter(
+                    times[number - 1] if number else self._get_last_time(), inf
+                )
         return times
 
-    def _look_at_markers(self, text: bytes, line: int) -> None:
+    def _examine_markers(self, text: bytes, line: int) -> None:
         """Look for markers at the origin, and for parts of markers."""
         cells = text.split(b"\t")
         start = 0
@@ -220,19 +227,19 @@ class Scan:
                     self._note("zero", number, line, start, cell)
             start += len(cell) + 1
 
-    def _samples(self) -> int:
+    def _count_missing_samples(self) -> int:
         """How many more rows are samples."""
         return max(2, min(_SAMPLES, _SAMPLED // max(1, self.cells * self.parts))) - len(
             self.rows.samples
         )
 
-    def _numbers(self, text: bytes, read: Callable[[bytes], float]) -> list[float]:
+    def _read_numbers(self, text: bytes, read: Callable[[bytes], float]) -> list[float]:
         """The numbers of a row, NaN where there is none."""
         if not self.markers:
             return list(map(read, text.replace(b",", b" ").split()))
         return [read(cell.strip() or b"nan") for cell in text.split(b"\t")]
 
-    def report_odd_line(self, text: bytes, line: int) -> None:
+    def examine_odd_line(self, text: bytes, line: int) -> None:
         """Look at one row that is not good."""
         # A byte for each character, so that places are those of characters.
         text = text.decode("utf-8", "replace").encode("latin-1", "replace").rstrip(b"\r")
@@ -246,7 +253,7 @@ class Scan:
         ):
             self._note("comment", 0, line, 0, b"")
             return
-        cells, count = self._cells_of(text)
+        cells, count = self._split_cells(text)
         if count != self.cells:
             end = cells[self.cells][0] if count > self.cells else len(text.rstrip())
             blanks = (
@@ -270,32 +277,32 @@ class Scan:
             if self.markers and number == 0:
                 self._expect_frame(cell, line)
             elif number == time:
-                value = number_in(cell)
+                value = parse_number(cell)
                 if value != value:
                     self._note("time", time, line, start, cell)
-                elif not value > self._last():
-                    self._order(text, line, value, self._last())
+                elif not value > self._get_last_time():
+                    self._note_order(text, line, value, self._get_last_time())
             elif not (self.markers and cell.lower() in (b"", b"nan")):
                 parts = cell.split(b",", self.parts) if self.parts > 1 else [cell]
                 if len(parts) != self.parts or any(
-                    number_in(part) != number_in(part) for part in parts
+                    parse_number(part) != parse_number(part) for part in parts
                 ):
                     self._note("cell", number, line, start, cell)
         if count == self.cells > time:
-            self._begin(line)
-            value = number_in(cells[time][1])
-            rows.times.append(value if value == value else nextafter(self._last(), inf))
+            self._note_line_of_row(line)
+            value = parse_number(cells[time][1])
+            rows.times.append(value if value == value else nextafter(self._get_last_time(), inf))
             rows.count += 1
             if self.markers:
                 form = b"\t".join(
                     b"" if cell.lower() in (b"", b"nan") else b"0" for _, cell in cells
                 )
-                rows.unseen -= _seen(form, self.cells) or set()
-                self._look_at_markers(text, line)
-            if self._samples() > 0:
-                rows.samples.append(self._numbers(text, number_in))
+                rows.unseen -= _find_seen_markers(form, self.cells) or set()
+                self._examine_markers(text, line)
+            if self._count_missing_samples() > 0:
+                rows.samples.append(self._read_numbers(text, parse_number))
 
-    def _cells_of(self, text: bytes) -> tuple[list[tuple[int, bytes]], int]:
+    def _split_cells(self, text: bytes) -> tuple[list[tuple[int, bytes]], int]:
         """The cells of a row with their places, of too many one more than there should be; and how many there are."""
         if not self.markers:
             words = _WORD.finditer(text)
@@ -310,11 +317,11 @@ class Scan:
         ends = count == self.cells + 1 and not cells[-1][1]
         return cells[: len(cells) - ends], count - ends
 
-    def _last(self) -> float:
+    def _get_last_time(self) -> float:
         """The time of the last row."""
         return self.rows.times[-1] if self.rows.times else -inf
 
-    def _begin(self, line: int) -> None:
+    def _note_line_of_row(self, line: int) -> None:
         """Note in which line the next row is, where it does not follow the one before."""
         if line != self.rows.line_of(self.rows.count):
             self.rows.lines.append((self.rows.count, line))
@@ -325,7 +332,7 @@ class Scan:
             self._note("frame", 0, line, 0, cell)
         self._frame = number if number is not None else self._frame + 1
 
-    def _order(self, text: bytes, line: int, time: float, before: float) -> None:
+    def _note_order(self, text: bytes, line: int, time: float, before: float) -> None:
         place = _WORD.search(text, text.find(b"\t") if self.markers else 0)
         start, word = (place.start(), place[0]) if place else (0, b"")
         self._note("order", int(time < before), line, start, word, f"{time:.9g} {before:.9g}")
@@ -346,12 +353,12 @@ class Scan:
             faults[kind, number] = known._replace(times=known.times + times)
         else:
             told = cell.decode("latin-1") if text is None else text
-            faults[kind, number] = Fault(
+            faults[kind, number] = RowFault(
                 kind, number, line, start + 1, max(1, len(cell)), told, times
             )
 
 
-def _looks(block: bytes, layout: Layout) -> tuple[bytes, bool]:
+def _compute_shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
     """What lines look like, those of markers without NaN, which stands for one that was not seen."""
     if b"\r" in block:
         block = block.replace(b"\r\n", b"\n")
@@ -362,11 +369,11 @@ def _looks(block: bytes, layout: Layout) -> tuple[bytes, bool]:
             .replace(b"\tNaN\t", b"\t\t")
             .replace(b"\tNaN\n", b"\t\n")
         )
-    return shapes(block, layout)
+    return compute_shapes(block, layout)
 
 
 @lru_cache(maxsize=256)
-def _seen(form: bytes, cells: int) -> frozenset[int] | None:
+def _find_seen_markers(form: bytes, cells: int) -> frozenset[int] | None:
     """The markers that are in a row of markers, by what the row looks like; None if that is no row of markers."""
     numbers = form.split(b"\t")
     if len(numbers) == cells + 1 and not numbers[-1]:
@@ -380,7 +387,7 @@ def _seen(form: bytes, cells: int) -> frozenset[int] | None:
     )
 
 
-def _blocks(data: bytes, start: int) -> Iterator[bytes]:
+def _split_blocks(data: bytes, start: int) -> Iterator[bytes]:
     """Whole lines from an offset on, each with its end; blank lines at the end of all left out."""
     size = len(data)
     while size > start and data[size - 1] in b"\r\n" and data[size - 2] in b"\r\n":
@@ -396,6 +403,6 @@ def _blocks(data: bytes, start: int) -> Iterator[bytes]:
         start = end
 
 
-def number_in(cell: bytes) -> float:
+def parse_number(cell: bytes) -> float:
     """A number; NaN for a text that is none as C++ reads numbers, which knows neither NaN nor infinity."""
     return float(cell) if _PLAIN.fullmatch(cell) else nan

@@ -13,10 +13,10 @@ from osimlite.base.project import find_settings, parse_max_file_size
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import OsimliteError
-from osimlite.lint.config import Config, checked_words
+from osimlite.lint.config import Config, parse_codes
 from osimlite.lint.diagnostic import Severity
 
-_KNOWN = (
+_SETTINGS = (
     "select", "ignore", "per-file-ignores", "severity", "mesh-paths", "fail-on", "thresholds", "largest-file",
     "classes", "target-version",
 )  # fmt: skip
@@ -41,7 +41,7 @@ class Settings:
         """The configuration of one file; what `overriding` says comes before what the project says."""
         return Config(
             overriding.select or self.select,
-            (*self.ignore, *self._ignored_in(Path(path)), *overriding.ignore),
+            (*self.ignore, *self._find_ignored_codes(Path(path)), *overriding.ignore),
             {**self.severity, **overriding.severity},
             (*overriding.mesh_paths, *self.mesh_paths, *map(str, list_mesh_folders())),
             {**self.thresholds, **overriding.thresholds},
@@ -49,7 +49,7 @@ class Settings:
             overriding.target_version or self.target_version,
         )
 
-    def _ignored_in(self, path: Path) -> tuple[str, ...]:
+    def _find_ignored_codes(self, path: Path) -> tuple[str, ...]:
         if not self.per_file_ignores or self.file is None:
             return ()
         try:
@@ -65,63 +65,63 @@ class Settings:
 
 
 @cache
-def settings_for(folder: Path) -> Settings:
+def load_settings(folder: Path) -> Settings:
     """The settings that hold in a folder: those of the nearest file that has any.
 
     Raises:
         OsimliteError: the file is no TOML, or has a setting that does not exist or makes no sense.
     """
     result = find_settings(folder)
-    return Settings() if result is None else _settings(*result)
+    return Settings() if result is None else _parse_settings(*result)
 
 
-def _settings(file: Path, table: dict[str, Any]) -> Settings:
+def _parse_settings(file: Path, table: dict[str, Any]) -> Settings:
     parse_max_file_size(file, table)
     for key in table:
-        if key not in _KNOWN:
-            every = join_words(_KNOWN, most=len(_KNOWN))
+        if key not in _SETTINGS:
+            every = join_words(_SETTINGS, most=len(_SETTINGS))
             raise OsimliteError(
-                f"there is no setting '{key}'{suggest_name(key, _KNOWN)} Settings are {every}",
+                f"unknown setting '{key}'{suggest_name(key, _SETTINGS)} Settings are {every}",
                 file=str(file),
             )
     try:
         return Settings(
             file,
-            checked_words(_words(table, "select")),
-            checked_words(_words(table, "ignore")),
+            parse_codes(_read_texts(table, "select")),
+            parse_codes(_read_texts(table, "ignore")),
             {
-                pattern: checked_words(words)
-                for pattern, words in _mapping(table, "per-file-ignores").items()
+                pattern: parse_codes(words)
+                for pattern, words in _read_table(table, "per-file-ignores").items()
             },
             {
-                checked_words([code])[0]: _severity(word)
-                for code, word in _mapping(table, "severity").items()
+                parse_codes([code])[0]: _parse_severity(word)
+                for code, word in _read_table(table, "severity").items()
             },
-            tuple(str(file.parent.resolve() / path) for path in _words(table, "mesh-paths")),
-            _severity(table["fail-on"]) if "fail-on" in table else None,
-            Config(thresholds=_mapping(table, "thresholds")).thresholds,
-            tuple(str(file.parent.resolve() / path) for path in _words(table, "classes")),
+            tuple(str(file.parent.resolve() / path) for path in _read_texts(table, "mesh-paths")),
+            _parse_severity(table["fail-on"]) if "fail-on" in table else None,
+            Config(thresholds=_read_table(table, "thresholds")).thresholds,
+            tuple(str(file.parent.resolve() / path) for path in _read_texts(table, "classes")),
             Config(target_version=str(table.get("target-version", ""))).target_version,
         )
     except OsimliteError as error:
         raise OsimliteError(error.message, file=str(file)) from None
 
 
-def _words(table: dict[str, Any], key: str) -> list[str]:
+def _read_texts(table: dict[str, Any], key: str) -> list[str]:
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(word, str) for word in value):
         raise OsimliteError(f"'{key}' must be a list of texts")
     return value
 
 
-def _mapping(table: dict[str, Any], key: str) -> dict[str, Any]:
+def _read_table(table: dict[str, Any], key: str) -> dict[str, Any]:
     value = table.get(key, {})
     if not isinstance(value, dict):
         raise OsimliteError(f"'{key}' must be a table")
     return value
 
 
-def _severity(word: object) -> Severity:
+def _parse_severity(word: object) -> Severity:
     if word not in tuple(Severity):
         raise OsimliteError(f"a severity is one of {join_words(Severity)}, not '{word}'")
     return Severity(str(word))

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from osimlite.io.document.cache import top_at
 from osimlite.io.document.survey import Survey
-from osimlite.lint.beside import beginning, documents_of, folders_in, table_at, tree_at
+from osimlite.lint.beside import list_documents, list_folders, read_beginning, read_table, read_tree
 from osimlite.lint.config import Config
 from osimlite.lint.project_files import is_table
 from osimlite.lint.registry import Rule
@@ -27,15 +27,15 @@ from osimlite.schema.model import Model
 from osimlite.schema.specs import FieldSpec, file_specs, member_specs, name_spec, naming_specs
 from osimlite.schema.tree import Tree, Use, is_a
 
-UNGIVEN = "OpenSim refuses it, unless a program or the GUI gives one"
+NO_FILE_CONSEQUENCE = "OpenSim rejects it unless a program or the GUI supplies one"
 """What becomes of a tool that names no file where it needs one."""
 _NAMES_MODEL = re.compile(rb"Tool|Moco|ModelProcessor")
-_MOST_NEIGHBOURS = 200
-_OF_MODELS = frozenset(("OSIM110", "OSIM111", "OSIM209"))
+_MAX_NEIGHBOURS = 200
+_MODEL_RULES = frozenset(("OSIM110", "OSIM111", "OSIM209"))
 """Rules of tags and values that hold of models only."""
 
 
-class Naming(NamedTuple):
+class FileReference(NamedTuple):
     """A file that an object names, and where it would be."""
 
     item: Object
@@ -61,7 +61,7 @@ class Setup(Subject):
         if rule.name == "included-file":
             return self.top is not None
         if rule.about == "model":
-            return rule.code not in _OF_MODELS and (
+            return rule.code not in _MODEL_RULES and (
                 rule.code[4] == "0" or (rule.code[4] in "12" and self.top is not None)
             )
         return rule.about == self.about and self.top is not None and self.sure_until is None
@@ -80,12 +80,12 @@ class Setup(Subject):
         return result
 
     @cached_property
-    def own(self) -> list[Object]:
+    def setup_items(self) -> list[Object]:
         """The objects that are no part of a model that the document holds, in the order of the document."""
         inside = {id(part) for model in self.by_class.get(Model, ()) for part in model.walk()}
         return [item for item in self.items if id(item) not in inside]
 
-    def having(self, *properties: str) -> Iterator[Any]:
+    def find_having(self, *properties: str) -> Iterator[Any]:
         """Every object whose class has these properties, class by class."""
         for cls, items in self.by_class.items():
             if all(name in cls.model_fields for name in properties):
@@ -95,25 +95,25 @@ class Setup(Subject):
         """The object itself: there is no tree of components."""
         return item
 
-    def _given(self, item: Object | None) -> int | None:
+    def _find_element(self, item: Object | None) -> int | None:
         """The element of an object; of one the text does not give, that at the top."""
         number = None if item is None else item._index
         return number if number is not None or self.top is None else self.top._index
 
-    def outside(self) -> list[str] | None:
+    def list_outside_paths(self) -> list[str] | None:
         """Every path that was looked at."""
-        known = super().outside()
+        known = super().list_outside_paths()
         return None if known is None else [*known, *self._looked_at]
 
     # ------------------------------------------------------------------------------------------------- files
 
-    def named_files(self, rule: str) -> Iterator[Naming]:
+    def find_named_files(self, rule: str) -> Iterator[FileReference]:
         """Every file that an object of the document names by a rule."""
-        for item in self.own:
-            for spec, name in files_of(item, rule):
-                yield Naming(item, spec, name, self.place(name.strip()))
+        for item in self.setup_items:
+            for spec, name in list_files(item, rule):
+                yield FileReference(item, spec, name, self.resolve_path(name.strip()))
 
-    def place(self, name: str) -> str:
+    def resolve_path(self, name: str) -> str:
         """Where OpenSim finds a file that is named here, if it was started in the folder of the setup."""
         folder = str(self.folder or Path())
         path = os.path.join(folder, name)
@@ -124,20 +124,24 @@ class Setup(Subject):
                 return name
         return path
 
-    def table(self, name: str) -> Table | None:
+    def read_table(self, name: str) -> Table | None:
         """The table in a file that is named here; None if there is none, or it cannot be read."""
-        return table_at(self.place(name.strip())) if is_given(name) and is_table(name) else None
+        return (
+            read_table(self.resolve_path(name.strip()))
+            if is_given(name) and is_table(name)
+            else None
+        )
 
-    def with_tables(self, items: Iterable[Any], tag: str) -> Iterator[tuple[Any, Table]]:
+    def iterate_with_tables(self, items: Iterable[Any], tag: str) -> Iterator[tuple[Any, Table]]:
         """Objects, each with the table that a property of it names; none without one, or with one without labels."""
         for item in items:
-            table = self.table(getattr(item, tag))
+            table = self.read_table(getattr(item, tag))
             if table is not None and table.labels:
                 yield item, table
 
-    def document(self, name: str) -> Object | None:
+    def read_document(self, name: str) -> Object | None:
         """The top of a document that is named here; None if there is none, or it cannot be read."""
-        return top_at(self.place(name.strip())) if is_given(name) else None
+        return top_at(self.resolve_path(name.strip())) if is_given(name) else None
 
     # ------------------------------------------------------------------------------------------------- context
 
@@ -147,15 +151,17 @@ class Setup(Subject):
         if self.folder is None:
             return []
         here = self.folder.resolve()
-        return self._tools_in([here, here.parent, *folders_in(here), *folders_in(here.parent)])
+        return self._find_tools(
+            [here, here.parent, *list_folders(here), *list_folders(here.parent)]
+        )
 
-    def _tools_in(self, folders: Iterable[Path]) -> list[tuple[str, Object]]:
+    def _find_tools(self, folders: Iterable[Path]) -> list[tuple[str, Object]]:
         result = []
         for folder in dict.fromkeys(folders):
             self._looked_at[str(folder)] = None
-            for file in (documents_of(str(folder)) or [])[:_MOST_NEIGHBOURS]:
-                top = top_at(file) if _NAMES_MODEL.search(beginning(file)) else None
-                if top is not None and _model_named_by(top) is not None:
+            for file in (list_documents(str(folder)) or [])[:_MAX_NEIGHBOURS]:
+                top = top_at(file) if _NAMES_MODEL.search(read_beginning(file)) else None
+                if top is not None and _find_model_file(top) is not None:
                     result.append((file, top))
                     self._looked_at[file] = None
         return result
@@ -163,20 +169,21 @@ class Setup(Subject):
     @cached_property
     def tool(self) -> tuple[str, Object] | None:
         """The tool that this is, or the first that reads this; with the path of its setup."""
-        return next(self.readers(), None)
+        return next(self.find_readers(), None)
 
-    def readers(self) -> Iterator[tuple[str, Object]]:
+    def find_readers(self) -> Iterator[tuple[str, Object]]:
         """The tool that this is, or all that read this; with the paths of their setups."""
         if self.top is None or self.file is None:
             return
-        if _model_named_by(self.top) is not None:
+        if _find_model_file(self.top) is not None:
             yield self.file, self.top
             return
         here = os.path.realpath(self.file)
         for file, top in self.neighbours:
             folder = os.path.dirname(file)
             if any(
-                os.path.realpath(os.path.join(folder, name)) == here for name in _files_read_by(top)
+                os.path.realpath(os.path.join(folder, name)) == here
+                for name in _list_read_files(top)
             ):
                 yield file, top
 
@@ -184,14 +191,16 @@ class Setup(Subject):
     def model_file(self) -> str | None:
         """Where the model is that the tool works on; None if there is no tool, or it names none."""
         return (
-            None if self.tool is None else self._place_by_tool(_model_named_by(self.tool[1]) or "")
+            None
+            if self.tool is None
+            else self._resolve_tool_path(_find_model_file(self.tool[1]) or "")
         )
 
     @cached_property
     def tree(self) -> Tree | None:  # type: ignore[override]
         """The component tree of the model that the tool works on; None if there is none to be read."""
         if self.model_file is not None:
-            return tree_at(self.model_file)
+            return read_tree(self.model_file)
         # A study may hold its model itself.
         models = (
             [item for item in self.tool[1].walk() if isinstance(item, Model) and item._index]
@@ -205,7 +214,7 @@ class Setup(Subject):
         """Every name that stands in the document, of a component or of something else."""
         result: list[Use] = []
         named: dict[int, Reference | None] = {}
-        for item in self.own:
+        for item in self.setup_items:
             cls = type(item)
             # What is named in a setup is looked up in the model: nothing in the document owns it.
             owner: Any = item if self.tree is None else self.tree.model
@@ -229,12 +238,12 @@ class Setup(Subject):
                     result.append(Use(item, owner, spec, value))
         return result
 
-    def table_of_tool(self, name: str) -> Table | None:
+    def read_tool_table(self, name: str) -> Table | None:
         """A table that the tool names."""
-        path = self._place_by_tool(name) if is_table(name) else None
-        return None if path is None else table_at(path)
+        path = self._resolve_tool_path(name) if is_table(name) else None
+        return None if path is None else read_table(path)
 
-    def _place_by_tool(self, name: str) -> str | None:
+    def _resolve_tool_path(self, name: str) -> str | None:
         """Where a file is that the tool names, if it names one."""
         if not is_given(name) or self.tool is None:
             return None
@@ -242,13 +251,13 @@ class Setup(Subject):
         self._looked_at[path] = None
         return path
 
-    def names_of(self, target: str) -> set[str]:
+    def list_names(self, target: str) -> set[str]:
         """The names of all components of a class that the tool works with: those of the model and of added sets."""
         if self.tree is None or self.tool is None:
             return set()
         names = {item.name for item in self.tree.of_class(target).values()}
         return names | {
-            item.name for _, added in self.added for item in added.walk() if is_a(item, target)
+            item.name for _, added in self.added_sets for item in added.walk() if is_a(item, target)
         }
 
     def is_bound(self, name: str) -> bool:
@@ -260,20 +269,20 @@ class Setup(Subject):
         return held or name in {str(coupler.dependent_coordinate_name) for coupler in bound}
 
     @cached_property
-    def added(self) -> list[tuple[str, Object]]:
+    def added_sets(self) -> list[tuple[str, Object]]:
         """The sets of forces and markers that the tool adds to its model, with the paths of their files."""
         if self.tool is None:
             return []
         top = self.tool[1]
         names = [*getattr(top, "force_set_files", ()), getattr(top, "marker_set_file", "")]
         names.append(getattr(getattr(top, "generic_model_maker", None), "marker_set_file", ""))
-        files = filter(None, map(self._place_by_tool, names))
+        files = filter(None, map(self._resolve_tool_path, names))
         return [(file, added) for file in files if (added := top_at(file)) is not None]
 
-    def writer_of(self, path: str) -> str | None:
+    def find_writer(self, path: str) -> str | None:
         """The other setup of the project that writes a file, which need not be there yet; None if none does."""
         wanted = os.path.realpath(path)
-        around = self._tools_in(list(Path(wanted).parents)[:3])
+        around = self._find_tools(list(Path(wanted).parents)[:3])
         named: dict[int, str] = {}
         for file, top in dict(self.neighbours + around).items():
             if self.file is not None and os.path.realpath(file) == os.path.realpath(self.file):
@@ -289,7 +298,7 @@ class Setup(Subject):
             if is_own and not wanted.endswith(".osim"):
                 named[len(top.name)] = file
             for item in top.walk():
-                for _, name in files_of(item, "output-file"):
+                for _, name in list_files(item, "output-file"):
                     if wanted in (
                         os.path.realpath(os.path.join(place, name)) for place in (folder, within)
                     ):
@@ -302,12 +311,12 @@ def is_given(name: str) -> bool:
     return name.strip() not in ("", "Unassigned")
 
 
-def content_of(spec: FieldSpec) -> str:
+def get_content_type(spec: FieldSpec) -> str:
     """What the file holds that a property names: a class of objects, or what kind of table."""
     return spec.reference.target.removesuffix(" file")
 
 
-def files_of(item: Object, rule: str) -> Iterator[tuple[FieldSpec, str]]:
+def list_files(item: Object, rule: str) -> Iterator[tuple[FieldSpec, str]]:
     """Every file that an object names by a rule."""
     for spec in file_specs(type(item), rule):
         value = getattr(item, spec.name)
@@ -316,28 +325,30 @@ def files_of(item: Object, rule: str) -> Iterator[tuple[FieldSpec, str]]:
                 yield spec, name
 
 
-def motion_of(file: str, tool: Object) -> str:
+def find_motion_file(file: str, tool: Object) -> str:
     """Where the coordinates are that a tool is given, by the file of its setup; "" if it is given none."""
-    name = next((name for spec, name in files_of(tool, "file") if content_of(spec) == "motion"), "")
+    name = next(
+        (name for spec, name in list_files(tool, "file") if get_content_type(spec) == "motion"), ""
+    )
     return name and os.path.realpath(os.path.join(os.path.dirname(file), name.strip()))
 
 
-def members(owner: Any, target: str) -> list[Any]:
+def select_members(owner: Any, target: str) -> list[Any]:
     """The objects of a set, or of a list, that are of a class: a text may put anything there."""
     return [
         item for item in (owner if isinstance(owner, list) else owner.objects) if is_a(item, target)
     ]
 
 
-def _files_read_by(top: Object) -> Iterator[str]:
+def _list_read_files(top: Object) -> Iterator[str]:
     """Every file that is read with a document, as it is named."""
     for item in top.walk():
         if item.layout is not None and item.layout.include is not None:
             yield item.layout.include.path
-        yield from (name for _, name in files_of(item, "file"))
+        yield from (name for _, name in list_files(item, "file"))
 
 
-def _model_named_by(top: Object) -> str | None:
+def _find_model_file(top: Object) -> str | None:
     """The file of the model that a tool works on; None of what is no tool."""
     for item in top.walk():
         if "model_file" in vars(item):

@@ -1,6 +1,6 @@
 """Which lines are rows of numbers, told for many lines at once.
 
-A block of lines becomes one large integer, a byte for each character: a shift by eight bits goes on
+A block of lines becomes one large integer, a byte for each character: a shift by eight bits continues
 to the next character, and an addition carries a mark over a run of characters to what follows on
 it. So the rules of how numbers are written are checked at hundreds of megabytes a second. The
 method is that of R. D. Cameron et al., "Bitwise data parallelism in regular expression matching"
@@ -37,7 +37,7 @@ class Layout(NamedTuple):
     hidden: bytes
 
 
-def _layout(kept: bytes, *more: tuple[bytes, int, int]) -> Layout:
+def _make_layout(kept: bytes, *more: tuple[bytes, int, int]) -> Layout:
     """A layout in which some separators are kept.
 
     Some characters are said to follow on each other never, though they may: that tells separators
@@ -58,11 +58,11 @@ def _layout(kept: bytes, *more: tuple[bytes, int, int]) -> Layout:
     )
 
 
-ROWS = _layout(b"", (b"\n", _SPACE, _POWER | _POINT))
+ROWS = _make_layout(b"", (b"\n", _SPACE, _POWER | _POINT))
 """Rows of numbers with blanks and tabs between them."""
-VECTORS = _layout(b",", (b"\n", _SPACE, _POWER | _POINT), (b",", _SPACE, _POWER | _SPACE))
+VECTORS = _make_layout(b",", (b"\n", _SPACE, _POWER | _POINT), (b",", _SPACE, _POWER | _SPACE))
 """Rows of several numbers each, with commas between these."""
-MARKERS = _layout(
+MARKERS = _make_layout(
     b"\t",
     (b"\n", _SPACE, _POWER | _SPACE | _POINT),
     (b" ", _SPACE, _POWER | _POINT),
@@ -74,7 +74,7 @@ _AS_NUMBERS = bytes.maketrans(b" \t", b"00")
 _NO_SEPARATORS = bytes(set(range(256)) - set(b" \t\n"))
 
 
-def shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
+def compute_shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
     """What lines look like: a ``0`` for each number, the separators that are kept, and ``!`` where something is wrong.
 
     Nothing is wrong with a line without ``!``: its numbers are such as C++ reads (no NaN, no
@@ -88,7 +88,7 @@ def shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
         The lines, and whether a number of markers may be 0.
     """
     text = int.from_bytes(block.translate(layout.codes), "little")
-    ones, twos, fifteens = _ones(len(block).bit_length())
+    ones, twos, fifteens = _make_masks(len(block).bit_length())
     spaces, points = text >> 2 & ones, text >> 3 & ones
     solid = ones ^ spaces
     behind_space = spaces << 8 | 1
@@ -127,7 +127,7 @@ def shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
 
 
 @lru_cache(maxsize=4)
-def _ones(bits: int) -> tuple[int, int, int]:
+def _make_masks(bits: int) -> tuple[int, int, int]:
     """A 1 in each of more bytes than so many bits can count, then 2 and 15 in each."""
     ones = int.from_bytes(b"\1" * ((1 << bits) + 1), "little")
     return ones, 2 * ones, 15 * ones

@@ -7,7 +7,7 @@ from itertools import chain
 from typing import NamedTuple, cast
 
 from osimlite.base.records import dataclass, field
-from osimlite.lint.subject import Subject, once
+from osimlite.lint.subject import Subject, cached_per_subject
 from osimlite.mechanics.multibody.topology import new_base, spanning_tree
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.custom_joint import CustomJoint
@@ -16,7 +16,7 @@ from osimlite.schema.joints import Joint, WeldJoint
 
 
 @dataclass(slots=True)
-class Link:
+class JointLink:
     """A joint with the frames it connects and the bodies (or ground) these are fixed to; None where unresolved."""
 
     joint: Joint
@@ -32,7 +32,7 @@ class Skeleton:
 
     bodies: list[Body]
     ground: Ground
-    links: list[Link] = field(default_factory=list)
+    links: list[JointLink] = field(default_factory=list)
 
     @property
     def complete(self) -> bool:
@@ -41,27 +41,27 @@ class Skeleton:
             link.parent_base is not None and link.child_base is not None for link in self.links
         )
 
-    def pairs(self) -> Iterator[tuple[Link, Component, Component]]:
+    def iterate_pairs(self) -> Iterator[tuple[JointLink, Component, Component]]:
         """The joints that connect two bodies, with the parent and the child."""
         for link in self.links:
             parent, child = link.parent_base, link.child_base
             if parent is not None and child is not None and parent is not child:
                 yield link, parent, child
 
-    def depths(self) -> dict[int, int]:
+    def compute_depths(self) -> dict[int, int]:
         """How many joints lie between ground and each body (by identity); bodies that none reach are left out."""
         depth = {id(self.ground): 0}
         pending: list[Component] = [self.ground]
         while pending:
             base = pending.pop(0)
-            for link in self.of(base):
+            for link in self.find_joints(base):
                 for end in (link.parent_base, link.child_base):
                     if end is not None and id(end) not in depth:
                         depth[id(end)] = depth[id(base)] + 1
                         pending.append(end)
         return depth
 
-    def of(self, base: Component) -> list[Link]:
+    def find_joints(self, base: Component) -> list[JointLink]:
         """The joints at a body."""
         return [link for link in self.links if base is link.parent_base or base is link.child_base]
 
@@ -72,24 +72,24 @@ class _Edge(NamedTuple):
     parent: str
     child: str
     coordinates: tuple[int, ...] = (0,)
-    link: Link | None = None
+    link: JointLink | None = None
 
 
-class Growth(NamedTuple):
+class TreeGrowth(NamedTuple):
     """How OpenSim makes a tree of the bodies of a skeleton."""
 
-    loops: list[Link]  # the joints that close loops, in the order of the joints
-    # whether it refuses the model, or crashes, for the bodies that no joint connects to ground. It
+    loops: list[JointLink]  # the joints that close loops, in the order of the joints
+    # whether it rejects the model, or crashes, for the bodies that no joint connects to ground. It
     # gives each of them, or one of each group, a joint to ground. With each joint that it makes it
     # forgets the order of all joints before, which it then adds to the system last, in the order of
     # the document: too late for offset frames, and for joints, on the bodies that they carry.
     fails: bool
 
 
-@once
-def growth(subject: Subject) -> Growth:
+@cached_per_subject
+def grow_tree(subject: Subject) -> TreeGrowth:
     """What OpenSim does with a skeleton, as far as its joints lead anywhere."""
-    bones = skeleton(subject)
+    bones = build_skeleton(subject)
     ground, masses = (
         subject.path(bones.ground),
         {subject.path(body): body.mass for body in bones.bodies},
@@ -102,7 +102,7 @@ def growth(subject: Subject) -> Growth:
             () if isinstance(link.joint, WeldJoint | CustomJoint) else (0,),
             link,
         )
-        for link, parent, child in bones.pairs()
+        for link, parent, child in bones.iterate_pairs()
     ]
     joined = {path for edge in edges for path in edge[:2]}
     edges += [_Edge(ground, path) for path in masses if path not in joined]
@@ -116,18 +116,20 @@ def growth(subject: Subject) -> Growth:
             break
         edges.append(_Edge(ground, new_base(loose, edges)))
     closing = [edge.link for edge in loops if edge.link is not None]
-    return Growth(
-        closing, any(edge.link is None for edge in edges) and _fails(subject, edges, order)
+    return TreeGrowth(
+        closing, any(edge.link is None for edge in edges) and _fails_to_build(subject, edges, order)
     )
 
 
-def _fails(subject: Subject, edges: list[_Edge], order: dict[str, _Edge]) -> bool:
+def _fails_to_build(subject: Subject, edges: list[_Edge], order: dict[str, _Edge]) -> bool:
     paths = [*order]
     last = max(index for index, edge in enumerate(order.values()) if edge.link is None)
     late = {*paths[:last]}
-    frames = chain(subject.named("PhysicalOffsetFrame"), subject.named("StationDefinedFrame"))
+    frames = chain(
+        subject.find_by_class("PhysicalOffsetFrame"), subject.find_by_class("StationDefinedFrame")
+    )
     framed = {
-        subject.path(base) for frame in frames if (base := base_of(subject, frame)) is not None
+        subject.path(base) for frame in frames if (base := find_base(subject, frame)) is not None
     }
     if not late.isdisjoint(framed) or any(
         not late.isdisjoint(order[path][:2]) for path in paths[last:]
@@ -142,18 +144,18 @@ def _fails(subject: Subject, edges: list[_Edge], order: dict[str, _Edge]) -> boo
     return False
 
 
-@once
-def skeleton(subject: Subject) -> Skeleton:
+@cached_per_subject
+def build_skeleton(subject: Subject) -> Skeleton:
     """The skeleton of a model."""
     assert subject.model is not None
-    bones = Skeleton([*subject.each(Body)], subject.model.ground)
+    bones = Skeleton([*subject.find_instances(Body)], subject.model.ground)
     for joint in subject.tree.components:
         if not isinstance(joint, Joint):
             continue
         parent = subject.target_of(joint, "socket_parent_frame")
         child = subject.target_of(joint, "socket_child_frame")
         bones.links.append(
-            Link(joint, parent, child, base_of(subject, parent), base_of(subject, child))
+            JointLink(joint, parent, child, find_base(subject, parent), find_base(subject, child))
         )
     return bones
 
@@ -170,9 +172,9 @@ def has_unknown_joints(subject: Subject) -> bool:
     return any(isinstance(item, Unknown) for item in [*members, *model.component_set.objects])
 
 
-def base_of(subject: Subject, frame: Component | None) -> Component | None:
+def find_base(subject: Subject, frame: Component | None) -> Component | None:
     """The body or ground that a frame is fixed to, through any number of offset frames; looked for once per frame."""
-    known = cast("dict[int, Component | None]", subject.kept.setdefault("bases", {}))
+    known = cast("dict[int, Component | None]", subject.cache.setdefault("bases", {}))
     way: set[int] = set()
     while frame is not None and not isinstance(frame, (Body, Ground)) and id(frame) not in known:
         if id(frame) in way:

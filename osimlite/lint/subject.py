@@ -13,11 +13,11 @@ from osimlite.errors import DocumentError, SpecialFileError
 from osimlite.io.document.notes import Note
 from osimlite.io.document.source import Position
 from osimlite.io.document.survey import Survey
-from osimlite.lint.checked import Checked
+from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
 from osimlite.lint.construction import CONSTRUCTION, find_obstacles, may_fail
-from osimlite.lint.measures import MEASURES, has_measures, unmeasured
-from osimlite.lint.words import called
+from osimlite.lint.measures import MEASURES, has_measures, measure_subject
+from osimlite.lint.words import describe_object
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.model import Model
 from osimlite.schema.specs import FieldSpec, file_specs, lineage
@@ -29,28 +29,30 @@ if TYPE_CHECKING:
 
 T = TypeVar("T", bound=Object)
 S = TypeVar("S", bound="Subject")
-Made = TypeVar("Made")
+Cached = TypeVar("Cached")
 P = ParamSpec("P")
 
 
-def once(make: Callable[Concatenate[S, P], Made]) -> Callable[Concatenate[S, P], Made]:
+def cached_per_subject(
+    make: Callable[Concatenate[S, P], Cached],
+) -> Callable[Concatenate[S, P], Cached]:
     """Let a function work a thing out once per subject, and once for each of its other arguments."""
 
     @wraps(make)
-    def kept(subject: S, /, *args: P.args, **named: P.kwargs) -> Made:
+    def kept(subject: S, /, *args: P.args, **named: P.kwargs) -> Cached:
         key = (make, *args, *named.items())
-        if key not in subject.kept:
-            subject.kept[key] = make(subject, *args, **named)
-        return cast("Made", subject.kept[key])
+        if key not in subject.cache:
+            subject.cache[key] = make(subject, *args, **named)
+        return cast("Cached", subject.cache[key])
 
     return kept
 
 
-class Subject(Checked):
+class Subject(CheckTarget):
     """One model under check. `source` is None for a model made in Python, `model` for a text that cannot be read.
 
     `top` is the object at the top of the document, whatever it is; `kept_in` the folder for what is
-    measured of it. If there was no machine code to measure it with, it `is_unsettled`: the next
+    measured of it. If there was no machine code to measure it with, it `needs_remeasuring`: the next
     check may find more.
     """
 
@@ -62,9 +64,9 @@ class Subject(Checked):
         self.notes: list[Note] = []
         self.changes: list[Change] = []
         self.refusals: list[Refusal] = []
-        self.kept: dict[object, object] = {}
-        self.kept_in: Path | None = None
-        self.is_unsettled = False
+        self.cache: dict[object, object] = {}
+        self.cache_folder: Path | None = None
+        self.needs_remeasuring = False
         if isinstance(found, Model):
             self.model = self.top = found
         else:
@@ -102,9 +104,9 @@ class Subject(Checked):
             return self.source is not None
         return self.model is not None and (self.sure_until is None or rule.code[4] in "12")
 
-    def unmeasured(self, *, anew: bool = True) -> str:
+    def measure(self, *, anew: bool = True) -> str:
         """Measure paths and muscles of the model, or recall it; why that cannot be done, if it cannot."""
-        return unmeasured(self, anew=anew)
+        return measure_subject(self, anew=anew)
 
     def find_obstacles(self, *, anew: bool = True) -> str:
         """Build the model, or recall what stops that; return why it was not built, if it was not."""
@@ -146,11 +148,11 @@ class Subject(Checked):
                 result.setdefault(name, []).append(items)
         return result
 
-    def each(self, cls: type[T]) -> Iterator[T]:
+    def find_instances(self, cls: type[T]) -> Iterator[T]:
         """Every object of a class or of one derived from it."""
-        return cast("Iterator[T]", self.named(cls.__name__))
+        return cast("Iterator[T]", self.find_by_class(cls.__name__))
 
-    def named(self, cls: str) -> Iterator[Any]:
+    def find_by_class(self, cls: str) -> Iterator[Any]:
         """Every object of the class with this name or of one derived from it; the class need not be imported."""
         return chain.from_iterable(self._by_base.get(cls, ()))
 
@@ -189,18 +191,22 @@ class Subject(Checked):
             return ""
         return self.tree.path_of(self.owner(item)) or ""
 
-    def called(self, item: Object) -> str:
+    def describe(self, item: Object) -> str:
         """What people call an object: ``Body 'pelvis'``; a part without a name goes by its owner."""
         owner = self.owner(item)
-        return called(item if item.name and item is not owner else owner)
+        return describe_object(item if item.name and item is not owner else owner)
 
-    def titled(self, item: Object, spec: FieldSpec) -> str:
+    def describe_property(self, item: Object, spec: FieldSpec) -> str:
         """What people call a property: ``mass of Body 'pelvis'``."""
-        return f"{spec.tag} of {called(item) if item.name else self.called(item)}"
+        return f"{spec.tag} of {describe_object(item) if item.name else self.describe(item)}"
 
-    def called_with(self, item: Object) -> str:
+    def describe_part(self, item: Object) -> str:
         """What people call a part without a name of its own: ``the SimmSpline of Coordinate 'knee'``."""
-        return called(item) if item.name else f"the {called(item)} of {called(self.owner(item))}"
+        return (
+            describe_object(item)
+            if item.name
+            else f"the {describe_object(item)} of {describe_object(self.owner(item))}"
+        )
 
     def target_of(self, owner: Component, tag: str) -> Component | None:
         """The component that a single reference of `owner` leads to; what is of another class has none."""
@@ -227,7 +233,7 @@ class Subject(Checked):
             if note.kind == kind and note.owner is not None
         ]
 
-    def noted(self, item: Object, spec: FieldSpec) -> bool:
+    def has_note(self, item: Object, spec: FieldSpec) -> bool:
         """Whether the reader noticed something about the text of this property."""
         return (id(item), spec.name) in self._noted
 
@@ -265,7 +271,7 @@ class Subject(Checked):
         if self.source is None:
             return None
         if number is None:
-            number = self._given(item)
+            number = self._find_element(item)
             if number is None:
                 return None
             if tag is not None:
@@ -281,9 +287,9 @@ class Subject(Checked):
             return self.source.of_text(number, word, nth)
         return self.source.of_tag(number)
 
-    def outside(self) -> list[str] | None:
+    def list_outside_paths(self) -> list[str] | None:
         """Every path outside the text that findings may depend on; None if nobody can say."""
-        if self.is_unsettled or any(note.kind == "include" for note in self.notes):
+        if self.needs_remeasuring or any(note.kind == "include" for note in self.notes):
             return None
         if any(isinstance(fault, SpecialFileError) for fault in self.faults):
             return None
@@ -308,7 +314,7 @@ class Subject(Checked):
                             result |= dict.fromkeys(map(os.path.dirname, paths))
         return list(result)
 
-    def names_itself(self, item: Object) -> bool:
+    def has_explicit_name(self, item: Object) -> bool:
         """Whether the text gives an object its name; always true of a model made in Python."""
         if self.source is None:
             return True
@@ -325,7 +331,7 @@ class Subject(Checked):
             self.source.position(result.start, len(name)) if result else self.source.of_tag(number)
         )
 
-    def _given(self, item: Object | None) -> int | None:
+    def _find_element(self, item: Object | None) -> int | None:
         """The element of an object; of one the text does not give, that of the component above it."""
         while item is not None:
             number = cast("int | None", item._index)

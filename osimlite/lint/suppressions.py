@@ -27,21 +27,21 @@ class Suppression:
     last: int
     used: set[str] = field(default_factory=set)
 
-    def covers(self, finding: Finding, is_called: Callable[[str], bool]) -> bool:
-        """Whether the finding, of a rule that `is_called` some names, is one of those the comment is about.
+    def covers(self, finding: Finding, has_name: Callable[[str], bool]) -> bool:
+        """Whether the finding, of a rule that `has_name` some names, is one of those the comment is about.
 
         It is noted as used then.
         """
         if finding.line is None or not self.first <= finding.line <= self.last:
             return False
-        code = next(filter(is_called, self.codes), None)
+        code = next(filter(has_name, self.codes), None)
         if code is None:
             return False
         self.used.add(code)
         return True
 
 
-def suppressions(source: Source) -> list[Suppression]:
+def read_suppressions(source: Source) -> list[Suppression]:
     """Every ignoring comment of a text.
 
     Before the root element it speaks of the whole file, alone on its line of the element that
@@ -62,22 +62,22 @@ def suppressions(source: Source) -> list[Suppression]:
             if number < len(source.spans):
                 following = source.spans[number]
                 last = source.position(following.end - 1).line
-        result.append(Suppression(place, _codes(match[1]), first, last))
+        result.append(Suppression(place, _split_codes(match[1]), first, last))
     return result
 
 
-def suppressions_in_header(lines: list[str]) -> list[Suppression]:
+def read_header_suppressions(lines: list[str]) -> list[Suppression]:
     """Every ignoring line in the header of a storage file, which OpenSim passes over; it speaks of the whole file."""
     result = []
     for number, line in enumerate(lines, 1):
         match = _LINE.match(line)
         if match:
             result.append(
-                Suppression(Position(number, 1, match.end()), _codes(match[1]), 1, LAST_LINE)
+                Suppression(Position(number, 1, match.end()), _split_codes(match[1]), 1, LAST_LINE)
             )
     return result
 
 
-def _codes(text: str) -> tuple[str, ...]:
+def _split_codes(text: str) -> tuple[str, ...]:
     words = (word for word in re.split(r"[\s,]+", text) if word)
     return tuple(word.upper() if word.upper().startswith("OSIM") else word for word in words)

@@ -10,17 +10,17 @@ from typing import ClassVar
 
 from osimlite.io.document.source import Position
 from osimlite.io.tables.headers import MARK, Entry, MarkerHeader, StorageHeader, Word
-from osimlite.lint.checked import Checked
+from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.scan import Rows, Scan, number_in
-from osimlite.lint.suppressions import Suppression, suppressions_in_header
+from osimlite.lint.scan import RowScanner, TableRows, parse_number
+from osimlite.lint.suppressions import Suppression, read_header_suppressions
 
 _CELL = re.compile(rb"[^ \t\r\n]+")
 _ROW = re.compile(rb"[^ \t\r\n][^\n]*")
 
 
-class Table(Checked):
+class Table(CheckTarget):
     """A table. Whatever is wrong with its text, all that can be read of it is there.
 
     Args:
@@ -63,7 +63,7 @@ class Table(Checked):
         return [label.text for label in (self.labels if self.is_markers else self.labels[1:])]
 
     @cached_property
-    def rows(self) -> Rows:
+    def rows(self) -> TableRows:
         """The rows."""
         header, cells = self.header, len(self.labels)
         # Where labels are missing or too many, the first row says how many cells a row has.
@@ -72,21 +72,23 @@ class Table(Checked):
             markers = (len(first[0].rstrip().split(b"\t")) - 2) // 3 if first else 0
             said = self.entries["NumMarkers"].value.text if "NumMarkers" in self.entries else ""
             cells = markers if str(markers) == said else cells
-            return Scan(cells * 3 + 2, markers=True).run(self.data, header.rows, header.row_line)
+            return RowScanner(cells * 3 + 2, markers=True).scan(
+                self.data, header.rows, header.row_line
+            )
         if not header.labels or "," in header.labels[0].text:
-            return Rows()
+            return TableRows()
         if first and str(len(first[0].split())) == header.value("nColumns"):
             cells = len(first[0].split())
-        return Scan(cells, header.parts).run(self.data, header.rows, header.row_line)
+        return RowScanner(cells, header.parts).scan(self.data, header.rows, header.row_line)
 
-    def rows_from(self, time: float) -> Iterator[list[bytes]]:
+    def iterate_rows(self, time: float) -> Iterator[list[bytes]]:
         """The cells of the rows from a time on; the first is looked for by halving the text."""
         data, place = self.data, int(self.is_markers)
         low, high = self.header.rows, len(data)
         while high - low > 2000:
             middle = data.find(b"\n", (low + high) // 2, high) + 1
             cells = data[middle : middle + 200].split(None, 2) if middle else []
-            if len(cells) <= place or not number_in(cells[place]) < time:
+            if len(cells) <= place or not parse_number(cells[place]) < time:
                 high = (low + high) // 2
             else:
                 low = middle
@@ -94,13 +96,13 @@ class Table(Checked):
             end = data.find(b"\n", low) + 1 or len(data)
             line = data[low:end].rstrip(b"\r\n")
             cells = line.split(b"\t") if self.is_markers else line.split()
-            if len(cells) > place and number_in(cells[place]) >= time:
+            if len(cells) > place and parse_number(cells[place]) >= time:
                 yield cells
             low = end
 
-    def row_at(self, time: float) -> list[float]:
+    def read_row(self, time: float) -> list[float]:
         """The numbers of the first row from a time on, NaN for what is none; nothing if there is none."""
-        return [number_in(cell) for cell in next(self.rows_from(time), [])]
+        return [parse_number(cell) for cell in next(self.iterate_rows(time), [])]
 
     @property
     def span(self) -> tuple[float, float] | None:
@@ -127,7 +129,7 @@ class Table(Checked):
             else str(number)
         )
 
-    def time_at(self, line: int) -> Position:
+    def locate_time(self, line: int) -> Position:
         """Where the time of the row in a line is."""
         start = self.line_start(line)
         text = self.data[start : self.line_start(2, start)]
@@ -137,10 +139,12 @@ class Table(Checked):
 
     def suppressions(self) -> list[Suppression]:
         """The lines of the header that ignore findings; a marker file cannot have any."""
-        return [] if self.is_markers else suppressions_in_header(self.header.lines)
+        return [] if self.is_markers else read_header_suppressions(self.header.lines)
 
-    def replacing(self, at: Position, named: object, text: str, *, certain: bool) -> Fix | None:
-        """The mend that puts a text in a place of the header, or among the labels; None where nobody knows the bytes.
+    def make_replacement(
+        self, at: Position, named: object, text: str, *, certain: bool
+    ) -> Fix | None:
+        """The fix that puts a text in a place of the header, or among the labels; None where nobody knows the bytes.
 
         `named` is what stands there, or None for whatever does.
         """
@@ -157,8 +161,8 @@ class Table(Checked):
         safe = certain or text.lower() == old.lower()
         return Fix((Edit(start, start + len(old.encode()), text),), safe)
 
-    def inserting(self, number: int, line: str) -> Fix:
-        """The mend that puts a line before another."""
+    def insert_line(self, number: int, line: str) -> Fix:
+        """The fix that puts a line before another."""
         start = self.line_start(number)
         return Fix((Edit(start, start, line + ("\r\n" if b"\r\n" in self.data[:1000] else "\n")),))
 

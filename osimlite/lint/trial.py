@@ -11,10 +11,10 @@ from math import isfinite, nan
 from typing import ClassVar, NamedTuple
 
 from osimlite.io.document.source import Position
-from osimlite.lint.checked import Checked
+from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Severity
-from osimlite.lint.registry import FindingSink, Threshold
+from osimlite.lint.registry import FindingCollector, Threshold
 
 TRIAL = "trial"
 """What rules are about that need such numbers."""
@@ -27,22 +27,22 @@ OPENSIM = "OpenSim's best practices"
 """Simulation with OpenSim - Best Practices, https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686"""
 CHECKLIST = "OpenSim's checklist"
 """For evaluating a simulation, https://simtk-confluence.stanford.edu:8443/plugins/viewsource/viewpagesrc.action?pageId=3376337"""
-OURS = "osimlite"
+OSIMLITE = "osimlite"
 """Where nobody has published a limit."""
 
 GOOD, OKAY, BAD = VERDICTS = ("good", "okay", "bad")
 """What a number is: within every limit, beyond the stricter of two, beyond all."""
 
-LEAST = 0.001
+SMALLEST_SHOWN = 0.001
 """What is less is not shown with its digits."""
 
-KINDS = {"peak": "the peak of "} | dict.fromkeys(
+STATISTICS = {"peak": "the peak of "} | dict.fromkeys(
     ("rms", "rms-translation"), "the root mean square of "
 )
 """What stands before the name of what was measured."""
 
 
-class Number(NamedTuple):
+class Measurement(NamedTuple):
     """Something that was measured of a trial."""
 
     rule: str  # name of the rule that judges it
@@ -53,12 +53,12 @@ class Number(NamedTuple):
     scale: float = nan  # what a limit may be a part of, in the `unit`; NaN if that is not known
     where: str = ""  # at which time, of which marker, in words
     at: Position | None = None  # where that is in the file
-    # whether the trial goes on with it; else it is worth no more than an info
+    # whether the trial continues with it; else it is worth no more than an info
     is_final: bool = True
     side: str = ""  # what else is known, in words
 
 
-class Verdict(NamedTuple):
+class TrialVerdict(NamedTuple):
     """A number with its limits."""
 
     code: str  # of the rule
@@ -77,12 +77,12 @@ class Verdict(NamedTuple):
     @property
     def shown(self) -> str:
         """The number with its unit."""
-        return f"{_rounded(self.value)} {self.unit}".rstrip()
+        return f"{_format_number(self.value)} {self.unit}".rstrip()
 
     @property
     def limits(self) -> str:
         """Up to which it is good, and up to which it is okay."""
-        return " / ".join(dict.fromkeys((_rounded(self.good), _rounded(self.bad))))
+        return " / ".join(dict.fromkeys((_format_number(self.good), _format_number(self.bad))))
 
     @property
     def words(self) -> str:
@@ -90,13 +90,13 @@ class Verdict(NamedTuple):
         return f"{self.of} ({self.where})" if self.where else self.of
 
 
-def _rounded(value: float) -> str:
-    if 0.0 < value < LEAST:
-        return f"<{LEAST:g}"
+def _format_number(value: float) -> str:
+    if 0.0 < value < SMALLEST_SHOWN:
+        return f"<{SMALLEST_SHOWN:g}"
     return f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"
 
 
-class Trial(Checked):
+class Trial(CheckTarget):
     """A file of a trial.
 
     Args:
@@ -110,15 +110,15 @@ class Trial(Checked):
     file: str
 
     def __init__(
-        self, file: str, data: bytes, numbers: Sequence[Number], config: Config | None = None
+        self, file: str, data: bytes, numbers: Sequence[Measurement], config: Config | None = None
     ) -> None:
         super().__init__(config)
         self.file, self.data, self.numbers = file, data, numbers
-        self.verdicts: list[Verdict] = []
+        self.verdicts: list[TrialVerdict] = []
 
     def judge(
         self,
-        report: FindingSink,
+        report: FindingCollector,
         limits: Sequence[Threshold | float],
         source: str,
         advice: str,
@@ -148,13 +148,13 @@ class Trial(Checked):
             if not known:
                 continue
             good, bad = min(known), max(known)
-            # What is no number is within no limit.
+            # What is not a number is within no limit.
             verdict = GOOD if number.value <= good else OKAY if number.value <= bad else BAD
             self.verdicts.append(
-                Verdict(
+                TrialVerdict(
                     rule.code,
                     rule.name,
-                    f"{KINDS.get(kind, '')}{number.of}",
+                    f"{STATISTICS.get(kind, '')}{number.of}",
                     number.value,
                     number.unit,
                     good,
@@ -170,8 +170,9 @@ class Trial(Checked):
                 unit = "" if not number.unit else f" {number.unit}" if number.unit != "%" else " %"
                 more = f", and more than {bad:.3g}{unit} is bad" if bad > good else ""
                 report(
-                    f"{KINDS.get(kind, '')}{number.of} is {_rounded(number.value)}{unit}"
-                    f"{f' ({number.where})' if number.where else ''}: up to {good:.3g}{unit} is good{more} ({source}); "
+                    f"{STATISTICS.get(kind, '')}{number.of} is "
+                    f"{_format_number(number.value)}{unit}{f' ({number.where})' if number.where else ''}: "
+                    f"up to {good:.3g}{unit} is good{more} ({source}); "
                     f"{f'{number.side}; ' if number.side else ''}{advice}",
                     at=number.at,
                     severity=None if verdict == BAD and number.is_final else Severity.INFO,

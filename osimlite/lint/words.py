@@ -9,18 +9,18 @@ from osimlite.io.document.lexical import shortest
 from osimlite.schema.base import Object, Unknown
 
 
-def called(item: Object) -> str:
+def describe_object(item: Object) -> str:
     """``Body 'pelvis'``, or ``Body`` for one without a name."""
     kind = item.class_name if isinstance(item, Unknown) else type(item).tag
     return f"{kind} '{item.name}'" if item.name else kind
 
 
-def a(noun: str) -> str:
+def with_article(noun: str) -> str:
     """The noun with its article."""
     return f"{'an' if noun[:1].lower() in 'aeiou' else 'a'} {noun}"
 
 
-def quantity(value: float | tuple[float, ...], unit: str | None = None) -> str:
+def format_quantity(value: float | tuple[float, ...], unit: str | None = None) -> str:
     """A number, or several, in few digits and with the unit."""
     values = value if isinstance(value, tuple) else (value,)
     text = " ".join(
@@ -30,19 +30,19 @@ def quantity(value: float | tuple[float, ...], unit: str | None = None) -> str:
     return f"{text} {unit}" if unit else text
 
 
-def shown(value: object) -> str:
+def format_value(value: object) -> str:
     """A value as a file would have it."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        return quantity(value)
+        return format_quantity(value)
     if isinstance(value, tuple):
-        return " ".join(map(shown, value)) or "an empty list"
+        return " ".join(map(format_value, value)) or "an empty list"
     return str(value) if value not in (None, "") else "nothing"
 
 
-def nearest_name(text: str, right: list[str]) -> str | None:
-    """The nearest right text; of paths the last names are compared, so that a long way there does not hide them."""
+def find_nearest_name(text: str, right: list[str]) -> str | None:
+    """The find_nearest right text; of paths the last names are compared, so that a long way there does not hide them."""
     whole = find_nearest(text, right, cutoff=70)
     last = text.rstrip("/").rpartition("/")[2]
     by_last = {word.rpartition("/")[2]: word for word in reversed(right)}
@@ -54,13 +54,13 @@ def nearest_name(text: str, right: list[str]) -> str | None:
     return by_last[near]
 
 
-def meant(wrong: Iterable[str], right: Iterable[str]) -> str:
+def suggest_names(wrong: Iterable[str], right: Iterable[str]) -> str:
     """What some texts may stand for, asked at the end of a sentence; nothing if no right one is like them."""
     known = sorted(right)
-    near = [f"'{name}' for '{text}'" for text in wrong if (name := nearest_name(text, known))]
+    near = [f"'{name}' for '{text}'" for text in wrong if (name := find_nearest_name(text, known))]
     return f"; is it {join_words(near)}?" if near else ""
 
 
-def closest(text: str, right: list[str]) -> str:
+def pick_closest(text: str, right: list[str]) -> str:
     """The one of some texts that is most like another."""
     return right[0] if len(right) == 1 else find_nearest(text, right, cutoff=0) or right[0]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-REFUSED: Final = "OpenSim refuses the model"
+REFUSED: Final = "OpenSim rejects the model"
 TOUCHING: Final = "forces and motion become NaN as soon as the surfaces touch"
 NAN: Final = "accelerations become NaN, without a message"
 STOPS: Final = "OpenSim cannot take one step"

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from osimlite.errors import DocumentError
 from osimlite.io.document.cache import while_unchanged
-from osimlite.lint.checked import Checked
+from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
-from osimlite.lint.engine import subject_of
+from osimlite.lint.engine import load_subject
 from osimlite.lint.setup import Setup
 
 MAX_DOCUMENTS = 500
@@ -22,12 +22,12 @@ Real setups name about ten.
 
 
 @while_unchanged(64)
-def read_subject(path: str) -> Checked:
+def read_subject(path: str) -> CheckTarget:
     """Return a document as the linter reads it; cached until its file changes.
 
     Use only the names of files in it: findings depend on other files too.
     """
-    return subject_of(path, Config())
+    return load_subject(path, Config())
 
 
 def find_named_files(setup: str, rule: str) -> Iterator[str]:
@@ -50,10 +50,10 @@ def find_named_files(setup: str, rule: str) -> Iterator[str]:
         subject = read_subject(file)
         if subject is None:
             # The error says that the file is missing.
-            subject = subject_of(file, Config())
+            subject = load_subject(file, Config())
         if not isinstance(subject, Setup):
             continue
-        for item in subject.named_files(rule):
+        for item in subject.find_named_files(rule):
             if rule == "file":
                 yield item.path
             else:
@@ -61,7 +61,7 @@ def find_named_files(setup: str, rule: str) -> Iterator[str]:
                 results = str(getattr(subject.top, "results_directory", "")).strip()
                 yield os.path.join(folder, item.name.strip())
                 yield os.path.join(folder, results, item.name.strip())
-        for item in subject.named_files("file"):
+        for item in subject.find_named_files("file"):
             real = os.path.realpath(item.path)
             if item.path.lower().endswith(".xml") and real not in visited and os.path.isfile(real):
                 visited.add(real)

@@ -13,10 +13,10 @@ from osimlite.base.writing import ResultWriter
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
 from osimlite.io.document.reader import collector_paused, read_any
 from osimlite.lint.config import Config
-from osimlite.lint.diagnostic import Finding, Report, merged
-from osimlite.lint.engine import run as checked
-from osimlite.lint.engine import subject_of
-from osimlite.lint.many import settings_of
+from osimlite.lint.diagnostic import Finding, Report, merge_reports
+from osimlite.lint.engine import load_subject
+from osimlite.lint.engine import run_rules as checked
+from osimlite.lint.many import find_settings
 from osimlite.lint.project_files import is_table
 from osimlite.lint.rules.values import KEEPS_DEFAULT
 from osimlite.lint.setup import Setup
@@ -116,7 +116,7 @@ def run(
     replaced = substitute_inputs(top, file.parent, substitutes or {})
     if check:
         away: dict[str, None] = {}
-        report = merged(_check_documents(str(file), away))
+        report = merge_reports(_check_documents(str(file), away))
         if errors := [
             e for e in report.errors if not (_is_run_by_opensim(e) or _is_about_any(e, replaced))
         ]:
@@ -140,8 +140,8 @@ def run(
 
         error.message = error.message.replace(SKIP_ADVICE, NO_OPTION)
         error.file = error.file or str(file)
-        subject = subject_of(str(file), Config()) if isinstance(error, MissingFileError) else None
-        if isinstance(subject, Setup) and (maker := subject.writer_of(error.file)) is not None:
+        subject = load_subject(str(file), Config()) if isinstance(error, MissingFileError) else None
+        if isinstance(subject, Setup) and (maker := subject.find_writer(error.file)) is not None:
             error.message += (
                 f"; run '{get_relative_path(maker, Path.cwd())}' first, which should make it"
             )
@@ -211,13 +211,13 @@ def _check_documents(setup: str, away: dict[str, None]) -> Iterator[Report]:
     waiting, visited = deque([setup]), {os.path.realpath(setup)}
     while waiting:
         file = waiting.popleft()
-        subject = subject_of(file, settings_of(file).config_for(file, Config()))
+        subject = load_subject(file, find_settings(file).config_for(file, Config()))
         read_subject.keep(file, subject)
         yield checked(subject, measure=False)
         if not isinstance(subject, Setup):
             continue
         named: list[str] = []
-        for naming in subject.named_files("file"):
+        for naming in subject.find_named_files("file"):
             path = naming.path
             if not os.path.isfile(path):
                 continue

@@ -189,13 +189,13 @@ def test_a_large_file_is_not_read(
 
 @pytest.mark.parametrize("given", ["0", "-1", "99", "inf", "nan", "true", '"1 GB"', "[]"])
 def test_a_size_that_makes_no_sense(tmp_path: Path, given: str) -> None:
-    from osimlite.lint.settings import settings_for
+    from osimlite.lint.settings import load_settings
 
     (tmp_path / "osimlite.toml").write_text(f"largest-file = {given}\n")
     with pytest.raises(
         OsimliteError, match="'largest-file' must be a number of MB, 100 or more, not"
     ):
-        settings_for(tmp_path)
+        load_settings(tmp_path)
 
 
 def test_an_endless_standard_input_is_not_read_to_the_end(

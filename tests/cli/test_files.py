@@ -153,7 +153,7 @@ def test_errors_are_one_sentence(tmp_path: Path) -> None:
         assert error.count("\n") == 1
     code, _, error = run("info", ".", folder=tmp_path)
     assert code == 2 and "this is a folder; name a model file in it" in error
-    said = "osimlite: .: there is no file of OpenSim in this folder: no .osim, .xml or .omoco (see docs/lint-in-ci.md)\n"
+    said = "osimlite: .: no OpenSim file in this folder: no .osim, .xml or .omoco (see docs/lint-in-ci.md)\n"
     assert run("format", ".", folder=tmp_path) == (2, "", said)
     (tmp_path / "empty.osim").touch()
     assert run("format", "empty.osim", folder=tmp_path)[0] == 2

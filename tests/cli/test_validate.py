@@ -77,10 +77,7 @@ def test_xml_of_others_is_passed_over_where_that_is_asked_for(tmp_path):
     assert run("validate", tmp_path / "pom.xml", "--skip-other-xml").code == 0
     for command in ("validate", "format"):
         done = run(command, tmp_path)
-        assert (
-            done.code == 2
-            and "there is no file of OpenSim in this folder: no .osim, .xml" in done.err
-        )
+        assert done.code == 2 and "no OpenSim file in this folder: no .osim, .xml" in done.err
 
 
 def test_a_folder_is_every_model_below(faulty):

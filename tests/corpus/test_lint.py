@@ -46,9 +46,9 @@ REASONS = {
     "m0382": ("OSIM102", "<Smith2018ArticularContactForce", "plug-in"),
     "m0386": ("OSIM102", "<PistonActuator", "no class 'PistonActuator'"),
     "m0387": ("OSIM701", "<filename>", "'blockMesh.obj'"),
-    "m0455": ("OSIM404", "pelvis_ground", "OpenSim refuses the model"),
-    "m0459": ("OSIM303", "<ActivationCoordinateActuator", "must name a Coordinate"),
-    "m0460": ("OSIM303", "<PointToPointActuator", "must name a Body"),
+    "m0455": ("OSIM404", "pelvis_ground", "OpenSim rejects the model"),
+    "m0459": ("OSIM303", "<ActivationCoordinateActuator", "expected the name of a Coordinate"),
+    "m0460": ("OSIM303", "<PointToPointActuator", "expected the name of a Body"),
     "m0702": ("OSIM102", "<WISCO_Ligament", "no class 'WISCO_Ligament'"),
     "m0713": (
         "OSIM102",

@@ -9,7 +9,7 @@ import pytest
 
 from osimlite.io.document.source import Source
 from osimlite.io.document.survey import survey
-from osimlite.lint.placement import default_poses
+from osimlite.lint.placement import compute_default_poses
 from osimlite.lint.subject import Subject
 from osimlite.mechanics.laws.rotations import transposed
 from osimlite.schema.frames import Body
@@ -21,14 +21,16 @@ def test_default_poses_are_opensims(corpus_model: CorpusModel) -> None:
     if corpus_model.converted is None:
         pytest.skip("OpenSim cannot load this file")
     subject = Subject(survey(Source(gzip.decompress(corpus_model.converted.read_bytes()))))
-    if next(subject.each(Constraint), None) is not None:
+    if next(subject.find_instances(Constraint), None) is not None:
         pytest.skip("OpenSim assembles this model, which moves it")
     truth = json.loads(gzip.decompress(corpus_model.truth.read_bytes()))["default_pose"][
         "body_xform"
     ]
-    poses = default_poses(subject)
+    poses = compute_default_poses(subject)
     placed = [
-        body for body in subject.each(Body) if id(body) in poses and subject.path(body) in truth
+        body
+        for body in subject.find_instances(Body)
+        if id(body) in poses and subject.path(body) in truth
     ]
     if not placed:
         pytest.skip("no body is placed by joints that can be followed without arrays")

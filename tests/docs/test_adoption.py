@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite.lint.settings import settings_for
+from osimlite.lint.settings import load_settings
 
 ROOT = Path(__file__).resolve().parents[2]
 KITS = sorted(path.parent for path in (ROOT / "docs" / "adoption").glob("*/README.md"))
@@ -93,4 +93,4 @@ def test_the_workflow_gives_the_action_what_it_takes(kit, repo):
 
 @each_kit
 def test_the_settings_are_read(kit):
-    assert "OSIM63" in settings_for(kit).ignore
+    assert "OSIM63" in load_settings(kit).ignore

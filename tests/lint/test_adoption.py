@@ -14,7 +14,7 @@ import pytest
 
 from osimlite.cli import COMMANDS
 from osimlite.lint import Config, all_rules, assert_valid, validate
-from osimlite.lint.settings import settings_for
+from osimlite.lint.settings import load_settings
 
 yaml = pytest.importorskip("yaml", reason="needs pyyaml (extra 'yaml')")
 
@@ -189,7 +189,7 @@ def test_the_settings_of_the_guide_are_settings(guide: str, tmp_path: Path, fixt
     assert tomllib.loads(block)
     (tmp_path / "pyproject.toml").write_text(block)
     (tmp_path / "my_classes.json").write_text('{"classes": {}}')
-    settings = settings_for(tmp_path)
+    settings = load_settings(tmp_path)
     walker = fixtures / "walker" / "DynamicWalkerModel.osim"
     other = settings.config_for(tmp_path / "walker.osim", Config())
     result = [finding for finding in validate(walker, config=other) if finding.code == "OSIM508"]

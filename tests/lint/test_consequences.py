@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.lint.rules.domains import consequence
+from osimlite.lint.rules.domains import describe_consequence
 from osimlite.schema.facts import NAN, REFUSED, Facts
 from osimlite.schema.fields import Value
 from osimlite.schema.registry import MODULES, class_for
@@ -36,7 +36,7 @@ def test_an_entry_is_a_property_with_a_domain(entry):
 def test_a_derived_class_inherits_and_zero_differs_from_less():
     thelen = class_for("Thelen2003Muscle")
     limit = class_for("CoordinateLimitForce")
-    assert consequence(thelen, "minimum_activation", 0.0) == (REFUSED, True)
-    assert consequence(limit, "transition", 0.0) == (REFUSED, True)
-    assert consequence(limit, "transition", -1.0) == ("", False)
-    assert consequence(limit, "upper_stiffness", 0.0) == (NAN, True)
+    assert describe_consequence(thelen, "minimum_activation", 0.0) == (REFUSED, True)
+    assert describe_consequence(limit, "transition", 0.0) == (REFUSED, True)
+    assert describe_consequence(limit, "transition", -1.0) == ("", False)
+    assert describe_consequence(limit, "upper_stiffness", 0.0) == (NAN, True)

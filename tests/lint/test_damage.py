@@ -22,7 +22,7 @@ from osimlite.errors import OsimliteError
 from osimlite.io.document.printer import to_text
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
-from osimlite.lint.engine import check_source, run, subject_of
+from osimlite.lint.engine import check_source, load_subject, run_rules
 from osimlite.lint.project_files import is_table
 from osimlite.lint.reporters import render
 from osimlite.schema.base import Object
@@ -181,8 +181,8 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[
 def check(folder: Path, name: str, data: bytes) -> None:
     path = folder / f"damaged{Path(name).suffix}"
     path.write_bytes(data)
-    subject = subject_of(str(path))
-    report = run(subject)
+    subject = load_subject(str(path))
+    report = run_rules(subject)
     lines = re.split("\n" if is_table(name) else r"\r\n|\r|\n", subject.text)
     for finding in report:
         assert finding.line is None or 1 <= finding.line <= len(lines) + 1, finding

@@ -10,7 +10,7 @@ import pytest
 from osimlite.errors import OsimliteError
 from osimlite.io.document.source import Source
 from osimlite.lint import validate
-from osimlite.lint.fixes import mended
+from osimlite.lint.fixes import apply_fixes
 
 HERE = Path(__file__).resolve().parent
 WALKER = HERE.parents[1] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
@@ -51,7 +51,7 @@ UNSAFE = [
 
 def mend(text: str, *, unsafe: bool = False) -> tuple[str, int]:
     source = Source(text.encode())
-    data, count = mended(source, validate(source), unsafe=unsafe)
+    data, count = apply_fixes(source, validate(source), unsafe=unsafe)
     return data.decode(), count
 
 
@@ -125,7 +125,7 @@ def test_another_encoding_stays():
         '<?xml version="1.0" encoding="ISO-8859-1"?>\n<OpenSimDocument Version="40600">\n'
         '<Model name="m" colour="red"><credits>Müller</credits></Model>\n</OpenSimDocument>\n'
     )
-    data, count = mended(source := Source(text.encode("latin-1")), validate(source))
+    data, count = apply_fixes(source := Source(text.encode("latin-1")), validate(source))
     assert count == 1 and data == text.replace(' colour="red"', "").encode("latin-1")
 
 
@@ -136,7 +136,7 @@ def test_mixed_encodings_are_left_alone():
     )
     source = Source(data)
     with pytest.raises(OsimliteError, match="mixes encodings"):
-        mended(source, validate(source))
+        apply_fixes(source, validate(source))
 
 
 @pytest.mark.parametrize(("named", "meant"), [("Pelviz", "Pelvis"), ("Pelvis Pelviz", None)])

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from osimlite.io.document.source import Source
 from osimlite.lint import validate
-from osimlite.lint.fixes import mended
-from osimlite.lint.inertia import possible_inertia, principal_axes
+from osimlite.lint.fixes import apply_fixes
+from osimlite.lint.inertia import compute_principal_axes, find_possible_inertia
 
 numbers = st.floats(-10, 10, allow_subnormal=False).map(lambda number: round(number, 6))
 
@@ -22,7 +22,7 @@ def matrix(inertia):
 
 @given(st.tuples(*[numbers] * 6))
 def test_axes_are_those_of_the_matrix(inertia):
-    moments, axes = principal_axes(inertia)
+    moments, axes = compute_principal_axes(inertia)
     v = np.array(axes)
     assert np.allclose(v @ v.T, np.eye(3), atol=1e-12)
     assert np.allclose(v @ np.diag(moments) @ v.T, matrix(inertia), atol=1e-10)
@@ -30,7 +30,7 @@ def test_axes_are_those_of_the_matrix(inertia):
 
 @given(st.tuples(*[numbers] * 6), st.integers(0, 2**32 - 1))
 def test_no_possible_inertia_is_nearer(inertia, seed):
-    nearest = matrix(possible_inertia(inertia))
+    nearest = matrix(find_possible_inertia(inertia))
     low, middle, high = np.linalg.eigvalsh(nearest)
     assert high <= low + middle + 1e-9
     distance = np.linalg.norm(nearest - matrix(inertia))
@@ -47,7 +47,7 @@ def test_no_possible_inertia_is_nearer(inertia, seed):
 def test_a_possible_inertia_stays(masses):
     one, two, three = masses
     inertia = (two + three, one + three, one + two, 0.0, 0.0, 0.0)
-    assert possible_inertia(inertia) == pytest.approx(inertia)
+    assert find_possible_inertia(inertia) == pytest.approx(inertia)
 
 
 def test_the_mend_is_unsafe_and_leaves_nothing_to_find():
@@ -58,5 +58,5 @@ def test_the_mend_is_unsafe_and_leaves_nothing_to_find():
     source = Source(text.encode())
     report = validate(source, select="OSIM502")
     assert report.codes == {"OSIM502": 1} and not report.findings[0].fixable
-    data, count = mended(source, report, unsafe=True)
+    data, count = apply_fixes(source, report, unsafe=True)
     assert count == 1 and not validate(Source(data), select="OSIM50").findings

@@ -15,9 +15,9 @@ from osimlite.base.writing import user_cache_folder
 from osimlite.errors import MissingFileError
 from osimlite.lint import Config, validate
 from osimlite.lint import many as module
-from osimlite.lint.cache import digest_of_code
-from osimlite.lint.many import Texts, check_files, settings_of
-from osimlite.lint.project_files import is_ours
+from osimlite.lint.cache import describe_code_version
+from osimlite.lint.many import SourceTexts, check_files, find_settings
+from osimlite.lint.project_files import is_opensim_xml
 
 MESH = """\
 <OpenSimDocument Version="40600">
@@ -35,25 +35,25 @@ MESH = """\
 
 @pytest.fixture
 def project(tmp_path):
-    settings_of.__globals__["settings_for"].cache_clear()
+    find_settings.__globals__["load_settings"].cache_clear()
     module.resolve_folder.cache_clear()
     (tmp_path / "osimlite.toml").write_text("")
     (tmp_path / "m.osim").write_text(MESH)
     yield tmp_path
-    settings_of.__globals__["settings_for"].cache_clear()
+    find_settings.__globals__["load_settings"].cache_clear()
 
 
 @pytest.fixture
 def checked(monkeypatch):
     """The files that were really checked."""
     files: list[str] = []
-    real = module.check_one
+    real = module.check_job
 
     def spy(job):
         files.append(Path(job.file).name)
         return real(job)
 
-    monkeypatch.setattr(module, "check_one", spy)
+    monkeypatch.setattr(module, "check_job", spy)
     return files
 
 
@@ -93,7 +93,7 @@ def later(monkeypatch):
 
 def test_a_file_whose_stamp_has_not_changed_is_not_read_again(project, checked, later, monkeypatch):
     first = codes(project)
-    monkeypatch.setattr("osimlite.lint.cache.text_of", None)
+    monkeypatch.setattr("osimlite.lint.cache.fingerprint_text", None)
     assert codes(project) == first and len(checked) == 1
 
 
@@ -285,7 +285,7 @@ def test_a_missing_file_is_named_also_by_another_process(project):
 
 
 def test_work_is_shared_only_if_there_is_enough(project, monkeypatch):
-    jobs = [module.Job(str(project / "m.osim"), Config(), None)] * 3
+    jobs = [module.CheckJob(str(project / "m.osim"), Config(), None)] * 3
     assert module.count_processes(jobs) == 1
     monkeypatch.setattr(module, "WORTH_SHARING", 10)
     monkeypatch.setattr("os.cpu_count", lambda: 4)
@@ -295,7 +295,7 @@ def test_work_is_shared_only_if_there_is_enough(project, monkeypatch):
 
 def test_the_text_of_a_file_that_has_gone_is_empty(project):
     file = project / "m.osim"
-    texts = Texts()
+    texts = SourceTexts()
     assert texts[str(file)] == MESH
     shutil.move(file, project / "moved.osim")
     assert texts[str(file)] == ""
@@ -313,8 +313,10 @@ def test_the_text_of_a_file_that_has_gone_is_empty(project):
     ],
 )
 def test_xml_of_other_programs_is_known_by_its_root(text, ours):
-    assert is_ours(text.encode()) is ours
+    assert is_opensim_xml(text.encode()) is ours
 
 
 def test_every_part_that_checks_tells_which_code_this_is():
-    assert digest_of_code().endswith(f" {len([*Path(module.__file__).parents[1].rglob('*.py')])}")
+    assert describe_code_version().endswith(
+        f" {len([*Path(module.__file__).parents[1].rglob('*.py')])}"
+    )

@@ -122,7 +122,7 @@ def test_numbers_beyond_what_is_computed_with_are_no_traceback(fixtures):
     )
     report = validate(Source(text.encode()))
     assert [why.partition(" (")[0] for why in report.unmeasured] == [
-        "the model: rules OSIM63 not measured: a number of it is beyond what can be computed with"
+        "the model: rules OSIM63 not measured: a number is too large to compute with"
     ]
 
 
@@ -130,7 +130,10 @@ def test_a_path_is_reported_once_with_its_greatest_jump(fixtures):
     text = (fixtures / "lint" / "OSIM632" / JUMPING).read_text()
     (one, two) = validate(Source(text.encode())).findings
     # It comes in at 0.2 and goes at 1.
-    assert "jumps by 18 mm at 'hip_flexion' = 11.46 deg, where 'b' comes or goes" in one.message
+    assert (
+        "jumps by 18 mm at 'hip_flexion' = 11.46 deg, where 'b' appears or disappears"
+        in one.message
+    )
     assert "jumps by 98.7 mm at 'knee_angle' = -57.3 deg" in two.message
 
 
@@ -156,7 +159,7 @@ def test_without_machine_code_many_surfaces_are_not_measured(jumping, monkeypatc
     """The report says so, and is not kept: the next check may have some."""
     from osimlite.lint.measuring import model
 
-    monkeypatch.setattr(measures, "FEW", -1)
+    monkeypatch.setattr(measures, "MAX_WRAPS_UNCOMPILED", -1)
     measures.remembered.clear()
     with monkeypatch.context() as without:
         without.setattr(model, "has_machine_code", lambda: False)

@@ -24,7 +24,7 @@ def test_what_is_no_file_is_not_called_by_its_own_name(tmp_path: Path, name: str
     assert finding.suggestion is None
     assert (
         finding.message
-        == f"'{name}' of Mesh 'bone' is a folder, a device or a link to nothing, and no file"
+        == f"'{name}' of Mesh 'bone' is a folder, a device or a broken link, not a file"
     )
 
 
@@ -37,4 +37,4 @@ def test_a_file_in_other_letter_case_is_still_pointed_out(tmp_path: Path) -> Non
     model.add(PinJoint(name="j").between(model.ground, body))
     write(model, tmp_path / "m.osim")
     (finding,) = validate(tmp_path / "m.osim", select=["OSIM701"]).findings
-    assert finding.suggestion == "bone.VTP" and "other systems" in finding.message
+    assert finding.suggestion == "bone.VTP" and "case-sensitive file names" in finding.message

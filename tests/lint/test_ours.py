@@ -8,7 +8,7 @@ import pytest
 
 from osimlite.cli import main
 from osimlite.lint import validate
-from osimlite.lint.project_files import is_ours
+from osimlite.lint.project_files import is_opensim_xml
 
 SETUP = """<?xml version="1.0"?>
 <OpenSimDocument Version="40600">
@@ -81,8 +81,8 @@ def test_a_misspelt_tool_is_told_with_the_right_name(tmp_path, tag, root):
 
 @pytest.mark.parametrize("name", OTHERS)
 def test_xml_of_other_programs_is_left_alone(name):
-    assert not is_ours(OTHERS[name].encode())
-    assert not is_ours(('<?xml version="1.0"?><!DOCTYPE x>' + OTHERS[name]).encode("utf-16"))
+    assert not is_opensim_xml(OTHERS[name].encode())
+    assert not is_opensim_xml(('<?xml version="1.0"?><!DOCTYPE x>' + OTHERS[name]).encode("utf-16"))
 
 
 def main_code(*words: str) -> int:

@@ -31,7 +31,7 @@ OWNER = re.compile(
 def asked(monkeypatch):
     """The paths that are measured, each time that something is."""
     results: list[list[str]] = []
-    own = osimlite.lint.measuring.measured
+    own = osimlite.lint.measuring.measure_model
 
     def measured(model, **given):
         result = own(model, **given)
@@ -40,7 +40,7 @@ def asked(monkeypatch):
         )
         return result
 
-    monkeypatch.setattr(osimlite.lint.measuring, "measured", measured)
+    monkeypatch.setattr(osimlite.lint.measuring, "measure_model", measured)
     measures.remembered.clear()
     return results
 
@@ -117,9 +117,9 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch, 
     result = check_files([str(path)], Config()).codes
     (kept,) = findings_cache.glob("*/measured/*.json")
     subject = Subject(osimlite.io.document.survey.survey(Source(text.encode())))
-    own = measures.parts_of(subject)
+    own = measures.digest_parts(subject)
     measures.remembered.clear()
-    known = measures.recall(own, kept.parents[1])
+    known = measures.recall_measures(own, kept.parents[1])
     assert known.measures == measures_of(text)
     for wrong in (
         "{}",
@@ -130,7 +130,7 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch, 
     ):
         measures.remembered.clear()
         kept.write_text(wrong)
-        assert measures.recall(own, kept.parents[1]) is None
+        assert measures.recall_measures(own, kept.parents[1]) is None
     measures.remembered.clear()
     assert check_files([str(path)], Config()).codes == result
 
@@ -138,8 +138,8 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch, 
 def measures_of(text):
     measures.remembered.clear()
     subject = Subject(osimlite.io.document.survey.survey(Source(text.encode())))
-    assert not subject.unmeasured()
-    return measures.measures_of(subject)
+    assert not subject.measure()
+    return measures.get_measures(subject)
 
 
 def test_a_model_whose_classes_stand_elsewhere_has_no_parts(fixtures):
@@ -147,4 +147,4 @@ def test_a_model_whose_classes_stand_elsewhere_has_no_parts(fixtures):
     subject = Subject(
         osimlite.io.document.survey.survey(Source(text.encode())), Config(classes=("x.toml",))
     )
-    assert measures.parts_of(subject) is None
+    assert measures.digest_parts(subject) is None

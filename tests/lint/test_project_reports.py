@@ -7,7 +7,7 @@ from shutil import copy
 
 import pytest
 
-from osimlite.lint.engine import run, subject_of
+from osimlite.lint.engine import load_subject, run_rules
 from tests.cli.command import run as command
 
 
@@ -94,11 +94,11 @@ def test_lines_and_comments_ignore(project):
     )
     unused = {("leg.mot", "OSIM010"), ("ik.xml", "OSIM010")}
     assert found()[0] == {("data/leg.trc", "OSIM802"), *unused}
-    (comment,) = run(subject_of("leg.mot"))
+    (comment,) = run_rules(load_subject("leg.mot"))
     assert (comment.line, comment.column, comment.message) == (
         2,
         1,
-        "nothing is found here that 'OSIM809' would ignore",
+        "'OSIM809' ignores nothing here; delete it",
     )
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from osimlite.lint.diagnostic import Finding
-from osimlite.lint.engine import run, subject_of
+from osimlite.lint.engine import load_subject, run_rules
 from tests.lint.project_faults import faults, harmless
 from tests.lint.projects import FIXTURES, Fault, Project, pendulum, walking
 from tests.suite import choose
@@ -55,7 +55,7 @@ class Folder:
             f
             for name in files
             if (self.path / name).exists()
-            for f in run(subject_of(str(self.path / name)))
+            for f in run_rules(load_subject(str(self.path / name)))
         ]
 
     def put(self, texts: dict[str, str | None]) -> None:

@@ -41,7 +41,7 @@ def report():
 def test_full(report):
     assert render(report) == dedent("""\
         m.osim:3:12: warning OSIM505 strange-gravity
-          gravity is 9806 m/s^2; in millimetres?
+          gravity is 9806 m/s^2; is it in millimetres?
           |
         3 | <gravity>0 -9806 0</gravity>
           |          ^^^^^^^^^
@@ -56,7 +56,7 @@ def test_full(report):
           = in /markerset/asis
 
         m.osim:8:13: error OSIM201 unreadable-value
-          fixed of Marker 'asis' is 'yes', not true or false: OpenSim keeps the
+          fixed of Marker 'asis' is 'yes', expected true or false: OpenSim keeps the
           default, false
           |
         8 | <fixed>yes</fixed>
@@ -73,7 +73,7 @@ def test_concise(report):
     assert render(report, "concise").splitlines()[1:] == [
         "m.osim:7:27: error OSIM301 Marker 'asis': socket_parent_frame names '/grund', but there is no such "
         "PhysicalFrame (did you mean '/ground'?)",
-        "m.osim:8:13: error OSIM201 fixed of Marker 'asis' is 'yes', not true or false: OpenSim keeps the default, "
+        "m.osim:8:13: error OSIM201 fixed of Marker 'asis' is 'yes', expected true or false: OpenSim keeps the default, "
         "false (did you mean 'true'?)",
         "Found 2 errors, 1 warning in 1 file.",
     ]

@@ -13,9 +13,9 @@ import pytest
 
 from osimlite.io.document.source import Source
 from osimlite.lint import Config, Severity, rules, validate
-from osimlite.lint.baseline import without_baseline, write_baseline
-from osimlite.lint.pages import index, page_of
-from osimlite.lint.registry import FAMILIES, RULE_MODULES, Rule, all_rules, groups
+from osimlite.lint.baseline import subtract_baseline, write_baseline
+from osimlite.lint.pages import format_index, format_rule_page
+from osimlite.lint.registry import FAMILIES, RULE_MODULES, Rule, all_rules, rule_groups
 from osimlite.schema.model import CURRENT_VERSION
 from tests.cases import of_each
 
@@ -136,20 +136,20 @@ def test_a_rule_mends_as_its_page_says(rule):
         for finding in checked(path, rule)
         if finding.fix is not None
     }
-    assert kinds == {"": set(), "both": {"safe", "unsafe"}}.get(rule.mends, {rule.mends})
+    assert kinds == {"": set(), "both": {"safe", "unsafe"}}.get(rule.fixes, {rule.fixes})
 
 
 def test_the_index_of_rules_is_that_of_the_rules():
-    # python -c "from osimlite.lint.pages import index; print(index(), end='')" > docs/rules.md
-    assert (HERE.parents[1] / "docs" / "rules.md").read_text(encoding="utf-8") == index()
+    # python -c "from osimlite.lint.pages import format_index; print(format_index(), end='')" > docs/rules.md
+    assert (HERE.parents[1] / "docs" / "rules.md").read_text(encoding="utf-8") == format_index()
 
 
 def test_a_page_says_severity_mends_and_settings():
-    pages = {rule.code: page_of(rule) for rule in all_rules()}
+    pages = {rule.code: format_rule_page(rule) for rule in all_rules()}
     assert pages["OSIM312"].startswith(
         "# illegal-name (OSIM312)\n\nSeverity: error; warning in files of a version before 30500\nFix: none\n"
     )
-    assert "Fix: sometimes, by --fix\n" in pages["OSIM104"]
+    assert "Fix: sometimes, with --fix\n" in pages["OSIM104"]
     assert (
         "- `contact-depth = 0.001` (m): surfaces may start this deep inside each other"
         in pages["OSIM521"]
@@ -225,7 +225,7 @@ def test_a_tag_of_an_old_format_is_called_so(fragment, tag, words):
 
 
 def test_fixture_folders_belong_to_rules():
-    codes = {rule.code for rule in (*all_rules(), *groups())}
+    codes = {rule.code for rule in (*all_rules(), *rule_groups())}
     assert {path.name for path in FIXTURES.iterdir() if path.is_dir()} == codes
 
 
@@ -258,7 +258,7 @@ def test_a_namespace_does_not_hide_the_right_name(tag, nearest):
     assert (finding.suggestion, finding.line, finding.column) == (nearest, 2, 19)
 
 
-GROUPS = [pytest.param(group, id=group.code) for group in groups()]
+GROUPS = [pytest.param(group, id=group.code) for group in rule_groups()]
 
 
 @pytest.mark.parametrize("group", GROUPS)
@@ -304,9 +304,9 @@ def test_a_baseline_of_before_the_faults_had_codes_still_counts(tmp_path):
     write_baseline(tmp_path / "old.json", report)
     text = (tmp_path / "old.json").read_text()
     (tmp_path / "old.json").write_text(re.sub(r"OSIM852\d\d", "OSIM852", text))
-    assert not without_baseline(tmp_path / "old.json", report).findings
+    assert not subtract_baseline(tmp_path / "old.json", report).findings
     (tmp_path / "old.json").write_text(re.sub(r"OSIM852\d\d", "OSIM853", text))
-    assert len(without_baseline(tmp_path / "old.json", report).findings) == 2
+    assert len(subtract_baseline(tmp_path / "old.json", report).findings) == 2
 
 
 def test_a_group_sets_the_severity_of_its_faults():

@@ -12,10 +12,10 @@ import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.io.document.source import Source
 from osimlite.lint import Config, Severity, validate
-from osimlite.lint.baseline import without_baseline, write_baseline
-from osimlite.lint.cache import key_of
+from osimlite.lint.baseline import subtract_baseline, write_baseline
+from osimlite.lint.cache import make_key
 from osimlite.lint.registry import all_rules
-from osimlite.lint.settings import Settings, settings_for
+from osimlite.lint.settings import Settings, load_settings
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / "lint"
 
@@ -41,7 +41,7 @@ def test_settings_come_from_the_nearest_file(tmp_path):
         '[tool.osimlite.per-file-ignores]\n"old/*.osim" = ["structure"]\n'
     )
     (tmp_path / "old" / "deep").mkdir(parents=True)
-    result = settings_for(tmp_path / "old" / "deep")
+    result = load_settings(tmp_path / "old" / "deep")
     assert result.file == tmp_path / "pyproject.toml" and result.fail_on is Severity.WARNING
     old = result.config_for(tmp_path / "old" / "x.osim", Config(ignore=("OSIM505",)))
     assert old.ignore == ("OSIM7", "structure", "OSIM505")
@@ -60,14 +60,14 @@ def test_thresholds_of_a_project_move_what_is_found(tmp_path):
     (tmp_path / "pyproject.toml").write_text(
         "[tool.osimlite.thresholds]\nlargest-gravity = 10000\n"
     )
-    config = settings_for(tmp_path).config_for(tmp_path / "x.osim", Config())
+    config = load_settings(tmp_path).config_for(tmp_path / "x.osim", Config())
     assert dict(config.thresholds) == {"largest-gravity": 10000}
     assert validate(Source(TEXT.encode()), config=config).codes == {"OSIM101": 1}
-    own = settings_for(tmp_path).config_for(
+    own = load_settings(tmp_path).config_for(
         tmp_path / "x.osim", Config(thresholds={"largest-gravity": 5})
     )
     assert validate(Source(TEXT.encode()), config=own).codes == {"OSIM505": 1, "OSIM101": 1}
-    assert key_of("x.osim", config) != key_of("x.osim", own) != key_of("x.osim", Config())
+    assert make_key("x.osim", config) != make_key("x.osim", own) != make_key("x.osim", Config())
 
 
 @pytest.mark.parametrize(
@@ -104,23 +104,27 @@ def test_each_threshold_moves_the_findings_of_its_rule(rule):
 def test_a_finding_is_kept_for_one_version_and_for_the_classes_of_one_day(tmp_path):
     declared = tmp_path / "classes.json"
     declared.write_text("{}")
-    before = key_of("x.osim", Config(classes=(str(declared),)))
+    before = make_key("x.osim", Config(classes=(str(declared),)))
     declared.write_text('{"classes": {}}')
-    keys = {before, key_of("x.osim", Config(classes=(str(declared),))), key_of("x.osim", Config())}
-    assert len({*keys, key_of("x.osim", Config(target_version="4.5"))}) == 4
+    keys = {
+        before,
+        make_key("x.osim", Config(classes=(str(declared),))),
+        make_key("x.osim", Config()),
+    }
+    assert len({*keys, make_key("x.osim", Config(target_version="4.5"))}) == 4
 
 
 def test_an_osimlite_toml_goes_first_and_a_pyproject_without_a_section_is_passed_over(tmp_path):
     (tmp_path / "osimlite.toml").write_text('select = ["references"]\n')
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "pyproject.toml").write_text("[project]\nname = 'x'\n")
-    assert settings_for(tmp_path / "sub").select == ("references",)
+    assert load_settings(tmp_path / "sub").select == ("references",)
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("selct = []", "there is no setting 'selct'; did you mean 'select'?"),
+        ("selct = []", "unknown setting 'selct'; did you mean 'select'?"),
         ('select = ["OSIM999"]', "no rule has the code or name 'OSIM999'"),
         ('select = "OSIM1"', "'select' must be a list of texts"),
         ('severity = "error"', "'severity' must be a table"),
@@ -145,7 +149,7 @@ def test_an_osimlite_toml_goes_first_and_a_pyproject_without_a_section_is_passed
 def test_a_setting_that_makes_no_sense_names_its_file(text, words, tmp_path):
     (tmp_path / "osimlite.toml").write_text(text)
     with pytest.raises(OsimliteError) as caught:
-        settings_for(tmp_path)
+        load_settings(tmp_path)
     assert words in str(caught.value) and "osimlite.toml" in str(caught.value)
 
 
@@ -174,7 +178,7 @@ def test_a_baseline_hides_what_it_knows_and_no_more(tmp_path):
     moved = Source(TEXT.replace("<foo/>", "\n\n<foo/><foo/>").encode(), "m.osim")
     # One finding counts all elements of an unknown name: one more of them makes another message.
     assert validate(moved).codes == {"OSIM505": 1, "OSIM101": 1}
-    assert without_baseline(path, validate(moved)).codes == {"OSIM101": 1}
+    assert subtract_baseline(path, validate(moved)).codes == {"OSIM101": 1}
     assert json.loads(path.read_text())["format"] == 1
 
 
@@ -192,15 +196,15 @@ def test_a_baseline_holds_wherever_the_project_lies(tmp_path, monkeypatch):
         assert geometry in report.findings[0].message
         if place == "here":
             write_baseline(tmp_path / "baseline.json", report)
-    assert not without_baseline(tmp_path / "baseline.json", report).findings
+    assert not subtract_baseline(tmp_path / "baseline.json", report).findings
 
 
 def test_a_file_that_is_no_baseline_is_refused(tmp_path):
     with pytest.raises(OsimliteError, match=r"absent.json: cannot read the file: no such file"):
-        without_baseline(tmp_path / "absent.json", validate(Source(TEXT.encode())))
+        subtract_baseline(tmp_path / "absent.json", validate(Source(TEXT.encode())))
     (tmp_path / "odd.json").write_text("[1]")
-    with pytest.raises(OsimliteError, match="this is no baseline"):
-        without_baseline(tmp_path / "odd.json", validate(Source(TEXT.encode())))
+    with pytest.raises(OsimliteError, match="this is not a baseline"):
+        subtract_baseline(tmp_path / "odd.json", validate(Source(TEXT.encode())))
 
 
 def test_mesh_folders_of_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.lint.engine import run, subject_of
+from osimlite.lint.engine import load_subject, run_rules
 from osimlite.lint.project_files import is_document, is_table
 from tests.lint.setup_faults import FAULTS, HARMLESS, STUDIES, TEXTS, UNTOLD, Fault, put_in
 
@@ -35,7 +35,7 @@ def checked(*files: Path) -> list[tuple[str, int | None, str, str]]:
         (file.name, one.line, one.code, str(one))
         for file in files
         if is_table(file.name) or is_document(file.name)
-        for one in run(subject_of(str(file)))
+        for one in run_rules(load_subject(str(file)))
     ]
 
 
@@ -91,7 +91,7 @@ def test_a_controller_names_actuators_by_their_paths_and_names_of_older_document
     )
     text = text.replace("<enabled>true", f"<{given}</{given.partition('>')[0]}>\n<enabled>true", 1)
     (pipeline / "forward.xml").write_text(text)
-    report = run(subject_of(str(pipeline / "forward.xml")))
+    report = run_rules(load_subject(str(pipeline / "forward.xml")))
     assert [str(finding.severity) for finding in report if finding.code == "OSIM831"] == severities
 
 

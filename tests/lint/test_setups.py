@@ -10,9 +10,9 @@ import pytest
 
 from osimlite.cli._validating import run as validate_paths
 from osimlite.lint import Config, validate
-from osimlite.lint.engine import run, subject_of
+from osimlite.lint.engine import load_subject, run_rules
 from osimlite.lint.many import check_files
-from osimlite.lint.project_files import project_files
+from osimlite.lint.project_files import find_project_files
 from osimlite.schema.registry import MODULES
 
 
@@ -43,7 +43,7 @@ def test_a_folder_is_checked_as_a_whole(project, capsys):
     assert validate_paths(["."], no_cache=True) == 0
     assert capsys.readouterr().out.startswith("Nothing found in 12")
     assert validate(".").checked == 12
-    assert len(project_files([".", project / "ik.xml", "./../project"])) == 12
+    assert len(find_project_files([".", project / "ik.xml", "./../project"])) == 12
     # The name of a marker is changed in the model alone.
     model = project / "leg.osim"
     model.write_text(model.read_text().replace('"knee_marker"', '"knee"'))
@@ -251,7 +251,7 @@ def test_every_class_of_setups_is_checked_by_every_rule(project, tag):
     ):
         text = f'<OpenSimDocument Version="40600"><{tag} name="x">{given}</{tag}></OpenSimDocument>'
         (project / "setup.xml").write_text(text)
-        run(subject_of("setup.xml"))
+        run_rules(load_subject("setup.xml"))
 
 
 @pytest.mark.parametrize(
@@ -262,13 +262,13 @@ def test_no_damage_makes_the_check_fail(project, name):
     draw = random.Random(2)
     for size in range(0, len(good), 41):
         (project / name).write_bytes(good[:size])
-        run(subject_of(name))
+        run_rules(load_subject(name))
     for _ in range(80):
         damaged = bytearray(good)
         for _ in range(draw.randint(1, 3)):
             damaged[draw.randrange(len(damaged))] = draw.choice(b' <>/"=.x9\xff-')
         (project / name).write_bytes(bytes(damaged))
-        run(subject_of(name))
+        run_rules(load_subject(name))
 
 
 @pytest.mark.parametrize(

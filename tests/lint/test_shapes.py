@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, shapes
+from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, compute_shapes
 
 NUMBER = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
@@ -45,7 +45,7 @@ def check(line: bytes, look: bytes, layout: Layout) -> None:
 def test_every_short_line_is_told_right(layout):
     for size in range(1, 5):
         lines = [bytes(characters) for characters in product(b"05.-e \t,x", repeat=size)]
-        looks = shapes(b"\n".join([b"", *lines, b""]), layout)[0].split(b"\n")
+        looks = compute_shapes(b"\n".join([b"", *lines, b""]), layout)[0].split(b"\n")
         for line, look in zip(lines, looks[1:-1], strict=True):
             check(line, look, layout)
 
@@ -54,7 +54,7 @@ def test_every_short_line_is_told_right(layout):
 def test_lines_are_told_each_for_itself(lines):
     block = [line.encode("latin-1") for line in lines]
     for layout in (ROWS, VECTORS, MARKERS):
-        looks = shapes(b"\n".join([b"", *block, b""]), layout)[0].split(b"\n")
+        looks = compute_shapes(b"\n".join([b"", *block, b""]), layout)[0].split(b"\n")
         for line, look in zip(block, looks[1:-1], strict=True):
             check(line, look, layout)
 
@@ -66,4 +66,4 @@ def test_lines_are_told_each_for_itself(lines):
 )
 def test_a_zero_among_markers_is_not_missed(cells):
     zeros = any(cell and not cell.strip("-0.") for cell in cells)
-    assert shapes("\t".join([*cells, "\n"]).encode(), MARKERS)[1] == zeros
+    assert compute_shapes("\t".join([*cells, "\n"]).encode(), MARKERS)[1] == zeros

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.io.document.source import Source
-from osimlite.lint.engine import run, subject_in
-from osimlite.lint.fixes import edits_of, mended
+from osimlite.lint.engine import make_subject, run_rules
+from osimlite.lint.fixes import apply_fixes, select_edits
 
 LINT = Path(__file__).resolve().parents[2] / "fixtures" / "lint"
 MOTION = b"knee\nversion=1\nnRows=3\nnColumns=3\ninDegrees=yes\nendheader\ntime\tknee\thip\n0\t1\t2\n0.1\t1\t3\n0.2\t1\t4\n"
@@ -44,7 +44,7 @@ BROKEN = [
 def mend(name: str, data: bytes, *, unsafe: bool = False) -> bytes:
     for _ in range(5):
         source = Source(data, name)
-        data, count = mended(source, run(subject_in(source)), unsafe=unsafe)
+        data, count = apply_fixes(source, run_rules(make_subject(source)), unsafe=unsafe)
         if not count:
             break
     return data
@@ -155,6 +155,6 @@ def test_mends_of_many_rows_are_many_edits():
     head[2] = b"100\t100\t3000\t1\tm\t100\t1\t3000"
     head[3], head[4] = b"Frame#\tTime\tasis", b"\t\tX1\tY1\tZ1"
     data = b"\n".join([*head, b"", rows])
-    report = run(subject_in(Source(data, "a.trc")))
-    assert len(edits_of(report)[0]) == 3000
+    report = run_rules(make_subject(Source(data, "a.trc")))
+    assert len(select_edits(report)[0]) == 3000
     assert mend("a.trc", data) == data.replace(b"\t\t\t\n", b"\n")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from osimlite.lint.engine import run
+from osimlite.lint.engine import run_rules
 from osimlite.lint.table import Table
 
 STORAGE = (
@@ -110,9 +110,9 @@ def test_a_fault_is_found_in_its_line_and_column(name, good, change):
     if name == "blanks in version 3 in storage":
         text = text.replace("\t", " ")
     file = "w.sto" if good is STORAGE else "w.trc"
-    result = run(Table(text.encode(), file)).findings
+    result = run_rules(Table(text.encode(), file)).findings
     assert [f"{finding.code} {finding.line}:{finding.column}" for finding in result] == wanted
-    windows = run(Table(text.replace("\n", "\r\n").encode(), file)).findings
+    windows = run_rules(Table(text.replace("\n", "\r\n").encode(), file)).findings
     assert [(finding.line, finding.column) for finding in windows] == [
         (one.line, one.column) for one in result
     ]

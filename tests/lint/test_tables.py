@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.lint import Config
-from osimlite.lint.engine import run, subject_of
+from osimlite.lint.engine import load_subject, run_rules
 from osimlite.lint.many import check_files
-from osimlite.lint.scan import Scan
+from osimlite.lint.scan import RowScanner
 from osimlite.lint.table import Table
 
 
@@ -33,7 +33,7 @@ def test_rows_of_numbers_in_any_form_have_no_fault(draw, columns, count, separat
         for row in range(count)
     ]
     text = draw.choice(["\n", "\r\n"]).join([*lines, ""])
-    rows = Scan(columns + 1).run(text.encode(), 0, 1)
+    rows = RowScanner(columns + 1).scan(text.encode(), 0, 1)
     assert (rows.count, list(rows.times), rows.faults) == (
         count,
         [row / 8 for row in range(count)],
@@ -71,7 +71,7 @@ def test_a_cell_that_is_no_number_is_found_where_it_is(draw, columns, count, wro
     ]
     row, column = draw.randrange(count), draw.randint(1, columns)
     rows[row][column] = wrong
-    result = Scan(columns + 1).run(
+    result = RowScanner(columns + 1).scan(
         "".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 5
     )
     (fault,) = result.faults.values()
@@ -86,7 +86,7 @@ def test_a_row_of_another_length_is_found(draw, columns, count, longer):
     ]
     row = draw.randrange(count)
     rows[row] = [*rows[row], "7"] if longer else rows[row][:-1]
-    result = Scan(columns + 1).run(
+    result = RowScanner(columns + 1).scan(
         "".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 1
     )
     (fault,) = result.faults.values()
@@ -100,7 +100,7 @@ def test_no_bytes_make_the_check_fail(data, name, more):
             [b"", b"x\nversion=1\nnRows=1\nendheader\ntime\ta\n0\t1\n", b"PathFileType\t4\n"]
         )
     )
-    run(Table(start + data, name))
+    run_rules(Table(start + data, name))
 
 
 @pytest.mark.parametrize("name", ["walk.trc", "walk.mot"])
@@ -108,12 +108,12 @@ def test_no_cut_and_no_changed_byte_makes_the_check_fail(fixtures, name):
     good = next((fixtures / "lint" / "OSIM801").glob("pass-*" + name[-4:])).read_bytes()
     draw = random.Random(1)
     for size in range(0, len(good), 3):
-        run(Table(good[:size], name))
+        run_rules(Table(good[:size], name))
     for _ in range(300):
         damaged = bytearray(good)
         for _ in range(draw.randint(1, 4)):
             damaged[draw.randrange(len(damaged))] = draw.choice(b"\t\n\r 019.-eEnaN,=\xff#")
-        run(Table(bytes(damaged), name))
+        run_rules(Table(bytes(damaged), name))
 
 
 def test_a_table_is_taken_from_the_cache(fixtures, tmp_path, monkeypatch):
@@ -123,7 +123,7 @@ def test_a_table_is_taken_from_the_cache(fixtures, tmp_path, monkeypatch):
     Path("walk.sto").write_text(text)
     first = check_files(["walk.sto"], Config())
     assert dict(first.codes) == {"OSIM807": 2}
-    monkeypatch.setattr("osimlite.lint.many.check_one", None)
+    monkeypatch.setattr("osimlite.lint.many.check_job", None)
     assert check_files(["walk.sto"], Config()).findings == first.findings
 
 
@@ -135,8 +135,8 @@ def test_a_file_of_many_blocks_is_one_table(tmp_path, monkeypatch):
     path.write_text(
         "x\nversion=1\nnRows=200\nnColumns=3\nendheader\ntime\ta\tb\n" + "\n".join(lines)
     )
-    table = subject_of(str(path))
-    (finding,) = run(table).findings
+    table = load_subject(str(path))
+    (finding,) = run_rules(table).findings
     assert (finding.code, finding.line, finding.column) == ("OSIM807", 157, 10)
     assert isinstance(table, Table)
     assert (table.span, round(table.step, 9), table.rows.line_of(199)) == ((0.0, 1.99), 0.01, 206)
@@ -151,7 +151,7 @@ def test_the_last_row_twice_is_how_opensim_ends_some_results(tmp_path, times, se
     file.write_text(
         f"states\nversion=1\nnRows=4\nnColumns=2\ninDegrees=no\nendheader\ntime knee\n{rows}"
     )
-    (finding,) = run(subject_of(str(file))).findings
+    (finding,) = run_rules(load_subject(str(file))).findings
     assert (finding.code, str(finding.severity)) == ("OSIM808", severity)
 
 
@@ -160,14 +160,14 @@ def test_rows_of_vectors_are_taken_many_at_a_time(monkeypatch: pytest.MonkeyPatc
     lines = [f"{0.1 * k:.1f}\t1,-2e-3,{k}\t0.5,0.25,-1\n" for k in range(50)]
     lines[20] = "2.0\t1,2\t0.5,0.25,-1\n"
     odd: list[int] = []
-    one_by_one = Scan.report_odd_line
+    one_by_one = RowScanner.examine_odd_line
 
-    def noted(scan: Scan, text: bytes, line: int) -> None:
+    def noted(scan: RowScanner, text: bytes, line: int) -> None:
         odd.append(line)
         one_by_one(scan, text, line)
 
-    monkeypatch.setattr(Scan, "report_odd_line", noted)
-    result = Scan(3, 3).run("".join(lines).encode(), 0, 7)
+    monkeypatch.setattr(RowScanner, "examine_odd_line", noted)
+    result = RowScanner(3, 3).scan("".join(lines).encode(), 0, 7)
     assert odd == [27] and result.count == 50 and list(result.times[:2]) == [0.0, 0.1]
     assert [(fault.kind, fault.line) for fault in result.faults.values()] == [("cell", 27)]
     assert result.samples[1] == [0.1, 1.0, -2e-3, 1.0, 0.5, 0.25, -1.0]

@@ -223,7 +223,7 @@ def test_a_mesh_with_a_backslash_is_found_on_windows_alone(tmp_path: Path):
         assert finding.code == "OSIM701" and finding.suggestion == "geo/bone.obj"
     path.write_text(small_model(children=mesh.format("geo\\skull.obj")))
     (finding,) = validate(path, ignore="OSIM63").findings
-    assert "is not there" in finding.message and finding.suggestion is None
+    assert "was not found" in finding.message and finding.suggestion is None
 
 
 @pytest.mark.parametrize("kind", ["Schutte1993Muscle_Deprecated", "Delp1990Muscle_Deprecated"])

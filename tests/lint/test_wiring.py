@@ -10,7 +10,7 @@ import pytest
 
 from osimlite.io.document.source import Source
 from osimlite.lint import validate
-from osimlite.lint.axes import axes_refused
+from osimlite.lint.axes import refuses_axes
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.registry import MODULES
@@ -123,7 +123,7 @@ def joint(declared, *names):
     ],
 )
 def test_axes_are_refused_as_opensim_does(declared, names, refused):
-    assert axes_refused(joint(declared, *names)) is refused
+    assert refuses_axes(joint(declared, *names)) is refused
 
 
 @pytest.mark.parametrize(

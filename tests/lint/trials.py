@@ -10,9 +10,9 @@ import re
 from osimlite.io.document.source import Position
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
-from osimlite.lint.engine import run
+from osimlite.lint.engine import run_rules
 from osimlite.lint.registry import Rule
-from osimlite.lint.trial import KINDS, Number, Trial
+from osimlite.lint.trial import STATISTICS, Measurement, Trial
 
 LINE = re.compile(
     r"(?P<kind>[a-z-]+)(?P<of> .*): (?P<value>[\d.]+) (?P<unit>[^,]*?)(, with .* of (?P<scale>[\d.]+) .*)?"
@@ -25,9 +25,13 @@ def trial_in(text: str, rule: Rule, config: Config | None = None) -> Trial:
     for number, line in enumerate(text.splitlines(), start=1):
         said = LINE.fullmatch(line)
         assert said is not None, line
-        of = said["of"].removeprefix(" of ") if said["kind"] in KINDS else said["kind"] + said["of"]
+        of = (
+            said["of"].removeprefix(" of ")
+            if said["kind"] in STATISTICS
+            else said["kind"] + said["of"]
+        )
         numbers.append(
-            Number(
+            Measurement(
                 rule.name, said["kind"], of, float(said["value"]), said["unit"], float(said["scale"] or "nan"),
                 at=Position(number, 1),
             )
@@ -37,4 +41,4 @@ def trial_in(text: str, rule: Rule, config: Config | None = None) -> Trial:
 
 def checked_trial(text: str, rule: Rule, config: Config | None = None) -> Report:
     """What rules find in these numbers."""
-    return run(trial_in(text, rule, config))
+    return run_rules(trial_in(text, rule, config))

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from osimlite.errors import OsimliteError
-from osimlite.lint.diagnostic import merged
+from osimlite.lint.diagnostic import merge_reports
 from osimlite.moco import solve
 from osimlite.tools.running import FaultySetup
 from osimlite.tools.running import run as run_setup
@@ -41,7 +41,7 @@ def said_of(study):
         try:
             found = run_setup(study, study.parent / "out").warnings
         except FaultySetup as error:
-            found = merged([error.report]).findings
+            found = merge_reports([error.report]).findings
     return refusal, found
 
 

@@ -17,10 +17,10 @@ import opensim
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.lint.measures import Measures, Pose
-from osimlite.lint.measuring import measured
+from osimlite.lint.measuring import measure_model
 from osimlite.lint.measuring.jumps import ASIDE
-from osimlite.lint.measuring.muscles import REST
-from osimlite.lint.measuring.sweeps import tied
+from osimlite.lint.measuring.muscles import REST_ACTIVATION
+from osimlite.lint.measuring.sweeps import find_tied_coordinates
 from tests.oracle.opensim_runs import put
 
 BEYOND = 0.05
@@ -33,7 +33,7 @@ class Beside:
     def __init__(self, file: Path) -> None:
         opensim.Logger.setLevelString("off")
         self.model = osimlite.read(file)
-        self.measures: Measures = measured(self.model, compiles=True)
+        self.measures: Measures = measure_model(self.model, compiles=True)
         self.theirs = opensim.Model(str(file))
         self.state = self.theirs.initSystem()
         self.paths, self.right = osimlite.paths(self.model), osimlite.paths(self.model, "geodesic")
@@ -89,7 +89,7 @@ class Beside:
         places = [
             self.paths.mechanism.coordinate_index(value.coordinate) for value in item.pose.values
         ]
-        return not tied(self.paths, self.default)[places].any()
+        return not find_tied_coordinates(self.paths, self.default)[places].any()
 
     def _of_points(self) -> Iterator[tuple[str, str, float, float]]:
         tree = self.model.tree()
@@ -131,7 +131,7 @@ class Beside:
             muscle = self._muscle(reach.owner)
             self.at(reach.pose)
             if not muscle.get_ignore_activation_dynamics():
-                muscle.setActivation(self.state, 1.0 if reach.is_active else REST)
+                muscle.setActivation(self.state, 1.0 if reach.is_active else REST_ACTIVATION)
             try:
                 muscle.computeEquilibrium(self.state)
             except RuntimeError:

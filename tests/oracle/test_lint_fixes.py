@@ -11,7 +11,7 @@ import pytest
 
 from osimlite.io.document.source import Source
 from osimlite.lint import validate
-from osimlite.lint.fixes import mended
+from osimlite.lint.fixes import apply_fixes
 from tests.oracle.test_lint_corpus_references import victim
 
 pytestmark = pytest.mark.oracle
@@ -28,7 +28,7 @@ _spec.loader.exec_module(faults)
 def safely_mended(text: str) -> tuple[str, int]:
     """The text after the safe mends, and how many these were."""
     source = Source(text.encode())
-    data, count = mended(source, validate(source, ignore="OSIM63"))
+    data, count = apply_fixes(source, validate(source, ignore="OSIM63"))
     return data.decode(), count
 
 

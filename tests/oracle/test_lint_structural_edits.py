@@ -29,11 +29,11 @@ WANTED = int(os.environ.get("OSIMLITE_EDITS", choose("20", "100")))
 SECONDS = 60 if "OSIMLITE_EDITS" not in os.environ else 7200
 LARGEST = 150_000 if "OSIMLITE_EDITS" not in os.environ else 10_000_000
 
-REFUSES = re.compile(r"(?:OpenSim|and) (?:refuses|crashes|cannot load)|which refuses it")
+REFUSES = re.compile(r"(?:OpenSim|and) (?:refuses|rejects|crashes|cannot load)|which rejects it")
 # Words of another fate, or of a refusal that is only one of several.
 ELSE = re.compile(
-    r"OpenSim (?:ignores|takes the first|keeps)|leaves the object out|crashes or|, or |needs (?:one|a value)|"
-    r"others refuse|makes \w+ up|switches the whole"
+    r"OpenSim (?:ignores|takes the first|uses the first|keeps)|leaves the object out|crashes or|, or |needs (?:one|a value)|"
+    r"other programs reject|OpenSim creates|disables the whole"
 )
 # Rules whose page says that OpenSim refuses whatever they find.
 ALWAYS = re.compile(r"OSIM(?:107|209|30[1-5]|312|33[123]|402|405|41[13]|501|611|615|622)")

@@ -207,7 +207,7 @@ def test_what_opensim_refuses_is_refused(tmp_path: Path, tag: str) -> None:
     )
     done = run("run", "so.xml", folder=folder)
     assert done.code == 2
-    assert "OpenSim refuses to load the file" in done.err
+    assert "OpenSim rejects the file" in done.err
 
 
 def test_an_empty_switch_of_an_older_class_is_off(tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def test_the_command_runs_from_anywhere_and_writes_where_it_is_told(
 
 def test_a_misspelt_name_is_told_with_its_line_and_nothing_is_written(setup: Path) -> None:
     setup.write_text(SETUP.replace("walk.mot", "wlak.mot"))
-    with pytest.raises(FaultySetup, match=r"setup\.xml:7:.*'wlak\.mot'.* is not there") as caught:
+    with pytest.raises(FaultySetup, match=r"setup\.xml:7:.*'wlak\.mot'.* does not exist") as caught:
         osimlite.run(setup)
     assert caught.value.report.errors
     done = run("run", "setup.xml", folder=setup.parent)

@@ -12,14 +12,14 @@ from osimlite.cli.language_server.text import Text
 from osimlite.io.document.source import Position, Source
 from osimlite.io.document.spans import Span
 from osimlite.io.document.survey import survey
-from osimlite.lint.checked import Checked
+from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
-from osimlite.lint.engine import run, subject_in, use_classes
+from osimlite.lint.engine import make_subject, run_rules, use_classes
 from osimlite.lint.measures import MEASURES
-from osimlite.lint.project_files import BEGINNING, is_ours, is_table
+from osimlite.lint.project_files import BEGINNING, is_opensim_xml, is_table
 from osimlite.lint.registry import all_rules
-from osimlite.lint.settings import settings_for
+from osimlite.lint.settings import load_settings
 from osimlite.lint.setup import Setup
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Component, Object
@@ -67,7 +67,7 @@ class Analysis:
         self.recalls = recalls
         self.is_table = is_table(file)
         beginning = text.content[:BEGINNING].encode("utf-8", "replace")
-        self.is_foreign = file.lower().endswith(".xml") and not is_ours(beginning)
+        self.is_foreign = file.lower().endswith(".xml") and not is_opensim_xml(beginning)
 
     @cached_property
     def source(self) -> Source:
@@ -82,7 +82,7 @@ class Analysis:
     @cached_property
     def config(self) -> Config:
         """What the project asks for; raises OsimliteError if that makes no sense."""
-        return settings_for(Path(self.file).resolve().parent).config_for(self.file, Config())
+        return load_settings(Path(self.file).resolve().parent).config_for(self.file, Config())
 
     def cursor(self, offset: int) -> Cursor:
         """What stands at an offset."""
@@ -91,20 +91,24 @@ class Analysis:
         return cursor_at(self.markup, min(offset, len(self.markup)))
 
     @cached_property
-    def subject(self) -> Checked:
+    def subject(self) -> CheckTarget:
         """What the rules look at.
 
         Raises:
             OsimliteError: the settings of the project make no sense.
         """
-        return Checked(self.config) if self.is_foreign else subject_in(self.source, self.config)
+        return (
+            CheckTarget(self.config) if self.is_foreign else make_subject(self.source, self.config)
+        )
 
     @cached_property
     def report(self) -> Report:
         """What the rules find."""
         # Measuring paths takes too long for every change of a text.
         return (
-            Report([]) if self.is_foreign else run(self.subject, measure=False, recall=self.recalls)
+            Report([])
+            if self.is_foreign
+            else run_rules(self.subject, measure=False, recall=self.recalls)
         )
 
     @property
@@ -115,7 +119,7 @@ class Analysis:
             subject is None
             or subject.model is None
             or subject.config.classes
-            or MEASURES in subject.kept
+            or MEASURES in subject.cache
         ):
             return False
         return any(known.about == MEASURES and subject.is_for(known) for known in all_rules())
@@ -127,7 +131,7 @@ class Analysis:
         meanwhile.
         """
         source = Source.of_characters(self.text.content, self.file)
-        return run(Subject(survey(source, of=Model), self.config))
+        return run_rules(Subject(survey(source, of=Model), self.config))
 
     @property
     def is_checked(self) -> bool:
@@ -243,13 +247,13 @@ class Analysis:
         text = str(use.value).strip()
         if use.reference.rule in ("file", "output-file"):
             path = (
-                setup.place(text)
+                setup.resolve_path(text)
                 if setup is not None
                 else os.path.join(os.path.dirname(self.file), text)
             )
             return Target(path) if os.path.isfile(path) else None
         if use.reference.rule == "column" and setup is not None:
-            table = setup.table(getattr(setup.top, "datafile", ""))
+            table = setup.read_table(getattr(setup.top, "datafile", ""))
             labels = (
                 ()
                 if table is None
@@ -269,7 +273,10 @@ class Analysis:
             # A study may hold its model itself.
             return self._target(setup.model_file or setup.tool[0], result)
         named = (
-            (file, item) for file, top in setup.added for item in top.walk() if item.name == text
+            (file, item)
+            for file, top in setup.added_sets
+            for item in top.walk()
+            if item.name == text
         )
         return next(
             (

@@ -11,7 +11,7 @@ from osimlite.base.text import escape_unprintable
 from osimlite.cli.language_server.analysis import Analysis
 from osimlite.io.document.source import Position
 from osimlite.lint.diagnostic import Edit, Finding, Severity
-from osimlite.lint.fixes import edits_of
+from osimlite.lint.fixes import select_edits
 
 _ENDS_HEADER = re.compile(r"(\r?\n)([ \t]*endheader)")
 
@@ -82,7 +82,7 @@ def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.Cod
                     edit=types.WorkspaceEdit({uri: [ignoring]}),
                 )
             )
-    safe = _edits(analysis, edits_of(analysis.report)[0])
+    safe = _edits(analysis, select_edits(analysis.report)[0])
     if safe:
         result.append(
             types.CodeAction(

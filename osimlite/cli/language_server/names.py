@@ -10,7 +10,7 @@ from typing import NamedTuple
 from osimlite.base.files import get_relative_path
 from osimlite.cli.language_server.analysis import Analysis
 from osimlite.cli.language_server.cursor import Cursor, Element
-from osimlite.lint.beside import beginning, folders_in
+from osimlite.lint.beside import list_folders, read_beginning
 from osimlite.lint.setup import Setup
 from osimlite.schema.base import Component
 from osimlite.schema.fields import Reference
@@ -83,7 +83,7 @@ def names(
             reference.target.removesuffix(" file").partition(" or ")[0],
         )
     elif reference.rule == "column":
-        table = None if setup is None else setup.table(getattr(setup.top, "datafile", ""))
+        table = None if setup is None else setup.read_table(getattr(setup.top, "datafile", ""))
         columns = [] if table is None else table.columns
         for prefix in dict.fromkeys(column[:-1] for column in columns if column[-1:] in "xyzXYZ"):
             yield Name(prefix, " ".join(column for column in columns if column.startswith(prefix)))
@@ -123,12 +123,12 @@ def _components(tree: Tree, reference: Reference, owner: Component) -> Iterator[
 def _in_tool(setup: Setup, tree: Tree, reference: Reference) -> Iterator[Name]:
     """Names in the model of the tool and in what the tool adds to it; those that were measured are the likely ones."""
     if reference.rule == "set-member":
-        known = [Name(text) for text in sorted(setup.names_of(reference.target))]
+        known = [Name(text) for text in sorted(setup.list_names(reference.target))]
     else:
         known = list(_components(tree, reference, tree.model))
         added = (
-            setup.names_of(reference.target) - {name.text for name in known}
-            if setup.added
+            setup.list_names(reference.target) - {name.text for name in known}
+            if setup.added_sets
             else set()
         )
         known += [
@@ -151,7 +151,7 @@ def measured(setup: Setup) -> tuple[str, list[str]] | None:
     """The file of the markers that the tool is given, and their labels; None if there is none."""
     for item in setup.tool[1].walk() if setup.tool is not None else ():
         name = str(getattr(item, "marker_file", "")).strip()
-        table = setup.table_of_tool(name)
+        table = setup.read_tool_table(name)
         if table is not None:
             return name, table.columns
     return None
@@ -160,9 +160,9 @@ def measured(setup: Setup) -> tuple[str, list[str]] | None:
 def _files(folder: str, content: str) -> Iterator[Name]:
     """The files in a folder and in those below it that may hold something."""
     suffixes = _SUFFIXES.get(content, (".xml",))
-    for place in (folder, *map(str, folders_in(Path(folder))[:50])):
+    for place in (folder, *map(str, list_folders(Path(folder))[:50])):
         for path in _listed(place, suffixes):
-            likely = content in _SUFFIXES or f"<{content}".encode() in beginning(path)
+            likely = content in _SUFFIXES or f"<{content}".encode() in read_beginning(path)
             yield Name(get_relative_path(path, folder), content if likely else "", likely)
 
 

@@ -15,7 +15,7 @@ from osimlite.cli.language_server.analysis import Analysis, Target
 from osimlite.cli.language_server.text import Text
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.io.document.source import Source
-from osimlite.lint.beside import documents_of, folders_in
+from osimlite.lint.beside import list_documents, list_folders
 from osimlite.schema.base import Component
 from osimlite.schema.editing import rename
 from osimlite.schema.resolution import ILLEGAL_CHARACTERS, last_name
@@ -81,7 +81,7 @@ class Project:
         result = []
         for uri, other in self.open.items():
             if other is not analysis and other.is_checked:
-                outside = other.subject.outside()
+                outside = other.subject.list_outside_paths()
                 if outside is None or path in map(os.path.realpath, outside):
                     result.append(uri)
         return result
@@ -109,9 +109,9 @@ class Project:
         yield own
         real = os.path.realpath(target.file)
         here = Path(real).parent
-        folders = [here, here.parent, *folders_in(here), *folders_in(here.parent)]
+        folders = [here, here.parent, *list_folders(here), *list_folders(here.parent)]
         for folder in dict.fromkeys(map(os.path.realpath, folders)):
-            for path in documents_of(folder) or ():
+            for path in list_documents(folder) or ():
                 other = self.analysis(path) if os.path.realpath(path) != real else None
                 if other is not None and target.item.name in other.text.content:
                     yield other

@@ -34,7 +34,7 @@ from osimlite.cli.language_server.protocol import (
 from osimlite.cli.language_server.text import Text
 from osimlite.errors import OsimliteError
 from osimlite.io.document.printer import formatted as formatted_text
-from osimlite.lint.settings import settings_for
+from osimlite.lint.settings import load_settings
 
 PAUSE = 0.02
 """A check begins when nothing has been typed for so long, s."""
@@ -199,13 +199,13 @@ def _add_files(server: Server) -> None:
     @server.feature(types.TEXT_DOCUMENT_DID_SAVE)
     async def saved(_: Server, params: types.DidSaveTextDocumentParams) -> None:
         # Settings and files that others name may have changed, of which their texts know nothing.
-        settings_for.cache_clear()
+        load_settings.cache_clear()
         files = server.project.open.items()
         server.check_again([uri for uri, file in files if not (file.is_table and file.is_checked)])
 
     @server.feature(types.WORKSPACE_DID_CHANGE_WATCHED_FILES)
     async def watched(_: Server, params: types.DidChangeWatchedFilesParams) -> None:
-        settings_for.cache_clear()
+        load_settings.cache_clear()
         changed = {change.uri for change in params.changes}
         is_settings = any(uri.endswith(".toml") for uri in changed)
         files = server.project.open.items()

@@ -1,5 +1,5 @@
 """Paths and muscles measured over the ranges of the coordinates, for the rules of the linter that are about that."""
 
-from osimlite.lint.measuring.model import measured
+from osimlite.lint.measuring.model import measure_model
 
-__all__ = ["measured"]
+__all__ = ["measure_model"]

@@ -177,7 +177,7 @@ class _Construction:
         except OsimliteError as error:
             yield self.describe(error, Stage.ACCELERATION)
             return
-        status = _evaluate(system, state)
+        status = _evaluate_accelerations(system, state)
         if status == OUTCOME.SINGULAR_MASS:
             if not _is_indefinite(mechanism, q):
                 yield self.describe_inertia(system, state)
@@ -189,17 +189,17 @@ class _Construction:
             elif isinstance(refusal, SimulationError) and status == OUTCOME.SINGULAR_RATES:
                 yield self.describe(refusal, Stage.ACCELERATION)
             elif status is None:
-                yield Obstacle(Stage.ACCELERATION, "", "the accelerations are no numbers")
+                yield Obstacle(Stage.ACCELERATION, "", "the accelerations are not finite")
         elif not np.isfinite(np.array(system.found())[: 2 * len(system.order)]).all():
             culprits = [*self.find_culprits(mechanism, forces, q, u)]
             yield from culprits or [
-                Obstacle(Stage.ACCELERATION, "", "the accelerations are no numbers")
+                Obstacle(Stage.ACCELERATION, "", "the accelerations are not finite")
             ]
         else:
             yield from self.find_rates(system)
 
     def find_rates(self, system: System) -> Iterator[Obstacle]:
-        """Yield the auxiliary states whose rates are no numbers."""
+        """Yield the auxiliary states whose rates are not numbers."""
         rates = system.found()[2 * len(system.order) :]
         for variable, rate in zip(system.state.variables, rates, strict=True):
             if not isfinite(rate):
@@ -209,7 +209,7 @@ class _Construction:
                 yield Obstacle(
                     Stage.RATE,
                     owner,
-                    f"the rate of {name} of {called} is no number where the model starts: "
+                    f"the rate of {name} of {called} is not finite where the model starts: "
                     "OpenSim's integrator stops there unless muscles are equilibrated first",
                 )
 
@@ -226,7 +226,7 @@ class _Construction:
     def find_culprits(
         self, mechanism: Mechanism, forces: Forces, q: Array, u: Array
     ) -> Iterator[Obstacle]:
-        """Yield the forces that alone make accelerations that are no numbers."""
+        """Yield the forces that alone make accelerations that are not numbers."""
         if not _is_computed(mechanism, Forces(()), q, u):
             # Other rules report NaN among the numbers of the mechanism.
             return
@@ -239,8 +239,8 @@ class _Construction:
             yield Obstacle(
                 Stage.ACCELERATION,
                 element.path,
-                f"{kind} '{element.path.rpartition('/')[2]}' gives no number in the default pose, "
-                "so that every acceleration is NaN or infinite",
+                f"{kind} '{element.path.rpartition('/')[2]}' gives no finite number in the "
+                "default pose, so every acceleration is NaN or infinite",
             )
 
     # ------------------------------------------------------------------------------------ helpers
@@ -275,13 +275,13 @@ def _is_computed(mechanism: Mechanism, forces: Forces, q: Array, u: Array) -> bo
     except OsimliteError:
         # A probe reads another element.
         return True
-    status = _evaluate(system, system.state.pack(q.tolist(), u.tolist()))
+    status = _evaluate_accelerations(system, system.state.pack(q.tolist(), u.tolist()))
     if status == OUTCOME.OK:
         return bool(np.isfinite(np.array(system.found())[: 2 * len(system.order)]).all())
     return status in (OUTCOME.SINGULAR_MASS, OUTCOME.SINGULAR_RATES, OUTCOME.UNSOLVED)
 
 
-def _evaluate(system: System, state: list[float]) -> int | None:
+def _evaluate_accelerations(system: System, state: list[float]) -> int | None:
     """Evaluate the accelerations and return the status, or None if a result is not finite.
 
     Kernels that run as Python raise where machine code computes a number that is none.

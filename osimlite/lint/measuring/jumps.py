@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from osimlite.lint.measures import Jump
+from osimlite.lint.measures import PathJump
 from osimlite.lint.measuring.sweeps import Sweep
 from osimlite.mechanics.kernels.paths import CONDITIONAL
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.paths import Paths
 
-LEAST = 1e-3
+MIN_JUMP_M = 1e-3
 """A jump (m) that is told; smaller ones are not looked for."""
 ASIDE = 1e-4
 """How far (rad or m) on either side of a jump lengths are taken: OpenSim's conditional points,
@@ -23,7 +23,7 @@ which come 1e-5 before their range and go 1e-5 after it, are all there or gone t
 """
 
 
-class Suspect(NamedTuple):
+class JumpSuspect(NamedTuple):
     """An interval of a sweep in which the length of a path may jump."""
 
     # by how much the length changes otherwise than next to the interval, m; infinite at a
@@ -36,36 +36,41 @@ class Suspect(NamedTuple):
     ends: tuple[float, float]  # of the interval
 
 
-def jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[Jump]:
+def find_jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[PathJump]:
     """The greatest jump of the length of each path that has one.
 
     They are looked for where conditional points come or go, and between values where a length
     changes otherwise than next to them: there a jump can hardly be greater than the difference.
     """
-    suspects = [suspect for sweep in looked_at for suspect in _suspects(paths, sweep)]
+    suspects = [suspect for sweep in looked_at for suspect in _find_suspects(paths, sweep)]
     if not suspects:
         return
-    values = _narrowed(paths, suspects)
-    sides = np.array([_beside(item, value) for item, value in zip(suspects, values, strict=True)])
+    values = _bisect_suspects(paths, suspects)
+    sides = np.array(
+        [_compute_side_poses(item, value) for item, value in zip(suspects, values, strict=True)]
+    )
     sides = sides.reshape(2 * len(suspects), -1)
     both = paths.system.lengths_of([item.path for item in suspects for _ in range(2)], sides)
     sizes = np.abs(np.diff(both.reshape(-1, 2), axis=1))[:, 0].tolist()
     greatest: dict[int, int] = {}
     for k in sorted(range(len(suspects)), key=lambda k: (suspects[k].path, -suspects[k].excess)):
         suspect, values_of = suspects[k], suspects[k].sweep.values
-        known = sizes[greatest[suspect.path]] if suspect.path in greatest else LEAST
+        known = sizes[greatest[suspect.path]] if suspect.path in greatest else MIN_JUMP_M
         is_inside = values_of[0] + ASIDE < values[k] < values_of[-1] - ASIDE
         if is_inside and sizes[k] > known and not suspect.excess < known:
             greatest[suspect.path] = k
     names = [*paths.routes]
     for path, k in greatest.items():
         sweep, name = suspects[k].sweep, names[path]
-        yield Jump(
-            name, sizes[k], sweep.pose(values[k]), _changed(paths, name, sides[2 * k : 2 * k + 2])
+        yield PathJump(
+            name,
+            sizes[k],
+            sweep.pose(values[k]),
+            _find_changed_parts(paths, name, sides[2 * k : 2 * k + 2]),
         )
 
 
-def _suspects(paths: Paths, sweep: Sweep) -> Iterator[Suspect]:
+def _find_suspects(paths: Paths, sweep: Sweep) -> Iterator[JumpSuspect]:
     changes = np.diff(sweep.lengths, axis=0)
     usual = np.full_like(changes, np.nan)
     if len(changes) > 2:
@@ -78,13 +83,15 @@ def _suspects(paths: Paths, sweep: Sweep) -> Iterator[Suspect]:
         for point in route.points:
             if point.kind == CONDITIONAL and point.coordinate == sweep.place:
                 for end in point.range:
-                    yield Suspect(inf, 0.0, sweep, path, 0, (end, end))
-        for k in np.flatnonzero(excess[:, path] > LEAST) if route.surfaces else ():
+                    yield JumpSuspect(inf, 0.0, sweep, path, 0, (end, end))
+        for k in np.flatnonzero(excess[:, path] > MIN_JUMP_M) if route.surfaces else ():
             ends = float(values[k]), float(values[k + 1])
-            yield Suspect(float(excess[k, path]), float(usual[k, path]), sweep, path, int(k), ends)
+            yield JumpSuspect(
+                float(excess[k, path]), float(usual[k, path]), sweep, path, int(k), ends
+            )
 
 
-def _narrowed(paths: Paths, suspects: Sequence[Suspect]) -> list[float]:
+def _bisect_suspects(paths: Paths, suspects: Sequence[JumpSuspect]) -> list[float]:
     """The value in each interval at which the length of the path changes most, besides the usual change."""
     low, high = np.array([item.ends for item in suspects]).T
     first, last, active = low, high, high - low > ASIDE
@@ -110,13 +117,13 @@ def _narrowed(paths: Paths, suspects: Sequence[Suspect]) -> list[float]:
     return np.where([item.excess < inf for item in suspects], 0.5 * (low + high), low).tolist()
 
 
-def _beside(suspect: Suspect, value: float) -> Array:
+def _compute_side_poses(suspect: JumpSuspect, value: float) -> Array:
     """The poses (2, n) on both sides of a value."""
     beside = np.array([value - ASIDE, value + ASIDE])
-    return suspect.sweep.at(beside, suspect.sweep.before(beside))
+    return suspect.sweep.interpolate_poses(beside, suspect.sweep.find_poses_before(beside))
 
 
-def _changed(paths: Paths, name: str, sides: Array) -> tuple[str, ...]:
+def _find_changed_parts(paths: Paths, name: str, sides: Array) -> tuple[str, ...]:
     """Names of the points and surfaces that a path runs through on one side only."""
     route = paths.routes[name]
     assert isinstance(route, ThroughPoints)

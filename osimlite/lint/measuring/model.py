@@ -12,14 +12,14 @@ from osimlite.lint.measures import (
     Measures,
     NoMachineCodeError,
     Pose,
-    swept_places,
-    together,
+    find_swept_coordinates,
+    merge_measures,
 )
-from osimlite.lint.measuring.jumps import jumps
-from osimlite.lint.measuring.muscles import fibers_of, reach_of, start_of
-from osimlite.lint.measuring.points import moving_points
-from osimlite.lint.measuring.sweeps import Sweep, sweeps
-from osimlite.lint.measuring.wrapping import wrappings
+from osimlite.lint.measuring.jumps import find_jumps
+from osimlite.lint.measuring.muscles import compute_reach, compute_start, find_fibers
+from osimlite.lint.measuring.points import measure_moving_points
+from osimlite.lint.measuring.sweeps import Sweep, sweep_coordinates
+from osimlite.lint.measuring.wrapping import compare_wrappings
 from osimlite.mechanics.multibody.constraints import Coupler, Lock, Prescribed
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -31,20 +31,20 @@ from osimlite.simulation.engines.machine_code import has_machine_code
 from osimlite.simulation.paths import Paths
 
 NEEDS_MACHINE_CODE = (
-    "so many surfaces take minutes in Python: install osimlite where a C++ compiler is found, "
-    "or run: pip install 'osimlite[jit]'"
+    "so many wrap surfaces take minutes in Python: install osimlite where a C++ compiler is "
+    "found, or run: pip install 'osimlite[jit]'"
 )
 """Why paths around many surfaces are not measured."""
 
 MAX_LOOP_CONSTRAINTS = 8
 """Constraints other than couplers of a model that is measured. Shoulders and knees of publications have up to six."""
 
-MIDDLE = 0.5
+MIDDLE_SHARE = 0.5
 """Part of a range in which fibers are looked at: at the ends, few muscles have not reached a limit."""
 
 
 @np.errstate(all="ignore")
-def measured(
+def measure_model(
     model: Model,
     *,
     compiles: bool,
@@ -75,37 +75,52 @@ def measured(
         isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values()
     )
     around = paths.around_surfaces(model, GEODESIC, code) if has_surfaces else None
-    _expect_few_loops(paths.mechanism)
+    _refuse_many_loops(paths.mechanism)
     start = paths.mechanism.assemble({})
     default = np.array(list(paths.lengths(start).values()))
-    looked_at = sweeps(paths, start, set() if still is None else swept_places(still))
-    if before is not None and {sweep.place for sweep in looked_at} != swept_places(before):
+    looked_at = sweep_coordinates(
+        paths, start, set() if still is None else find_swept_coordinates(still)
+    )
+    if before is not None and {sweep.place for sweep in looked_at} != find_swept_coordinates(
+        before
+    ):
         # All paths are looked at in the same poses.
-        return measured(model, compiles=compiles, mechanism=mechanism)
+        return measure_model(model, compiles=compiles, mechanism=mechanism)
     starts, reaches = [], []
-    ends = dict(zip(paths.names, zip(default, _ends(looked_at, default), strict=True), strict=True))
-    for fibers in fibers_of(model, paths.mechanism, ends):
+    ends = dict(
+        zip(
+            paths.names,
+            zip(default, _find_length_extremes(looked_at, default), strict=True),
+            strict=True,
+        )
+    )
+    for fibers in find_fibers(model, paths.mechanism, ends):
         length, ((shortest, short), (longest, long)) = ends[fibers.path]
-        begun = start_of(fibers, length)
+        begun = compute_start(fibers, length)
         starts += [begun] if begun is not None else []
-        reaches += [reach_of(fibers, shortest, True, short), reach_of(fibers, longest, False, long)]
+        reaches += [
+            compute_reach(fibers, shortest, True, short),
+            compute_reach(fibers, longest, False, long),
+        ]
     moved = {sweep.place: sweep.moved for sweep in looked_at}
     result = Measures(
         {
             name: tuple(place for place, own in moved.items() if own[k])
             for k, name in enumerate(paths.names)
         },
-        [*wrappings(around, paths, start, looked_at)] if around is not None else [],
-        [*jumps(paths, looked_at)],
-        [*_on_surfaces(paths, start, looked_at)],
-        [*moving_points(paths)],
+        [*compare_wrappings(around, paths, start, looked_at)] if around is not None else [],
+        [*find_jumps(paths, looked_at)],
+        [*_find_bad_surface_lengths(paths, start, looked_at)],
+        [*measure_moving_points(paths)],
         starts,
         reaches,
     )
-    return result if still is None else together(still, result)
+    return result if still is None else merge_measures(still, result)
 
 
-def _on_surfaces(paths: Paths, start: Array, looked_at: list[Sweep]) -> Iterator[LengthOnSurface]:
+def _find_bad_surface_lengths(
+    paths: Paths, start: Array, looked_at: list[Sweep]
+) -> Iterator[LengthOnSurface]:
     """The lengths on surfaces that are no lengths, of each path on each surface the first that is found."""
     poses = [Pose(), *(sweep.pose(value) for sweep in looked_at for value in sweep.values)]
     every = np.concatenate([start[None], *(sweep.poses for sweep in looked_at)])
@@ -114,7 +129,7 @@ def _on_surfaces(paths: Paths, start: Array, looked_at: list[Sweep]) -> Iterator
             yield LengthOnSurface(name, surface, float(lengths[k]), poses[k])
 
 
-def _expect_few_loops(mechanism: Mechanism) -> None:
+def _refuse_many_loops(mechanism: Mechanism) -> None:
     """Refuse models with too many loops to assemble poses within the time of a check.
 
     Couplers are not counted: a spine has a hundred, and they are assembled at once.
@@ -125,11 +140,12 @@ def _expect_few_loops(mechanism: Mechanism) -> None:
     count = sum(not isinstance(each, Coupler | Lock | Prescribed) for each in mechanism.constraints)
     if count > MAX_LOOP_CONSTRAINTS:
         raise UnsupportedError(
-            f"{count} constraints of it close loops, and the poses of at most {MAX_LOOP_CONSTRAINTS} are measured"
+            f"{count} constraints close loops; models with more than {MAX_LOOP_CONSTRAINTS} are "
+            "not measured"
         )
 
 
-def _ends(
+def _find_length_extremes(
     looked_at: list[Sweep], default: Array
 ) -> Iterator[tuple[tuple[float, Pose], tuple[float, Pose]]]:
     """Where each path is shortest and where it is longest, by default and in the middle of the ranges."""
@@ -137,7 +153,7 @@ def _ends(
     for sweep in looked_at:
         low, high = sweep.info.range
         inside = np.flatnonzero(
-            np.round(np.abs((sweep.values - low) / (high - low) - 0.5), 9) <= 0.5 * MIDDLE
+            np.round(np.abs((sweep.values - low) / (high - low) - 0.5), 9) <= 0.5 * MIDDLE_SHARE
         )
         poses += [sweep.pose(value) for value in sweep.values[inside]]
         rows.append(sweep.lengths[inside])

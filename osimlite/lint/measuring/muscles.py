@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from osimlite.errors import ModelError
-from osimlite.lint.measures import Pose, Reach, Start
+from osimlite.lint.measures import FiberReach, MuscleStart, Pose
 from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
@@ -22,11 +22,11 @@ from osimlite.simulation.elements.parameters import Fields, Number, Numbers, Tog
 from osimlite.simulation.elements.registry import FORCE_TYPES
 
 ROUNDING = 1e-9
-REST = 0.01
+REST_ACTIVATION = 0.01
 """The activation of a muscle at rest: none of Thelen's or Millard's has less by default."""
 
 
-class Fibers(NamedTuple):
+class MuscleFibers(NamedTuple):
     """A muscle with its law, which is called as Python: some hundred times, where compiling it would take longer."""
 
     path: str  # of the muscle
@@ -39,25 +39,25 @@ class Fibers(NamedTuple):
         """Whether there is something to bring into equilibrium."""
         return not set(self.kind.settled).isdisjoint(states_of(self.component))
 
-    def starts(self) -> dict[str, float]:
+    def get_start_states(self) -> dict[str, float]:
         """The states where they start."""
         return {state.name: state.at_start(self.component) for state in self.kind.states}
 
-    def settled(self, length: float, states: dict[str, float]) -> dict[str, float]:
+    def equilibrate(self, length: float, states: dict[str, float]) -> dict[str, float]:
         """The states in equilibrium at a length of the path (m), NaN if there is none."""
         if not self.is_elastic:
             return states
-        is_found, *result = self._asked(self.kind.equilibrium, length, states)
+        is_found, *result = self._call_law(self.kind.equilibrium, length, states)
         return states | dict(
             zip(self.kind.settled, result if is_found else repeat(nan), strict=False)
         )
 
-    def at(self, length: float, states: dict[str, float]) -> dict[str, float]:
+    def evaluate_law(self, length: float, states: dict[str, float]) -> dict[str, float]:
         """What the law gives by the names of its outputs, the path at rest; tension and fiber length are normalized."""
         known = dict(
             zip(
                 self.kind.outputs,
-                map(float, self._asked(self.kind.law, length, states)),
+                map(float, self._call_law(self.kind.law, length, states)),
                 strict=False,
             )
         )
@@ -65,7 +65,7 @@ class Fibers(NamedTuple):
         known["fiber_length"] /= self.component.optimal_fiber_length
         return known
 
-    def _asked(
+    def _call_law(
         self, law: Callable[..., Any] | None, length: float, states: dict[str, float]
     ) -> Sequence[Any]:
         assert law is not None
@@ -79,7 +79,9 @@ class Fibers(NamedTuple):
         return result
 
 
-def fibers_of(model: Model, mechanism: Mechanism, wanted: Container[str]) -> Iterator[Fibers]:
+def find_fibers(
+    model: Model, mechanism: Mechanism, wanted: Container[str]
+) -> Iterator[MuscleFibers]:
     """The muscles that pull, whose laws are given numbers: those of Thelen, Millard, De Groote, Meyer.
 
     Args:
@@ -100,11 +102,11 @@ def fibers_of(model: Model, mechanism: Mechanism, wanted: Container[str]) -> Ite
         )
         if not all(isinstance(part, Fields | Number | Numbers) for part in parts):
             continue
-        # What OpenSim refuses, other rules have told.
+        # What OpenSim rejects, other rules have told.
         with suppress(ModelError):
             if kind.check is not None:
                 kind.check(builder, muscle)
-            yield Fibers(
+            yield MuscleFibers(
                 builder.path(muscle),
                 kind,
                 muscle,
@@ -112,20 +114,27 @@ def fibers_of(model: Model, mechanism: Mechanism, wanted: Container[str]) -> Ite
             )
 
 
-def start_of(fibers: Fibers, length: float) -> Start | None:
+def compute_start(fibers: MuscleFibers, length: float) -> MuscleStart | None:
     """Start and equilibrium at a length of the path, m; None of a muscle that has nothing to bring into equilibrium."""
     if not fibers.is_elastic:
         return None
-    states = fibers.starts()
-    one, two = fibers.at(length, states), fibers.at(length, fibers.settled(length, states))
+    states = fibers.get_start_states()
+    one, two = (
+        fibers.evaluate_law(length, states),
+        fibers.evaluate_law(length, fibers.equilibrate(length, states)),
+    )
     lengths, tensions = ((one[name], two[name]) for name in ("fiber_length", "tension"))
-    return Start(fibers.path, lengths, tensions)
+    return MuscleStart(fibers.path, lengths, tensions)
 
 
-def reach_of(fibers: Fibers, length: float, is_active: bool, pose: Pose) -> Reach:
+def compute_reach(fibers: MuscleFibers, length: float, is_active: bool, pose: Pose) -> FiberReach:
     """Fibers in equilibrium at a length of the path, m."""
-    known = fibers.at(
-        length, fibers.settled(length, fibers.starts() | {"activation": 1.0 if is_active else REST})
+    known = fibers.evaluate_law(
+        length,
+        fibers.equilibrate(
+            length,
+            fibers.get_start_states() | {"activation": 1.0 if is_active else REST_ACTIVATION},
+        ),
     )
     numbers = fibers.values[0]
     least = (
@@ -133,4 +142,4 @@ def reach_of(fibers: Fibers, length: float, is_active: bool, pose: Pose) -> Reac
         / fibers.component.optimal_fiber_length
     )
     is_limit = known["fiber_length"] <= least * (1.0 + ROUNDING) or known["cos_pennation"] <= 0.0
-    return Reach(fibers.path, is_active, pose, known["fiber_length"], is_limit)
+    return FiberReach(fibers.path, is_active, pose, known["fiber_length"], is_limit)

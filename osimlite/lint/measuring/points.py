@@ -16,28 +16,28 @@ from osimlite.simulation.elements.geometries.paths.geometry_path import Node, Th
 from osimlite.simulation.paths import Paths
 
 
-def moving_points(paths: Paths) -> Iterator[MovingPoint]:
+def measure_moving_points(paths: Paths) -> Iterator[MovingPoint]:
     """Each moving point at both ends of the range of its coordinate."""
     for name, route in paths.routes.items():
         for point in route.points if isinstance(route, ThroughPoints) else ():
             if point.kind != MOVING:
                 continue
             info = paths.mechanism.coordinates[point.coordinate]
-            low, high = _given(point)
+            low, high = _find_defined_range(point)
             for end in info.range:
                 inside = min(max(end, low), high)
-                place, rate = _at(point, end)
+                place, rate = _evaluate_point(point, end)
                 yield MovingPoint(
                     name,
                     point.name,
                     Value(info.name, end, info.unit),
                     abs(end - inside),
-                    float(np.linalg.norm(place - _at(point, inside)[0])),
+                    float(np.linalg.norm(place - _evaluate_point(point, inside)[0])),
                     float(np.linalg.norm(rate)),
                 )
 
 
-def _at(point: Node, value: float) -> tuple[Array, Array]:
+def _evaluate_point(point: Node, value: float) -> tuple[Array, Array]:
     """Place of a point at a value of its coordinate, and the derivative of it."""
     result = [function.evaluate(np.array([value])) for function in point.functions]
     return np.array([place for place, _, _ in result]), np.array(
@@ -45,13 +45,13 @@ def _at(point: Node, value: float) -> tuple[Array, Array]:
     )
 
 
-def _given(point: Node) -> tuple[float, float]:
+def _find_defined_range(point: Node) -> tuple[float, float]:
     """The values of the coordinate that all functions of a point are given for."""
-    ranges = [_range(function) for function in point.functions]
+    ranges = [_find_function_range(function) for function in point.functions]
     return max(low for low, _ in ranges), min(high for _, high in ranges)
 
 
-def _range(function: Any) -> tuple[float, float]:
+def _find_function_range(function: Any) -> tuple[float, float]:
     while isinstance(function, Scaled):
         function = function.function
     x: Any = getattr(function, "x", getattr(function, "knots", ()))

@@ -20,9 +20,9 @@ VALUES, TIED_VALUES, TIED_POSES = 9, 5, 40
 """Of each coordinate; of each that constraints tie to others, whose poses take long to find; and
 how many of these poses are found at most.
 """
-WIDEST = 4.0 * pi
+MAX_RANGE = 4.0 * pi
 """A wider range (rad or m) stands for none."""
-STILL = 1e-9
+MIN_CHANGE_M = 1e-9
 """A length that changes by less (m) does not."""
 
 
@@ -45,7 +45,7 @@ class Sweep:
     @property
     def moved(self) -> NDArray[np.bool_]:
         """Whether the length of each path (p,) changes."""
-        return np.nan_to_num(np.ptp(self.lengths, axis=0)) > STILL
+        return np.nan_to_num(np.ptp(self.lengths, axis=0)) > MIN_CHANGE_M
 
     @property
     def info(self) -> CoordinateInfo:
@@ -60,7 +60,7 @@ class Sweep:
         """What people call the pose at a value of the coordinate."""
         return Pose((self.value(value),))
 
-    def at(self, values: Array, place: NDArray[np.intp]) -> Array:
+    def interpolate_poses(self, values: Array, place: NDArray[np.intp]) -> Array:
         """Values (k, n) of all coordinates where this one has a value, along straight lines between the poses.
 
         Args:
@@ -71,12 +71,12 @@ class Sweep:
         part = (values - before[:, self.place]) / (after[:, self.place] - before[:, self.place])
         return before + part[:, None] * (after - before)
 
-    def before(self, values: Array) -> NDArray[np.intp]:
+    def find_poses_before(self, values: Array) -> NDArray[np.intp]:
         """Numbers (k,) of the poses before values of the coordinate."""
         return np.clip(np.searchsorted(self.values, values), 1, len(self.values) - 1) - 1
 
 
-def sweeps(paths: Paths, start: Array, others: Container[int] = ()) -> list[Sweep]:
+def sweep_coordinates(paths: Paths, start: Array, others: Container[int] = ()) -> list[Sweep]:
     """A sweep of each coordinate that changes the length of a path.
 
     Args:
@@ -84,7 +84,7 @@ def sweeps(paths: Paths, start: Array, others: Container[int] = ()) -> list[Swee
         start: the default pose (n,).
         others: places of coordinates that change the length of a path that is not among these.
     """
-    are_tied, left = tied(paths, start), TIED_POSES
+    are_tied, left = find_tied_coordinates(paths, start), TIED_POSES
     result: list[tuple[int, Array, bool]] = []
     for place, info in enumerate(paths.mechanism.coordinates):
         low, high = info.range
@@ -92,14 +92,14 @@ def sweeps(paths: Paths, start: Array, others: Container[int] = ()) -> list[Swee
             info.locked
             or info.prescribed is not None
             or info.yielding
-            or not 0.0 < high - low <= WIDEST
+            or not 0.0 < high - low <= MAX_RANGE
         ):
             continue
         is_tied = bool(are_tied[place])
         if is_tied and left < TIED_VALUES:
             continue
         left -= is_tied * TIED_VALUES
-        poses = _poses(
+        poses = _find_poses(
             paths, start, place, np.linspace(low, high, TIED_VALUES if is_tied else VALUES), is_tied
         )
         if len(poses) > 1:
@@ -114,7 +114,7 @@ def sweeps(paths: Paths, start: Array, others: Container[int] = ()) -> list[Swee
     return [sweep for sweep in swept if sweep.place in others or sweep.moved.any()]
 
 
-def _poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool) -> Array:
+def _find_poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool) -> Array:
     """The poses with these values of a coordinate, from the default one to where constraints let it go no further."""
     poses = np.tile(start, (len(values), 1))
     poses[:, place] = values
@@ -131,7 +131,7 @@ def _poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool)
     return np.array(sorted(result, key=lambda q: float(q[place]))).reshape(-1, len(start))
 
 
-def tied(paths: Paths, start: Array) -> Array:
+def find_tied_coordinates(paths: Paths, start: Array) -> Array:
     """Whether each coordinate (n,) is in the equations of a constraint."""
     constraints = paths.mechanism.constraints
     if not constraints:

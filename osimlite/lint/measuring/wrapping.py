@@ -7,12 +7,12 @@ from random import Random
 
 import numpy as np
 
-from osimlite.lint.measures import Pose, Wrapping
+from osimlite.lint.measures import Pose, WrappingError
 from osimlite.lint.measuring.sweeps import Sweep
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
 
-TOGETHER = 64
+RANDOM_POSES = 64
 """Poses with values of all coordinates within their ranges, at random but always the same."""
 
 
@@ -20,9 +20,9 @@ ASIDE, NEAR = 1e-7, 1e-4
 """How far (rad or m) beside a pose a length is computed again, and by how much (m) it may differ there."""
 
 
-def wrappings(
+def compare_wrappings(
     geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[Sweep]
-) -> Iterator[Wrapping]:
+) -> Iterator[WrappingError]:
     """Each path around surfaces: by how much it is longer than along geodesics by default, and where by most.
 
     Args:
@@ -32,7 +32,7 @@ def wrappings(
         looked_at: the sweeps.
     """
     free = [sweep for sweep in looked_at if not sweep.is_tied]
-    together = _together(start, free)
+    together = _sample_poses(start, free)
     poses = np.concatenate([start[None], *(sweep.poses for sweep in looked_at), together])
     columns = [paths.names.index(name) for name in geodesic.names]
     swept = [sweep.lengths[:, columns] for sweep in looked_at]
@@ -64,23 +64,25 @@ def wrappings(
             k for k in order if _is_certain(geodesic, paths, own, path, excess[k], told(k)[1])
         )
         worst = next(certain, order[-1])
-        yield Wrapping(name, around, float(excess[0]), float(excess[worst]), told(worst)[0])
+        yield WrappingError(name, around, float(excess[0]), float(excess[worst]), told(worst)[0])
 
 
-def _together(start: Array, free: Sequence[Sweep]) -> Array:
+def _sample_poses(start: Array, free: Sequence[Sweep]) -> Array:
     """Poses (k, n) with values of all coordinates anywhere in their ranges."""
     # Python's own generator, since pydantic has loaded it: `numpy.random` would take five
     # milliseconds more.
     generator = Random(0)
-    parts = np.array([[generator.random() for _ in free] for _ in range(TOGETHER)]).reshape(
-        TOGETHER, len(free)
+    parts = np.array([[generator.random() for _ in free] for _ in range(RANDOM_POSES)]).reshape(
+        RANDOM_POSES, len(free)
     )
     values = [
         low + parts[:, k] * (high - low)
         for k, (low, high) in enumerate(sweep.info.range for sweep in free)
     ]
-    together = np.tile(start, (TOGETHER, 1))
-    together[:, [sweep.place for sweep in free]] = np.array(values).reshape(len(free), TOGETHER).T
+    together = np.tile(start, (RANDOM_POSES, 1))
+    together[:, [sweep.place for sweep in free]] = (
+        np.array(values).reshape(len(free), RANDOM_POSES).T
+    )
     return together
 
 

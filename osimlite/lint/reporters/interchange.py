@@ -174,7 +174,7 @@ def _describe_rule(rule: Rule) -> dict[str, Any]:
 
 
 def _to_camel_case(name: str) -> str:
-    """Return the name of a rule in camel case, as SARIF recommends."""
+    """Return the name of a rule in camel case, as SARIF recomfixes."""
     return "".join(word.capitalize() for word in name.split("-"))
 
 

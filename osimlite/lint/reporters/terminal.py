@@ -74,7 +74,10 @@ def describe_skipped(report: Report, everything: bool) -> str:
     if everything:
         return escape_unprintable(f"Skipped, not OpenSim files: {', '.join(report.passed)}.")
     count = len(report.passed)
-    return f"{count} {_pluralize('file', count)} skipped ({'not an OpenSim file' if count == 1 else 'not OpenSim files'})."
+    return (
+        f"{count} {_pluralize('file', count)} skipped "
+        f"({'not an OpenSim file' if count == 1 else 'not OpenSim files'})."
+    )
 
 
 def _pluralize(noun: str, count: int) -> str:

@@ -1,1 +1,1 @@
-"""The rules, one module per family; :mod:`osimlite.lint.engine` collects them."""
+"""The rules, one module per family; :mod:`osimlite.lint.registry` lists them."""

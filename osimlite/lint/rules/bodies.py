@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from typing import TypedDict
 
 from osimlite.lint.diagnostic import Fix
-from osimlite.lint.fixes import replaced
-from osimlite.lint.inertia import possible_inertia, principal_axes
-from osimlite.lint.placement import on_base
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, Threshold, rule
-from osimlite.lint.skeleton import skeleton
+from osimlite.lint.fixes import replace_text
+from osimlite.lint.inertia import compute_principal_axes, find_possible_inertia
+from osimlite.lint.placement import locate_frame
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, Threshold, rule
+from osimlite.lint.skeleton import build_skeleton
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity
+from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.frames import Body
 
 SLACK = Threshold(
@@ -29,12 +29,12 @@ MASS = Threshold("largest-mass", 1000.0, "kg", "no body of a model is heavier")
 
 
 @rule("OSIM501", "missing-mass", severity=ERROR)
-def missing_mass(subject: Subject, report: FindingSink) -> None:
+def report_missing_mass(subject: Subject, report: FindingCollector) -> None:
     """A body has no mass.
 
     Reports bodies whose mass is not given.
 
-    The default is NaN, so that nobody can forget it: OpenSim refuses to load the file.
+    The default is NaN: OpenSim rejects the file.
 
     ```xml
     - <Body name="thigh"> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -42,24 +42,24 @@ def missing_mass(subject: Subject, report: FindingSink) -> None:
     ```
     """
     mass = Body.field_specs()["mass"]
-    for body in subject.each(Body):
+    for body in subject.find_instances(Body):
         if (
             body.mass != body.mass
             and "mass" not in body.model_fields_set
-            and not subject.noted(body, mass)
+            and not subject.has_note(body, mass)
         ):
-            report(f"{called(body)} has no mass: OpenSim refuses to load the file", body)
+            report(f"{describe_object(body)} has no mass: OpenSim rejects the file", body)
 
 
-@rule("OSIM502", "impossible-inertia", severity=WARNING, thresholds=(SLACK,), mends="unsafe")
-def impossible_inertia(subject: Subject, report: FindingSink) -> None:
-    """No distribution of mass has this inertia.
+@rule("OSIM502", "impossible-inertia", severity=WARNING, thresholds=(SLACK,), fixes="unsafe")
+def report_impossible_inertia(subject: Subject, report: FindingCollector) -> None:
+    """An inertia violates the triangle inequality.
 
-    Reports inertias of which one principal moment is larger than the other two together, and by how
-    much.
+    Reports inertias whose largest principal moment exceeds the sum of the other two, and by how
+    much: no distribution of mass has such an inertia.
 
-    Such a body cannot exist. OpenSim computes with it all the same, and accelerations about that
-    axis are too small. Often two numbers are swapped, or the inertia was scaled axis by axis.
+    Such a body cannot exist. OpenSim computes with it anyway, and accelerations about that axis are
+    too small. Often two numbers are swapped, or the inertia was scaled axis by axis.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.5 0 0 0</inertia> </Body>
@@ -67,30 +67,31 @@ def impossible_inertia(subject: Subject, report: FindingSink) -> None:
     ```
     """
     slack = subject.config.value_of(SLACK)
-    for body, moments in _inertias(subject):
+    for body, moments in _list_inertias(subject):
         small, middle, large = moments
         if small >= 0 and large > (small + middle) * (1 + slack):
             excess = 100 * (large / (small + middle) - 1) if small + middle > 0 else math.inf
             report(
-                f"the inertia of {called(body)} is impossible: its largest principal moment, {quantity(large)}, is "
-                f"more than the sum of the others, {quantity(small + middle)}"
+                f"the inertia of {describe_object(body)} is impossible: its largest principal "
+                f"moment, {format_quantity(large)}, is more than the sum of the others, "
+                f"{format_quantity(small + middle)}"
                 + (f", by {excess:.3g} %" if math.isfinite(excess) else "")
-                + _closest(body),
+                + _describe_closest(body),
                 body,
                 tag="inertia",
-                **_nearest(subject, body),
+                **_suggest_inertia(subject, body),
             )
 
 
-@rule("OSIM503", "inertia-not-positive", severity=WARNING, thresholds=(SLACK,), mends="unsafe")
-def inertia_not_positive(subject: Subject, report: FindingSink) -> None:
+@rule("OSIM503", "inertia-not-positive", severity=WARNING, thresholds=(SLACK,), fixes="unsafe")
+def report_inertia_not_positive(subject: Subject, report: FindingCollector) -> None:
     """An inertia has a negative principal moment.
 
     Reports inertias that are negative about some axis: a negative moment, or products that are too
     large for the moments.
 
     A torque about that axis turns the body the other way. OpenSim does not check, and the
-    simulation blows up or quietly shows nonsense.
+    simulation becomes unstable or gives wrong results without a message.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.3 0 0</inertia> </Body>
@@ -98,28 +99,28 @@ def inertia_not_positive(subject: Subject, report: FindingSink) -> None:
     ```
     """
     slack = subject.config.value_of(SLACK)
-    for body, moments in _inertias(subject):
+    for body, moments in _list_inertias(subject):
         if moments[0] < -slack * max(map(abs, moments)):
             cause = (
                 "" if min(body.inertia[:3]) < 0 else "; its products are too large for its moments"
             )
             report(
-                f"the inertia of {called(body)} has a negative principal moment, {quantity(moments[0])}{cause}"
-                + _closest(body),
+                f"the inertia of {describe_object(body)} has a negative principal moment, {format_quantity(moments[0])}{cause}"
+                + _describe_closest(body),
                 body,
                 tag="inertia",
-                **_nearest(subject, body),
+                **_suggest_inertia(subject, body),
             )
 
 
 @rule("OSIM504", "no-inertia", severity=WARNING)
-def no_inertia(subject: Subject, report: FindingSink) -> None:
+def report_no_inertia(subject: Subject, report: FindingCollector) -> None:
     """A body has mass and no inertia.
 
-    Reports bodies with a mass whose inertia is zero or not given; and, for information, those
-    without a mass that have an inertia, which OpenSim drops with a line in its log.
+    Reports bodies with a mass whose inertia is zero or missing; and, for information, bodies
+    without a mass that have an inertia, which OpenSim sets to zero with a line in its log.
 
-    All the mass is then in one point. A joint that turns about this point has no resistance at all:
+    All the mass is then in one point. Nothing resists a joint that rotates about this point:
     accelerations become NaN if the body is the last of its chain (an error), and the integrator
     takes ever smaller steps otherwise.
 
@@ -129,19 +130,21 @@ def no_inertia(subject: Subject, report: FindingSink) -> None:
     ```
     """
     inertia = Body.field_specs()["inertia"]
-    for body in subject.each(Body):
-        if body.mass == 0.0 and any(body.inertia) and not subject.noted(body, inertia):
+    for body in subject.find_instances(Body):
+        if body.mass == 0.0 and any(body.inertia) and not subject.has_note(body, inertia):
             report(
-                f"{called(body)} has an inertia and no mass: OpenSim sets the inertia to zero",
+                f"{describe_object(body)} has an inertia but no mass: OpenSim sets the inertia to "
+                "zero",
                 body,
                 tag="inertia",
                 severity=INFO,
             )
-        if body.mass > 0 and not any(body.inertia) and not subject.noted(body, inertia):
+        if body.mass > 0 and not any(body.inertia) and not subject.has_note(body, inertia):
             state = "is zero" if "inertia" in body.model_fields_set else "is not given"
             spins = _spins_freely(subject, body)
             report(
-                f"the inertia of {called(body)} {state} though its mass is {quantity(body.mass, 'kg')}"
+                f"the inertia of {describe_object(body)} {state} though its mass is "
+                f"{format_quantity(body.mass, 'kg')}"
                 + (": nothing resists its joint, and accelerations become NaN" if spins else ""),
                 body,
                 tag="inertia",
@@ -154,18 +157,18 @@ def _spins_freely(subject: Subject, body: Body) -> bool:
 
     A ball joint, or any that turns about three axes, always has an axis through the mass center.
     """
-    links = skeleton(subject).of(body)
+    links = build_skeleton(subject).find_joints(body)
     if len(links) != 1 or links[0].child_base is not body:
         return False
-    joint, place = links[0].joint, on_base(subject, links[0].child)
+    joint, place = links[0].joint, locate_frame(subject, links[0].child)
     turns = [motion for motion in joint.motion_types or () if motion == "rotational"]
     at_center = place is not None and place[1].position == body.mass_center
     return len(turns) == 3 or bool(turns and at_center)
 
 
 @rule("OSIM523", "mass-out-of-proportion", severity=WARNING, thresholds=(MASS, GYRATION))
-def mass_out_of_proportion(subject: Subject, report: FindingSink) -> None:
-    """A mass, or an inertia for its mass, is larger than that of any body.
+def report_mass_out_of_proportion(subject: Subject, report: FindingCollector) -> None:
+    """A mass, or an inertia for its mass, is implausibly large.
 
     Reports bodies heavier than a tonne, and inertias that would need the mass to lie several metres
     from the mass center (the radius of gyration, the square root of the largest moment over the
@@ -180,60 +183,62 @@ def mass_out_of_proportion(subject: Subject, report: FindingSink) -> None:
     ```
     """
     heaviest, widest = subject.config.value_of(MASS), subject.config.value_of(GYRATION)
-    for body in subject.each(Body):
+    for body in subject.find_instances(Body):
         if heaviest < body.mass < math.inf:
             report(
-                f"the mass of {called(body)} is {quantity(body.mass, 'kg')}; in grams?",
+                f"the mass of {describe_object(body)} is {format_quantity(body.mass, 'kg')}; is "
+                "it in grams?",
                 body,
                 tag="mass",
                 suggestion=f"{body.mass / 1000:.6g}",
             )
-    for body, moments in _inertias(subject):
+    for body, moments in _list_inertias(subject):
         if not 0 < body.mass < math.inf:
             continue
         radius = math.sqrt(max(moments[2], 0) / body.mass)
         if radius > widest:
             report(
-                f"the inertia of {called(body)} is as if its {quantity(body.mass, 'kg')} lay {quantity(radius, 'm')} "
-                "from its mass center; in kg mm^2?",
+                f"the inertia of {describe_object(body)} would need its "
+                f"{format_quantity(body.mass, 'kg')} to be {format_quantity(radius, 'm')} from "
+                "its mass center; is it in kg mm^2?",
                 body,
                 tag="inertia",
                 suggestion=" ".join(f"{number / 1e6:.6g}" for number in body.inertia),
             )
 
 
-class _Mend(TypedDict):
+class _Suggestion(TypedDict):
     suggestion: str
     fix: Fix | None
 
 
-def _closest(body: Body) -> str:
+def _describe_closest(body: Body) -> str:
     """How far the nearest possible inertia is from that of a body."""
-    nearest = possible_inertia(body.inertia)
+    nearest = find_possible_inertia(body.inertia)
     parts = [new - old for new, old in zip(nearest, body.inertia, strict=True)]
     # Each product stands in the matrix twice.
     distance, size = (math.hypot(*matrix, *matrix[3:]) for matrix in (parts, body.inertia))
     return (
         f"; the closest possible one, {' '.join(f'{number:.4g}' for number in nearest)}, is "
-        f"{quantity(distance, 'kg m^2')} ({100 * distance / size:.2g} % of it) away"
+        f"{format_quantity(distance, 'kg m^2')} ({100 * distance / size:.2g} % of it) away"
     )
 
 
-def _nearest(subject: Subject, body: Body) -> _Mend:
+def _suggest_inertia(subject: Subject, body: Body) -> _Suggestion:
     """The nearest possible inertia, as what to write instead."""
-    text = " ".join(f"{number:.9g}" for number in possible_inertia(body.inertia))
+    text = " ".join(f"{number:.9g}" for number in find_possible_inertia(body.inertia))
     place = (
         subject.position(body, tag="inertia")
         if subject.element_of(body, "inertia") is not None
         else None
     )
-    return {"suggestion": text, "fix": replaced(subject.source, place, text, safe=False)}
+    return {"suggestion": text, "fix": replace_text(subject.source, place, text, safe=False)}
 
 
-def _inertias(subject: Subject) -> list[tuple[Body, Sequence[float]]]:
+def _list_inertias(subject: Subject) -> list[tuple[Body, Sequence[float]]]:
     """Each body with a finite inertia that is not zero, and its principal moments in rising order."""
     return [
-        (body, sorted(principal_axes(body.inertia)[0]))
-        for body in subject.each(Body)
+        (body, sorted(compute_principal_axes(body.inertia)[0]))
+        for body in subject.find_instances(Body)
         if any(body.inertia) and all(map(math.isfinite, body.inertia))
     ]

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 
 from osimlite.base.text import find_nearest
 from osimlite.io.document.notes import Note
-from osimlite.lint.fixes import renamed, replaced
+from osimlite.lint.fixes import rename_tag, replace_text
 from osimlite.lint.old_tags import successor
-from osimlite.lint.registry import ERROR, FindingSink, rule
+from osimlite.lint.registry import ERROR, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import a, called
+from osimlite.lint.words import describe_object, with_article
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Held
 from osimlite.schema.model import Model
@@ -19,18 +19,18 @@ from osimlite.schema.registry import class_for, tags, tags_of
 from osimlite.schema.specs import FieldSpec, field_specs
 
 
-@rule("OSIM102", "unknown-class", severity=ERROR, mends="both")
-def unknown_class(subject: Subject, report: FindingSink) -> None:
-    """An object is of a class that OpenSim does not have.
+@rule("OSIM102", "unknown-class", severity=ERROR, fixes="both")
+def report_unknown_class(subject: Subject, report: FindingCollector) -> None:
+    """An object has a class that OpenSim does not have.
 
-    Reports elements that should be objects and are of no class of OpenSim 4.6: misspelt, in the
-    wrong case, or of a plug-in. Names the class that is meant if the spelling is a slip away from
-    it, it may stand there, and it has the properties that the element gives.
+    Reports elements in the place of objects whose tag is not a class of OpenSim 4.6: misspelt, in
+    the wrong case, or of a plug-in. Suggests a class with a similar name if it is allowed there and
+    has the properties that the element contains.
 
-    In a set (bodies, joints, forces ...) OpenSim refuses to load the file; elsewhere it leaves the
-    object out. Of a plug-in, OpenSim must have loaded that plug-in first; the rest of the file is
-    checked all the same. With the file that the setting `classes` names, osimlite knows the classes
-    of a plug-in as well.
+    In a set (bodies, joints, forces ...) OpenSim rejects the file; elsewhere it leaves the object
+    out. For a class of a plug-in, OpenSim must load the plug-in first; the rest of the file is
+    checked anyway. The setting `classes` names files that declare the classes of plug-ins to
+    osimlite.
 
     ```xml
     - <MarkerSet> <objects> <Merker name="asis" /> </objects> </MarkerSet>
@@ -42,19 +42,19 @@ def unknown_class(subject: Subject, report: FindingSink) -> None:
     ```
     """
     for note, owner in subject.notes_of("unknown-class"):
-        fate = _fate(subject, note)
+        fate = _describe_consequence(subject, note)
         accepted = (
             tags() if note.spec is None or note.spec.accepts is None else tags_of(note.spec.accepts)
         )
-        suggestion = _nearest_class(subject, note, accepted)
+        suggestion = _find_nearest_class(subject, note, accepted)
         message = f"OpenSim has no class '{note.word}' and {fate}"
-        plugin = plugin_of(note.word)
+        plugin = find_plugin(note.word)
         if plugin:
             message += f"; it belongs to {plugin}: load that first; nothing in it was checked"
         elif suggestion is None or suggestion.lower() != note.word.lower():
             message += "; if it belongs to a plug-in, load that first: nothing in it was checked"
         same = suggestion is not None and suggestion.lower() == note.word.lower()
-        fix = renamed(subject.source, note.number, suggestion, safe=same)
+        fix = rename_tag(subject.source, note.number, suggestion, safe=same)
         report(message, owner, number=note.number, suggestion=suggestion, fix=fix)
 
 
@@ -66,12 +66,12 @@ PLUGINS = {
 """Plug-ins by the beginning of the names of their classes."""
 
 
-def plugin_of(name: str) -> str:
+def find_plugin(name: str) -> str:
     """Return the known plug-in that a class belongs to; an empty text for others."""
     return next((plugin for start, plugin in PLUGINS.items() if name.startswith(start)), "")
 
 
-def _nearest_class(subject: Subject, note: Note, accepted: Iterable[str]) -> str | None:
+def _find_nearest_class(subject: Subject, note: Note, accepted: Iterable[str]) -> str | None:
     """Return the class that a misspelt tag of an object means, or None.
 
     Another class is another physics, so the spelling must be a slip away: at most two letters
@@ -79,7 +79,7 @@ def _nearest_class(subject: Subject, note: Note, accepted: Iterable[str]) -> str
     least half of the elements inside are properties of it.
     """
     word = note.word.rpartition(":")[2]
-    if plugin_of(word):
+    if find_plugin(word):
         return None
     known = [tag for tag in accepted if not _is_later(tag)]
     whole = {note.word.lower(), word.lower()}
@@ -129,13 +129,12 @@ def _is_part(specs: Mapping[str, FieldSpec], tag: str) -> bool:
 
 
 @rule("OSIM103", "wrong-class", severity=ERROR)
-def wrong_class(subject: Subject, report: FindingSink) -> None:
-    """An object of a known class stands where that class may not stand.
+def report_wrong_class(subject: Subject, report: FindingCollector) -> None:
+    """An object is in a place where its class is not allowed.
 
-    Reports members of a set, or of another property, that are of a class the property does not
-    take.
+    Reports members of a set, or of another property, whose class the property does not accept.
 
-    In a set OpenSim refuses to load the file; elsewhere it leaves the object out.
+    In a set OpenSim rejects the file; elsewhere it leaves the object out.
 
     ```xml
     - <MarkerSet> <objects> <Body name="foot"> <mass>1</mass> </Body> </objects> </MarkerSet>
@@ -149,26 +148,29 @@ def wrong_class(subject: Subject, report: FindingSink) -> None:
     for note, owner in subject.notes_of("wrong-class"):
         assert note.spec is not None and note.spec.accepts is not None
         kinds = note.spec.accepts.__name__
-        home = set_for(note.value)
+        home = find_set(note.value)
         where = f"; it belongs in the {home}" if home else ""
         holder = (
-            f"{called(owner)}: {note.spec.tag}" if note.spec.tag != "objects" else called(owner)
+            f"{describe_object(owner)}: {note.spec.tag}"
+            if note.spec.tag != "objects"
+            else describe_object(owner)
         )
         report(
-            f"{holder} takes {a(kinds)}, not {a(note.word)}: OpenSim {_fate(subject, note)}{where}",
+            f"{holder} expects {with_article(kinds)}, found {with_article(note.word)}: OpenSim "
+            f"{_describe_consequence(subject, note)}{where}",
             owner,
             number=note.number,
         )
 
 
-@rule("OSIM108", "wrong-part-name", severity=ERROR, mends="unsafe")
-def wrong_part_name(subject: Subject, report: FindingSink) -> None:
-    """A part of an object has a name other than that of its property.
+@rule("OSIM108", "wrong-part-name", severity=ERROR, fixes="unsafe")
+def report_wrong_part_name(subject: Subject, report: FindingCollector) -> None:
+    """An object in a property does not have the name of the property.
 
-    Reports objects such as `<FrameGeometry name="axes">`: a property that holds one object finds it
-    by its name.
+    Reports objects such as `<FrameGeometry name="axes">`: OpenSim finds the object of a property by
+    its name.
 
-    OpenSim does not take the object and goes on with the default: everything inside is lost.
+    OpenSim ignores the object and uses the default: everything inside is lost.
 
     ```xml
       <Body name="thigh">
@@ -179,16 +181,17 @@ def wrong_part_name(subject: Subject, report: FindingSink) -> None:
     ```
     """
     for note, owner in subject.notes_of("unknown-tag"):
-        spec = part_for(note, owner)
+        spec = find_part(note, owner)
         if spec is not None:
             assert subject.source is not None
             report(
-                f"{called(owner)} takes its {spec.tag} by that name; OpenSim ignores this {note.word}",
+                f"{describe_object(owner)} finds its {spec.tag} by that name; OpenSim ignores "
+                f"this {note.word}",
                 owner,
                 number=note.number,
                 attribute="name",
                 suggestion=spec.tag,
-                fix=replaced(
+                fix=replace_text(
                     subject.source,
                     subject.position(None, number=note.number, attribute="name"),
                     spec.tag,
@@ -198,12 +201,12 @@ def wrong_part_name(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM109", "missing-wrapper", severity=ERROR)
-def missing_wrapper(subject: Subject, report: FindingSink) -> None:
-    """Members of a set do not stand in its `<objects>`.
+def report_missing_wrapper(subject: Subject, report: FindingCollector) -> None:
+    """Members of a set are outside its `<objects>`.
 
-    Reports objects that stand directly in a set or in the object that should list them.
+    Reports objects that are placed directly in a set, or in the object that should list them.
 
-    OpenSim looks for members inside `<objects>` only, and ignores these.
+    OpenSim reads members inside `<objects>` only, and ignores these.
 
     ```xml
       <MarkerSet>
@@ -218,12 +221,12 @@ def missing_wrapper(subject: Subject, report: FindingSink) -> None:
     notes = subject.notes_of("unknown-tag")
     standing = Counter(id(owner) for note, owner in notes if note.value is not None)
     for note, owner in notes:
-        wrapper = wrapper_for(note, owner)
+        wrapper = find_wrapper(note, owner)
         if wrapper is None or id(owner) in reported:
             continue
         reported.add(id(owner))
         report(
-            f"{called(owner)} holds {note.word} objects inside <{wrapper}> only; OpenSim ignores this one"
+            f"{note.word} objects of {describe_object(owner)} must be inside <{wrapper}>; OpenSim ignores this one"
             + (" and the others" if standing[id(owner)] > 1 else ""),
             owner,
             number=note.number,
@@ -231,9 +234,9 @@ def missing_wrapper(subject: Subject, report: FindingSink) -> None:
         )
 
 
-def wrapper_for(note: Note, owner: Object) -> str | None:
+def find_wrapper(note: Note, owner: Object) -> str | None:
     """The list of `owner` that an object standing directly in it belongs in."""
-    if note.value is None or part_for(note, owner) is not None:
+    if note.value is None or find_part(note, owner) is not None:
         return None
     lists = (
         s
@@ -251,7 +254,7 @@ def wrapper_for(note: Note, owner: Object) -> str | None:
     return best.tag if best is not None else None
 
 
-def part_for(note: Note, owner: Object) -> FieldSpec | None:
+def find_part(note: Note, owner: Object) -> FieldSpec | None:
     """The one-object property that takes the class of this element, if it would only be called right."""
     if note.value is None:
         return None
@@ -266,22 +269,22 @@ def part_for(note: Note, owner: Object) -> FieldSpec | None:
     return None
 
 
-def _fate(subject: Subject, note: Note) -> str:
+def _describe_consequence(subject: Subject, note: Note) -> str:
     """What OpenSim does with an object it cannot take."""
     spec = note.spec
     if spec is None or not isinstance(spec.kind, Held):
         return "leaves the object out"
     if spec.tag == "objects":
-        return "refuses to load the file"
+        return "rejects the file"
     if spec.kind.form != "single":
         return "leaves the object out"
     attributes = None if subject.source is None else subject.source.attributes_of(note.number)
     if attributes is None or ("name" in attributes and attributes["name"].value == spec.tag):
-        return "refuses to load the file"
+        return "rejects the file"
     return "leaves the object out, and fails where it needs one"
 
 
-def set_for(cls: type[Object] | None) -> str | None:
+def find_set(cls: type[Object] | None) -> str | None:
     """The set of a model that takes objects of a class."""
     if cls is None:
         return None

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from osimlite.base.text import format_count
 from osimlite.lint.construction import CONSTRUCTION, Obstacle, Stage, obstacles_of
 from osimlite.lint.diagnostic import Severity
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Unknown
 from osimlite.schema.registry import further_classes
@@ -17,14 +17,14 @@ _QUOTED = re.compile(r"'([^']+)'")
 
 
 @rule("OSIM421", "impossible-mechanism", severity=ERROR, about=CONSTRUCTION)
-def impossible_mechanism(subject: Subject, report: FindingSink) -> None:
-    """The bodies, joints and constraints of a model make no mechanism.
+def report_impossible_mechanism(subject: Subject, report: FindingCollector) -> None:
+    """The bodies, joints and constraints of a model do not form a mechanism.
 
     Builds the mechanism as `osimlite simulate` does, and reports what stops that: a joint, frame,
-    function or constraint that has no meaning, and that no other rule has reported.
+    function or constraint that cannot be computed, and that no other rule has reported.
 
-    OpenSim refuses such a model, or computes with what happens to be in memory. No command that
-    computes takes it.
+    OpenSim rejects such a model, or computes with undefined values. Commands that compute reject
+    it.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -41,15 +41,15 @@ def impossible_mechanism(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM422", "unmet-constraint", severity=ERROR, about=CONSTRUCTION)
-def unmet_constraint(subject: Subject, report: FindingSink) -> None:
+def report_unmet_constraint(subject: Subject, report: FindingCollector) -> None:
     """No pose of the model fulfils a constraint.
 
     Assembles the default pose, and reports each constraint that the nearest pose does not fulfil,
     with how far it is from that (m, or rad for constraints of angles).
 
-    OpenSim logs that it is unable to assemble the model and relaxes the constraints; its
-    integrator then refuses to start. Usual causes are a length in millimetres, both ends on one
-    body, and two locked or prescribed coordinates that a constraint connects.
+    OpenSim logs that it is unable to assemble the model and relaxes the constraints; its integrator
+    then fails to start. Usual causes are a length in millimetres, both ends on one body, and two
+    locked or prescribed coordinates that a constraint connects.
 
     ```xml
       <ConstantDistanceConstraint name="rod">
@@ -65,7 +65,7 @@ def unmet_constraint(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM423", "range-not-kept", severity=WARNING, about=CONSTRUCTION)
-def range_not_kept(subject: Subject, report: FindingSink) -> None:
+def report_range_not_kept(subject: Subject, report: FindingCollector) -> None:
     """A clamped coordinate leaves its range in the default pose.
 
     Assembles the default pose, and reports clamped coordinates that a constraint or their
@@ -91,7 +91,7 @@ def range_not_kept(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM424", "singular-mass-matrix", severity=ERROR, about=CONSTRUCTION)
-def singular_mass_matrix(subject: Subject, report: FindingSink) -> None:
+def report_singular_mass_matrix(subject: Subject, report: FindingCollector) -> None:
     """A coordinate moves no mass in the default pose.
 
     Evaluates the accelerations in the default pose, and reports the coordinate without inertia:
@@ -125,15 +125,14 @@ def singular_mass_matrix(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM531", "impossible-force", severity=ERROR, about=CONSTRUCTION)
-def impossible_force(subject: Subject, report: FindingSink) -> None:
-    """A force, a controller or a probe has no meaning.
+def report_impossible_force(subject: Subject, report: FindingCollector) -> None:
+    """A force, a controller or a probe cannot be computed.
 
-    Makes all forces, controllers and probes as `osimlite simulate` does, and reports what stops
-    that and no other rule has reported. It is a warning for a number that OpenSim computes with
-    though it makes no sense.
+    Builds all forces, controllers and probes as `osimlite simulate` does, and reports failures that
+    no other rule has reported. It is a warning where OpenSim computes with a doubtful number.
 
-    OpenSim refuses such a model when it builds the system, or fails when it needs the force. No
-    command that computes takes it.
+    OpenSim rejects such a model when it builds the system, or fails when it needs the force.
+    Commands that compute reject it.
 
     ```xml
       <ComponentSet>
@@ -159,11 +158,12 @@ def impossible_force(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM532", "no-acceleration", severity=ERROR, about=CONSTRUCTION)
-def no_acceleration(subject: Subject, report: FindingSink) -> None:
-    """The accelerations of a model are no numbers in the default pose.
+def report_no_acceleration(subject: Subject, report: FindingCollector) -> None:
+    """The accelerations of a model are not finite in the default pose.
 
-    Evaluates the accelerations in the default pose, and reports the forces that give none. It is a
-    warning where only a state of a muscle has no rate, as before its equilibrium.
+    Evaluates the accelerations in the default pose, and reports the forces that make them NaN or
+    infinite. It is a warning where only the rate of a muscle state is not finite, as before
+    equilibration.
 
     OpenSim gives no message: every acceleration is NaN from the start, and so is the motion.
 
@@ -183,14 +183,14 @@ def no_acceleration(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM533", "not-computed", severity=INFO, about=CONSTRUCTION)
-def not_computed(subject: Subject, report: FindingSink) -> None:
+def report_not_computed(subject: Subject, report: FindingCollector) -> None:
     """OpenSim runs a component that osimlite cannot compute.
 
-    Reports joints, constraints, forces and controllers of OpenSim's own classes that
-    `osimlite simulate` and the other commands that compute do not know. Of each class, the first
-    is reported, with the number of the others.
+    Reports joints, constraints, forces and controllers of OpenSim's own classes that `osimlite
+    simulate` and the other commands that compute do not know. Of each class, the first is reported,
+    with the number of the others.
 
-    The model is as it should be. Commands that compute refuse it, or leave the component out with
+    The model is correct. Commands that compute reject it, or leave the component out with
     `--skip-unsupported`.
 
     ```xml
@@ -225,15 +225,15 @@ def not_computed(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM534", "impassable-obstacle", severity=ERROR, about=CONSTRUCTION)
-def impassable_obstacle(subject: Subject, report: FindingSink) -> None:
-    """A path cannot be laid over an obstacle.
+def report_impassable_obstacle(subject: Subject, report: FindingCollector) -> None:
+    """A path cannot wrap over an obstacle.
 
-    Reports paths over obstacles (Scholz2015GeometryPath) of which a point, or another obstacle, is
-    inside an obstacle in the default pose, as written or as assembled; and those whose search
-    fails, since a `contact_hint` is in the middle of the surface or leads nowhere.
+    Reports paths over obstacles (Scholz2015GeometryPath) with a point, or another obstacle, inside
+    an obstacle in the default pose, as written or as assembled; and paths whose search fails
+    because a `contact_hint` is in the middle of the surface or unsuitable.
 
-    OpenSim refuses the model: it lays the path as soon as it initialises the system. A GeometryPath
-    is another matter, it goes straight through a surface that a point of it is inside of (OSIM616).
+    OpenSim rejects the model: it computes the path when it initialises the system. A GeometryPath,
+    in contrast, goes straight through a surface that contains one of its points (OSIM616).
 
     ```xml
       <PathSpring name="cable">
@@ -261,10 +261,12 @@ def impassable_obstacle(subject: Subject, report: FindingSink) -> None:
     ```
     """
     for obstacle in _select_unreported(subject, report, Stage.CABLE):
-        _report(subject, report, obstacle, f"{obstacle.message}: OpenSim refuses the model")
+        _report(subject, report, obstacle, f"{obstacle.message}: OpenSim rejects the model")
 
 
-def _select_unreported(subject: Subject, report: FindingSink, stage: Stage) -> Iterator[Obstacle]:
+def _select_unreported(
+    subject: Subject, report: FindingCollector, stage: Stage
+) -> Iterator[Obstacle]:
     """Yield the obstacles of a stage whose cause no other rule has reported."""
     errors = [item for item in report.findings if item.severity == ERROR]
     places = {item.component for item in errors if item.component}
@@ -287,13 +289,13 @@ def _is_related(path: str, place: str) -> bool:
     return path == place or place.startswith(f"{path}/") or path.startswith(f"{place}/")
 
 
-def _has_error(report: FindingSink, families: str) -> bool:
+def _has_error(report: FindingCollector, families: str) -> bool:
     return any(item.severity == ERROR and item.code[4] in families for item in report.findings)
 
 
 def _report(
     subject: Subject,
-    report: FindingSink,
+    report: FindingCollector,
     obstacle: Obstacle,
     message: str,
     severity: Severity | None = None,

@@ -7,11 +7,11 @@ from itertools import combinations
 from typing import Any
 
 from osimlite.base.text import join_words
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
-from osimlite.lint.rules.references import broken_references
-from osimlite.lint.skeleton import base_of
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.rules.references import find_broken_references
+from osimlite.lint.skeleton import find_base
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called
+from osimlite.lint.words import describe_object
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.forces import Force
@@ -20,16 +20,15 @@ from osimlite.schema.tree import Use
 
 
 @rule("OSIM321", "contact-without-partner", severity=WARNING)
-def contact_without_partner(subject: Subject, report: FindingSink) -> None:
-    """A contact force has no two surfaces that can meet.
+def report_contact_without_partner(subject: Subject, report: FindingCollector) -> None:
+    """A contact force has no pair of surfaces that can touch.
 
-    Reports contact forces that list no contact geometry, or only one, over all their parameter sets
-    together; and those of whose surfaces no two can meet: all are on one body, or of shapes between
-    which OpenSim computes no contact. A HuntCrossleyForce acts between spheres, ellipsoids, and
-    these and a half-space; an ElasticFoundationForce between a mesh and a mesh, a sphere or a
-    half-space.
+    Reports contact forces that list no contact geometry, or only one, over all their parameter
+    sets; and forces whose surfaces cannot touch: all are on one body, or have shapes between which
+    OpenSim computes no contact. A HuntCrossleyForce acts between spheres, ellipsoids, and these and
+    a half-space; an ElasticFoundationForce between a mesh and a mesh, a sphere or a half-space.
 
-    Such a force never acts, and OpenSim does not mention it.
+    Such a force never acts, and OpenSim gives no message.
 
     ```xml
       <HuntCrossleyForce::ContactParameters>
@@ -38,15 +37,15 @@ def contact_without_partner(subject: Subject, report: FindingSink) -> None:
       </HuntCrossleyForce::ContactParameters>
     ```
     """
-    for force, holders, uses in _contact_lists(subject):
+    for force, holders, uses in _find_contact_lists(subject):
         if len(uses) > 1:
-            reason = _reason_for_no_contact(subject, force, uses)
+            reason = _explain_missing_contact(subject, force, uses)
             if not reason:
                 continue
-            message = f"{called(force)} lists {reason}: it never acts"
+            message = f"{describe_object(force)} lists {reason}: it never acts"
         else:
             listed_one = f"one surface, '{uses[0].text}'" if uses else "no contact geometry"
-            message = f"{called(force)} lists {listed_one}: it never acts"
+            message = f"{describe_object(force)} lists {listed_one}: it never acts"
         if holders:
             report(message, holders[0], tag="geometry")
         else:
@@ -65,19 +64,19 @@ def _can_meet(force: str, first: str, second: str) -> bool:
     return not shapes.isdisjoint(_ROUND) and shapes <= _ROUND | {"ContactHalfSpace"}
 
 
-def _reason_for_no_contact(subject: Subject, force: Component, uses: list[Use]) -> str:
+def _explain_missing_contact(subject: Subject, force: Component, uses: list[Use]) -> str:
     """Return why no two of the surfaces of a force can meet; empty if some can, or it is not known."""
     kind = type(force).__name__
     if kind not in ("HuntCrossleyForce", "ElasticFoundationForce"):
         return ""
     surfaces = [subject.resolution(use).target for use in uses]
     known = [surface for surface in surfaces if isinstance(surface, ContactGeometry)]
-    bases = [base_of(subject, subject.target_of(surface, "socket_frame")) for surface in known]
+    bases = [find_base(subject, subject.target_of(surface, "socket_frame")) for surface in known]
     if len(known) != len(surfaces) or any(base is None for base in bases):
         return ""
     pairs = [*combinations(zip(known, bases, strict=True), 2)]
     if all(first[1] is second[1] for first, second in pairs):
-        return f"surfaces of {called(bases[0])} alone" if bases[0] is not None else ""
+        return f"surfaces of {describe_object(bases[0])} alone" if bases[0] is not None else ""
     if any(
         first[1] is not second[1]
         and _can_meet(kind, type(first[0]).__name__, type(second[0]).__name__)
@@ -89,7 +88,7 @@ def _reason_for_no_contact(subject: Subject, force: Component, uses: list[Use]) 
 
 
 @rule("OSIM322", "contact-listed-twice", severity=ERROR)
-def contact_listed_twice(subject: Subject, report: FindingSink) -> None:
+def report_contact_listed_twice(subject: Subject, report: FindingCollector) -> None:
     """A contact force lists the same surface twice.
 
     Reports every mention of a contact geometry after the first within one force.
@@ -103,7 +102,7 @@ def contact_listed_twice(subject: Subject, report: FindingSink) -> None:
       </HuntCrossleyForce::ContactParameters>
     ```
     """
-    for force, _, uses in _contact_lists(subject):
+    for force, _, uses in _find_contact_lists(subject):
         seen: set[int] = set()
         words: dict[tuple[int, str], int] = {}
         for use in uses:
@@ -114,7 +113,8 @@ def contact_listed_twice(subject: Subject, report: FindingSink) -> None:
                 continue
             if id(target) in seen:
                 report(
-                    f"{called(force)} lists '{target.name}' again: OpenSim counts it twice and the force is doubled",
+                    f"{describe_object(force)} lists '{target.name}' again: OpenSim counts it "
+                    "twice and the force is doubled",
                     use.holder,
                     tag=use.spec.tag,
                     word=use.text,
@@ -124,12 +124,12 @@ def contact_listed_twice(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM323", "unused-contact-geometry", severity=INFO)
-def unused_contact_geometry(subject: Subject, report: FindingSink) -> None:
-    """A contact geometry is used by nothing.
+def report_unused_contact_geometry(subject: Subject, report: FindingCollector) -> None:
+    """A contact geometry is not used.
 
-    Reports contact geometry that no force and no path names.
+    Reports contact geometry that no force and no path refers to.
 
-    It has no effect; often a force was meant to list it.
+    It has no effect; often a force should list it.
 
     ```xml
       <ContactSphere name="toe"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.02</radius> </ContactSphere>
@@ -139,13 +139,13 @@ def unused_contact_geometry(subject: Subject, report: FindingSink) -> None:
       </HuntCrossleyForce::ContactParameters>
     ```
     """
-    surfaces = list(subject.each(ContactGeometry))
+    surfaces = list(subject.find_instances(ContactGeometry))
     if not surfaces or subject.has_unknown:
         return
-    if any(broken.use.reference.target in _SURFACES for broken in broken_references(subject)):
+    if any(broken.use.reference.target in _SURFACES for broken in find_broken_references(subject)):
         # A misspelt name may mean any of them.
         return
-    if any(len(uses) < 2 for _, _, uses in _contact_lists(subject)):
+    if any(len(uses) < 2 for _, _, uses in _find_contact_lists(subject)):
         return
     used = {
         id(subject.resolution(use).target)
@@ -154,16 +154,16 @@ def unused_contact_geometry(subject: Subject, report: FindingSink) -> None:
     }
     for surface in surfaces:
         if id(surface) not in used:
-            report(f"no force uses {called(surface)}", surface, attribute="name")
+            report(f"no force uses {describe_object(surface)}", surface, attribute="name")
 
 
 _SURFACES = {"ContactGeometry", "ContactSphere", "ContactHalfSpace"}
 
 
-def _contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Object], list[Use]]]:
+def _find_contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Object], list[Use]]]:
     """Each force that works through lists of contact geometry: the force, its parameter objects, what they name."""
     forces: dict[int, tuple[Component, list[Object], list[Use]]] = {}
-    for force in subject.each(Force):
+    for force in subject.find_instances(Force):
         if "contact_parameters" in defaults(type(force))[1]:
             parameters: Any = force
             if not isinstance(parameters.contact_parameters, Unknown):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from osimlite.io.document.lexical import shortest
-from osimlite.lint.fixes import replaced
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, Threshold, rule
+from osimlite.lint.fixes import replace_text
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, Threshold, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity
+from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.base import Object
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.functions import (
@@ -40,14 +40,14 @@ ORIENTATION = Threshold(
 )
 
 
-@rule("OSIM511", "inverted-range", severity=WARNING, mends="unsafe")
-def inverted_range(subject: Subject, report: FindingSink) -> None:
+@rule("OSIM511", "inverted-range", severity=WARNING, fixes="unsafe")
+def report_inverted_range(subject: Subject, report: FindingCollector) -> None:
     """The range of a coordinate ends before it begins.
 
     Reports ranges whose first number is larger than the second; an error if the coordinate is
     clamped.
 
-    OpenSim refuses to load a clamped coordinate like this. Otherwise it does not check, and sliders
+    OpenSim rejects a clamped coordinate like this. Otherwise it does not check, and user interfaces
     and solvers that use the range misbehave.
 
     ```xml
@@ -59,41 +59,40 @@ def inverted_range(subject: Subject, report: FindingSink) -> None:
       </PinJoint>
     ```
     """
-    for coordinate in subject.each(Coordinate):
+    for coordinate in subject.find_instances(Coordinate):
         low, high = coordinate.range
         if low > high:
-            refused = (
-                ": OpenSim refuses to load a clamped coordinate like this"
-                if coordinate.clamped
-                else ""
+            rejected = (
+                ": OpenSim rejects a clamped coordinate like this" if coordinate.clamped else ""
             )
             report(
-                f"the range of {called(coordinate)} runs from {quantity(low)} down to {quantity(high)}{refused}",
+                f"the range of {describe_object(coordinate)} runs from {format_quantity(low)} "
+                f"down to {format_quantity(high)}{rejected}",
                 coordinate,
                 tag="range",
                 severity=ERROR if coordinate.clamped else None,
                 suggestion=(better := f"{shortest(high)} {shortest(low)}"),
-                fix=replaced(
+                fix=replace_text(
                     subject.source, subject.position(coordinate, tag="range"), better, safe=False
                 ),
             )
 
 
 @rule("OSIM512", "default-outside-range", severity=WARNING)
-def default_outside_range(subject: Subject, report: FindingSink) -> None:
+def report_default_outside_range(subject: Subject, report: FindingCollector) -> None:
     """The default value of a coordinate lies outside its range.
 
     Reports such defaults; an error if the coordinate is clamped.
 
-    OpenSim refuses to load a clamped coordinate like this. Otherwise the model starts in a pose
-    that its own range rules out; often the range or the default is in degrees.
+    OpenSim rejects a clamped coordinate like this. Otherwise the model starts in a pose outside its
+    range; often the range or the default is in degrees.
 
     ```xml
     - <Coordinate name="knee_angle"> <default_value>0.3</default_value> <range>-2.1 0</range> </Coordinate>
     + <Coordinate name="knee_angle"> <default_value>-0.3</default_value> <range>-2.1 0</range> </Coordinate>
     ```
     """
-    for coordinate in subject.each(Coordinate):
+    for coordinate in subject.find_instances(Coordinate):
         low, high = coordinate.range
         slack = (
             1e-9 * max(abs(low), abs(high), 1.0)
@@ -103,14 +102,13 @@ def default_outside_range(subject: Subject, report: FindingSink) -> None:
         if low <= high and not low - slack <= coordinate.default_value <= high + slack:
             if not math.isfinite(coordinate.default_value):
                 continue
-            refused = (
-                ": OpenSim refuses to load a clamped coordinate like this"
-                if coordinate.clamped
-                else ""
+            rejected = (
+                ": OpenSim rejects a clamped coordinate like this" if coordinate.clamped else ""
             )
             report(
-                f"the default value of {called(coordinate)}, {quantity(coordinate.default_value)}, is outside its "
-                f"range, {quantity(low)} to {quantity(high)}{refused}",
+                f"the default value of {describe_object(coordinate)}, "
+                f"{format_quantity(coordinate.default_value)}, is outside its range, "
+                f"{format_quantity(low)} to {format_quantity(high)}{rejected}",
                 coordinate,
                 tag="default_value",
                 severity=ERROR if coordinate.clamped else None,
@@ -118,12 +116,12 @@ def default_outside_range(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM515", "locked-and-prescribed", severity=ERROR)
-def locked_and_prescribed(subject: Subject, report: FindingSink) -> None:
+def report_locked_and_prescribed(subject: Subject, report: FindingCollector) -> None:
     """A coordinate is both locked and prescribed.
 
     Reports such coordinates, unless the function is a constant that equals the default value.
 
-    The lock and the function contradict each other. OpenSim refuses the model, or its integrator
+    The lock and the function contradict each other. OpenSim rejects the model, or its integrator
     stops as soon as the function leaves the default value. Unlock the coordinate, or set
     `prescribed` to false.
 
@@ -137,27 +135,27 @@ def locked_and_prescribed(subject: Subject, report: FindingSink) -> None:
       </Coordinate>
     ```
     """
-    for coordinate in subject.each(Coordinate):
+    for coordinate in subject.find_instances(Coordinate):
         function = coordinate.prescribed_function
         if not (coordinate.locked and coordinate.prescribed) or function is None:
             continue
-        value = constant_value(function)
+        value = get_constant_value(function)
         if value is None or abs(value - coordinate.default_value) > _ASSEMBLY_ACCURACY:
             report(
-                f"{called(coordinate)} is locked and prescribed: OpenSim refuses the model, or "
-                "stops as soon as the function leaves the default value",
+                f"{describe_object(coordinate)} is locked and prescribed: OpenSim rejects the "
+                "model, or stops as soon as the function leaves the default value",
                 coordinate,
                 tag="locked",
             )
 
 
 @rule("OSIM513", "prescribed-without-function", severity=ERROR)
-def prescribed_without_function(subject: Subject, report: FindingSink) -> None:
-    """A coordinate is prescribed and has no function.
+def report_prescribed_without_function(subject: Subject, report: FindingCollector) -> None:
+    """A prescribed coordinate has no function.
 
     Reports coordinates with `<prescribed>true</prescribed>` and no `<prescribed_function>`.
 
-    OpenSim switches the prescription off in silence, and the coordinate moves freely.
+    OpenSim disables the prescription without a message, and the coordinate moves freely.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -166,10 +164,11 @@ def prescribed_without_function(subject: Subject, report: FindingSink) -> None:
       </Coordinate>
     ```
     """
-    for coordinate in subject.each(Coordinate):
+    for coordinate in subject.find_instances(Coordinate):
         if coordinate.prescribed and coordinate.prescribed_function is None:
             report(
-                f"{called(coordinate)} is prescribed without a prescribed_function: OpenSim lets it move freely",
+                f"{describe_object(coordinate)} is prescribed without a prescribed_function: "
+                "OpenSim lets it move freely",
                 coordinate,
                 tag="prescribed",
             )
@@ -178,11 +177,11 @@ def prescribed_without_function(subject: Subject, report: FindingSink) -> None:
 @rule(
     "OSIM514", "degrees-for-radians", severity=WARNING, thresholds=(ANGLE, UNBOUNDED, ORIENTATION)
 )
-def degrees_for_radians(subject: Subject, report: FindingSink) -> None:
-    """An angle looks as if it were in degrees.
+def report_degrees_for_radians(subject: Subject, report: FindingCollector) -> None:
+    """An angle seems to be in degrees.
 
     Reports rotational coordinates whose default value or range goes beyond five turns, in radians,
-    and frames, surfaces and wrap objects that are turned by more than one.
+    and frames, surfaces and wrap objects that are rotated by more than one turn.
 
     Coordinates are in radians (only the limits of a CoordinateLimitForce are in degrees); 90 is
     more than fourteen turns.
@@ -197,7 +196,7 @@ def degrees_for_radians(subject: Subject, report: FindingSink) -> None:
     ```
     """
     turns, unbounded = subject.config.value_of(ANGLE), subject.config.value_of(UNBOUNDED)
-    for joint in subject.each(Joint):
+    for joint in subject.find_instances(Joint):
         for coordinate, motion in zip(joint.coordinates, joint.motion_types or (), strict=False):
             if motion != "rotational" or not isinstance(coordinate, Coordinate):
                 continue
@@ -207,15 +206,17 @@ def degrees_for_radians(subject: Subject, report: FindingSink) -> None:
             # 99999.9 and the like stand for "no bound".
             if turns < largest < unbounded:
                 report(
-                    f"the range of {called(coordinate)}, {quantity(coordinate.range)}, is in radians; in degrees?",
+                    f"the range of {describe_object(coordinate)}, "
+                    f"{format_quantity(coordinate.range)}, is read in radians; is it in degrees?",
                     coordinate,
                     tag="range",
                     suggestion=" ".join(f"{math.radians(bound):.6g}" for bound in coordinate.range),
                 )
             if turns < abs(coordinate.default_value) < math.inf:
                 report(
-                    f"the default value of {called(coordinate)}, {quantity(coordinate.default_value)}, is in radians; "
-                    "in degrees?",
+                    f"the default value of {describe_object(coordinate)}, "
+                    f"{format_quantity(coordinate.default_value)}, is read in radians; is it in "
+                    "degrees?",
                     coordinate,
                     tag="default_value",
                     suggestion=f"{math.radians(coordinate.default_value):.6g}",
@@ -228,20 +229,21 @@ def degrees_for_radians(subject: Subject, report: FindingSink) -> None:
                 angles = getattr(item, spec.name)
                 if any(largest < abs(angle) < math.inf for angle in angles):
                     report(
-                        f"{subject.titled(item, spec)}, {quantity(angles)}, is in radians; in degrees?",
+                        f"{subject.describe_property(item, spec)}, {format_quantity(angles)}, is "
+                        "read in radians; is it in degrees?",
                         item,
                         tag=spec.tag,
                         suggestion=" ".join(f"{math.radians(angle):.6g}" for angle in angles),
                     )
 
 
-def constant_value(function: Object | None) -> float | None:
+def get_constant_value(function: Object | None) -> float | None:
     """Return the value of a function that is constant; None if it changes, or is not known."""
     match function:
         case Constant():
             return function.value
         case MultiplierFunction():
-            inner = constant_value(function.function)
+            inner = get_constant_value(function.function)
             return None if inner is None else function.scale * inner
         case LinearFunction() if len(function.coefficients) > 1:
             return None if function.coefficients[0] else function.coefficients[1]

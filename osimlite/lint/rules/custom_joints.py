@@ -6,10 +6,10 @@ import math
 from typing import TYPE_CHECKING, Any, cast
 
 from osimlite.base.text import find_nearest, join_words
-from osimlite.lint.axes import axes_of, axes_refused, coordinates_of
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.axes import list_axes, list_coordinates, refuses_axes
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called
+from osimlite.lint.words import describe_object
 from osimlite.mechanics.laws.vectors import cross, norm
 from osimlite.schema.base import Unknown
 from osimlite.schema.coordinates import Coordinate
@@ -32,15 +32,14 @@ if TYPE_CHECKING:
 
 
 @rule("OSIM410", "made-up-coordinate", severity=ERROR)
-def made_up_coordinate(subject: Subject, report: FindingSink) -> None:
+def report_made_up_coordinate(subject: Subject, report: FindingCollector) -> None:
     """An axis of a custom joint names a coordinate that the joint does not declare.
 
-    Reports such names where OpenSim takes the model all the same; where it refuses the model, the
-    name is reported as a reference that leads nowhere. It is a warning if the joint declares no
-    coordinate at all.
+    Reports such names where OpenSim accepts the model; where it rejects the model, the name is
+    reported as an unresolved reference. It is a warning if the joint declares no coordinate at all.
 
-    OpenSim makes a coordinate of that name up, without a word: the joint has one degree of freedom
-    more, its value is 0, and the axis no longer follows the coordinate it was meant to follow.
+    OpenSim creates a coordinate of that name without a message: the joint gets an additional degree
+    of freedom with the value 0, and the axis does not follow the intended coordinate.
 
     ```xml
       <TransformAxis name="translation1">
@@ -50,18 +49,18 @@ def made_up_coordinate(subject: Subject, report: FindingSink) -> None:
       </TransformAxis>
     ```
     """
-    for joint in subject.named("CustomJoint"):
-        declared = [coordinate.name for coordinate in coordinates_of(joint)]
-        if axes_refused(joint):
+    for joint in subject.find_by_class("CustomJoint"):
+        declared = [coordinate.name for coordinate in list_coordinates(joint)]
+        if refuses_axes(joint):
             continue
-        for axis in axes_of(joint):
+        for axis in list_axes(joint):
             for index, name in enumerate(axis.coordinates):
                 if not isinstance(name, str) or name in declared:
                     continue
                 word, nth = subject.word_at(axis, "coordinates", index)
                 report(
-                    f"{axis.name} of {called(joint)} names '{name}', which the joint does not declare: OpenSim makes a "
-                    "coordinate of that name up",
+                    f"{axis.name} of {describe_object(joint)} names '{name}', which the joint "
+                    "does not declare: OpenSim creates a coordinate of that name",
                     axis,
                     tag="coordinates",
                     word=word,
@@ -72,11 +71,11 @@ def made_up_coordinate(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM412", "axis-without-coordinate", severity=ERROR)
-def axis_without_coordinate(subject: Subject, report: FindingSink) -> None:
+def report_axis_without_coordinate(subject: Subject, report: FindingCollector) -> None:
     """An axis of a custom joint has a function and no coordinate for it.
 
-    Reports axes that name no coordinate though their function wants a variable. Constant and linear
-    functions do without.
+    Reports axes that name no coordinate although their function needs a variable. Constant and
+    linear functions need none.
 
     OpenSim crashes, without a message.
 
@@ -87,8 +86,8 @@ def axis_without_coordinate(subject: Subject, report: FindingSink) -> None:
       </TransformAxis>
     ```
     """
-    for joint in subject.named("CustomJoint"):
-        for axis in axes_of(joint):
+    for joint in subject.find_by_class("CustomJoint"):
+        for axis in list_axes(joint):
             function = axis.function
             while (
                 is_a(function, "MultiplierFunction")
@@ -101,22 +100,22 @@ def axis_without_coordinate(subject: Subject, report: FindingSink) -> None:
                 "Unknown",
             ):
                 report(
-                    f"{axis.name} of {called(joint)} names no coordinate for its {called(axis.function)}: "
-                    "OpenSim crashes",
+                    f"{axis.name} of {describe_object(joint)} names no coordinate for its "
+                    f"{describe_object(axis.function)}: OpenSim crashes",
                     axis,
                     tag="coordinates",
                 )
 
 
 @rule("OSIM413", "collinear-axes", severity=ERROR)
-def collinear_axes(subject: Subject, report: FindingSink) -> None:
+def report_collinear_axes(subject: Subject, report: FindingCollector) -> None:
     """Two rotations, or two translations, of a custom joint have the same axis.
 
-    Reports axes of a custom joint that are parallel to one before of the same kind, or have no
+    Reports axes of a custom joint that are parallel to an earlier axis of the same kind, or have no
     length.
 
-    OpenSim refuses to load the file, also where an axis moves nothing. Give each unused axis a
-    direction of its own.
+    OpenSim rejects the file, also if an axis moves nothing. Give each unused axis a different
+    direction.
 
     ```xml
       <TransformAxis name="rotation1"> <axis>0 0 1</axis> </TransformAxis>
@@ -124,8 +123,8 @@ def collinear_axes(subject: Subject, report: FindingSink) -> None:
     + <TransformAxis name="rotation2"> <axis>0 1 0</axis> </TransformAxis>
     ```
     """
-    for joint in subject.named("CustomJoint"):
-        axes = axes_of(joint)
+    for joint in subject.find_by_class("CustomJoint"):
+        axes = list_axes(joint)
         for kind in (axes[:3], axes[3:]):
             # Of an axis with NaN in it OpenSim's comparison says nothing.
             kind = [axis for axis in kind if not any(map(math.isnan, axis.axis))]
@@ -148,23 +147,24 @@ def collinear_axes(subject: Subject, report: FindingSink) -> None:
                         else f"is parallel to that of {twin.name if twin else ''}"
                     )
                     report(
-                        f"the axis of {axis.name} of {called(joint)} {state}: OpenSim refuses to load the file",
+                        f"the axis of {axis.name} of {describe_object(joint)} {state}: OpenSim "
+                        "rejects the file",
                         axis,
                         tag="axis",
                     )
 
 
 @rule("OSIM414", "idle-coordinate", severity=ERROR)
-def idle_coordinate(subject: Subject, report: FindingSink) -> None:
+def report_idle_coordinate(subject: Subject, report: FindingCollector) -> None:
     """A coordinate of a custom joint moves nothing.
 
-    Reports coordinates that no axis uses, or only with a function that does not change with them in
-    the default pose: a constant one, one with the weight 0, or one of a single variable that reads
-    another coordinate.
+    Reports coordinates that no axis uses, or that only functions use which do not change with them
+    in the default pose: constant functions, functions with the weight 0, or functions of one
+    variable that read another coordinate.
 
-    The joint has a degree of freedom without a motion, so that the mass matrix cannot be inverted:
-    all accelerations of the joint become NaN, without a message, also if the coordinate is locked
-    or prescribed.
+    The joint has a degree of freedom without motion, so the mass matrix cannot be inverted: all
+    accelerations of the joint become NaN, without a message, also if the coordinate is locked or
+    prescribed.
 
     ```xml
       <TransformAxis name="rotation1">
@@ -174,49 +174,61 @@ def idle_coordinate(subject: Subject, report: FindingSink) -> None:
       </TransformAxis>
     ```
     """
-    for joint in subject.named("CustomJoint"):
-        coordinates = coordinates_of(joint)
-        if not coordinates or axes_refused(joint):
+    for joint in subject.find_by_class("CustomJoint"):
+        coordinates = list_coordinates(joint)
+        if not coordinates or refuses_axes(joint):
             continue
-        columns = {coordinate.name: _motion_by(joint, coordinate) for coordinate in coordinates}
+        columns = {
+            coordinate.name: _compute_axis_rates(joint, coordinate) for coordinate in coordinates
+        }
         idle = [coordinate for coordinate in coordinates if not any(columns[coordinate.name])]
         for coordinate in idle:
-            axes = [axis.name for axis in axes_of(joint) if coordinate.name in axis.names]
-            state = f"does not change {join_words(axes)} of it" if axes else "is on no axis of it"
+            axes = [axis.name for axis in list_axes(joint) if coordinate.name in axis.names]
+            state = (
+                f"does not change its axes {join_words(axes)}"
+                if axes
+                else "is not used by any of its axes"
+            )
             report(
-                f"{called(coordinate)} of {called(joint)} {state}: accelerations become NaN, without a message",
+                f"{describe_object(coordinate)} of {describe_object(joint)} {state}: "
+                "accelerations become NaN, without a message",
                 coordinate,
                 attribute="name",
             )
-        if not idle and _rank(list(columns.values())) < len(columns):
+        if not idle and _compute_rank(list(columns.values())) < len(columns):
             report(
-                f"the coordinates of {called(joint)} move it in the same way: accelerations are NaN, or anything",
+                f"the coordinates of {describe_object(joint)} produce the same motion: "
+                "accelerations are NaN or meaningless",
                 joint,
                 number=subject.element_of(joint, "coordinates"),
             )
 
 
 _COLLINEAR = 1e-5
-"""Length of the cross product of two axes below which OpenSim 4.6 refuses them; it does not make them unit vectors."""
+"""Length of the cross product of two axes below which OpenSim 4.6 rejects them; it does not make them unit vectors."""
 
 
-def _motion_by(joint: CustomJoint, coordinate: Coordinate) -> list[float]:
+def _compute_axis_rates(joint: CustomJoint, coordinate: Coordinate) -> list[float]:
     """How fast each axis moves with a coordinate in the default pose; where nobody can tell, some number but 0."""
-    values = {item.name: item.default_value for item in coordinates_of(joint)}
+    values = {item.name: item.default_value for item in list_coordinates(joint)}
     result = []
-    for number, axis in enumerate(axes_of(joint)):
+    for number, axis in enumerate(list_axes(joint)):
         names = axis.names
         # Of a name that stands twice the last place counts.
         place = max(
             (place for place, name in enumerate(names) if name == coordinate.name), default=None
         )
-        known = 0.0 if place is None else _slope(axis.function, place, values.get(names[0], 0.0))
+        known = (
+            0.0
+            if place is None
+            else _compute_slope(axis.function, place, values.get(names[0], 0.0))
+        )
         # No combination of these numbers is 0 by chance.
         result.append(math.sqrt(2 + number + 7 * (place or 0)) if known is None else known)
     return result
 
 
-def _slope(function: Function | None, place: int, first: float) -> float | None:
+def _compute_slope(function: Function | None, place: int, first: float) -> float | None:
     """The derivative of a function by one of its variables, of which the first has a value; None if it is not known."""
     match function:
         case None | Constant():
@@ -224,7 +236,7 @@ def _slope(function: Function | None, place: int, first: float) -> float | None:
         case LinearFunction():
             return function.coefficients[place] if place < len(function.coefficients) else 0.0
         case MultiplierFunction():
-            inner = _slope(function.function, place, first)
+            inner = _compute_slope(function.function, place, first)
             return 0.0 if function.scale == 0 else None if inner is None else function.scale * inner
         case PolynomialFunction() if place == 0:
             degree = len(function.coefficients) - 1
@@ -239,7 +251,7 @@ def _slope(function: Function | None, place: int, first: float) -> float | None:
     )
 
 
-def _rank(rows: list[list[float]]) -> int:
+def _compute_rank(rows: list[list[float]]) -> int:
     """The number of rows that no others make up, by elimination."""
     rank = 0
     rows = [row[:] for row in rows]

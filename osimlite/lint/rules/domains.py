@@ -9,16 +9,16 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from osimlite.base.text import find_nearest, join_words
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
-from osimlite.lint.subject import Subject, once
-from osimlite.lint.words import quantity, shown
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.subject import Subject, cached_per_subject
+from osimlite.lint.words import format_quantity, format_value
 from osimlite.schema.base import Object
 from osimlite.schema.facts import REFUSED
 from osimlite.schema.fields import Value, domain_test
 from osimlite.schema.specs import FieldSpec, lineage, value_specs
 
 
-def consequence(
+def describe_consequence(
     cls: type[Object], name: str, number: float, *, rigid_tendon: bool = False
 ) -> tuple[str, bool]:
     """What happens with `number`, outside its domain, in a property; and whether that is a failure.
@@ -47,63 +47,64 @@ def consequence(
 
 
 @rule("OSIM205", "not-finite", severity=ERROR)
-def not_finite(subject: Subject, report: FindingSink) -> None:
-    """A number is NaN, or infinite where that makes no sense.
+def report_not_finite(subject: Subject, report: FindingCollector) -> None:
+    """A number is NaN, or infinite where that is not allowed.
 
     Reports NaN in any number, and infinity except in bounds (ranges, smallest and largest
-    controls), where it is a way to say that there is none.
+    controls), where it stands for an unlimited value.
 
-    OpenSim accepts a single number or a vector in silence, and everything that is computed with it
-    becomes NaN: the simulation runs to its end without a message and without a result. It refuses
-    to load a file with such a number in a list, as the points of a function are. In what is only
-    drawn, and in bounds, it is a warning: the motion stays.
+    OpenSim accepts it in a single number or a vector without a message, and everything computed
+    from it becomes NaN: the simulation runs to its end without a result. It rejects a file with
+    such a number in a list, such as the points of a function. In properties for drawing and in
+    bounds it is a warning: the motion is not affected.
 
     ```xml
     - <gravity>0 NaN 0</gravity>
     + <gravity>0 -9.80665 0</gravity>
     ```
     """
-    for item, spec, value in _reals(subject):
-        if spec.tag == "mass" and value != value and subject.noted(item, spec):
+    for item, spec, value in _find_large_numbers(subject):
+        if spec.tag == "mass" and value != value and subject.has_note(item, spec):
             continue
         if _has_nan(spec.default) and spec.name not in item.model_fields_set:
             continue
         bad = [
             number
-            for number in _numbers(value)
-            if math.isnan(number) or (math.isinf(number) and not _bound(item, spec))
+            for number in _to_numbers(value)
+            if math.isnan(number) or (math.isinf(number) and not _may_be_infinite(item, spec))
         ]
         if bad:
-            fate = _fate_of_nan(item, spec, bad[0])
+            fate = _describe_nan_consequence(item, spec, bad[0])
             report(
-                f"{subject.titled(item, spec)} is {shown(value)}: {fate}",
+                f"{subject.describe_property(item, spec)} is {format_value(value)}: {fate}",
                 item,
                 tag=spec.tag,
-                word=_word_of(subject, item, spec, bad[0]),
-                severity=WARNING if fate in (_DRAWN_FATE, _BOUND_FATE) else None,
+                word=_find_word(subject, item, spec, bad[0]),
+                severity=WARNING if fate in (_DRAWN_CONSEQUENCE, _BOUND_CONSEQUENCE) else None,
             )
 
 
-def _fate_of_nan(item: Object, spec: FieldSpec, number: float) -> str:
+def _describe_nan_consequence(item: Object, spec: FieldSpec, number: float) -> str:
     """Return what OpenSim 4.6 does with NaN or infinity in a property (measured)."""
     assert isinstance(spec.kind, Value)
     if spec.kind.legacy and spec.kind.shape == "list":
-        return "OpenSim refuses to load the file"
+        return "OpenSim rejects the file"
     if spec.tag == "gravity" or (spec.tag == "mass" and not number > 0.0):
-        return "OpenSim refuses the model"
+        return "OpenSim rejects the model"
     if not _DRAWN.isdisjoint(lineage(type(item))):
-        return _DRAWN_FATE
-    return _BOUND_FATE if _bound(item, spec) else _NAN_FATE
+        return _DRAWN_CONSEQUENCE
+    return _BOUND_CONSEQUENCE if _may_be_infinite(item, spec) else _NAN_CONSEQUENCE
 
 
 @rule("OSIM206", "impossible-value", severity=ERROR)
-def impossible_value(subject: Subject, report: FindingSink) -> None:
+def report_impossible_value(subject: Subject, report: FindingCollector) -> None:
     """A number makes OpenSim fail or compute NaN.
 
-    Reports values outside their domain of which it is known that OpenSim refuses them, or computes
-    nonsense: contact stiffness 0, a negative mass, a limit without transition.
+    Reports values outside their domain that OpenSim is known to reject or to compute wrong results
+    with: contact stiffness 0, a negative mass, a limit without transition.
 
-    Most of them pass in silence. A contact stiffness of 0 is 0/0 as soon as the surfaces touch.
+    OpenSim gives no message for most of them. A contact stiffness of 0 gives 0/0 as soon as the
+    surfaces touch.
 
     ```xml
       <CoordinateLimitForce name="stop">
@@ -113,47 +114,48 @@ def impossible_value(subject: Subject, report: FindingSink) -> None:
       </CoordinateLimitForce>
     ```
     """
-    for item, spec, value, verdict in outside(subject):
+    for item, spec, value, verdict in find_outside_domain(subject):
         if verdict.known:
             _report_domain(subject, report, item, spec, value, verdict)
 
 
 @rule("OSIM207", "doubtful-value", severity=WARNING)
-def doubtful_value(subject: Subject, report: FindingSink) -> None:
-    """A number is outside the values that make sense for its property.
+def report_doubtful_value(subject: Subject, report: FindingCollector) -> None:
+    """A number is outside the sensible range of its property.
 
     Reports numbers outside the domain that the property declares: a negative radius or dissipation,
     an opacity of 3; and numbers of 1e20 and more.
 
-    OpenSim computes with it all the same: a negative dissipation feeds energy into each impact, and
-    a sphere with a negative radius touches nothing.
+    OpenSim computes with it anyway: a negative dissipation adds energy in each impact, and a sphere
+    with a negative radius touches nothing.
 
     ```xml
     - <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <radius>-0.05</radius> </ContactSphere>
     + <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.05</radius> </ContactSphere>
     ```
     """
-    for item, spec, value, verdict in outside(subject):
+    for item, spec, value, verdict in find_outside_domain(subject):
         if not verdict.known:
             _report_domain(subject, report, item, spec, value, verdict)
-    for item, spec, value in _reals(subject):
-        huge = [number for number in _numbers(value) if HUGE <= abs(number) < math.inf]
-        if huge and not _bound(item, spec):
+    for item, spec, value in _find_large_numbers(subject):
+        huge = [number for number in _to_numbers(value) if HUGE <= abs(number) < math.inf]
+        if huge and not _may_be_infinite(item, spec):
             report(
-                f"{subject.titled(item, spec)} is {shown(value)}: no quantity of a motion is of this size",
+                f"{subject.describe_property(item, spec)} is {format_value(value)}: no physical "
+                "quantity of a motion is this large",
                 item,
                 tag=spec.tag,
-                word=_word_of(subject, item, spec, huge[0]),
+                word=_find_word(subject, item, spec, huge[0]),
             )
 
 
 @rule("OSIM208", "unknown-choice", severity=ERROR)
-def unknown_choice(subject: Subject, report: FindingSink) -> None:
-    """A property has a value other than those that mean something.
+def report_unknown_choice(subject: Subject, report: FindingCollector) -> None:
+    """A property has an unknown value.
 
-    Reports words and numbers outside the list of those that OpenSim knows for a property.
+    Reports words and numbers that are not in the list of values that OpenSim knows for a property.
 
-    OpenSim takes one of the others, or refuses the model.
+    OpenSim uses one of the known values, or rejects the model.
 
     ```xml
       <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame>
@@ -170,12 +172,13 @@ def unknown_choice(subject: Subject, report: FindingSink) -> None:
                 continue
             for item in items:
                 value = getattr(item, spec.name)
-                if spec.name not in item.model_fields_set or subject.noted(item, spec):
+                if spec.name not in item.model_fields_set or subject.has_note(item, spec):
                     continue
                 for word in value if isinstance(value, tuple) else (value,):
                     if word not in choices:
                         report(
-                            f"{subject.titled(item, spec)} is '{word}'; OpenSim knows {join_words(map(str, choices))}",
+                            f"{subject.describe_property(item, spec)} is '{word}', expected one "
+                            f"of {join_words(map(str, choices))}",
                             item,
                             tag=spec.tag,
                             word=str(word) if isinstance(value, tuple) else None,
@@ -189,7 +192,7 @@ HUGE = 1e20
 """No quantity of a motion, in whatever unit, is as large."""
 
 
-class Verdict(NamedTuple):
+class DomainVerdict(NamedTuple):
     """A number outside its domain: the number, the domain, what OpenSim makes of it, and whether that is known."""
 
     number: float
@@ -198,9 +201,9 @@ class Verdict(NamedTuple):
     known: bool
 
 
-_NAN_FATE = "what is computed with it becomes NaN, without a message"
-_DRAWN_FATE = "it cannot be drawn"
-_BOUND_FATE = "what takes it as a bound fails"
+_NAN_CONSEQUENCE = "everything computed from it becomes NaN, without a message"
+_DRAWN_CONSEQUENCE = "it cannot be drawn"
+_BOUND_CONSEQUENCE = "whatever uses it as a bound fails"
 _DRAWN = {
     "Geometry",
     "Appearance",
@@ -211,23 +214,23 @@ _DRAWN = {
 """Classes of what is only drawn."""
 
 
-_Outside = tuple[Object, FieldSpec, Any, Verdict]
+_OutsideDomain = tuple[Object, FieldSpec, Any, DomainVerdict]
 
 
-@once
-def outside(subject: Subject) -> list[_Outside]:
+@cached_per_subject
+def find_outside_domain(subject: Subject) -> list[_OutsideDomain]:
     """Every number outside its domain."""
-    return list(_find_outside(subject))
+    return list(_iterate_outside_domain(subject))
 
 
-def _find_outside(subject: Subject) -> Iterator[_Outside]:
+def _iterate_outside_domain(subject: Subject) -> Iterator[_OutsideDomain]:
     # A path is laid around them at once, which needs a surface.
     obstacles = {
         id(subject.target_of(obstacle, "socket_contact_geometry"))
-        for obstacle in subject.named("Scholz2015GeometryPathObstacle")
+        for obstacle in subject.find_by_class("Scholz2015GeometryPathObstacle")
     }
     for cls, items in subject.by_class.items():
-        for spec, inside in _domains(cls):
+        for spec, inside in _list_domains(cls):
             assert isinstance(spec.kind, Value)
             for item in items:
                 value = item.__dict__[spec.name]
@@ -235,25 +238,25 @@ def _find_outside(subject: Subject) -> Iterator[_Outside]:
                     continue
                 wrong = [
                     number
-                    for number in _numbers(value)
+                    for number in _to_numbers(value)
                     if not inside(number) and math.isfinite(number)
                 ]
                 if not wrong and _is_missing(item, spec, value):
-                    fate, fails = consequence(cls, spec.name, math.nan)
+                    fate, fails = describe_consequence(cls, spec.name, math.nan)
                     if fails:
-                        yield item, spec, value, Verdict(math.nan, "", fate, fails)
+                        yield item, spec, value, DomainVerdict(math.nan, "", fate, fails)
                     continue
                 if not wrong or (
-                    subject.noted(item, spec) and wrong == list(_numbers(spec.default))
+                    subject.has_note(item, spec) and wrong == list(_to_numbers(spec.default))
                 ):
                     continue
                 if id(item) in obstacles and (spec.name, wrong[0]) != ("torus_radius", 0):
                     fate, fails = REFUSED, True
                 else:
                     rigid = bool(getattr(item, "ignore_tendon_compliance", False))
-                    fate, fails = consequence(cls, spec.name, wrong[0], rigid_tendon=rigid)
-                domain = _domain(cls, spec)
-                yield item, spec, value, Verdict(wrong[0], domain, fate, fails)
+                    fate, fails = describe_consequence(cls, spec.name, wrong[0], rigid_tendon=rigid)
+                domain = _get_domain(cls, spec)
+                yield item, spec, value, DomainVerdict(wrong[0], domain, fate, fails)
 
 
 def _is_missing(item: Object, spec: FieldSpec, value: Any) -> bool:
@@ -263,25 +266,26 @@ def _is_missing(item: Object, spec: FieldSpec, value: Any) -> bool:
 
 def _report_domain(
     subject: Subject,
-    report: FindingSink,
+    report: FindingCollector,
     item: Object,
     spec: FieldSpec,
     value: Any,
-    verdict: Verdict,
+    verdict: DomainVerdict,
 ) -> None:
     given = spec.name in item.model_fields_set
     assert isinstance(spec.kind, Value)
     if verdict.number != verdict.number:
         report(
-            f"{subject.titled(item, spec)} is not given and has no default: {verdict.fate}",
+            f"{subject.describe_property(item, spec)} is missing and has no default: "
+            f"{verdict.fate}",
             item,
             tag=spec.tag,
         )
         return
     size = (
-        quantity(value, spec.kind.unit)
+        format_quantity(value, spec.kind.unit)
         if given
-        else f"not given, so {quantity(value, spec.kind.unit)}"
+        else f"not given (default {format_quantity(value, spec.kind.unit)})"
     )
     wanted = (
         re.sub(r"^>= (\S+)$", r"\1 or more", verdict.domain)
@@ -290,14 +294,14 @@ def _report_domain(
     )
     fate = f": {verdict.fate}" if verdict.fate else ""
     report(
-        f"{subject.titled(item, spec)} is {size}, it should be {wanted}{fate}",
+        f"{subject.describe_property(item, spec)} is {size}, expected {wanted}{fate}",
         item,
         tag=spec.tag,
-        word=_word_of(subject, item, spec, verdict.number),
+        word=_find_word(subject, item, spec, verdict.number),
     )
 
 
-def _domain(cls: type[Object], spec: FieldSpec) -> str:
+def _get_domain(cls: type[Object], spec: FieldSpec) -> str:
     """The numbers that a property of a class may have; what a base has stricter is not so for it."""
     assert isinstance(spec.kind, Value)
     return (
@@ -308,21 +312,21 @@ def _domain(cls: type[Object], spec: FieldSpec) -> str:
 
 
 @cache
-def _domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float], bool]], ...]:
+def _list_domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float], bool]], ...]:
     """The properties of a class that have a domain, with the test for it."""
     result = []
     for spec in value_specs(cls):
         assert isinstance(spec.kind, Value)
-        domain = _domain(cls, spec)
+        domain = _get_domain(cls, spec)
         if domain and spec.kind.scalar in ("double", "int"):
             result.append((spec, domain_test(domain)))
     return tuple(result)
 
 
-def _reals(subject: Subject) -> Iterator[tuple[Object, FieldSpec, Any]]:
+def _find_large_numbers(subject: Subject) -> Iterator[tuple[Object, FieldSpec, Any]]:
     """Every property that may hold a number that is huge or not finite: a quick test, since there are many numbers."""
     for cls, items in subject.by_class.items():
-        specs = _numeric(cls)
+        specs = _list_real_properties(cls)
         for item in items:
             state = item.__dict__
             for spec, name in specs:
@@ -336,7 +340,7 @@ def _reals(subject: Subject) -> Iterator[tuple[Object, FieldSpec, Any]]:
 
 
 @cache
-def _numeric(cls: type[Object]) -> tuple[tuple[FieldSpec, str], ...]:
+def _list_real_properties(cls: type[Object]) -> tuple[tuple[FieldSpec, str], ...]:
     """The properties of a class that hold real numbers, each with its name."""
     specs = (
         spec
@@ -346,24 +350,26 @@ def _numeric(cls: type[Object]) -> tuple[tuple[FieldSpec, str], ...]:
     return tuple((spec, spec.name) for spec in specs)
 
 
-def _numbers(value: Any) -> tuple[float, ...]:
+def _to_numbers(value: Any) -> tuple[float, ...]:
     return tuple(value) if isinstance(value, tuple) else () if value is None else (value,)
 
 
 def _has_nan(value: Any) -> bool:
-    return any(isinstance(number, float) and number != number for number in _numbers(value))
+    return any(isinstance(number, float) and number != number for number in _to_numbers(value))
 
 
-def _bound(item: Object, spec: FieldSpec) -> bool:
+def _may_be_infinite(item: Object, spec: FieldSpec) -> bool:
     """Whether infinity is a way to say that there is no bound."""
     if type(item).__name__ == "AnalyzeTool" and spec.tag.endswith("_time"):
         return True
-    if any(isinstance(number, float) and math.isinf(number) for number in _numbers(spec.default)):
+    if any(
+        isinstance(number, float) and math.isinf(number) for number in _to_numbers(spec.default)
+    ):
         return True
     return re.search(r"range|limit|(?:^|_)(?:min|max)(?:_|$)|bound", spec.tag) is not None
 
 
-def _word_of(subject: Subject, item: Object, spec: FieldSpec, number: float) -> str | None:
+def _find_word(subject: Subject, item: Object, spec: FieldSpec, number: float) -> str | None:
     """The word of the text that a number was read from."""
     element = subject.element_of(item, spec.tag)
     if element is None or subject.source is None:

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
-from osimlite.lint.placement import Pose, default_poses, on_base
-from osimlite.lint.registry import ERROR, FindingSink, rule
-from osimlite.lint.skeleton import base_of
+from osimlite.lint.placement import FramePose, compute_default_poses, locate_frame
+from osimlite.lint.registry import ERROR, FindingCollector, rule
+from osimlite.lint.skeleton import find_base
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called
+from osimlite.lint.words import describe_object
 from osimlite.mechanics.laws.vectors import norm, plus, times
 from osimlite.schema.base import Component
 from osimlite.schema.tree import is_a
@@ -20,15 +20,15 @@ NO_LENGTH_M = 1e-14
 
 
 @rule("OSIM541", "ends-in-one-place", severity=ERROR)
-def ends_in_one_place(subject: Subject, report: FindingSink) -> None:
-    """Both ends of a force are in one place in the default pose.
+def report_ends_in_one_place(subject: Subject, report: FindingCollector) -> None:
+    """Both ends of a force coincide in the default pose.
 
     Reports PointToPointSprings, PointToPointActuators and ExpressionBasedPointToPointForces whose
-    two points coincide in the default pose, and paths of which two points that follow each other
-    are on different bodies and coincide there. Forces with `appliesForce` false are left out.
+    two points coincide in the default pose, and paths with two consecutive points that are on
+    different bodies and coincide there. Forces with `appliesForce` false are not checked.
 
     The force has no direction. OpenSim gives no message: every acceleration of the model is NaN,
-    also if the force is zero.
+    even if the force is zero.
 
     ```xml
       <PointToPointSpring name="band">
@@ -40,24 +40,24 @@ def ends_in_one_place(subject: Subject, report: FindingSink) -> None:
       </PointToPointSpring>
     ```
     """
-    for force, first, second in _two_ended(subject):
+    for force, first, second in _find_two_ended_forces(subject):
         if not getattr(force, "appliesForce", True):
             continue
         # OpenSim takes the points in the body itself, also where a frame that is off it is named.
         ends = [
-            _place_in_ground(subject, base_of(subject, frame), point)
+            _locate_in_ground(subject, find_base(subject, frame), point)
             for frame, point in (first, second)
         ]
         if ends[0] is None or ends[1] is None:
             continue
         if norm(plus(ends[0], times(-1.0, ends[1]))) < NO_LENGTH_M:
             report(
-                f"both ends of {called(force)} are in one place in the default pose: every "
-                "acceleration is NaN, without a message",
+                f"both ends of {describe_object(force)} are in one place in the default pose: "
+                "every acceleration is NaN, without a message",
                 force,
                 attribute="name",
             )
-    for path in subject.named("GeometryPath"):
+    for path in subject.find_by_class("GeometryPath"):
         owner = subject.owner(path)
         holder = owner if owner is not path else subject.tree.parent_of(path)
         if holder is None or not getattr(holder, "appliesForce", True):
@@ -65,23 +65,23 @@ def ends_in_one_place(subject: Subject, report: FindingSink) -> None:
         for before, point in pairwise(path.path_point_set.objects):
             if _coincide(subject, before, point):
                 report(
-                    f"'{before.name}' and '{point.name}' of the path of {called(holder)} are on "
-                    "different bodies and in one place in the default pose: every acceleration is "
-                    "NaN, without a message",
+                    f"'{before.name}' and '{point.name}' of the path of {describe_object(holder)} "
+                    "are on different bodies and in one place in the default pose: every "
+                    "acceleration is NaN, without a message",
                     point,
                     attribute="name",
                 )
 
 
 @rule("OSIM542", "spring-on-one-body", severity=ERROR)
-def spring_on_one_body(subject: Subject, report: FindingSink) -> None:
+def report_spring_on_one_body(subject: Subject, report: FindingCollector) -> None:
     """Both ends of a PointToPointSpring are on one body.
 
     Reports PointToPointSprings whose two frames are the same or are fixed to the same body, also
     those with `appliesForce` false.
 
-    OpenSim refuses the model. Other forces between two points may have both on one body, where
-    they do nothing.
+    OpenSim rejects the model. Other forces between two points may have both ends on one body, where
+    they have no effect.
 
     ```xml
       <PointToPointSpring name="band">
@@ -93,27 +93,29 @@ def spring_on_one_body(subject: Subject, report: FindingSink) -> None:
       </PointToPointSpring>
     ```
     """
-    for spring in subject.named("PointToPointSpring"):
+    for spring in subject.find_by_class("PointToPointSpring"):
         first, second = (
-            base_of(subject, subject.target_of(spring, f"socket_body{number}")) for number in (1, 2)
+            find_base(subject, subject.target_of(spring, f"socket_body{number}"))
+            for number in (1, 2)
         )
         if first is not None and first is second:
             report(
-                f"both ends of {called(spring)} are on {called(first)}: OpenSim refuses the model",
+                f"both ends of {describe_object(spring)} are on {describe_object(first)}: OpenSim "
+                "rejects the model",
                 spring,
                 tag="socket_body2",
             )
 
 
 @rule("OSIM543", "external-force-in-model", severity=ERROR)
-def external_force_in_model(subject: Subject, report: FindingSink) -> None:
-    """An ExternalForce stands in a model.
+def report_external_force_in_model(subject: Subject, report: FindingCollector) -> None:
+    """A model contains an ExternalForce.
 
-    Reports ExternalForces of a model; their place is a document of ExternalLoads, which names the
-    file with the measured forces.
+    Reports ExternalForces of a model; they belong in an ExternalLoads file, which names the file
+    with the measured forces.
 
-    OpenSim refuses the model, since the force has no data. This is so with `appliesForce` false
-    too.
+    OpenSim rejects the model, since the force has no data. It does so even if `appliesForce` is
+    false.
 
     ```xml
     - <ExternalForce name="plate">
@@ -124,22 +126,22 @@ def external_force_in_model(subject: Subject, report: FindingSink) -> None:
     + </SpringGeneralizedForce>
     ```
     """
-    for force in subject.named("ExternalForce"):
+    for force in subject.find_by_class("ExternalForce"):
         report(
-            f"{called(force)} stands in a model, where it has no data: OpenSim refuses the model; "
-            "move it to a document of ExternalLoads",
+            f"{describe_object(force)} is in a model, where it has no data: OpenSim rejects the "
+            "model; move it to an ExternalLoads file",
             force,
         )
 
 
 @rule("OSIM544", "reflex-without-muscle", severity=ERROR)
-def reflex_without_muscle(subject: Subject, report: FindingSink) -> None:
-    """A ToyReflexController drives what is no muscle.
+def report_reflex_without_muscle(subject: Subject, report: FindingCollector) -> None:
+    """A ToyReflexController drives an actuator that is not a muscle.
 
-    Reports the actuators of ToyReflexControllers that are no muscles.
+    Reports the actuators of ToyReflexControllers that are not muscles.
 
-    A reflex answers to the lengthening of a muscle; of others there is none. OpenSim refuses the
-    model.
+    A reflex responds to the lengthening of a muscle, which other actuators do not have. OpenSim
+    rejects the model.
 
     ```xml
       <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
@@ -155,7 +157,8 @@ def reflex_without_muscle(subject: Subject, report: FindingSink) -> None:
             target = subject.resolution(use).target
             if target is not None and not is_a(target, "Muscle"):
                 report(
-                    f"{called(use.owner)} drives {called(target)}, which is no muscle: OpenSim refuses the model",
+                    f"{describe_object(use.owner)} drives {describe_object(target)}, which is not "
+                    "a muscle: OpenSim rejects the model",
                     use.owner,
                     tag="socket_actuators",
                     word=use.text,
@@ -165,15 +168,15 @@ def reflex_without_muscle(subject: Subject, report: FindingSink) -> None:
 _End = tuple[Component | None, Any]
 
 
-def _two_ended(subject: Subject) -> Iterator[tuple[Component, _End, _End]]:
+def _find_two_ended_forces(subject: Subject) -> Iterator[tuple[Component, _End, _End]]:
     """Yield each force between two points with the frame and the place of both."""
-    for force in subject.named("PointToPointSpring"):
+    for force in subject.find_by_class("PointToPointSpring"):
         first, second = (subject.target_of(force, f"socket_body{number}") for number in (1, 2))
         yield force, (first, force.point1), (second, force.point2)
-    for force in subject.named("ExpressionBasedPointToPointForce"):
+    for force in subject.find_by_class("ExpressionBasedPointToPointForce"):
         first, second = (subject.target_of(force, f"body{number}") for number in (1, 2))
         yield force, (first, force.point1), (second, force.point2)
-    for force in subject.named("PointToPointActuator"):
+    for force in subject.find_by_class("PointToPointActuator"):
         first, second = (subject.target_of(force, f"body{letter}") for letter in "AB")
         ground = subject.model.ground if subject.model is not None else None
         if force.points_are_global:
@@ -181,14 +184,14 @@ def _two_ended(subject: Subject) -> Iterator[tuple[Component, _End, _End]]:
         yield force, (first, force.pointA), (second, force.pointB)
 
 
-def _place_in_ground(subject: Subject, frame: Component | None, point: Any) -> Any:
+def _locate_in_ground(subject: Subject, frame: Component | None, point: Any) -> Any:
     """Return where a point of a frame is in ground in the default pose; None if it is not known."""
-    end = on_base(subject, frame)
+    end = locate_frame(subject, frame)
     if end is None:
         return None
     base, pose = end
-    carrier: Pose | None = default_poses(subject).get(id(base))
-    return None if carrier is None else carrier.then(pose).of(point)
+    carrier: FramePose | None = compute_default_poses(subject).get(id(base))
+    return None if carrier is None else carrier.compose(pose).transform_point(point)
 
 
 def _coincide(subject: Subject, before: Any, point: Any) -> bool:
@@ -201,10 +204,10 @@ def _coincide(subject: Subject, before: Any, point: Any) -> bool:
         if frame is None:
             return False
         frames.append(frame)
-    if base_of(subject, frames[0]) is base_of(subject, frames[1]):
+    if find_base(subject, frames[0]) is find_base(subject, frames[1]):
         return False
-    first = _place_in_ground(subject, frames[0], before.location)
-    second = _place_in_ground(subject, frames[1], point.location)
+    first = _locate_in_ground(subject, frames[0], before.location)
+    second = _locate_in_ground(subject, frames[1], point.location)
     if first is None or second is None:
         return False
     return norm(plus(first, times(-1.0, second))) < NO_LENGTH_M

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from osimlite.errors import ModelError
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.rules.functions import UNUSED, is_unused
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called
+from osimlite.lint.words import describe_object
 from osimlite.schema.base import Object
 from osimlite.schema.forces import Force
 
@@ -27,16 +27,16 @@ FORMULAS = {
 
 
 @rule("OSIM606", "broken-expression", severity=ERROR)
-def broken_expression(subject: Subject, report: FindingSink) -> None:
+def report_broken_expression(subject: Subject, report: FindingCollector) -> None:
     """The formula of a force or a function cannot be read.
 
-    Reports expressions that are no formula, and those that name a variable or a function that there
-    is not.
+    Reports expressions with a syntax error, and those that name an unknown variable or function.
 
-    OpenSim refuses the model where the formula is wrong, and fails at the first acceleration where
-    a variable is unknown; if what has the formula is off, it never gets there (a warning). Formulas
-    know + - * / ^, functions such as sin, sqrt, exp, min, step, and after a semicolon definitions
-    as in `k*q; k=100`. There is no pi and no `**`. What drops out needs no value: `0*x` is 0.
+    OpenSim rejects the model where the formula is wrong, and fails at the first acceleration where
+    a variable is unknown; if the owner of the formula is disabled, OpenSim never evaluates it (a
+    warning). Formulas support + - * / ^, functions such as sin, sqrt, exp, min, step, and
+    definitions after a semicolon as in `k*q; k=100`. There is no pi and no `**`. Terms that cancel
+    need no value: `0*x` is 0.
 
     ```xml
       <ExpressionBasedCoordinateForce name="spring">
@@ -46,7 +46,7 @@ def broken_expression(subject: Subject, report: FindingSink) -> None:
       </ExpressionBasedCoordinateForce>
     ```
     """
-    for item, tag, variables in _formulas(subject):
+    for item, tag, variables in _find_formulas(subject):
         # Few models have formulas, and reading them takes the kernels.
         from osimlite.mechanics.multibody.formula import Formula, UnknownVariableError
 
@@ -60,7 +60,8 @@ def broken_expression(subject: Subject, report: FindingSink) -> None:
             is_read = isinstance(item, Force) and not isinstance(error, UnknownVariableError)
             is_off = is_unused(subject, item) and not is_read
             report(
-                f"{tag} of {subject.called_with(item) if not item.name else called(item)} is "
+                f"{tag} of "
+                f"{subject.describe_part(item) if not item.name else describe_object(item)} is "
                 f"{shown}: {reason}; {UNUSED if is_off else 'OpenSim cannot compute it'}",
                 item,
                 tag=tag,
@@ -68,11 +69,11 @@ def broken_expression(subject: Subject, report: FindingSink) -> None:
             )
 
 
-def _formulas(subject: Subject) -> Iterator[tuple[Object, str, tuple[str, ...]]]:
+def _find_formulas(subject: Subject) -> Iterator[tuple[Object, str, tuple[str, ...]]]:
     """Yield each formula of a model: the object, the property, the variables."""
     for name, (tags, variables) in FORMULAS.items():
-        for force in subject.named(name):
+        for force in subject.find_by_class(name):
             for tag in tags:
                 yield force, tag, variables
-    for function in subject.named("ExpressionBasedFunction"):
+    for function in subject.find_by_class("ExpressionBasedFunction"):
         yield function, "expression", tuple(function.variables)

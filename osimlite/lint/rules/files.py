@@ -8,25 +8,25 @@ from functools import lru_cache
 from osimlite.base.files import MESH_FOLDER_HINT
 from osimlite.base.text import format_count, join_words
 from osimlite.io.document.source import Source
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called
+from osimlite.lint.words import describe_object
 from osimlite.schema.base import Object
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.geometry import Mesh
 
 
 @rule("OSIM701", "missing-mesh", severity=WARNING)
-def missing_mesh(subject: Subject, report: FindingSink) -> None:
-    """A mesh file is not there.
+def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
+    """A mesh file does not exist.
 
     Looks for the file of each mesh where OpenSim does: beside the model, in the folder `Geometry`
-    beside it, and in the folders that the configuration names. A file of the same name in other
-    letter case is pointed out, and one that is found with / in the place of a backslash.
+    beside it, and in the folders that the configuration names. Suggests a file whose name differs
+    in letter case only, and one that is found with / instead of a backslash.
 
-    OpenSim draws nothing for such a mesh. A contact mesh that is missing makes it refuse the model.
-    A name in the wrong case is found on Windows and macOS and missing on Linux; one with a
-    backslash is found on Windows alone.
+    OpenSim draws nothing for such a mesh. It rejects a model with a missing contact mesh. A name in
+    the wrong case works on Windows and macOS and fails on Linux; a name with a backslash works on
+    Windows only.
 
     ```xml
       <Body name="thigh"> <attached_geometry>
@@ -36,9 +36,9 @@ def missing_mesh(subject: Subject, report: FindingSink) -> None:
     ```
     """
     items: list[tuple[Object, str, str]] = [
-        (mesh, "mesh_file", mesh.mesh_file) for mesh in subject.each(Mesh)
+        (mesh, "mesh_file", mesh.mesh_file) for mesh in subject.find_instances(Mesh)
     ]
-    items += [(mesh, "filename", mesh.filename) for mesh in subject.each(ContactMesh)]
+    items += [(mesh, "filename", mesh.filename) for mesh in subject.find_instances(ContactMesh)]
     folder = subject.folder if items else None
     if folder is None:
         return
@@ -46,21 +46,30 @@ def missing_mesh(subject: Subject, report: FindingSink) -> None:
     places = [str(path) for path in beside]
     tried = join_words(dict.fromkeys(places))
     remedy = f"name its folder {MESH_FOLDER_HINT}"
-    folders = _Folders()
+    folders = _FolderListings()
     for item, tag, name in items:
         severity = ERROR if isinstance(item, ContactMesh) else None
         if not name:
-            fate = "" if severity is None else ": OpenSim refuses the model"
-            report(f"{called(item)} names no file{fate}", item, tag=tag, severity=severity)
+            fate = "" if severity is None else ": OpenSim rejects the model"
+            report(f"{describe_object(item)} names no file{fate}", item, tag=tag, severity=severity)
             continue
         if any(folders.has(place, name) for place in places):
             continue
         twin = folders.in_other_case(places, name)
-        message = f"the file '{name}' of {called(item)} is not there; looked in {tried}; {remedy}"
+        message = (
+            f"the file '{name}' of {describe_object(item)} was not found; searched {tried}; "
+            f"{remedy}"
+        )
         if any(os.path.lexists(os.path.join(place, name)) for place in places):
-            message = f"'{name}' of {called(item)} is a folder, a device or a link to nothing, and no file"
+            message = (
+                f"'{name}' of {describe_object(item)} is a folder, a device or a broken link, not "
+                "a file"
+            )
         if twin is not None:
-            message = f"the file '{name}' of {called(item)} is called '{twin}': other systems do not find it"
+            message = (
+                f"the file '{name}' of {describe_object(item)} is named '{twin}': systems with "
+                "case-sensitive file names do not find it"
+            )
         elif "\\" in name:
             plain = name.replace("\\", "/")
             twin = plain if any(folders.has(place, plain) for place in places) else None
@@ -69,24 +78,24 @@ def missing_mesh(subject: Subject, report: FindingSink) -> None:
                 twin = f"{plain.rpartition('/')[0]}/{other}"
             if twin is not None:
                 message = (
-                    f"the file '{name}' of {called(item)} is there as '{twin}': only Windows reads a backslash so, and "
-                    "other systems do not find it"
+                    f"the file '{name}' of {describe_object(item)} exists as '{twin}': only "
+                    "Windows accepts backslashes, other systems do not find it"
                 )
         report(message, item, tag=tag, suggestion=twin, severity=severity)
 
 
 @rule("OSIM702", "included-file", severity=INFO)
-def included_file(subject: Subject, report: FindingSink) -> None:
-    """An object is kept in another file.
+def report_included_file(subject: Subject, report: FindingCollector) -> None:
+    """An object is stored in another file.
 
-    Reports `file=` on an object: for information, as a warning if that file is not there or does
-    not hold it, is no ordinary file (a pipe, a device) or larger than the settings allow
-    (`largest-file`), and as an error if the element itself holds something, or if another component
-    names the object, which without its file has no name.
+    Reports `file=` on an object: for information, as a warning if that file does not exist, does
+    not contain the object, is not an ordinary file (a pipe, a device) or is larger than the setting
+    `largest-file` allows, and as an error if the element itself has content, or if another
+    component refers to an object that has no name without its file.
 
-    OpenSim reads the object from the other file, and writes that file anew when it saves the model;
-    if it is missing, it goes on with an empty object. Of what stands inside an element with `file=`
-    it reads nothing.
+    OpenSim reads the object from the other file, and rewrites that file when it saves the model; if
+    the file is missing, it continues with an empty object. It ignores the content of an element
+    with `file=`.
 
     ```xml
     - <MarkerSet file="markers.xml" />
@@ -104,7 +113,8 @@ def included_file(subject: Subject, report: FindingSink) -> None:
         read = included or (subject.folder is None and not note.why)
         if note.owner is subject.top:
             report(
-                f"OpenSim does not look for {called(note.owner)} in '{note.value}': it reads what stands here",
+                f"OpenSim does not read {describe_object(note.owner)} from '{note.value}': it "
+                "reads the content given here",
                 note.owner,
                 number=note.number,
                 attribute="file",
@@ -115,7 +125,7 @@ def included_file(subject: Subject, report: FindingSink) -> None:
         state = "is read from" if read else "should be read from"
         why = "" if read else f", which {note.why or 'OpenSim does not open for a member of a set'}"
         fate = (
-            ": OpenSim ignores what stands here"
+            ": OpenSim ignores the content given here"
             if ignored
             else ": it stays empty"
             if note.why
@@ -125,9 +135,12 @@ def included_file(subject: Subject, report: FindingSink) -> None:
         uses = subject.uses if note.why and subject.model is not None else []
         wanted = sum(subject.resolution(use).target is note.owner for use in uses)
         if wanted:
-            fate += f", while {format_count(wanted, 'reference')} to it {'leads' if wanted == 1 else 'lead'} nowhere"
+            fate += (
+                f", while {format_count(wanted, 'reference')} to it "
+                f"{'leads' if wanted == 1 else 'lead'} nowhere"
+            )
         report(
-            f"{called(note.owner)} {state} '{note.value}'{why}{fate}",
+            f"{describe_object(note.owner)} {state} '{note.value}'{why}{fate}",
             note.owner,
             number=note.number,
             attribute="file",
@@ -151,13 +164,13 @@ def _has_content(source: Source | None, number: int) -> bool:
 
 
 @rule("OSIM703", "missing-data-file", severity=ERROR)
-def missing_data_file(subject: Subject, report: FindingSink) -> None:
-    """A file of measured loads, of controls or of a table is not there.
+def report_missing_data_file(subject: Subject, report: FindingCollector) -> None:
+    """A file of measured loads, of controls or of a table does not exist.
 
     Looks for the files of external loads, of controllers and of table sources beside the model and
-    in the folder that the program was started in.
+    in the working folder of the program.
 
-    OpenSim refuses the model when it is connected; only a ControlSetController goes on, without any
+    OpenSim rejects the model when it is connected; only a ControlSetController continues, without
     controls.
 
     ```xml
@@ -175,11 +188,11 @@ def missing_data_file(subject: Subject, report: FindingSink) -> None:
         "ExternalLoads": "datafile",
         "TableSource": "filename",
     }
-    items = [(item, cls, tag) for cls, tag in tags.items() for item in subject.named(cls)]
+    items = [(item, cls, tag) for cls, tag in tags.items() for item in subject.find_by_class(cls)]
     if not items or subject.folder is None:
         return
     places = [str(subject.folder), ""]
-    folders = _Folders()
+    folders = _FolderListings()
     for item, cls, tag in items:
         name = getattr(item, tag)
         if name is None or (cls != "PrescribedController" and name.lower() in ("", "unassigned")):
@@ -188,18 +201,18 @@ def missing_data_file(subject: Subject, report: FindingSink) -> None:
             continue
         twin = folders.in_other_case(places, name)
         fate = (
-            "it has no controls" if cls == "ControlSetController" else "OpenSim refuses the model"
+            "it has no controls" if cls == "ControlSetController" else "OpenSim rejects the model"
         )
         report(
-            f"the file '{name}' of {called(item)} is not there: {fate}",
+            f"the file '{name}' of {describe_object(item)} does not exist: {fate}",
             item,
             tag=tag,
             suggestion=twin,
         )
 
 
-class _Folders:
-    """The folders that files are looked for in, each listed once: a model names a hundred meshes in one of them."""
+class _FolderListings:
+    """The folders that files are looked for in, each join_words once: a model names a hundred meshes in one of them."""
 
     def __init__(self) -> None:
         self._known: dict[str, dict[str, str]] = {}
@@ -229,18 +242,18 @@ class _Folders:
             folder = os.path.join(place, before)
         known = self._known.get(folder)
         if known is None:
-            known = self._known[folder] = _lowered(folder)
+            known = self._known[folder] = _list_lower_case(folder)
         return known, last
 
 
-def _lowered(folder: str) -> dict[str, str]:
+def _list_lower_case(folder: str) -> dict[str, str]:
     try:
         # The listing of a folder holds until something in it is made, renamed or removed.
-        return _listed(folder, os.stat(folder).st_mtime_ns)
+        return _list_folder(folder, os.stat(folder).st_mtime_ns)
     except (OSError, ValueError):
         return {}
 
 
 @lru_cache(maxsize=64)
-def _listed(folder: str, changed: int) -> dict[str, str]:
+def _list_folder(folder: str, changed: int) -> dict[str, str]:
     return {name.lower(): name for name in os.listdir(folder)}

@@ -7,10 +7,10 @@ from math import comb
 from typing import Final, cast
 
 from osimlite.base.text import format_count
-from osimlite.lint.axes import axes_of
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.axes import list_axes
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity
+from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.base import Component, Object
 from osimlite.schema.forces import Force
 from osimlite.schema.functions import (
@@ -34,17 +34,17 @@ Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstant
 
 
 @rule("OSIM601", "unsorted-abscissae", severity=ERROR)
-def unsorted_abscissae(subject: Subject, report: FindingSink) -> None:
-    """The x values of a function do not rise.
+def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> None:
+    """The x values of a function do not increase.
 
-    Reports the first x that is smaller than the one before it, and of splines also the first that
+    Reports the first x that is smaller than the previous one, and for splines also the first that
     is equal to it.
 
-    A GCVSpline is refused, or OpenSim fails when a force or a controller asks for its value. A
-    SimmSpline divides by the difference without a word and gives values in the millions; piecewise
-    functions take the wrong piece. A moment arm or a moving point is then anywhere. Where the same
-    point stands twice, a SimmSpline has no slope (a warning). What is off, a controller or a force,
-    never computes its functions (a warning).
+    OpenSim rejects a GCVSpline, or fails when a force or a controller needs its value. A SimmSpline
+    divides by the difference without a message and gives values in the millions; piecewise
+    functions use the wrong piece. Moment arms and moving points are then wrong. Where the same
+    point is given twice, a SimmSpline is constant (a warning). A disabled controller or force never
+    computes its functions (a warning).
 
     ```xml
       <Coordinate name="knee_angle">
@@ -55,32 +55,32 @@ def unsorted_abscissae(subject: Subject, report: FindingSink) -> None:
       </Coordinate>
     ```
     """
-    for function in _tabulated(subject):
+    for function in _find_tabulated(subject):
         strictly = isinstance(function, (SimmSpline, GCVSpline))
         for index in range(1, len(function.x)):
             before, here = function.x[index - 1], function.x[index]
             if here < before or (strictly and here == before):
-                refused = isinstance(function, GCVSpline)
+                rejected = isinstance(function, GCVSpline)
                 is_off = is_unused(subject, function)
                 level = (
                     here == before
-                    and not refused
+                    and not rejected
                     and function.y[index - 1 : index] == function.y[index : index + 1]
                 )
                 fate = (
                     UNUSED
                     if is_off
-                    else "OpenSim refuses it"
-                    if refused
-                    else "it is level there"
+                    else "OpenSim rejects it"
+                    if rejected
+                    else "the function is constant there"
                     if level
-                    else "its values are wrong"
+                    else "the function values are wrong"
                 )
                 relation = "repeats" if here == before else "is smaller than"
                 word, nth = subject.word_at(function, "x", index)
                 report(
-                    f"x of {subject.called_with(function)}: number {index + 1}, {quantity(here)}, {relation} the one "
-                    f"before; {fate}",
+                    f"x of {subject.describe_part(function)}: number {index + 1}, "
+                    f"{format_quantity(here)}, {relation} the one before; {fate}",
                     function,
                     tag="x",
                     word=word,
@@ -92,13 +92,13 @@ def unsorted_abscissae(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM602", "unequal-points", severity=ERROR)
-def unequal_points(subject: Subject, report: FindingSink) -> None:
-    """A function has not as many y values as x values.
+def report_unequal_points(subject: Subject, report: FindingCollector) -> None:
+    """A function has different numbers of x and y values.
 
-    Reports tabulated functions whose lists are of different length. Too many y are a warning.
+    Reports tabulated functions whose lists differ in length. Too many y values are a warning.
 
-    Where y is missing OpenSim reads beyond the end of the list, whatever is in memory there; a
-    GCVSpline is refused. Too many y are ignored.
+    Where y values are missing OpenSim reads undefined memory beyond the end of the list; it rejects
+    a GCVSpline. It ignores extra y values.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -109,7 +109,7 @@ def unequal_points(subject: Subject, report: FindingSink) -> None:
       </Coordinate>
     ```
     """
-    for function in _tabulated(subject):
+    for function in _find_tabulated(subject):
         xs, ys = len(function.x), len(function.y)
         if xs == ys:
             continue
@@ -119,10 +119,10 @@ def unequal_points(subject: Subject, report: FindingSink) -> None:
             if is_off
             else "OpenSim reads beyond the end of the list"
             if ys < xs
-            else "the rest is ignored"
+            else "the extra values are ignored"
         )
         report(
-            f"{subject.called_with(function)} has {xs} x and {ys} y: {fate}",
+            f"{subject.describe_part(function)} has {xs} x values and {ys} y values: {fate}",
             function,
             tag="y",
             severity=WARNING if is_off or ys > xs else None,
@@ -130,14 +130,14 @@ def unequal_points(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM603", "too-few-points", severity=ERROR)
-def too_few_points(subject: Subject, report: FindingSink) -> None:
+def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
     """A function has too few points.
 
     Reports a SimmSpline of fewer than two points, a GCVSpline of fewer than twice its half order or
     without a half order, and piecewise functions without any.
 
-    A SimmSpline is then NaN everywhere, a GCVSpline is refused, and a piecewise function returns
-    what is in memory.
+    A SimmSpline is then NaN everywhere, a GCVSpline is rejected, and a piecewise function returns
+    undefined values.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -146,7 +146,7 @@ def too_few_points(subject: Subject, report: FindingSink) -> None:
       </Coordinate>
     ```
     """
-    for function in _tabulated(subject):
+    for function in _find_tabulated(subject):
         least, is_off = 1, is_unused(subject, function)
         severity = WARNING if is_off else None
         if isinstance(function, SimmSpline):
@@ -161,7 +161,8 @@ def too_few_points(subject: Subject, report: FindingSink) -> None:
             )
             fate = _describe_refusal(subject, function)
             report(
-                f"half_order of {subject.called_with(function)} is {given}: {fate}; 2 is a cubic spline",
+                f"half_order of {subject.describe_part(function)} is {given}: {fate}; 2 is a "
+                "cubic spline",
                 function,
                 tag="half_order",
                 severity=severity,
@@ -172,7 +173,7 @@ def too_few_points(subject: Subject, report: FindingSink) -> None:
                 fate = _describe_refusal(subject, function)
             given = format_count(len(function.x), "point")
             report(
-                f"{subject.called_with(function)} has {given} and needs {least}: {fate}",
+                f"{subject.describe_part(function)} has {given} and needs {least}: {fate}",
                 function,
                 tag="x",
                 severity=severity,
@@ -180,17 +181,17 @@ def too_few_points(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM604", "coefficient-count", severity=WARNING)
-def coefficient_count(subject: Subject, report: FindingSink) -> None:
+def report_coefficient_count(subject: Subject, report: FindingCollector) -> None:
     """A linear function or a polynomial has too many or too few coefficients.
 
-    Reports linear functions without coefficients (an error), polynomials of several variables with
-    another number than their dimension and order ask for (an error), and linear functions on the
-    axis of a joint or of a coordinate coupler that have fewer (an error) or more than the
-    coordinates there and a constant.
+    Reports linear functions without coefficients (an error), polynomials of several variables whose
+    number does not match their dimension and order (an error), and linear functions on the axis of
+    a joint or of a coordinate coupler that have fewer (an error) or more than one per coordinate
+    and a constant.
 
-    OpenSim crashes on an empty list, and refuses a polynomial. Where the constant is missing it
-    reads beyond the end of the list. Of too many it takes the first for the weights, the next for
-    the constant, and ignores the rest.
+    OpenSim crashes on an empty list, and rejects a polynomial. Where the constant is missing it
+    reads beyond the end of the list. Of too many it uses the first as weights, the next as the
+    constant, and ignores the rest.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -201,17 +202,17 @@ def coefficient_count(subject: Subject, report: FindingSink) -> None:
       </Coordinate>
     ```
     """
-    for function in subject.each(LinearFunction):
+    for function in subject.find_instances(LinearFunction):
         if not function.coefficients:
             is_off = is_unused(subject, function)
             fate = UNUSED if is_off else "OpenSim crashes when it needs a value"
             report(
-                f"{subject.called_with(function)} has no coefficients: {fate}",
+                f"{subject.describe_part(function)} has no coefficients: {fate}",
                 function,
                 tag="coefficients",
                 severity=WARNING if is_off else ERROR,
             )
-    for polynomial in subject.each(MultivariatePolynomialFunction):
+    for polynomial in subject.find_instances(MultivariatePolynomialFunction):
         dimension, order, given = (
             polynomial.dimension,
             polynomial.order,
@@ -224,13 +225,13 @@ def coefficient_count(subject: Subject, report: FindingSink) -> None:
             is_off = is_unused(subject, polynomial)
             fate = UNUSED if is_off else "OpenSim fails when it needs a value"
             report(
-                f"{subject.called_with(polynomial)} has {format_count(given, 'coefficient')}; "
+                f"{subject.describe_part(polynomial)} has {format_count(given, 'coefficient')}; "
                 f"{format_count(dimension, 'variable')} to order {order} need {wanted}: {fate}",
                 polynomial,
                 tag="coefficients",
                 severity=WARNING if is_off else ERROR,
             )
-    for holder, names, function in _linear(subject):
+    for holder, names, function in _find_linear_functions(subject):
         given, wanted = len(function.coefficients), names + 1
         if given and given != wanted:
             fate = (
@@ -239,8 +240,9 @@ def coefficient_count(subject: Subject, report: FindingSink) -> None:
                 else "OpenSim ignores the rest"
             )
             report(
-                f"the LinearFunction of {called(holder)} has {format_count(given, 'coefficient')} for "
-                f"{format_count(names, 'coordinate')}: {wanted} belong there; {fate}",
+                f"the LinearFunction of {describe_object(holder)} has "
+                f"{format_count(given, 'coefficient')} for {format_count(names, 'coordinate')}, expected "
+                f"{wanted}; {fate}",
                 function,
                 tag="coefficients",
                 severity=ERROR if given < wanted else None,
@@ -248,15 +250,15 @@ def coefficient_count(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM607", "function-of-several", severity=ERROR)
-def function_of_several(subject: Subject, report: FindingSink) -> None:
-    """A function of one variable stands on several coordinates.
+def report_function_of_several(subject: Subject, report: FindingCollector) -> None:
+    """A function of one variable is given several coordinates.
 
     Reports splines, piecewise functions, polynomials, sines and steps on an axis of a CustomJoint,
     or in a CoordinateCouplerConstraint, that names more than one coordinate; and
     MultivariatePolynomialFunctions whose `dimension` is not the number of the coordinates.
 
-    OpenSim gives no message. It takes values and derivatives of different coordinates, so that the
-    motion is that of neither. A LinearFunction takes any number of coordinates, a
+    OpenSim gives no message. It mixes values and derivatives of different coordinates, so the
+    motion is wrong. A LinearFunction takes any number of coordinates, a
     MultivariatePolynomialFunction those of its dimension.
 
     ```xml
@@ -276,19 +278,20 @@ def function_of_several(subject: Subject, report: FindingSink) -> None:
             function = function.function
         wanted = function.dimension if isinstance(function, MultivariatePolynomialFunction) else 1
         if (
-            not isinstance(function, (*_OF_ONE, MultivariatePolynomialFunction))
+            not isinstance(function, (*_ONE_VARIABLE, MultivariatePolynomialFunction))
             or count == wanted
             or not count
         ):
             continue
         report(
-            f"the {type(function).tag} of {called(holder)} is a function of {format_count(wanted, 'variable')} and stands "
-            f"on {format_count(count, 'coordinate')}: OpenSim computes what is meant for neither",
+            f"the {type(function).tag} of {describe_object(holder)} takes "
+            f"{format_count(wanted, 'variable')} but is given {format_count(count, 'coordinate')}: OpenSim "
+            "computes wrong values",
             holder,
         )
 
 
-_NEEDED: Final = {
+_REQUIRED_FUNCTIONS: Final = {
     "Bhargava2004SmoothedMuscleMetabolics_MuscleParameters": ("use_provided_muscle_mass",),
     "CoordinateCouplerConstraint": ("coupled_coordinates_function",),
     "FunctionBasedBushingForce": tuple(
@@ -303,16 +306,16 @@ _NEEDED: Final = {
 
 
 @rule("OSIM605", "missing-function", severity=ERROR)
-def missing_function(subject: Subject, report: FindingSink) -> None:
-    """A function is not there that OpenSim cannot do without.
+def report_missing_function(subject: Subject, report: FindingCollector) -> None:
+    """A required function is missing.
 
     Reports MultiplierFunctions, CoordinateCouplerConstraints and FunctionBasedPaths without a
     function inside, and empty functions of MovingPathPoints and FunctionBasedBushingForces; and
-    PrescribedForces with other than three functions, or none, for the force, its point or the
-    torque.
+    PrescribedForces whose number of functions for the force, its point or the torque is neither
+    zero nor three.
 
-    OpenSim refuses the model, or fails when it needs the value. Scaling a model wraps functions in
-    multipliers; one that was taken out later leaves an empty multiplier.
+    OpenSim rejects the model, or fails when it needs the value. Scaling a model wraps functions in
+    multipliers; deleting the function later leaves an empty multiplier.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -324,39 +327,40 @@ def missing_function(subject: Subject, report: FindingSink) -> None:
       </Coordinate>
     ```
     """
-    for force in subject.named("PrescribedForce"):
+    for force in subject.find_by_class("PrescribedForce"):
         for name in ("forceFunctions", "pointFunctions", "torqueFunctions"):
             functions = getattr(force, name)
             if isinstance(functions, FunctionSet) and len(functions.objects) not in (0, 3):
                 given = format_count(len(functions.objects), "function")
                 report(
-                    f"{name} of {called(force)} has {given}, not three or none: OpenSim refuses to load the file",
+                    f"{name} of {describe_object(force)} has {given}, not three or none: OpenSim "
+                    "rejects the file",
                     functions,
                 )
     if subject.has_unknown:
         return
-    for kind, properties in _NEEDED.items():
-        refused = (
-            "OpenSim refuses the model"
+    for kind, properties in _REQUIRED_FUNCTIONS.items():
+        rejected = (
+            "OpenSim rejects the model"
             if len(properties) == 1
             else "OpenSim fails when it needs a value"
         )
-        for item in subject.named(kind):
+        for item in subject.find_by_class(kind):
             for name in properties:
                 if getattr(item, name) is None:
-                    report(f"{called(item)} has no {name}: {refused}", item, tag=name)
-    for function in subject.each(MultiplierFunction):
+                    report(f"{describe_object(item)} has no {name}: {rejected}", item, tag=name)
+    for function in subject.find_instances(MultiplierFunction):
         if function.function is None:
             is_off = is_unused(subject, function)
             fate = UNUSED if is_off else "OpenSim fails when it needs a value"
             report(
-                f"{subject.called_with(function)} has no function to multiply: {fate}",
+                f"{subject.describe_part(function)} has no function to multiply: {fate}",
                 function,
                 severity=WARNING if is_off else None,
             )
 
 
-_OF_ONE: Final = (
+_ONE_VARIABLE: Final = (
     SimmSpline,
     GCVSpline,
     PiecewiseLinearFunction,
@@ -371,12 +375,12 @@ def _find_functions_of_coordinates(
     subject: Subject,
 ) -> Iterator[tuple[Object, int, Function | None]]:
     """Yield the functions of coordinates: what they belong to, the number of coordinates, the function."""
-    for joint in subject.named("CustomJoint"):
+    for joint in subject.find_by_class("CustomJoint"):
         # An axis without coordinates takes any function that needs none.
-        for axis in axes_of(joint):
+        for axis in list_axes(joint):
             if axis.coordinates:
                 yield axis, len(axis.coordinates), axis.function
-    for coupler in subject.named("CoordinateCouplerConstraint"):
+    for coupler in subject.find_by_class("CoordinateCouplerConstraint"):
         yield (
             coupler,
             len(coupler.independent_coordinate_names),
@@ -384,7 +388,7 @@ def _find_functions_of_coordinates(
         )
 
 
-def _linear(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
+def _find_linear_functions(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
     """The linear functions of several variables: what they belong to, how many variables, and the function."""
     for holder, count, held in _find_functions_of_coordinates(subject):
         function = held
@@ -396,7 +400,7 @@ def _linear(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
             yield holder, count, function
 
 
-UNUSED: Final = "what it belongs to is off, and OpenSim does not compute it"
+UNUSED: Final = "its owner is disabled, so OpenSim does not compute it"
 
 
 def is_unused(subject: Subject, function: Object) -> bool:
@@ -428,11 +432,11 @@ def _describe_refusal(subject: Subject, function: Object) -> str:
         return UNUSED
     # What a force or a controller asks for is made at the first acceleration.
     is_late = _find_user(subject, function) is not None
-    return "OpenSim fails when it needs a value" if is_late else "OpenSim refuses it"
+    return "OpenSim fails when it needs a value" if is_late else "OpenSim rejects it"
 
 
-def _tabulated(subject: Subject) -> Iterator[Tabulated]:
+def _find_tabulated(subject: Subject) -> Iterator[Tabulated]:
     for cls in (SimmSpline, GCVSpline, PiecewiseLinearFunction, PiecewiseConstantFunction):
-        for function in subject.each(cls):
+        for function in subject.find_instances(cls):
             if function._index is not None or subject.source is None:
                 yield cast("Tabulated", function)

@@ -11,25 +11,25 @@ from osimlite.io.document.lexical import ABSENT, Unclean, converter
 from osimlite.io.document.names import ATTRIBUTE
 from osimlite.io.document.source import Source
 from osimlite.io.document.spans import blank_remarks
-from osimlite.lint.fixes import without_attribute, without_element, without_text
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.fixes import remove_attribute, remove_element, remove_text
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called
+from osimlite.lint.words import describe_object
 from osimlite.schema.base import Component
 from osimlite.schema.fields import Value
 from osimlite.schema.forces import Force
 from osimlite.schema.specs import field_specs
 
 
-@rule("OSIM105", "unknown-attribute", severity=ERROR, mends="safe")
-def unknown_attribute(subject: Subject, report: FindingSink) -> None:
-    """An element has an attribute that means nothing.
+@rule("OSIM105", "unknown-attribute", severity=ERROR, fixes="safe")
+def report_unknown_attribute(subject: Subject, report: FindingCollector) -> None:
+    """An element has an attribute without meaning.
 
-    Reports attributes of objects other than `name` and `file`; a warning on an element that is no
-    object. Attributes of XML itself (`xmlns`, and all with a colon) are for information.
+    Reports attributes of objects other than `name` and `file`; on an element that is not an object
+    it is a warning. Attributes of XML itself (`xmlns`, and all with a colon) are for information.
 
-    OpenSim ignores them: properties are elements, not attributes. Those of objects stay when a
-    model is written, those of other elements are lost.
+    OpenSim ignores them: properties are elements, not attributes. osimlite keeps attributes of
+    objects when it writes a model; those of other elements are lost.
 
     ```xml
     - <Marker name="asis" fixed="true"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -37,7 +37,7 @@ def unknown_attribute(subject: Subject, report: FindingSink) -> None:
     ```
     """
     for note, owner in subject.notes_of("unknown-attribute"):
-        message = f"OpenSim ignores the attribute '{note.word}' of {called(owner)}"
+        message = f"OpenSim ignores the attribute '{note.word}' of {describe_object(owner)}"
         if note.word in field_specs(type(owner)):
             message += f"; write <{note.word}>{note.value}</{note.word}> inside"
         suggestion = (
@@ -46,11 +46,9 @@ def unknown_attribute(subject: Subject, report: FindingSink) -> None:
             else None
         )
         fix = (
-            without_attribute(subject.source, note.number, note.word)
-            if suggestion is None
-            else None
+            remove_attribute(subject.source, note.number, note.word) if suggestion is None else None
         )
-        of_xml = INFO if _of_xml(note.word) else None
+        of_xml = INFO if _is_xml_attribute(note.word) else None
         place = subject.attribute_name(note.number, note.word)
         report(
             message,
@@ -60,27 +58,28 @@ def unknown_attribute(subject: Subject, report: FindingSink) -> None:
             suggestion=suggestion,
             fix=None if of_xml else fix,
         )
-    for number, tag, word in _beside_objects(subject):
+    for number, tag, word in _find_ignored_attributes(subject):
         report(
-            f"OpenSim ignores the attribute '{word}' of <{tag}>; it is lost when the model is written",
+            f"OpenSim ignores the attribute '{word}' of <{tag}>; it is lost when the model is "
+            "written",
             at=subject.attribute_name(number, word),
-            severity=INFO if _of_xml(word) else WARNING,
-            fix=None if _of_xml(word) else without_attribute(subject.source, number, word),
+            severity=INFO if _is_xml_attribute(word) else WARNING,
+            fix=None if _is_xml_attribute(word) else remove_attribute(subject.source, number, word),
         )
 
 
-def _of_xml(attribute: str) -> bool:
+def _is_xml_attribute(attribute: str) -> bool:
     """Whether an attribute is for programs that read any XML."""
     return attribute == "xmlns" or ":" in attribute
 
 
-def _beside_objects(subject: Subject) -> Iterator[tuple[int, str, str]]:
+def _find_ignored_attributes(subject: Subject) -> Iterator[tuple[int, str, str]]:
     """Every attribute without a meaning of an element that is no object: the element's number and tag, its name."""
     source = subject.source
     if source is None or not source.attributes:
         return
     known = {(note.number, note.word) for note in subject.notes if note.kind == "unknown-attribute"}
-    kept = {note.number for note in subject.notes if note.kind in _KEPT_WHOLE}
+    kept = {note.number for note in subject.notes if note.kind in _UNREAD_KINDS}
     inside = 0
     for number, span in enumerate(source.spans):
         if span.start < inside:
@@ -96,14 +95,14 @@ def _beside_objects(subject: Subject) -> Iterator[tuple[int, str, str]]:
                 yield number, span.tag, word
 
 
-@rule("OSIM106", "stray-text", severity=WARNING, mends="safe")
-def stray_text(subject: Subject, report: FindingSink) -> None:
+@rule("OSIM106", "stray-text", severity=WARNING, fixes="safe")
+def report_stray_text(subject: Subject, report: FindingCollector) -> None:
     """There is text between elements.
 
-    Reports text that stands beside elements, where only elements have a meaning.
+    Reports text beside elements, where only elements have a meaning.
 
-    OpenSim drops it in silence. It is often what is left of a tag: a value that lost its element,
-    or half a comment.
+    OpenSim ignores it without a message. It is often the rest of a tag: a value that lost its
+    element, or half a comment.
 
     ```xml
     - <Body name="thigh"> mass 8 <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -118,13 +117,13 @@ def stray_text(subject: Subject, report: FindingSink) -> None:
         for note in subject.notes
         if note.kind == "child-in-value"
     ]
-    for start, stray in sorted(_beside_elements(source)):
+    for start, stray in sorted(_find_stray_texts(source)):
         # Text outside the root is worse, and another rule speaks of it.
         if any(first < start < last for first, last in in_values) or start >= source.spans[0].end:
             continue
         text = stray.splitlines()[0]
         shown = "U+FEFF (a byte-order mark)" if text == "\ufeff" else f"'{text}'"
-        whole = without_text(source, start, start + len(stray))
+        whole = remove_text(source, start, start + len(stray))
         report(
             f"OpenSim ignores the text {shown} between elements",
             at=source.position(start, len(text)),
@@ -132,7 +131,7 @@ def stray_text(subject: Subject, report: FindingSink) -> None:
         )
 
 
-def _beside_elements(source: Source) -> Iterator[tuple[int, str]]:
+def _find_stray_texts(source: Source) -> Iterator[tuple[int, str]]:
     """Where text stands beside elements, and the text; what stands in a comment is none."""
     if source.mixed is None:
         plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), blank_remarks(source.text))
@@ -151,17 +150,16 @@ def _beside_elements(source: Source) -> Iterator[tuple[int, str]]:
             begin = behind
 
 
-@rule("OSIM110", "defaults", severity=WARNING, mends="safe")
-def defaults_block(subject: Subject, report: FindingSink) -> None:
+@rule("OSIM110", "defaults", severity=WARNING, fixes="safe")
+def report_defaults_block(subject: Subject, report: FindingCollector) -> None:
     """The file has a `<defaults>` block.
 
-    Reports `<defaults>`: a warning if there is something in it, else for information. What OpenSim
-    cannot read in the objects that belong to tools, a CMC_Joint, is an error: it refuses to load
-    the file.
+    Reports `<defaults>`: a warning if it has content, otherwise for information. Values that
+    OpenSim cannot read in objects of tools (CMC_Joint) are errors: it rejects the file.
 
     Each object inside replaces the defaults of its class in the whole running program, for this
-    file and for all that are loaded later. What a model means then depends on what was loaded
-    before. Here the block counts for its own file.
+    file and for all files loaded later. The meaning of a model then depends on the files loaded
+    before it. osimlite applies the block to its own file only.
 
     ```xml
     - <defaults> <Marker name="default"> <fixed>true</fixed> </Marker> </defaults>
@@ -180,30 +178,30 @@ def defaults_block(subject: Subject, report: FindingSink) -> None:
         )
         for item in source.children(number):
             tag = source.spans[item].tag
-            for name, kind in _OF_TOOLS.get(tag, {}).items():
+            for name, kind in _TOOL_CLASSES.get(tag, {}).items():
                 value = source.child(item, name)
-                if value is not None and (wanted := _unread(source, value, kind)):
+                if value is not None and (wanted := _describe_unreadable(source, value, kind)):
                     report(
-                        f"<{name}> of the {tag} in <defaults> is not {wanted}: OpenSim refuses to load the file",
+                        f"<{name}> of the {tag} in <defaults> is not {wanted}: OpenSim rejects "
+                        "the file",
                         model,
                         number=value,
                         severity=ERROR,
                     )
     elif number is not None:
-        fix = without_element(source, number)
-        report("<defaults> is empty and can go", model, number=number, severity=INFO, fix=fix)
+        fix = remove_element(source, number)
+        report("<defaults> is empty; delete it", model, number=number, severity=INFO, fix=fix)
 
 
 @rule("OSIM111", "force-outside-set", severity=INFO)
-def force_outside_set(subject: Subject, report: FindingSink) -> None:
-    """Forces stand elsewhere than in the ForceSet.
+def report_force_outside_set(subject: Subject, report: FindingCollector) -> None:
+    """Forces are outside the ForceSet.
 
     Reports forces, actuators and muscles among the `<components>` of the model or of another part
-    of it, or in its
-    ComponentSet: once for each such place.
+    of it, or in its ComponentSet: once for each such place.
 
-    They act. But OpenSim's lists of forces, actuators and muscles go through the ForceSet alone, so
-    that controllers, probes, static optimization and CMC do not see a muscle that stands elsewhere.
+    They act. But OpenSim lists forces, actuators and muscles from the ForceSet only, so
+    controllers, probes, static optimization and CMC do not find a muscle elsewhere.
 
     ```xml
     - <components>
@@ -212,7 +210,7 @@ def force_outside_set(subject: Subject, report: FindingSink) -> None:
     ```
     """
     places: dict[int, list[Component]] = {}
-    for force in subject.each(Force):
+    for force in subject.find_instances(Force):
         above = subject.tree.parent_of(force)
         if above is not None and subject.model is not None and above is not subject.model.force_set:
             places.setdefault(id(above), []).append(force)
@@ -220,24 +218,23 @@ def force_outside_set(subject: Subject, report: FindingSink) -> None:
         first, others = forces[0], len(forces) - 1
         more = f" and {others} more" if others else ""
         report(
-            f"{called(first)}{more} {'stand' if others else 'stands'} outside the ForceSet: "
-            f"{'they act' if others else 'it acts'}, and what asks the model for its forces or muscles does not find "
-            + ("them" if others else "it"),
+            f"{describe_object(first)}{more} {'are' if others else 'is'} outside the ForceSet: "
+            f"{'they act' if others else 'it acts'}, but tools that list the forces or muscles of the "
+            "model do not find " + ("them" if others else "it"),
             first,
             attribute="name",
         )
 
 
 @rule("OSIM112", "not-upgradable", severity=ERROR)
-def not_upgradable(subject: Subject, report: FindingSink) -> None:
-    """OpenSim cannot bring an old document up to date.
+def report_not_upgradable(subject: Subject, report: FindingCollector) -> None:
+    """OpenSim cannot upgrade an old document.
 
-    Reports what OpenSim needs while it changes a document of an older version into the current
-    format, and finds missing or unreadable: a body without `<Joint>`, a transform that is not six
-    finite numbers, a display preference that is no whole number, a connector without a name.
+    Reports content that OpenSim needs to upgrade a document of an older version, and that is
+    missing or unreadable: a body without `<Joint>`, a transform that is not six finite numbers, a
+    display preference that is not a whole number, a connector without a name.
 
-    OpenSim refuses to load the file. `osimlite upgrade` is more lenient, and writes the current
-    format.
+    OpenSim rejects the file. `osimlite upgrade` is more lenient, and writes the current format.
 
     ```document
       <OpenSimDocument Version="30000">
@@ -269,13 +266,13 @@ def not_upgradable(subject: Subject, report: FindingSink) -> None:
         if refusal.number in told:
             continue
         report(
-            f"{refusal.message}: OpenSim, which has to bring a document of version {subject.version} up to date, "
-            "refuses to load it",
+            f"{refusal.message}: OpenSim, which must upgrade a document of version "
+            f"{subject.version}, rejects it",
             number=refusal.number,
         )
 
 
-def _unread(source: Source, number: int, kind: str) -> str:
+def _describe_unreadable(source: Source, number: int, kind: str) -> str:
     """What an element should hold; empty if it does."""
     span, inside = source.spans[number], source.children(number)
     pieces = [
@@ -302,13 +299,13 @@ def _unread(source: Source, number: int, kind: str) -> str:
 
 
 _COMMENT = re.compile("<!--.*?-->", re.DOTALL)
-_OF_TOOLS = {
+_TOOL_CLASSES = {
     "CMC_Joint": dict.fromkeys(["on", "wrt_body", "express_body", "active", "coordinate"], "text")
     | dict.fromkeys(["weight", "kp", "kv", "ka", "r0", "r1", "r2"], "numbers")
     | {"limit": "number"},
 }
 """Classes that are no part of a model and that old files hold defaults of: how OpenSim reads what they say."""
-_KEPT_WHOLE = frozenset(
+_UNREAD_KINDS = frozenset(
     ("unknown-tag", "unknown-class", "wrong-class", "wrong-name", "duplicate-tag")
 )
 _QUOTED = re.compile(r"=\s*+(?:\"[^\"<]*>[^\"<]*\"|'[^'<]*>[^'<]*')")

@@ -6,21 +6,21 @@ from math import hypot
 
 from osimlite.io.document.source import Position
 from osimlite.io.tables.headers import METRES
-from osimlite.lint.registry import INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import INFO, WARNING, FindingCollector, rule
 from osimlite.lint.table import Table
 
 _LARGEST, _SMALLEST = 8.0, 0.02
 """Between these, m, is how far the markers of one frame are spread."""
 
 
-@rule("OSIM811", "marker-units", severity=WARNING, mends="unsafe", about="table")
-def marker_units(table: Table, report: FindingSink) -> None:
+@rule("OSIM811", "marker-units", severity=WARNING, fixes="unsafe", about="table")
+def report_marker_units(table: Table, report: FindingCollector) -> None:
     """The units of a marker file do not fit its numbers.
 
-    Looks how far the markers of a frame are spread: more than 8 m or less than 2 cm is no moving
+    Checks the spread of the markers in each frame: more than 8 m or less than 2 cm is not a moving
     body.
 
-    OpenSim takes millimetres for metres without a word: inverse kinematics ends with errors of
+    OpenSim reads millimetres as metres without a message: inverse kinematics ends with errors of
     kilometres, and a scaled model is a thousand times too large.
 
     ```trc
@@ -39,7 +39,7 @@ def marker_units(table: Table, report: FindingSink) -> None:
     if units is None or unit is None or len(table.labels) < 2:
         return
     spreads = sorted(
-        spread for sample in table.rows.samples if (spread := _spread(sample)) is not None
+        spread for sample in table.rows.samples if (spread := _measure_spread(sample)) is not None
     )
     if not spreads:
         return
@@ -49,13 +49,14 @@ def marker_units(table: Table, report: FindingSink) -> None:
             (name for name in ("m", "mm", "cm") if 0.2 <= usual * METRES[name] <= 3.0), None
         )
         report(
-            f"the markers of a frame are spread over {usual * unit:.3g} m if the units are '{units.value.text}'",
+            f"the markers of a frame are spread over {usual * unit:.3g} m if the units are "
+            f"'{units.value.text}'",
             at=units.value.at,
             suggestion=right,
         )
 
 
-def _spread(sample: list[float]) -> float | None:
+def _measure_spread(sample: list[float]) -> float | None:
     """The diagonal of the box around the markers of a row."""
     axes = [[number for number in sample[2 + axis :: 3] if number == number] for axis in range(3)]
     if any(len(numbers) < 2 for numbers in axes):
@@ -64,14 +65,14 @@ def _spread(sample: list[float]) -> float | None:
 
 
 @rule("OSIM812", "marker-gap", severity=WARNING, about="table")
-def marker_gap(table: Table, report: FindingSink) -> None:
-    """A marker is at the origin, or only a part of it is there.
+def report_marker_gap(table: Table, report: FindingCollector) -> None:
+    """A marker is at the origin, or has only some of its coordinates.
 
-    Finds markers at 0 0 0, where programs put what they did not see, markers of which one or two
-    cells are empty, and (for information) markers that no frame has.
+    Reports markers at 0 0 0, where some programs put missing markers, markers with one or two empty
+    cells, and (for information) markers that no frame has.
 
-    OpenSim takes 0 0 0 for where the marker is and bends the model towards it. A marker with one
-    empty cell is not seen at all in that frame.
+    OpenSim takes 0 0 0 as the position of the marker and bends the model towards it. A marker with
+    one empty cell is missing in that frame.
 
     ```trc
       PathFileType→4→(X/Y/Z)→walk.trc
@@ -86,15 +87,15 @@ def marker_gap(table: Table, report: FindingSink) -> None:
     + 2→0.02→0.6→0.5→0.1→0.6→0.9→0.1
     ```
     """
-    for fault in table.rows.of("zero", "part"):
+    for fault in table.rows.select("zero", "part"):
         name = table.label_of(fault.number)
         what = (
-            "is at 0 0 0 as if it had been seen there"
+            "is at 0 0 0, which OpenSim takes for a measured position"
             if fault.kind == "zero"
-            else "lacks a part of its place"
+            else "lacks some of its coordinates"
         )
         report(
-            f"the marker '{name}' {what}{fault.more()}",
+            f"the marker '{name}' {what}{fault.describe_rest()}",
             at=Position(fault.line, fault.column, fault.length),
         )
     for label in [
@@ -104,12 +105,12 @@ def marker_gap(table: Table, report: FindingSink) -> None:
 
 
 @rule("OSIM813", "frame-number", severity=INFO, about="table")
-def frame_number(table: Table, report: FindingSink) -> None:
-    """The frames of a marker file are not numbered one after the other.
+def report_frame_number(table: Table, report: FindingCollector) -> None:
+    """The frames of a marker file are not numbered consecutively.
 
     Compares the number of each frame with that of the frame before.
 
-    OpenSim does not look at the numbers; but frames may have been taken out or put in.
+    OpenSim ignores the numbers, but frames may have been removed or inserted.
 
     ```trc
       PathFileType→4→(X/Y/Z)→walk.trc
@@ -123,10 +124,13 @@ def frame_number(table: Table, report: FindingSink) -> None:
     + 2→0.02→0.6→0.5→0.1→0.6→0.9→0.1
     ```
     """
-    for fault in table.rows.of("frame"):
+    for fault in table.rows.select("frame"):
         what = (
-            f"'{fault.text}' does not follow on the frame before"
+            f"'{fault.text}' does not follow the number of the previous frame"
             if fault.text
-            else "the number of the frame is missing"
+            else "the frame number is missing"
         )
-        report(f"{what}{fault.more()}", at=Position(fault.line, fault.column, max(1, fault.length)))
+        report(
+            f"{what}{fault.describe_rest()}",
+            at=Position(fault.line, fault.column, max(1, fault.length)),
+        )

@@ -7,8 +7,8 @@ import re
 from osimlite.io.document.source import Source
 from osimlite.io.document.spans import blank_remarks
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.fixes import replaced, without_text
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.fixes import remove_text, replace_text
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 
 _CONTROLS = re.compile("[\f\v]")
@@ -18,14 +18,14 @@ _BLANK_IN_CLOSING = re.compile(r"</[^<>\s]+(\s+)>")
 _NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
 
 
-@rule("OSIM008", "character-reference", severity=ERROR, mends="safe")
-def character_reference(subject: Subject, report: FindingSink) -> None:
+@rule("OSIM008", "character-reference", severity=ERROR, fixes="safe")
+def report_character_reference(subject: Subject, report: FindingCollector) -> None:
     """A numeric character reference stands for a character beyond ASCII.
 
     Reports references such as `&#233;` with a number above 127.
 
-    OpenSim keeps the lowest byte of the number and throws the rest away: a name with `&#233;` in it
-    becomes invalid UTF-8, and `&#8364;` becomes another character. Write the character itself.
+    OpenSim keeps only the lowest byte of the number: a name with `&#233;` in it becomes invalid
+    UTF-8, and `&#8364;` becomes another character. Write the character itself.
 
     ```xml
     - <credits>Ren&#233;</credits>
@@ -40,23 +40,24 @@ def character_reference(subject: Subject, report: FindingSink) -> None:
         number = int(match[1], 16) if match[1] else int(match[2])
         if 127 < number < 0x110000:
             report(
-                f"OpenSim cuts '{match[0]}' to the byte 0x{number & 255:02X}; write the character itself",
+                f"OpenSim cuts '{match[0]}' to the byte 0x{number & 255:02X}; write the character "
+                "itself",
                 at=(place := source.position(match.start(), len(match[0]))),
                 suggestion=chr(number),
-                fix=replaced(source, place, chr(number)),
+                fix=replace_text(source, place, chr(number)),
             )
 
 
-@rule("OSIM009", "lenient-xml", severity=WARNING, mends="safe")
-def lenient_xml(subject: Subject, report: FindingSink) -> None:
-    """The text is not XML in a way that OpenSim overlooks.
+@rule("OSIM009", "lenient-xml", severity=WARNING, fixes="safe")
+def report_lenient_xml(subject: Subject, report: FindingCollector) -> None:
+    """The text has an XML error that OpenSim tolerates.
 
     Reports a bare `&`, `]]>`, two hyphens inside a comment, characters that XML does not have,
     values of attributes without quotes, attributes without a blank between, and an XML declaration
-    that is none or does not stand at the very beginning.
+    that is malformed or not at the very beginning.
 
-    OpenSim's parser reads such a file, and most other XML readers refuse it. A bare `&` it leaves out: of `Anna & Bert`
-    it keeps `Anna  Bert`.
+    OpenSim's parser reads such a file, and most other XML readers reject it. It removes a bare `&`:
+    of `Anna & Bert` it keeps `Anna` and `Bert`.
 
     ```xml
     - <credits>Anna & Bert</credits>
@@ -70,7 +71,7 @@ def lenient_xml(subject: Subject, report: FindingSink) -> None:
     for note in subject.notes:
         if note.kind not in _OVERLOOKED:
             continue
-        offset = _word_behind(source, max(offset + 1, source.line_start(note.line or 1)), note.word)
+        offset = _find_word(source, max(offset + 1, source.line_start(note.line or 1)), note.word)
         place = source.position(offset, len(note.word.splitlines()[0]))
         match note.kind:
             case "bare-ampersand":
@@ -78,17 +79,19 @@ def lenient_xml(subject: Subject, report: FindingSink) -> None:
                 better = str(note.value) if known else f"&amp;{note.word[1:]}"
                 does = f"leaves the & out and keeps '{note.word[1:]}'" if known else "leaves it out"
                 report(
-                    f"'{note.word}' is not XML; OpenSim {does}, others refuse the file",
+                    f"'{note.word}' is not valid XML; OpenSim {does}, other programs reject the "
+                    "file",
                     at=place,
                     suggestion=better,
-                    fix=replaced(source, place, better),
+                    fix=replace_text(source, place, better),
                 )
             case "hyphens-in-comment":
                 report(
-                    f"'{note.word}' may not stand in a comment; OpenSim reads it, others refuse the file",
+                    f"'{note.word}' is not allowed in a comment; OpenSim reads it, other programs "
+                    "reject the file",
                     at=place,
                     suggestion="-",
-                    fix=replaced(source, place, "-"),
+                    fix=replace_text(source, place, "-"),
                 )
             case "overlooked":
                 odd = len(note.word) == 1 and not note.word.isprintable()
@@ -97,24 +100,30 @@ def lenient_xml(subject: Subject, report: FindingSink) -> None:
                     if odd
                     else f"'{note.word.splitlines()[0][:40]}'"
                 )
-                report(f"{what} is not XML; {note.value}, others refuse the file", at=place)
-            case "control-character":
-                place = source.position(_control(source, offset))
                 report(
-                    f"the character {note.word} is not XML; OpenSim takes it for a blank, others refuse the file",
+                    f"{what} is not valid XML; {note.value}, other programs reject the file",
                     at=place,
-                    fix=replaced(source, place, " "),
+                )
+            case "control-character":
+                place = source.position(_find_control_character(source, offset))
+                report(
+                    f"the character {note.word} is not valid XML; OpenSim reads it as a blank, "
+                    "other programs reject the file",
+                    at=place,
+                    fix=replace_text(source, place, " "),
                 )
             case _:
                 report(
-                    "the XML declaration belongs at the very beginning; OpenSim reads it here, others refuse the file",
+                    "the XML declaration belongs at the very beginning; OpenSim reads it here, "
+                    "other programs reject the file",
                     at=place,
-                    fix=without_text(source, offset, offset + len(note.word)),
+                    fix=remove_text(source, offset, offset + len(note.word)),
                 )
     start = source.text.find("<?xml")
     if start > 0 and not source.text[:start].strip():
         report(
-            "there are blanks before the XML declaration; OpenSim reads the file, others refuse it",
+            "there are blanks before the XML declaration; OpenSim reads the file, other programs "
+            "reject it",
             at=source.position(start, 5),
             fix=Fix((Edit(0, start, ""),)),
         )
@@ -125,25 +134,25 @@ _OVERLOOKED = frozenset(
 )
 
 
-def _word_behind(source: Source, start: int, word: str) -> int:
+def _find_word(source: Source, start: int, word: str) -> int:
     place = source.text.find(word, start)
     return place if place >= 0 else start
 
 
-def _control(source: Source, start: int) -> int:
+def _find_control_character(source: Source, start: int) -> int:
     match = _CONTROLS.search(source.text, start)
     return match.start() if match is not None else start
 
 
-@rule("OSIM011", "text-outside-root", severity=ERROR, mends="safe")
-def text_outside_root(subject: Subject, report: FindingSink) -> None:
+@rule("OSIM011", "text-outside-root", severity=ERROR, fixes="safe")
+def report_text_outside_root(subject: Subject, report: FindingCollector) -> None:
     """There is text before or after the root element.
 
-    Reports text that stands outside `<OpenSimDocument>`, be it a remark that is no comment, what an
-    editor left behind, or a byte-order mark at another place than the beginning.
+    Reports text outside `<OpenSimDocument>`: notes that are not comments, remains of an editor, or
+    a byte-order mark that is not at the beginning.
 
-    OpenSim finds no root element then and refuses the file, with a message about a node that is
-    none. Make a comment of a remark: `<!-- ... -->`.
+    OpenSim then finds no root element and rejects the file, with a message about an invalid node.
+    Write notes as comments: `<!-- ... -->`.
 
     ```document
     - scaled by Anna, 2021
@@ -157,7 +166,7 @@ def text_outside_root(subject: Subject, report: FindingSink) -> None:
     for note in subject.notes if source is not None else ():
         assert source is not None
         if note.kind in ("text-outside-root", "byte-order-mark"):
-            start = _word_behind(source, source.line_start(note.line or 1), note.word)
+            start = _find_word(source, source.line_start(note.line or 1), note.word)
             if not start and note.kind == "byte-order-mark":
                 # Two of them at the beginning do no harm.
                 continue
@@ -165,23 +174,23 @@ def text_outside_root(subject: Subject, report: FindingSink) -> None:
                 "a byte-order mark" if note.kind == "byte-order-mark" else f"the text '{note.word}'"
             )
             report(
-                f"{what} stands outside the document: OpenSim refuses the file",
+                f"{what} is outside the root element: OpenSim rejects the file",
                 at=source.position(start, len(note.word)),
-                fix=without_text(source, start, start + 1)
+                fix=remove_text(source, start, start + 1)
                 if note.kind == "byte-order-mark"
                 else None,
             )
 
 
 @rule("OSIM012", "byte-order-mark", severity=INFO)
-def byte_order_mark(subject: Subject, report: FindingSink) -> None:
+def report_byte_order_mark(subject: Subject, report: FindingCollector) -> None:
     """The file has a byte-order mark.
 
     Reports the bytes EF BB BF at the beginning of a file, which some Windows editors write, and the
     same mark between elements.
 
-    OpenSim and XML readers pass over it. Files that are joined, cut or compared with other tools
-    carry it to places where it is part of a name or a number, and nobody sees it.
+    OpenSim and XML readers ignore it. But joining, cutting or comparing files with other tools can
+    move it into a name or a number, where it is invisible.
 
     ```document
     - \ufeff<OpenSimDocument Version="40600">
@@ -195,14 +204,14 @@ def byte_order_mark(subject: Subject, report: FindingSink) -> None:
         report("the file begins with a byte-order mark", at=source.position(0))
 
 
-@rule("OSIM013", "closing-tag", severity=ERROR, mends="safe")
-def closing_tag(subject: Subject, report: FindingSink) -> None:
+@rule("OSIM013", "closing-tag", severity=ERROR, fixes="safe")
+def report_closing_tag(subject: Subject, report: FindingCollector) -> None:
     """There is white space in a closing tag.
 
-    Reports closing tags such as `</mass >`, and those that are broken over two lines.
+    Reports closing tags such as `</mass >`, and closing tags that span two lines.
 
-    XML allows it, so that editors and other programs say nothing. OpenSim's parser does not know it
-    and cannot load the file.
+    XML allows it, so editors and other programs accept it. OpenSim's parser does not, and cannot
+    load the file.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass > <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -216,7 +225,8 @@ def closing_tag(subject: Subject, report: FindingSink) -> None:
     for match in _BLANK_IN_CLOSING.finditer(plain):
         start, end = match.span(1)
         report(
-            f"OpenSim cannot read '{''.join(match[0].split())[:-1]} >': no white space may stand in a closing tag",
+            f"OpenSim cannot read '{''.join(match[0].split())[:-1]} ': white space is not allowed "
+            "in a closing tag",
             at=source.position(match.start(), start - match.start()),
             suggestion="".join(match[0].split()),
             fix=Fix((Edit(start, end, ""),)),

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from osimlite.lint.measures import MEASURES, measures_of
-from osimlite.lint.registry import INFO, WARNING, FindingSink, Threshold, rule
+from osimlite.lint.measures import MEASURES, get_measures
+from osimlite.lint.registry import INFO, WARNING, FindingCollector, Threshold, rule
 from osimlite.lint.rules.muscles import LONGEST
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called
+from osimlite.lint.words import describe_object
 
 OFF = Threshold(
     "off-equilibrium",
@@ -17,22 +17,21 @@ OFF = Threshold(
 
 
 @rule("OSIM635", "start-off-equilibrium", severity=INFO, thresholds=(OFF,), about=MEASURES)
-def start_off_equilibrium(subject: Subject, report: FindingSink) -> None:
+def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> None:
     """A muscle starts far from equilibrium.
 
     Reports muscles with an elastic tendon whose fibers, in the default pose and at their default
-    activation, start more than 0.1 optimal fiber lengths from where they would be in equilibrium,
-    or whose tension is off by more than 0.1 `max_isometric_force`. A muscle without an equilibrium
-    there is a warning. Thelen2003Muscle, Millard2012EquilibriumMuscle and DeGrooteFregly2016Muscle
-    are looked at.
+    activation, start more than 0.1 optimal fiber lengths from their equilibrium length, or whose
+    tension is off by more than 0.1 `max_isometric_force`. A muscle without an equilibrium there is
+    a warning. Thelen2003Muscle, Millard2012EquilibriumMuscle and DeGrooteFregly2016Muscle are
+    checked.
 
-    OpenSim brings muscles into equilibrium only where it is asked to
-    (`solve_for_equilibrium_for_auxiliary_states` of ForwardTool, Model::equilibrateMuscles); else
-    fibers begin with `default_fiber_length`, which is 0.1 m where a file does not say. The tendon
-    is slack then or pulls with many times the muscle's strength, and the fibers snap into place
-    with hundreds of lengths per second: the motion of the first tenths of a second is that of no
-    muscle. Where there is no equilibrium OpenSim throws an exception when it is asked for one. The
-    fibers' length in equilibrium is a good default.
+    OpenSim equilibrates muscles only on request (`solve_for_equilibrium_for_auxiliary_states` of
+    ForwardTool, Model::equilibrateMuscles); otherwise fibers start with `default_fiber_length`, 0.1
+    m if it is missing. The tendon is then slack, or pulls with many times the strength of the
+    muscle, and the fibers move at hundreds of lengths per second: the first tenths of a second of
+    the motion are meaningless. Where there is no equilibrium OpenSim throws an exception when it is
+    asked for one. The equilibrium length of the fibers is a good default.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -42,39 +41,41 @@ def start_off_equilibrium(subject: Subject, report: FindingSink) -> None:
     ```
     """
     most = subject.config.value_of(OFF)
-    for start in measures_of(subject).starts:
+    for start in get_measures(subject).starts:
         muscle = subject.tree.at(start.owner)
         (length, settled), (tension, settled_tension) = start.lengths, start.tensions
         if settled != settled:
             report(
-                f"{called(muscle)} has no equilibrium in the default pose: OpenSim fails where it is asked to find it",
+                f"{describe_object(muscle)} has no equilibrium in the default pose: OpenSim fails "
+                "when asked to equilibrate it",
                 muscle,
                 severity=WARNING,
             )
         elif abs(length - settled) > most or abs(tension - settled_tension) > most:
             report(
-                f"{called(muscle)} starts with fibers of {length:.3g} optimal lengths and a tension of {tension:.3g} "
-                f"max_isometric_force; in equilibrium these are {settled:.3g} and {settled_tension:.3g}",
+                f"{describe_object(muscle)} starts with fibers of {length:.3g} optimal lengths "
+                f"and a tension of {tension:.3g} max_isometric_force; in equilibrium these are "
+                f"{settled:.3g} and {settled_tension:.3g}",
                 muscle,
                 tag="default_fiber_length" if hasattr(muscle, "default_fiber_length") else None,
             )
 
 
 @rule("OSIM636", "fiber-limit", severity=INFO, thresholds=(LONGEST,), about=MEASURES)
-def fiber_limit(subject: Subject, report: FindingSink) -> None:
+def report_fiber_limit(subject: Subject, report: FindingCollector) -> None:
     """The fibers of a muscle reach a limit within the ranges of the coordinates.
 
     Reports muscles whose fibers in equilibrium, fully active, are as short as pennation
     (`maximum_pennation_angle`) or the curve of active force lets them be where the path is
     shortest; those whose fibers at rest are longer than 2 optimal lengths where it is longest; and
-    muscles that have no equilibrium in one of these poses. The poses are the default one and five
-    values of each coordinate in the middle half of its range, the others as in the default pose: at
-    the ends of wide ranges there are few muscles that have reached no limit.
+    muscles that have no equilibrium in one of these poses. The poses are the default pose and five
+    values of each coordinate in the middle half of its range, with the others at their defaults: at
+    the ends of wide ranges most muscles reach a limit.
 
-    A muscle whose fibers can shorten no further has a slack tendon and no force, whatever its
-    activation. Fibers beyond twice their length are torn in life. The lengths may be those of
-    another muscle, a scaling may have forgotten them, or the range of the coordinate is wider than
-    the joint.
+    A muscle whose fibers cannot shorten further has a slack tendon and no force, whatever its
+    activation. Real fibers tear beyond twice their length. The lengths may belong to another
+    muscle, may not have been scaled, or the range of the coordinate is wider than that of the
+    joint.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -84,20 +85,21 @@ def fiber_limit(subject: Subject, report: FindingSink) -> None:
     ```
     """
     longest = subject.config.value_of(LONGEST)
-    for reach in measures_of(subject).reaches:
+    for reach in get_measures(subject).reaches:
         muscle = subject.tree.at(reach.owner)
         lengths = f"{reach.length:.3g} optimal lengths"
         if reach.length != reach.length:
-            report(f"{called(muscle)} has no equilibrium {reach.pose}", muscle)
+            report(f"{describe_object(muscle)} has no equilibrium {reach.pose}", muscle)
         elif reach.is_active and reach.is_limit:
             report(
-                f"fully active, the fibers of {called(muscle)} are as short as they can be, {lengths}, {reach.pose}",
+                f"fully active, the fibers of {describe_object(muscle)} are as short as they can "
+                f"be, {lengths}, {reach.pose}",
                 muscle,
                 tag="tendon_slack_length",
             )
         elif not reach.is_active and reach.length > longest:
             report(
-                f"at rest, the fibers of {called(muscle)} are {lengths} long {reach.pose}",
+                f"at rest, the fibers of {describe_object(muscle)} are {lengths} long {reach.pose}",
                 muscle,
                 tag="optimal_fiber_length",
             )

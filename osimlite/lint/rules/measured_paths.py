@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from osimlite.base.text import join_words
-from osimlite.lint.measures import MEASURES, MovingPoint, measures_of
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, Threshold, rule
+from osimlite.lint.measures import MEASURES, MovingPoint, get_measures
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, Threshold, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called
+from osimlite.lint.words import describe_object
 
 SHOWN = 5e-6
 """Less (m) is no error of the default pose."""
@@ -20,21 +20,21 @@ OFF = Threshold(
 
 
 @rule("OSIM631", "wrong-wrapping", severity=WARNING, thresholds=(OFF,), about=MEASURES)
-def wrong_wrapping(subject: Subject, report: FindingSink) -> None:
-    """OpenSim computes a path around surfaces wrongly.
+def report_wrong_wrapping(subject: Subject, report: FindingCollector) -> None:
+    """OpenSim computes the length of a path around surfaces incorrectly.
 
-    Reports paths whose length in OpenSim is a millimetre or more off that along geodesics, the
-    shortest ways on the surfaces, in the default pose, at one of nine values of each coordinate
-    over its range, the others as in the default pose, or in one of 64 poses in which all
-    coordinates are anywhere in their ranges. A negative number is how much too short OpenSim has
-    the path. Paths of OSIM633 are left out.
+    Reports paths whose length in OpenSim differs by a millimetre or more from the length along
+    geodesics, the shortest lines on the surfaces: in the default pose, at one of nine values of
+    each coordinate over its range with the others at their defaults, or in one of 64 random poses
+    within the ranges. A negative number means that OpenSim's path is too short. Paths of OSIM633
+    are not reported here.
 
-    Around several surfaces OpenSim looks for the way in rounds, but measures straight pieces
-    between tangent points of an earlier round: paths are shorter than they can be, and their forces
-    have a moment that nothing bears. Around one surface it goes another way than the shortest on an
-    ellipsoid and a torus, and along a cylinder. The moment arm is not the derivative of the length
-    then, so that the muscle's work is not what its force and its length say. `osimlite muscles` and
-    `osimlite simulate` compute the right lengths with `--wrapping geodesic`.
+    Around several surfaces OpenSim iterates, but measures straight segments between tangent points
+    of an earlier iteration: paths are shorter than possible, and their forces have an unbalanced
+    moment. Around one ellipsoid or torus, and along a cylinder, it does not follow the shortest
+    line. The moment arm is then not the derivative of the length, so the work of the muscle does
+    not match its force and length. `osimlite muscles` and `osimlite simulate` compute the right
+    lengths with `--wrapping geodesic`.
 
     ```xml
       <Body name="shank"> <mass>3</mass> <inertia>0.05 0.05 0.005 0 0 0</inertia>
@@ -59,7 +59,7 @@ def wrong_wrapping(subject: Subject, report: FindingSink) -> None:
       </PathWrapSet>
     ```
     """
-    most, measures = subject.config.value_of(OFF), measures_of(subject)
+    most, measures = subject.config.value_of(OFF), get_measures(subject)
     told = {item.owner for item in measures.on_surfaces}
     for wrapping in measures.wrappings:
         if abs(wrapping.worst) >= most and wrapping.owner not in told:
@@ -70,8 +70,8 @@ def wrong_wrapping(subject: Subject, report: FindingSink) -> None:
             by_default = f"{1000.0 * wrapping.default:.3g} mm in the default pose and by "
             default = by_default if wrapping.pose.values and abs(wrapping.default) >= SHOWN else ""
             report(
-                f"OpenSim's length of the path of {called(owner)} around {surfaces} is off by {default}"
-                f"{1000.0 * wrapping.worst:.3g} mm {wrapping.pose}",
+                f"OpenSim's length of the path of {describe_object(owner)} around {surfaces} is "
+                f"off by {default}{1000.0 * wrapping.worst:.3g} mm {wrapping.pose}",
                 owner,
             )
 
@@ -82,19 +82,20 @@ JUMP = Threshold(
 
 
 @rule("OSIM632", "path-jump", severity=WARNING, thresholds=(JUMP,), about=MEASURES)
-def path_jump(subject: Subject, report: FindingSink) -> None:
+def report_path_jump(subject: Subject, report: FindingCollector) -> None:
     """The length of a path jumps.
 
-    Reports paths whose length jumps by a millimetre or more where a coordinate takes a value within
-    its range, the others being as in the default pose: since a conditional point comes or goes, or
-    since OpenSim finds another way around a surface. Each path is reported once, with its greatest
-    jump. Nine values of each coordinate are looked at, the ends of the ranges of conditional
-    points, and what lies between two values where the length changes otherwise than next to them.
+    Reports paths whose length jumps by a millimetre or more at a value of a coordinate within its
+    range, with the others at their defaults: because a conditional point appears or disappears, or
+    because OpenSim finds another route around a surface. Each path is reported once, with its
+    greatest jump. The rule checks nine values of each coordinate, the ends of the ranges of
+    conditional points, and intervals in which the length changes differently from the neighbouring
+    intervals.
 
-    The muscle's force jumps there, and so do accelerations: integrators take ever smaller steps,
-    optimisations have no derivative, and a fiber is torn at once by as much as the path jumps. The
-    moment arm tells nothing of it. A wrap surface, or a moving point, in place of the conditional
-    point makes the length continuous.
+    The muscle force jumps there, and so do accelerations: integrators take ever smaller steps,
+    optimisations have no derivative, and the fibers stretch suddenly by the jump. The moment arm
+    does not show it. A wrap surface, or a moving point, in place of the conditional point makes the
+    length continuous.
 
     ```xml
       <ConditionalPathPoint name="via">
@@ -104,32 +105,32 @@ def path_jump(subject: Subject, report: FindingSink) -> None:
       </ConditionalPathPoint>
     ```
     """
-    for jump in measures_of(subject).jumps:
+    for jump in get_measures(subject).jumps:
         if jump.size < subject.config.value_of(JUMP):
             continue
         owner = subject.tree.at(jump.owner)
         parts = join_words([f"'{part}'" for part in jump.parts])
         why = (
-            f"{parts} {'come or go' if len(jump.parts) > 1 else 'comes or goes'}"
+            f"{parts} {'appear or disappear' if len(jump.parts) > 1 else 'appears or disappears'}"
             if parts
-            else "its way changes"
+            else "its route changes"
         )
-        length = f"the length of the path of {called(owner)}"
+        length = f"the length of the path of {describe_object(owner)}"
         report(f"{length} jumps by {1000.0 * jump.size:.3g} mm {jump.pose}, where {why}", owner)
 
 
 @rule("OSIM633", "length-of-wrap", severity=ERROR, about=MEASURES)
-def length_of_wrap(subject: Subject, report: FindingSink) -> None:
-    """OpenSim computes a negative length of a path on a surface, or none.
+def report_length_of_wrap(subject: Subject, report: FindingCollector) -> None:
+    """OpenSim computes a negative path length on a surface, or finds no path.
 
-    Reports wraps of which OpenSim subtracts the length of the path on the surface instead of adding
-    it, which happens on the far side of a sphere whose `quadrant` is not all of it; and wraps for
-    which it finds no points, so that the path goes straight through the surface, which happens
-    where the line between the points goes through the middle of a sphere. Looked at are the default
-    pose, and nine values of each coordinate over its range.
+    Reports wraps where OpenSim subtracts the path length on the surface instead of adding it, which
+    happens on the far side of a sphere whose `quadrant` is not `all`; and wraps for which it finds
+    no tangent points, so the path goes straight through the surface, which happens where the line
+    between the points goes through the centre of a sphere. The rule checks the default pose and
+    nine values of each coordinate over its range.
 
-    The path is too short, by centimetres and perhaps below zero; forces and moment arms are those
-    of another path. Where a path goes through the middle of a sphere its length jumps.
+    The path is too short, by centimetres and perhaps below zero; forces and moment arms are wrong.
+    Where a path goes through the centre of a sphere its length jumps.
 
     ```xml
       <PathPoint name="band_a"> <location>-0.039 -0.18 0</location> </PathPoint>
@@ -142,17 +143,19 @@ def length_of_wrap(subject: Subject, report: FindingSink) -> None:
       </WrapSphere>
     ```
     """
-    for item in measures_of(subject).on_surfaces:
+    for item in get_measures(subject).on_surfaces:
         owner = subject.tree.at(item.owner)
-        path = f"the path of {called(owner)}"
+        path = f"the path of {describe_object(owner)}"
         if item.length < 0.0:
             report(
-                f"OpenSim counts {path} on '{item.surface}' as {1000.0 * item.length:.3g} mm {item.pose}",
+                f"OpenSim counts {path} on '{item.surface}' as {1000.0 * item.length:.3g} mm "
+                f"{item.pose}",
                 owner,
             )
         else:
             report(
-                f"{path} goes straight through '{item.surface}' {item.pose}: OpenSim finds no points",
+                f"{path} goes straight through '{item.surface}' {item.pose}: OpenSim finds no "
+                "points",
                 owner,
             )
 
@@ -172,20 +175,20 @@ RATE = Threshold(
 
 
 @rule("OSIM634", "moving-point-range", severity=WARNING, thresholds=(MADE_UP, RATE), about=MEASURES)
-def moving_point_range(subject: Subject, report: FindingSink) -> None:
-    """A moving path point has no place for all values of its coordinate.
+def report_moving_point_range(subject: Subject, report: FindingCollector) -> None:
+    """A moving path point is not defined over the range of its coordinate.
 
-    Reports moving points whose functions end before the range of their coordinate does, and make
-    the point move on by a millimetre or more from there to the end of the range. As an info it
-    reports those whose place would go on changing at an end of the range by 5 mm per radian or
-    more, if nothing keeps the coordinate within: that is, if no CoordinateLimitForce acts on it and
-    it is neither locked nor prescribed.
+    Reports moving points whose functions end before the range of their coordinate, if extrapolation
+    moves the point by a millimetre or more from there to the end of the range. As an info it
+    reports points that would still move by 5 mm per radian or more at an end of the range, if
+    nothing keeps the coordinate within it: that is, if no CoordinateLimitForce acts on it and it is
+    neither locked nor prescribed.
 
-    Where functions are not given OpenSim prolongs them: a spline by a straight line, a GCVSpline by
-    a parabola or so, which soon leads off the bone. Outside the range of the coordinate a moving
-    point rests in OpenSim, while the speed of the path, its moment arm and its work go on as if the
-    point moved: the length and its rate contradict each other, and energy is not conserved. Nothing
-    keeps a coordinate in its range in a simulation, `clamped` neither.
+    Beyond their ends OpenSim extrapolates functions: a spline by a straight line, a GCVSpline
+    roughly by a parabola, which soon leaves the bone. Outside the range of the coordinate OpenSim
+    keeps a moving point in place, while the speed of the path, its moment arm and its work are
+    computed as if the point moved: the length and its rate contradict each other, and energy is not
+    conserved. Nothing keeps a coordinate in its range in a simulation, not even `clamped`.
 
     ```xml
       <MovingPathPoint name="patella">
@@ -196,14 +199,14 @@ def moving_point_range(subject: Subject, report: FindingSink) -> None:
     ```
     """
     made_up, rate = subject.config.value_of(MADE_UP), subject.config.value_of(RATE)
-    limits = subject.named("CoordinateLimitForce")
+    limits = subject.find_by_class("CoordinateLimitForce")
     kept = {
         item.name
         for force in limits
         if (item := subject.target_of(force, "coordinate")) is not None
     }
     worst: dict[tuple[str, str], MovingPoint] = {}
-    for point in measures_of(subject).moving_points:
+    for point in get_measures(subject).moving_points:
         if point.moved >= made_up or (point.rate >= rate and point.end.coordinate not in kept):
             other = worst.setdefault((point.owner, point.point), point)
             worst[point.owner, point.point] = max(
@@ -211,17 +214,19 @@ def moving_point_range(subject: Subject, report: FindingSink) -> None:
             )
     for point in worst.values():
         owner, end = subject.tree.at(point.owner), point.end
-        names = f"'{point.point}' of {called(owner)}"
+        names = f"'{point.point}' of {describe_object(owner)}"
         if point.moved >= made_up:
             report(
-                f"the functions of the place of {names} end {end.sized(point.beyond, 3)} before the range of "
-                f"'{end.coordinate}': OpenSim lets it move on by {1000.0 * point.moved:.3g} mm, to its place at {end}",
+                f"the location functions of {names} end {end.format_value(point.beyond, 3)} "
+                f"before the range of '{end.coordinate}': OpenSim extrapolates them and moves the "
+                f"point by {1000.0 * point.moved:.3g} mm up to {end}",
                 owner,
             )
         else:
             report(
-                f"beyond the range of '{end.coordinate}', which nothing keeps it in, {names} rests and OpenSim goes on "
-                f"as if it moved, by {1000.0 * point.rate:.3g} mm per {end.unit or 'unit'} at {end}",
+                f"outside the range of '{end.coordinate}', which nothing enforces, {names} stays "
+                f"in place, but OpenSim computes with a speed of {1000.0 * point.rate:.3g} mm per "
+                f"{end.unit or 'unit'} at {end}",
                 owner,
                 severity=INFO,
             )

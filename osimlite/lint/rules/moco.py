@@ -1,4 +1,4 @@
-"""OSIM86x: studies of Moco that OpenSim refuses, or cannot solve."""
+"""OSIM86x: studies of Moco that OpenSim rejects, or cannot solve."""
 
 from __future__ import annotations
 
@@ -8,31 +8,31 @@ from itertools import chain
 from typing import Any
 
 from osimlite.base.text import join_words
-from osimlite.lint.posture import angles_of, coordinate_of
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
-from osimlite.lint.setup import Setup, members
+from osimlite.lint.posture import coordinate_name, find_angles
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.setup import Setup, select_members
 from osimlite.lint.table import Table
-from osimlite.lint.words import called, nearest_name
+from osimlite.lint.words import describe_object, find_nearest_name
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.fields import Reference, Value
 from osimlite.schema.specs import field_specs, file_specs, member_specs
 from osimlite.schema.states import variables
 from osimlite.schema.tree import Tree, is_a
 
-_ALLOW = ("allow_unused_references", "kinematics_allow_extra_columns")
+_ALLOWING_FLAGS = ("allow_unused_references", "kinematics_allow_extra_columns")
 """What lets a table have columns that nothing follows."""
 
 
 @rule("OSIM861", "impossible-bounds", severity=ERROR, about="document")
-def impossible_bounds(setup: Setup, report: FindingSink) -> None:
-    """Bounds of a study leave no value.
+def report_impossible_bounds(setup: Setup, report: FindingCollector) -> None:
+    """Bounds of a study are empty or contradict each other.
 
-    Compares both ends of all bounds, bounds at the start and at the end with those of the whole
-    phase, and the times at which a phase begins and ends. Points out a state or control that has
-    bounds twice, bounds of an angle that look like degrees, and bounds of a time that are empty.
+    Compares both ends of all bounds, initial and final bounds with those of the whole phase, and
+    the start and end times of a phase. Reports a state or control that has bounds twice, bounds of
+    an angle that look like degrees, and bounds of a time that are empty.
 
     The optimizer fails with a message that names neither bounds nor variable. Of two sets of bounds
-    the last counts, without a word.
+    OpenSim uses the last, without a message.
 
     ```setup
       <MocoPhase name="phase">
@@ -44,7 +44,7 @@ def impossible_bounds(setup: Setup, report: FindingSink) -> None:
     ```
     """
     for item in chain.from_iterable(
-        map(setup.named, ("MocoBounds", "MocoVariableInfo", "MocoScaleFactor"))
+        map(setup.find_by_class, ("MocoBounds", "MocoVariableInfo", "MocoScaleFactor"))
     ):
         for tag in ("bounds", "initial_bounds", "final_bounds"):
             ends: tuple[float, ...] = getattr(item, tag, ())
@@ -58,50 +58,53 @@ def impossible_bounds(setup: Setup, report: FindingSink) -> None:
                 and (ends[-1] < whole[0] or ends[0] > whole[-1])
             ):
                 report(
-                    f"{tag} of {called(item)} are outside its bounds from {whole[0]:g} to {whole[-1]:g}: OpenSim fails",
+                    f"{tag} of {describe_object(item)} are outside its bounds from {whole[0]:g} "
+                    f"to {whole[-1]:g}: OpenSim fails",
                     item,
                     tag=tag,
                 )
-    angles = angles_of(setup)
-    for phase in setup.named("MocoPhase"):
-        for info in members(phase.state_infos, "MocoVariableInfo"):
+    angles = find_angles(setup)
+    for phase in setup.find_by_class("MocoPhase"):
+        for info in select_members(phase.state_infos, "MocoVariableInfo"):
             bounds = (*info.bounds, *info.initial_bounds, *info.final_bounds)
             largest = max(filter(math.isfinite, map(abs, bounds)), default=0.0)
             if (
                 info.name.endswith("/value")
-                and coordinate_of(info.name) in angles
+                and coordinate_name(info.name) in angles
                 and largest > 10.0
             ):
                 report(
-                    f"a bound of {largest:g} for the angle '{info.name}' is in radians: in degrees?",
+                    f"a bound of {largest:g} for the angle '{info.name}' is read in radians: is "
+                    "it in degrees?",
                     info,
                     severity=WARNING,
                 )
         for bounds in (phase.time_initial_bounds, phase.time_final_bounds):
             if bounds._index and not bounds.bounds:
                 report(
-                    "a time without bounds may be any: the optimizer seldom ends",
+                    "a time without bounds is free: the optimizer seldom converges",
                     bounds,
                     severity=WARNING,
                 )
         starts, ends = phase.time_initial_bounds.bounds, phase.time_final_bounds.bounds
         if starts and ends and ends[-1] < starts[0]:
             report(
-                f"the phase ends at {ends[-1]:g} s at the latest, and begins at {starts[0]:g} s at the earliest",
+                f"the phase ends at {ends[-1]:g} s at the latest, and begins at {starts[0]:g} s "
+                "at the earliest",
                 phase.time_final_bounds,
                 tag="bounds",
             )
         for infos in (phase.state_infos, phase.control_infos, phase.input_control_infos):
-            for info in _repeated(infos):
+            for info in _find_repeated(infos):
                 report(
-                    f"'{info.name}' has bounds already: these replace all of them",
+                    f"'{info.name}' already has bounds: these replace them",
                     info,
                     attribute="name",
                     severity=WARNING,
                 )
 
 
-def _repeated(items: list[Any]) -> Iterator[Any]:
+def _find_repeated(items: list[Any]) -> Iterator[Any]:
     """The objects with a name that one before has."""
     names: set[str] = set()
     for item in items:
@@ -123,14 +126,14 @@ _COUNTED = (
 
 
 @rule("OSIM862", "study-data", severity=ERROR, about="document")
-def study_data(setup: Setup, report: FindingSink) -> None:
-    """A table that a study follows, or starts from, does not fit its model.
+def report_study_data(setup: Setup, report: FindingCollector) -> None:
+    """A table that a study tracks, or uses as initial guess, does not fit its model.
 
-    Looks for tables that are not named, for motions that do not say whether they are in degrees,
-    for times that a table does not have, for columns that are no state, control, generalized force
-    or marker of the model, and for states and controls that an initial guess lacks.
+    Checks for missing table names, for motions without `inDegrees`, for times outside a table, for
+    columns that are not a state, control, generalized force or marker of the model, and for states
+    and controls that are missing in an initial guess.
 
-    OpenSim refuses the study.
+    OpenSim rejects the study.
 
     ```setup
       <MocoStudy name="study">
@@ -151,10 +154,10 @@ def study_data(setup: Setup, report: FindingSink) -> None:
       </MocoStudy>
     ```
     """
-    for processor in setup.named("ModelProcessor"):
+    for processor in setup.find_by_class("ModelProcessor"):
         if not processor.filepath and processor.model is None:
             report(
-                f"{called(processor)} names no model: OpenSim refuses the study",
+                f"{describe_object(processor)} names no model: OpenSim rejects the study",
                 processor,
                 tag="filepath",
             )
@@ -165,13 +168,14 @@ def study_data(setup: Setup, report: FindingSink) -> None:
             tag = next((file.tag for file in file_specs(spec.accepts, "file")), "")
             name = getattr(held, tag, "").strip()
             if not name and spec.names.required and tag:
-                report(f"{called(item)} names no table to follow: OpenSim refuses it", item)
-            table = setup.table(name)
+                report(f"{describe_object(item)} names no table to track: OpenSim rejects it", item)
+            table = setup.read_table(name)
             if table is not None and spec.names.target == "state variable":
                 said = table.entries.get("inDegrees")
                 if said is None or said.value.text not in ("yes", "no"):
                     report(
-                        f"'{name}' must say inDegrees=yes or inDegrees=no: OpenSim refuses the study",
+                        f"'{name}' must say inDegrees=yes or inDegrees=no: OpenSim rejects the "
+                        "study",
                         held,
                         tag=tag,
                     )
@@ -181,32 +185,36 @@ def study_data(setup: Setup, report: FindingSink) -> None:
                     wanted = getattr(item, time)
                     if wanted is not None and not first <= wanted <= last:
                         report(
-                            f"'{name}' has {first!r} to {last!r} s, and not {wanted!r} s: OpenSim refuses the tool",
+                            f"'{name}' has {first!r} to {last!r} s, not {wanted!r} s: OpenSim "
+                            "rejects the tool",
                             item,
                             tag=time,
                         )
-            allowed = any(getattr(item, flag, False) for flag in _ALLOW)
+            allowed = any(getattr(item, flag, False) for flag in _ALLOWING_FLAGS)
             for column in (
-                [] if allowed or table is None else _strangers(setup, spec.names, held, table)
+                []
+                if allowed or table is None
+                else _find_unknown_columns(setup, spec.names, held, table)
             ):
                 report(
-                    f"'{name}' has a column '{column}', which is nothing of the model: OpenSim refuses the study",
+                    f"'{name}' has a column '{column}', which is not in the model: OpenSim "
+                    "rejects the study",
                     held,
                     tag=tag,
                 )
-    if setup.tree is None or any(setup.named("ModelOperator")):
+    if setup.tree is None or any(setup.find_by_class("ModelOperator")):
         return
-    for item, guess in setup.with_tables(setup.having("guess_file"), "guess_file"):
-        if fault := _fault_of_guess(setup, setup.tree, guess):
+    for item, guess in setup.iterate_with_tables(setup.find_having("guess_file"), "guess_file"):
+        if fault := _describe_guess_fault(setup, setup.tree, guess):
             report(
-                f"the guess '{item.guess_file}' {fault}: OpenSim refuses it", item, tag="guess_file"
+                f"the guess '{item.guess_file}' {fault}: OpenSim rejects it", item, tag="guess_file"
             )
 
 
-def _fault_of_guess(setup: Setup, tree: Tree, guess: Table) -> str:
+def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
     """What is wrong with the columns of a trajectory, their counts and their order; nothing if all is right."""
     wanted = set(variables(tree, "state or control variable")) | {
-        item.name for item in setup.named("MocoParameter")
+        item.name for item in setup.find_by_class("MocoParameter")
     }
     columns = {
         column
@@ -218,7 +226,7 @@ def _fault_of_guess(setup: Setup, tree: Tree, guess: Table) -> str:
         return (
             f"lacks {join_words(missing)}"
             if missing
-            else f"has {join_words(more)}, which the model has not"
+            else f"has {join_words(more)}, which the model does not have"
         )
     said = {
         what: guess.entries[key].value.text if (key := f"num_{what}") in guess.entries else ""
@@ -240,10 +248,10 @@ def _fault_of_guess(setup: Setup, tree: Tree, guess: Table) -> str:
     return "" if odd is None else f"has '{odd}' among its first columns, which are those of states"
 
 
-def _strangers(setup: Setup, reference: Reference, held: Any, table: Table) -> list[str]:
+def _find_unknown_columns(setup: Setup, reference: Reference, held: Any, table: Table) -> list[str]:
     """The columns of a table that are not what they must be names of."""
     tree = setup.tree
-    if tree is None or Unknown in tree.by_class or any(setup.named("ModelOperator")):
+    if tree is None or Unknown in tree.by_class or any(setup.find_by_class("ModelOperator")):
         return []
     if any(
         is_a(operator, "TabOpUseAbsoluteStateNames") for operator in getattr(held, "operators", ())
@@ -257,15 +265,15 @@ def _strangers(setup: Setup, reference: Reference, held: Any, table: Table) -> l
 
 
 @rule("OSIM863", "study-parts", severity=ERROR, about="document")
-def study_parts(setup: Setup, report: FindingSink) -> None:
-    """A part of a study has a name or a target that OpenSim refuses.
+def report_study_parts(setup: Setup, report: FindingCollector) -> None:
+    """A part of a study has a name or a target that OpenSim rejects.
 
-    Looks for goals, constraints and parameters without a name or with that of another, for
-    parameters of properties that a component has not or that are no numbers, for measured forces
-    that the loads have not, and for models with locked coordinates or with joints whose speeds are
-    not the rates of their coordinates.
+    Checks for goals, constraints and parameters without a name or with a duplicate name, for
+    parameters of properties that a component does not have or that are not numbers, for measured
+    forces that are not in the loads, and for models with locked coordinates or with joints whose
+    speeds are not the rates of their coordinates.
 
-    OpenSim refuses the study.
+    OpenSim rejects the study.
 
     ```setup
       <MocoPhase name="phases">
@@ -278,81 +286,82 @@ def study_parts(setup: Setup, report: FindingSink) -> None:
       </MocoPhase>
     ```
     """
-    for phase in setup.named("MocoPhase"):
+    for phase in setup.find_by_class("MocoPhase"):
         for parts in (phase.goals, phase.parameters, phase.path_constraints):
             for part in parts:
                 if not part.name:
-                    report(f"{called(part)} has no name: OpenSim refuses it", part)
-            for part in _repeated([part for part in parts if part.name]):
+                    report(f"{describe_object(part)} has no name: OpenSim rejects it", part)
+            for part in _find_repeated([part for part in parts if part.name]):
                 report(
-                    f"another is called '{part.name}' already: OpenSim refuses it",
+                    f"the name '{part.name}' is already used: OpenSim rejects it",
                     part,
                     attribute="name",
                 )
     for goal in setup.items:
         if hasattr(goal, "contact_groups") and goal.enabled:
-            loads = goal.external_loads or setup.document(goal.external_loads_file)
+            loads = goal.external_loads or setup.read_document(goal.external_loads_file)
             names = [force.name for force in getattr(loads, "objects", ())]
             for group in goal.contact_groups if names else ():
                 if group.external_force_name not in names:
                     report(
-                        f"the loads have no force '{group.external_force_name}': OpenSim refuses the goal",
+                        f"the loads have no force '{group.external_force_name}': OpenSim rejects "
+                        "the goal",
                         group,
                         tag="external_force_name",
-                        suggestion=nearest_name(group.external_force_name, names),
+                        suggestion=find_nearest_name(group.external_force_name, names),
                     )
     tree = setup.tree
     if tree is None:
         return
-    for parameter in setup.named("MocoParameter"):
+    for parameter in setup.find_by_class("MocoParameter"):
         for path in parameter.component_paths:
             component = tree.walk(str(path), "", "Component").target
             if component is None or isinstance(component, Unknown):
                 continue
-            fault = _fault_of(parameter, component)
+            fault = _describe_property_fault(parameter, component)
             if fault:
                 report(
-                    f"{fault}: OpenSim refuses the study",
+                    f"{fault}: OpenSim rejects the study",
                     parameter,
                     tag="property_name",
-                    suggestion=nearest_name(
+                    suggestion=find_nearest_name(
                         parameter.property_name, [*field_specs(type(component))]
                     ),
                 )
     welded = {
         str(path)
-        for operator in setup.named("ModOpReplaceJointsWithWelds")
+        for operator in setup.find_by_class("ModOpReplaceJointsWithWelds")
         for path in operator.joint_paths
     }
     for processor in (
-        setup.named("ModelProcessor") if any(map(setup.named, ("MocoStudy", "MocoTool"))) else ()
+        setup.find_by_class("ModelProcessor")
+        if any(map(setup.find_by_class, ("MocoStudy", "MocoTool")))
+        else ()
     ):
         for joint in tree.of_class("Joint").values():
             faults = [
-                f"{called(item)} is locked"
+                f"{describe_object(item)} is locked"
                 for item in joint.coordinates
                 if getattr(item, "locked", False)
             ]
             if not joint.speeds_are_rates:
                 faults.append(
-                    f"{called(joint)} has speeds that are not the rates of its coordinates"
+                    f"{describe_object(joint)} has speeds that are not the rates of its coordinates"
                 )
             for fault in faults if tree.path_of(joint) not in welded else ():
-                report(f"{fault}: Moco refuses the model", processor, tag="filepath")
+                report(f"{fault}: Moco rejects the model", processor, tag="filepath")
 
 
-def _fault_of(parameter: Any, component: Component) -> str:
+def _describe_property_fault(parameter: Any, component: Component) -> str:
     """What is wrong with the property that a parameter is about, nothing if all is right."""
     name, element = parameter.property_name, parameter.property_element
     spec = field_specs(type(component)).get(name)
     if spec is None:
-        return f"{called(component)} has no property '{name}'"
+        return f"{describe_object(component)} has no property '{name}'"
     size = spec.kind.size if isinstance(spec.kind, Value) and spec.kind.scalar == "double" else None
     if size not in (1, 3, 6):
-        return f"{name} of {called(component)} is not one, three or six numbers"
+        return f"{name} of {describe_object(component)} is not one, three or six numbers"
     if size == 1:
-        return "" if element is None else f"{name} is one number, and wants no property_element"
+        return "" if element is None else f"{name} is one number and needs no property_element"
     wrong = element is None or not 0 <= element < size
-    return (
-        f"property_element must say which of the {size} numbers of {name} is meant" if wrong else ""
-    )
+    return f"property_element must select one of the {size} numbers of {name}" if wrong else ""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from osimlite.lint.placement import default_poses, on_base
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, Threshold, rule
+from osimlite.lint.placement import compute_default_poses, locate_frame
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, Threshold, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity
+from osimlite.lint.words import describe_object, format_quantity
 from osimlite.mechanics.laws.vectors import Vector
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint
@@ -21,16 +21,16 @@ LONGEST = Threshold("longest-fiber", 2.0, "of the optimal length", "no fiber sta
 
 
 @rule("OSIM621", "doubtful-muscle", severity=WARNING, thresholds=(PENNATION, SHORTEST, LONGEST))
-def doubtful_muscle(subject: Subject, report: FindingSink) -> None:
+def report_doubtful_muscle(subject: Subject, report: FindingCollector) -> None:
     """The fibers of a muscle have an implausible length or angle.
 
     Reports a pennation angle of a quarter turn or more, and a default fiber length, given in the
-    file, that is less than 0.2 or more than 2 optimal lengths. Numbers that OpenSim refuses are
+    file, that is less than 0.2 or more than 2 optimal lengths. Numbers that OpenSim rejects are
     reported as impossible values.
 
-    Fibers across the tendon pull nothing along it; often the angle is in degrees. Beyond twice the
-    optimal length a muscle is torn, and below a fifth it has no force; the search for equilibrium
-    then starts far from any, and often the numbers belong to two different muscles.
+    Fibers perpendicular to the tendon pull nothing along it; often the angle is in degrees. A
+    muscle tears beyond twice its optimal length, and has no force below a fifth of it; the search
+    for equilibrium then starts far away, and often the numbers belong to two different muscles.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -42,13 +42,14 @@ def doubtful_muscle(subject: Subject, report: FindingSink) -> None:
     steepest, shortest, longest = (
         subject.config.value_of(known) for known in (PENNATION, SHORTEST, LONGEST)
     )
-    for muscle in subject.named("Muscle"):
+    for muscle in subject.find_by_class("Muscle"):
         angle = muscle.pennation_angle_at_optimal
         if steepest <= angle < math.inf:
             report(
-                f"the pennation angle of {called(muscle)} is {quantity(angle, 'rad')}"
+                f"the pennation angle of {describe_object(muscle)} is "
+                f"{format_quantity(angle, 'rad')}"
                 + (", a quarter turn or more" if angle >= math.pi / 2 else "")
-                + ("; in degrees?" if angle > math.pi else ""),
+                + ("; is it in degrees?" if angle > math.pi else ""),
                 muscle,
                 tag="pennation_angle_at_optimal",
             )
@@ -59,22 +60,22 @@ def doubtful_muscle(subject: Subject, report: FindingSink) -> None:
             ratio = length / optimal
             if not shortest <= ratio <= longest:
                 report(
-                    f"the default fiber length of {called(muscle)}, {quantity(length, 'm')}, is {ratio:.3g} times its "
-                    "optimal length",
+                    f"the default fiber length of {describe_object(muscle)}, "
+                    f"{format_quantity(length, 'm')}, is {ratio:.3g} times its optimal length",
                     muscle,
                     tag="default_fiber_length",
                 )
 
 
 @rule("OSIM622", "control-below-activation", severity=ERROR)
-def control_below_activation(subject: Subject, report: FindingSink) -> None:
-    """The least control of a muscle is below its least activation.
+def report_control_below_activation(subject: Subject, report: FindingCollector) -> None:
+    """The minimum control of a muscle is below its minimum activation.
 
     Reports Thelen and Millard muscles whose `min_control` is smaller than their
     `minimum_activation`.
 
-    OpenSim refuses the model. Activation never falls below its minimum, since the equations of the
-    muscle divide by it; a control that asks for less is a contradiction.
+    OpenSim rejects the model. Activation never falls below its minimum, since the equations of the
+    muscle divide by it; a smaller control contradicts it.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -83,11 +84,12 @@ def control_below_activation(subject: Subject, report: FindingSink) -> None:
       </Millard2012EquilibriumMuscle>
     ```
     """
-    for muscle in subject.named("Muscle"):
+    for muscle in subject.find_by_class("Muscle"):
         if muscle.min_control < getattr(muscle, "minimum_activation", -math.inf):
             report(
-                f"min_control of {called(muscle)} is {quantity(muscle.min_control)}, less than its minimum_activation, "
-                f"{quantity(muscle.minimum_activation)}: OpenSim refuses the model",
+                f"min_control of {describe_object(muscle)} is "
+                f"{format_quantity(muscle.min_control)}, less than its minimum_activation, "
+                f"{format_quantity(muscle.minimum_activation)}: OpenSim rejects the model",
                 muscle,
                 tag="min_control"
                 if "min_control" in muscle.model_fields_set
@@ -96,17 +98,17 @@ def control_below_activation(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM623", "out-of-reach", severity=WARNING, thresholds=(LONGEST,))
-def out_of_reach(subject: Subject, report: FindingSink) -> None:
-    """The path of a muscle leaves its fibers no length that they could have.
+def report_out_of_reach(subject: Subject, report: FindingCollector) -> None:
+    """The path of a muscle requires an impossible fiber length.
 
     Reports muscles whose path, in the default pose, is shorter than the slack tendon, or longer
-    than it by more than 2 optimal fiber lengths. Paths that wrap around surfaces count as if they
-    were straight, which is the least they can be; those through moving points, or points whose
-    place cannot be told without a simulation, are not looked at.
+    than it by more than 2 optimal fiber lengths. Paths around surfaces count as straight, which is
+    their minimum length; paths through moving points, or through points whose position needs a
+    simulation, are not checked.
 
-    A slack muscle bears no force, and fibers are torn at twice their optimal length. OpenSim finds
-    no equilibrium of such muscles, or computes NaN; where it computes on, the forces are those of
-    no muscle. Often the lengths are those of another muscle, or were not scaled with the bones.
+    A slack muscle has no force, and fibers tear at twice their optimal length. OpenSim finds no
+    equilibrium of such muscles, or computes NaN; otherwise the forces are wrong. Often the lengths
+    belong to another muscle, or were not scaled with the bones.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -116,17 +118,21 @@ def out_of_reach(subject: Subject, report: FindingSink) -> None:
     ```
     """
     longest = subject.config.value_of(LONGEST)
-    for muscle in subject.named("Muscle"):
+    for muscle in subject.find_by_class("Muscle"):
         path, slack, optimal = (
             muscle.geometry_path,
             muscle.tendon_slack_length,
             muscle.optimal_fiber_length,
         )
-        points = _in_ground(subject, path) if isinstance(path, GeometryPath) and optimal > 0 else []
+        points = (
+            _locate_path_points(subject, path)
+            if isinstance(path, GeometryPath) and optimal > 0
+            else []
+        )
         if len(points) < 2:
             continue
         length = sum(math.dist(*pair) for pair in pairwise(points))
-        tells = f"the path of {called(muscle)} is {length:.4g} m long in the default pose"
+        tells = f"the path of {describe_object(muscle)} is {length:.4g} m long in the default pose"
         if length < slack and not path.path_wrap_set.objects:
             report(
                 f"{tells}, less than its tendon_slack_length, {slack:.4g} m",
@@ -135,24 +141,24 @@ def out_of_reach(subject: Subject, report: FindingSink) -> None:
             )
         elif (ratio := (length - slack) / optimal) > longest:
             report(
-                f"{tells}, which leaves its fibers {ratio:.3g} optimal lengths beyond the slack tendon",
+                f"{tells}, which leaves its fibers {ratio:.3g} optimal lengths beyond the slack "
+                "tendon",
                 muscle,
                 tag="optimal_fiber_length",
             )
 
 
 @rule("OSIM624", "shared-time-constants", severity=WARNING)
-def shared_time_constants(subject: Subject, report: FindingSink) -> None:
-    """Muscles differ in time constants that OpenSim has only once.
+def report_shared_time_constants(subject: Subject, report: FindingCollector) -> None:
+    """Muscles differ in time constants that OpenSim shares among all of them.
 
     Reports each DeGrooteFregly2016Muscle whose `activation_time_constant`,
-    `deactivation_time_constant` or `activation_dynamics_smoothing` is not that of the first one in
-    the model, among those whose activation is a state.
+    `deactivation_time_constant` or `activation_dynamics_smoothing` differs from that of the first
+    such muscle in the model whose activation is a state.
 
-    OpenSim keeps these three for the whole process. They are those of the muscle that it computes
-    first, also if that belongs to a model that was loaded before: a muscle of 30 ms that comes
-    after one of 15 ms is activated twice as fast as its file says. Muscles of other classes each
-    have their own.
+    OpenSim stores these three once per process: it uses those of the muscle that it computes first,
+    even if that belongs to a model loaded earlier. A muscle of 30 ms after one of 15 ms is
+    activated twice as fast as its file says. Muscles of other classes have separate values.
 
     ```xml
       <DeGrooteFregly2016Muscle name="fast">
@@ -165,33 +171,33 @@ def shared_time_constants(subject: Subject, report: FindingSink) -> None:
     ```
     """
     first = None
-    for muscle in subject.named("DeGrooteFregly2016Muscle"):
+    for muscle in subject.find_by_class("DeGrooteFregly2016Muscle"):
         if muscle.ignore_activation_dynamics:
             continue
         first = first or muscle
-        for tag in _SHARED:
+        for tag in _SHARED_CONSTANTS:
             own, counts = getattr(muscle, tag), getattr(first, tag)
             if own != counts:
                 report(
-                    f"{tag} of {called(muscle)} is {quantity(own)}, and OpenSim computes with {quantity(counts)}, that "
-                    f"of {called(first)}",
+                    f"{tag} of {describe_object(muscle)} is {format_quantity(own)}, and OpenSim "
+                    f"computes with {format_quantity(counts)}, that of {describe_object(first)}",
                     muscle,
                     tag=tag if tag in muscle.model_fields_set else None,
                 )
 
 
-_SHARED = (
+_SHARED_CONSTANTS = (
     "activation_time_constant",
     "deactivation_time_constant",
     "activation_dynamics_smoothing",
 )
 
 
-def _in_ground(subject: Subject, path: GeometryPath) -> list[Vector]:
+def _locate_path_points(subject: Subject, path: GeometryPath) -> list[Vector]:
     """Where the points of a path are in the default pose that belong to it there; none if one of them is not known."""
-    poses, places = default_poses(subject), []
+    poses, places = compute_default_poses(subject), []
     for point in path.path_point_set.objects:
-        placed = on_base(subject, subject.target_of(point, "socket_parent_frame"))
+        placed = locate_frame(subject, subject.target_of(point, "socket_parent_frame"))
         if not isinstance(point, PathPoint) or placed is None or id(placed[0]) not in poses:
             return []
         if isinstance(point, ConditionalPathPoint):
@@ -200,5 +206,7 @@ def _in_ground(subject: Subject, path: GeometryPath) -> list[Vector]:
                 return []
             if not point.range[0] <= coordinate.default_value <= point.range[1]:
                 continue
-        places.append(poses[id(placed[0])].of(placed[1].of(point.location)))
+        places.append(
+            poses[id(placed[0])].transform_point(placed[1].transform_point(point.location))
+        )
     return places

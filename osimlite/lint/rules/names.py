@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from osimlite.base.text import format_count, join_words
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
-from osimlite.lint.rules.references import Broken, broken_references
-from osimlite.lint.subject import Subject, once
-from osimlite.lint.words import called
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.rules.references import BrokenReference, find_broken_references
+from osimlite.lint.subject import Subject, cached_per_subject
+from osimlite.lint.words import describe_object
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import PhysicalOffsetFrame
@@ -19,14 +19,14 @@ _ILLEGAL = frozenset(ILLEGAL_CHARACTERS)
 
 
 @rule("OSIM311", "duplicate-name", severity=ERROR)
-def duplicate_name(subject: Subject, report: FindingSink) -> None:
-    """Two components beside each other have the same name.
+def report_duplicate_name(subject: Subject, report: FindingCollector) -> None:
+    """Two sibling components have the same name.
 
-    Reports the second of two siblings with one name, with the name OpenSim gives it and with those
-    who name it.
+    Reports the second of two siblings with one name, with the name that OpenSim gives it and the
+    components that refer to it.
 
-    OpenSim renames the second and adds a number. Everything that was meant to name it leads to the
-    first: both feet then touch the ground with the same sphere.
+    OpenSim renames the second by adding a number. All references to it lead to the first: both feet
+    then touch the ground with the same sphere.
 
     ```xml
       <MarkerSet>
@@ -42,24 +42,30 @@ def duplicate_name(subject: Subject, report: FindingSink) -> None:
     for renamed in tree.renamed:
         item = renamed.component
         # Of what has no name in the file nobody expects one.
-        if not item.name or not subject.names_itself(item) or isinstance(item, Unknown):
+        if not item.name or not subject.has_explicit_name(item) or isinstance(item, Unknown):
             continue
-        users = list(_holders(subject).get(id(renamed.first), ()))
-        message = f"another {called(renamed.first)} stands beside this one; OpenSim renames this to '{renamed.name}'"
+        users = list(_find_holders(subject).get(id(renamed.first), ()))
+        message = (
+            f"another {describe_object(renamed.first)} has the same parent; OpenSim renames this "
+            f"one to '{renamed.name}'"
+        )
         if users:
-            message += f", and {join_words(users, most=3)} then {'uses' if len(users) == 1 else 'use'} the first"
+            message += (
+                f", and {join_words(users, most=3)} then {'uses' if len(users) == 1 else 'use'} the "
+                "first"
+            )
         report(message, item, attribute="name", suggestion=None)
 
 
 @rule("OSIM312", "illegal-name", severity=ERROR, before=(30500, WARNING))
-def illegal_name(subject: Subject, report: FindingSink) -> None:
-    """The name of a component has a character that names cannot have.
+def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
+    """The name of a component contains an illegal character.
 
     Reports white space, `/`, `\\`, `*` and `+` in the names of components.
 
-    Names are the parts of paths; OpenSim refuses to load the file. Of files older than version
-    30500 it takes white space out of the names by itself, and not out of what refers to them: a
-    muscle or a marker is then not found.
+    Names are the parts of paths; OpenSim rejects the file. In files older than version 30500 it
+    removes white space from the names, but not from references to them: a muscle or a marker is
+    then not found.
 
     ```xml
     - <Marker name="right asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -83,7 +89,7 @@ def illegal_name(subject: Subject, report: FindingSink) -> None:
             ["white space" if character.isspace() else f"'{character}'" for character in bad]
         )
         report(
-            f"the name of {called(component)} has {shown} in it: OpenSim refuses to load the file",
+            f"the name of {describe_object(component)} contains {shown}: OpenSim rejects the file",
             component,
             attribute="name",
             suggestion="".join(
@@ -91,7 +97,7 @@ def illegal_name(subject: Subject, report: FindingSink) -> None:
             ),
             severity=ERROR,
         )
-    # In a file this old OpenSim mends the name, but not what names it.
+    # In a file this old OpenSim fixes the name, but not what names it.
     for change in subject.changes:
         if change.step == "names" and subject.source is not None:
             place = subject.source.of_attribute(change.number, "name")
@@ -102,12 +108,13 @@ def illegal_name(subject: Subject, report: FindingSink) -> None:
                 used = subject.source.text.count(name) > 1
                 frame = subject.source.spans[change.number].tag in ("Body", "Ground")
                 fate = f"OpenSim makes it '{better}'" + (
-                    ", and not where others use it" if used else ""
+                    ", but not where others use it" if used else ""
                 )
                 if frame:
-                    fate = "OpenSim makes frames of that name for the joints and refuses them"
+                    fate = "OpenSim creates frames of that name for the joints and rejects them"
                 report(
-                    f"the name '{name}' has white space in it: in a file of version {subject.version} {fate}",
+                    f"the name '{name}' contains white space: in a file of version "
+                    f"{subject.version} {fate}",
                     at=place,
                     suggestion=better,
                     severity=ERROR if frame else None if used else INFO,
@@ -115,14 +122,14 @@ def illegal_name(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM313", "missing-name", severity=WARNING)
-def missing_name(subject: Subject, report: FindingSink) -> None:
-    """A component that others name by its name has none.
+def report_missing_name(subject: Subject, report: FindingCollector) -> None:
+    """A component has no name.
 
     Reports members of sets, and coordinates, without a name or with an empty one. It is an error if
-    something names a component that is missing, which may be this one.
+    a reference is unresolved that may mean this component.
 
-    OpenSim calls such a component after its class, in lower case. Nothing can name it by what the
-    author had in mind, and the columns of results are called `body` or `pinjoint`.
+    OpenSim names such a component after its class, in lower case. References by the intended name
+    fail, and the columns of results are named `body` or `pinjoint`.
 
     ```xml
     - <Marker> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -133,10 +140,10 @@ def missing_name(subject: Subject, report: FindingSink) -> None:
     # What the file does not name has got a name while it was upgraded, as OpenSim does. It is
     # looked at if others name what is not there.
     renamed = subject.upgraded and any(
-        broken.why in ("missing", "form") for broken in broken_references(subject)
+        broken.why in ("missing", "form") for broken in find_broken_references(subject)
     )
     for component in tree.components:
-        if component.name and not (renamed and not subject.names_itself(component)):
+        if component.name and not (renamed and not subject.has_explicit_name(component)):
             continue
         if isinstance(component, (Model, ModelComponentSet)):
             continue
@@ -145,17 +152,23 @@ def missing_name(subject: Subject, report: FindingSink) -> None:
         )
         if not frame and not _should_have_name(subject, component):
             continue
-        wanted = _wanted_names(subject, component)
+        wanted = _list_missing_names(subject, component)
         if not wanted and (frame or component.name):
             continue
-        last = _last(tree.path_of(component) or "")
-        message = f"this {type(component).tag} has no name; OpenSim calls it '{last}'"
+        last = _get_last_part(tree.path_of(component) or "")
+        message = f"this {type(component).tag} has no name; OpenSim names it '{last}'"
         if wanted:
             count = format_count(
-                sum(_last(b.text) == wanted[0] for b in _leading_nowhere(subject, component)),
+                sum(
+                    _get_last_part(b.text) == wanted[0]
+                    for b in _find_fixable_references(subject, component)
+                ),
                 "reference",
             )
-            message += f", while {count} to '{wanted[0]}' {'leads' if count.startswith('1 ') else 'lead'} nowhere"
+            message += (
+                f", while {count} to '{wanted[0]}' {'leads' if count.startswith('1 ') else 'lead'} "
+                "nowhere"
+            )
         report(
             message,
             component,
@@ -176,11 +189,11 @@ def _should_have_name(subject: Subject, component: Component) -> bool:
     return parent is not None and any(item is component for item in parent.subcomponents)
 
 
-def _leading_nowhere(subject: Subject, component: Component) -> list[Broken]:
-    """The broken references that a component of this class would mend if it had the right name."""
+def _find_fixable_references(subject: Subject, component: Component) -> list[BrokenReference]:
+    """The broken references that a component of this class would fix if it had the right name."""
     parent = subject.tree.parent_of(component)
     result = []
-    for broken in broken_references(subject):
+    for broken in find_broken_references(subject):
         use = broken.use
         # Of a group OpenSim drops what is missing, and a probe it switches off: neither needs the
         # name to load.
@@ -194,29 +207,33 @@ def _leading_nowhere(subject: Subject, component: Component) -> list[Broken]:
                 use.owner is parent and "/" not in broken.text and broken.why in ("missing", "form")
             )
         else:
-            beside = f"{subject.path(component).rpartition('/')[0]}/{_last(broken.text)}"
+            beside = f"{subject.path(component).rpartition('/')[0]}/{_get_last_part(broken.text)}"
             near = broken.why == "missing" and ("/" not in broken.text or broken.text == beside)
         if near:
             result.append(broken)
     return result
 
 
-def _wanted_names(subject: Subject, component: Component) -> list[str]:
+def _list_missing_names(subject: Subject, component: Component) -> list[str]:
     """Names that are missing and that a component of this class would bear."""
     return list(
-        dict.fromkeys(_last(broken.text) for broken in _leading_nowhere(subject, component))
+        dict.fromkeys(
+            _get_last_part(broken.text) for broken in _find_fixable_references(subject, component)
+        )
     )
 
 
-def _last(text: str) -> str:
+def _get_last_part(text: str) -> str:
     return text.rpartition("/")[2]
 
 
-@once
-def _holders(subject: Subject) -> dict[int, dict[str, None]]:
+@cached_per_subject
+def _find_holders(subject: Subject) -> dict[int, dict[str, None]]:
     """Who holds a reference that leads to a component, by its identity."""
     known: dict[int, dict[str, None]] = {}
     for use in subject.uses:
         if use.reference.rule not in ("file", "column", "input"):
-            known.setdefault(id(subject.resolution(use).target), {})[called(use.owner)] = None
+            known.setdefault(id(subject.resolution(use).target), {})[describe_object(use.owner)] = (
+                None
+            )
     return known

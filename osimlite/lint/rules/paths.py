@@ -7,9 +7,9 @@ from itertools import pairwise
 from math import pi, radians
 
 from osimlite.base.text import format_count
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, Threshold, rule
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, Threshold, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity
+from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.base import Object
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.joints import Joint
@@ -19,13 +19,13 @@ from osimlite.schema.wrapping import WrapObject
 
 
 @rule("OSIM611", "short-path", severity=ERROR)
-def short_path(subject: Subject, report: FindingSink) -> None:
+def report_short_path(subject: Subject, report: FindingCollector) -> None:
     """A path has fewer than two points.
 
     Reports geometry paths with no point, or with one, muscles and springs without a path, and a
     Scholz2015GeometryPath that begins or ends with an obstacle.
 
-    OpenSim refuses the model.
+    OpenSim rejects the model.
 
     ```xml
       <PathPointSet>
@@ -36,32 +36,34 @@ def short_path(subject: Subject, report: FindingSink) -> None:
       </PathPointSet>
     ```
     """
-    for path in subject.each(GeometryPath):
+    for path in subject.find_instances(GeometryPath):
         points = path.path_point_set.objects
         owner = subject.tree.parent_of(path)
         if len(points) > 1 or owner is None:
             continue
         if path._index is not None or subject.source is None:
             report(
-                f"the path of {called(owner)} has {format_count(len(points), 'point')} and needs two",
+                f"the path of {describe_object(owner)} has {format_count(len(points), 'point')} and "
+                "needs two",
                 path,
             )
         elif not any(note.owner is owner and note.kind in _NOT_READ for note in subject.notes):
-            report(f"{called(owner)} has no path, and OpenSim refuses the model", owner)
-    for path in subject.named("Scholz2015GeometryPath"):
+            report(f"{describe_object(owner)} has no path: OpenSim rejects the model", owner)
+    for path in subject.find_by_class("Scholz2015GeometryPath"):
         elements = path.path_elements
         count = sum(item.tag == _CABLE_POINT for item in elements)
         owner = subject.tree.parent_of(path) or path
         if count < 2:
             report(
-                f"the path of {called(owner)} has {format_count(count, 'point')} and needs two",
+                f"the path of {describe_object(owner)} has {format_count(count, 'point')} and needs two",
                 path,
             )
             continue
         for item, end in ((elements[0], "begins"), (elements[-1], "ends")):
             if item.tag != _CABLE_POINT:
                 report(
-                    f"the path of {called(owner)} {end} with an obstacle, and OpenSim refuses the model",
+                    f"the path of {describe_object(owner)} {end} with an obstacle: OpenSim "
+                    "rejects the model",
                     item,
                 )
 
@@ -77,13 +79,13 @@ DISTANCE = Threshold(
 
 
 @rule("OSIM612", "coincident-path-points", severity=WARNING, thresholds=(DISTANCE,))
-def coincident_path_points(subject: Subject, report: FindingSink) -> None:
-    """Two points of a path that follow each other are in the same place.
+def report_coincident_path_points(subject: Subject, report: FindingCollector) -> None:
+    """Two consecutive points of a path coincide.
 
-    Reports a point fixed at the same place of the same frame as the point before it.
+    Reports a point at the same location of the same frame as the point before it.
 
-    The piece between them has no length and no direction; if it is the whole path, the length of
-    the muscle is 0. Usually one point was copied and not moved.
+    The segment between them has no length and no direction; if it is the whole path, the length of
+    the muscle is 0. Usually a point was copied and not moved.
 
     ```xml
       <PathPointSet>
@@ -96,7 +98,7 @@ def coincident_path_points(subject: Subject, report: FindingSink) -> None:
     ```
     """
     nearest = subject.config.value_of(DISTANCE)
-    for path in subject.each(GeometryPath):
+    for path in subject.find_instances(GeometryPath):
         points: list[Object] = list(path.path_point_set.objects)
         for before, point in pairwise(points):
             if type(before) is not PathPoint or type(point) is not PathPoint:
@@ -110,21 +112,22 @@ def coincident_path_points(subject: Subject, report: FindingSink) -> None:
             if frame is not None and frame is subject.target_of(before, "socket_parent_frame"):
                 owner = subject.tree.parent_of(path)
                 report(
-                    f"{called(point)} of {called(owner or path)} is in the same place as '{before.name}' before it",
+                    f"{describe_object(point)} of {describe_object(owner or path)} is at the same "
+                    f"location as '{before.name}' before it",
                     point,
                     tag="location",
                 )
 
 
 @rule("OSIM613", "inverted-point-range", severity=WARNING)
-def inverted_point_range(subject: Subject, report: FindingSink) -> None:
+def report_inverted_point_range(subject: Subject, report: FindingCollector) -> None:
     """A conditional path point is never in the path.
 
     Reports conditional points whose range ends before it begins, or lies outside of the range of
-    the coordinate, and those without any. Where both ends in radians would lie in the range of the
-    coordinate, the range is in degrees.
+    the coordinate, and points without a range. Where both ends converted to radians would lie in
+    the range of the coordinate, the range is in degrees.
 
-    The coordinate is never inside, so that the path always leaves the point out.
+    The coordinate is never inside the range, so the path never uses the point.
 
     ```xml
       <ConditionalPathPoint name="via">
@@ -134,11 +137,12 @@ def inverted_point_range(subject: Subject, report: FindingSink) -> None:
       </ConditionalPathPoint>
     ```
     """
-    for point in subject.each(ConditionalPathPoint):
+    for point in subject.find_instances(ConditionalPathPoint):
         low, high = point.range
         if low > high:
             report(
-                f"the range of {called(point)} runs from {quantity(low)} down to {quantity(high)}: it never counts",
+                f"the range of {describe_object(point)} runs from {format_quantity(low)} down to "
+                f"{format_quantity(high)}: the point is never active",
                 point,
                 tag="range",
             )
@@ -146,13 +150,16 @@ def inverted_point_range(subject: Subject, report: FindingSink) -> None:
             _report_unreachable(subject, report, point)
         else:
             report(
-                f"{called(point)} has no range: it counts only where the coordinate is exactly 0",
+                f"{describe_object(point)} has no range: it is active only where the coordinate "
+                "is exactly 0",
                 point,
                 tag="range",
             )
 
 
-def _report_unreachable(subject: Subject, report: FindingSink, point: ConditionalPathPoint) -> None:
+def _report_unreachable(
+    subject: Subject, report: FindingCollector, point: ConditionalPathPoint
+) -> None:
     """Report the range of a conditional point that no value of its coordinate reaches."""
     coordinate = subject.target_of(point, "socket_coordinate")
     if not isinstance(coordinate, Coordinate) or "range" not in coordinate.model_fields_set:
@@ -180,10 +187,11 @@ def _report_unreachable(subject: Subject, report: FindingSink, point: Conditiona
         unit = "rad" if turns else "m"
         verb = "lies outside of" if never else "goes far beyond"
         report(
-            f"the range of {called(point)}, {quantity(first)} to {quantity(last, unit)}, "
-            f"{verb} that of '{coordinate.name}', {quantity(low)} to {quantity(high, unit)}"
-            + (": it never counts" if never else "")
-            + ("; in degrees?" if fits else ""),
+            f"the range of {describe_object(point)}, {format_quantity(first)} to "
+            f"{format_quantity(last, unit)}, {verb} that of '{coordinate.name}', "
+            f"{format_quantity(low)} to {format_quantity(high, unit)}"
+            + (": the point is never active" if never else "")
+            + ("; is it in degrees?" if fits else ""),
             point,
             tag="range",
             suggestion=f"{meant[0]:.6g} {meant[1]:.6g}" if fits else None,
@@ -191,12 +199,12 @@ def _report_unreachable(subject: Subject, report: FindingSink, point: Conditiona
 
 
 @rule("OSIM614", "unused-wrap-object", severity=INFO)
-def unused_wrap_object(subject: Subject, report: FindingSink) -> None:
-    """No path wraps around a wrap surface.
+def report_unused_wrap_object(subject: Subject, report: FindingCollector) -> None:
+    """A wrap surface is not used by any path.
 
     Reports wrap objects that no path names.
 
-    They have no effect; often a path was meant to use them.
+    They have no effect; often a path should use them.
 
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
@@ -206,7 +214,7 @@ def unused_wrap_object(subject: Subject, report: FindingSink) -> None:
       </Body>
     ```
     """
-    surfaces = list(subject.each(WrapObject))
+    surfaces = list(subject.find_instances(WrapObject))
     if not surfaces or subject.has_unknown:
         return
     used = {
@@ -216,16 +224,16 @@ def unused_wrap_object(subject: Subject, report: FindingSink) -> None:
     }
     for surface in surfaces:
         if id(surface) not in used:
-            report(f"no path wraps around {called(surface)}", surface, attribute="name")
+            report(f"no path wraps around {describe_object(surface)}", surface, attribute="name")
 
 
 @rule("OSIM615", "moving-point-coordinates", severity=ERROR)
-def moving_point_coordinates(subject: Subject, report: FindingSink) -> None:
+def report_moving_point_coordinates(subject: Subject, report: FindingCollector) -> None:
     """The location of a moving path point depends on more than one coordinate.
 
     Reports moving path points whose x, y and z follow different coordinates.
 
-    OpenSim refuses the model. Such a point moves along a curve on the bone as one joint turns, as
+    OpenSim rejects the model. Such a point moves along a curve on the bone as one joint rotates, as
     the patellar tendon does with the knee; two joints would need a surface.
 
     ```xml
@@ -237,14 +245,14 @@ def moving_point_coordinates(subject: Subject, report: FindingSink) -> None:
       </MovingPathPoint>
     ```
     """
-    for point in subject.named("MovingPathPoint"):
+    for point in subject.find_by_class("MovingPathPoint"):
         tags = ("socket_x_coordinate", "socket_y_coordinate", "socket_z_coordinate")
         x, *others = (subject.target_of(point, tag) for tag in tags)
         for tag, other in zip(tags[1:], others, strict=True):
             if x is not None and other is not None and other is not x:
                 report(
-                    f"{called(point)} follows {called(x)} along x and {called(other)} along {tag[7]}: OpenSim refuses "
-                    "the model",
+                    f"{describe_object(point)} follows {describe_object(x)} along x and "
+                    f"{describe_object(other)} along {tag[7]}: OpenSim rejects the model",
                     point,
                     tag=tag,
                 )

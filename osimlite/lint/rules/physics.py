@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from osimlite.lint.registry import INFO, WARNING, FindingSink, Threshold, rule
+from osimlite.lint.registry import INFO, WARNING, FindingCollector, Threshold, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity
+from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import (
     CoordinateLimitForce,
@@ -37,7 +37,7 @@ UNLIMITED = Threshold(
 
 
 @rule("OSIM505", "strange-gravity", severity=WARNING, thresholds=(GRAVITY,))
-def strange_gravity(subject: Subject, report: FindingSink) -> None:
+def report_strange_gravity(subject: Subject, report: FindingCollector) -> None:
     """Gravity is far from that of the Earth.
 
     Reports gravity stronger than 30 m/s^2, which is usually one in millimetres, and gravity that
@@ -57,22 +57,22 @@ def strange_gravity(subject: Subject, report: FindingSink) -> None:
     if not math.isfinite(size):
         return
     if size > subject.config.value_of(GRAVITY):
-        unit = "; in millimetres?" if 9000 < size < 11000 else ""
-        report(f"gravity is {quantity(size, 'm/s^2')}{unit}", model, tag="gravity")
+        unit = "; is it in millimetres?" if 9000 < size < 11000 else ""
+        report(f"gravity is {format_quantity(size, 'm/s^2')}{unit}", model, tag="gravity")
     elif model.gravity[1] > 1e-9 * size and model.gravity[1] > 0.9 * size:
         report("gravity points up: Y is the upward axis in OpenSim", model, tag="gravity")
 
 
 @rule("OSIM506", "friction-order", severity=WARNING)
-def friction_order(subject: Subject, report: FindingSink) -> None:
+def report_friction_order(subject: Subject, report: FindingCollector) -> None:
     """Static friction is smaller than dynamic friction.
 
     Reports contact materials whose static coefficient is below the dynamic one.
 
-    No material resists sliding more than sticking; usually the two numbers are swapped. Simbody's
+    No material has more friction while sliding; usually the two numbers are swapped. Simbody's
     friction rises with the speed v of sliding, measured in transition velocities, as min(v, 1) (d +
     2 (s - d) / (1 + v^2)), with s static and d dynamic: where s is less than half of d this is
-    negative at small v, and friction pushes the way things slide.
+    negative at small v, and friction accelerates the sliding.
 
     ```xml
       <HuntCrossleyForce::ContactParameters>
@@ -82,14 +82,15 @@ def friction_order(subject: Subject, report: FindingSink) -> None:
       </HuntCrossleyForce::ContactParameters>
     ```
     """
-    for material in subject.each(HuntCrossleyContactParameters):
+    for material in subject.find_instances(HuntCrossleyContactParameters):
         if 0 <= material.static_friction < material.dynamic_friction:
             report(
-                f"static friction of {subject.called(material)}, {quantity(material.static_friction)}, is smaller than "
-                f"dynamic friction, {quantity(material.dynamic_friction)}"
+                f"static friction of {subject.describe(material)}, "
+                f"{format_quantity(material.static_friction)}, is smaller than dynamic friction, "
+                f"{format_quantity(material.dynamic_friction)}"
                 + (
-                    "; less than half of it, so that friction drives slow sliding on"
-                    if _drives(subject, material)
+                    "; it is less than half of it, so friction accelerates slow sliding"
+                    if _drives_sliding(subject, material)
                     else ""
                 ),
                 material,
@@ -98,13 +99,12 @@ def friction_order(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM507", "limits-swapped", severity=WARNING)
-def limits_swapped(subject: Subject, report: FindingSink) -> None:
+def report_limits_swapped(subject: Subject, report: FindingCollector) -> None:
     """The upper limit of a limit force lies below its lower limit.
 
     Reports limit forces whose upper limit is smaller than the lower one.
 
-    Between the two both springs push against each other, at every pose of the joint that was meant
-    to be free.
+    Between the two limits both springs act against each other, in every pose that should be free.
 
     ```xml
       <CoordinateLimitForce name="stop">
@@ -113,24 +113,25 @@ def limits_swapped(subject: Subject, report: FindingSink) -> None:
       </CoordinateLimitForce>
     ```
     """
-    for force in subject.each(CoordinateLimitForce):
+    for force in subject.find_instances(CoordinateLimitForce):
         if force.upper_limit < force.lower_limit:
             report(
-                f"the upper limit of {called(force)}, {quantity(force.upper_limit)}, is below the lower limit, "
-                f"{quantity(force.lower_limit)}: both act at once",
+                f"the upper limit of {describe_object(force)}, "
+                f"{format_quantity(force.upper_limit)}, is below the lower limit, "
+                f"{format_quantity(force.lower_limit)}: both act at once",
                 force,
                 tag="upper_limit",
             )
 
 
 @rule("OSIM508", "limit-outside-range", severity=INFO, thresholds=(BEYOND,))
-def limit_outside_range(subject: Subject, report: FindingSink) -> None:
+def report_limit_outside_range(subject: Subject, report: FindingCollector) -> None:
     """A limit force begins beyond the range of its coordinate.
 
     Reports limits that lie outside the range of the coordinate by more than the transition.
 
-    The range does not stop the motion, the limit force does; the model then moves further than its
-    range says. Note that limits are in degrees and ranges in radians.
+    The limit force stops the motion, not the range; the model then moves beyond its range. Note
+    that limits are in degrees and ranges in radians.
 
     ```xml
       <CoordinateLimitForce name="stop">
@@ -139,7 +140,7 @@ def limit_outside_range(subject: Subject, report: FindingSink) -> None:
       </CoordinateLimitForce>
     ```
     """
-    for force, coordinate, scale, low, high in _limited(subject):
+    for force, coordinate, scale, low, high in _find_limits(subject):
         unit = "m" if scale == 1.0 else "deg"
         slack = abs(force.transition) + subject.config.value_of(BEYOND) * (high - low) + 1e-6
         for tag, limit, outside in (
@@ -148,23 +149,23 @@ def limit_outside_range(subject: Subject, report: FindingSink) -> None:
         ):
             if outside:
                 report(
-                    f"{tag} of {called(force)} is {quantity(limit, unit)}, beyond the range of '{coordinate.name}' "
-                    f"({quantity(low)} to {quantity(high, unit)})",
+                    f"{tag} of {describe_object(force)} is {format_quantity(limit, unit)}, beyond "
+                    f"the range of '{coordinate.name}' ({format_quantity(low)} to "
+                    f"{format_quantity(high, unit)})",
                     force,
                     tag=tag,
                 )
 
 
 @rule("OSIM509", "limit-inside-range", severity=INFO, thresholds=(INSIDE, UNLIMITED))
-def limit_inside_range(subject: Subject, report: FindingSink) -> None:
+def report_limit_inside_range(subject: Subject, report: FindingCollector) -> None:
     """A limit force begins well inside the range of its coordinate.
 
     Reports limits inside the range of the coordinate by more than the transition and a quarter of
     the range. It is a warning if the default value of the coordinate is already beyond the limit.
 
-    Part of the range can only be reached against the spring. Past the limit in the default pose,
-    the force is there from the first instant. Note that limits are in degrees and ranges in
-    radians.
+    Part of the range can only be reached against the spring. If the default pose is past the limit,
+    the force acts from the start. Note that limits are in degrees and ranges in radians.
 
     ```xml
       <CoordinateLimitForce name="stop">
@@ -173,7 +174,7 @@ def limit_inside_range(subject: Subject, report: FindingSink) -> None:
       </CoordinateLimitForce>
     ```
     """
-    for force, coordinate, scale, low, high in _limited(subject):
+    for force, coordinate, scale, low, high in _find_limits(subject):
         unit = "m" if scale == 1.0 else "deg"
         slack = max(abs(force.transition), subject.config.value_of(INSIDE) * (high - low)) + 1e-6
         start = coordinate.default_value * scale
@@ -204,10 +205,15 @@ def limit_inside_range(subject: Subject, report: FindingSink) -> None:
                 near = min(abs(meant - low), abs(meant - high)) <= 0.1 * (high - low)
                 radians = unit == "deg" and small and near
                 report(
-                    f"{tag} of {called(force)} is {quantity(limit, unit)}, inside the range of '{coordinate.name}' "
-                    f"({quantity(low)} to {quantity(high, unit)})"
-                    + ("; in radians?" if radians else "")
-                    + (f"; it acts in the default pose, {quantity(start, unit)}" if acts else ""),
+                    f"{tag} of {describe_object(force)} is {format_quantity(limit, unit)}, inside "
+                    f"the range of '{coordinate.name}' ({format_quantity(low)} to "
+                    f"{format_quantity(high, unit)})"
+                    + ("; is it in radians?" if radians else "")
+                    + (
+                        f"; it acts in the default pose, {format_quantity(start, unit)}"
+                        if acts
+                        else ""
+                    ),
                     force,
                     tag=tag,
                     severity=WARNING if acts or radians else None,
@@ -215,7 +221,7 @@ def limit_inside_range(subject: Subject, report: FindingSink) -> None:
                 )
 
 
-def _drives(subject: Subject, material: HuntCrossleyContactParameters) -> bool:
+def _drives_sliding(subject: Subject, material: HuntCrossleyContactParameters) -> bool:
     """Whether friction at the smallest speeds acts along the sliding, even with the viscous part."""
     force = subject.owner(material)
     viscous = (
@@ -226,7 +232,7 @@ def _drives(subject: Subject, material: HuntCrossleyContactParameters) -> bool:
     return 2 * material.static_friction + viscous < material.dynamic_friction
 
 
-def _limited(
+def _find_limits(
     subject: Subject,
 ) -> Iterator[tuple[CoordinateLimitForce, Coordinate, float, float, float]]:
     """Limit forces with their coordinates, in how many of the forces' units 1 rad or 1 m is, and the range in these.
@@ -235,7 +241,7 @@ def _limited(
     what it means.
     """
     spec = CoordinateLimitForce.field_specs()["coordinate"]
-    for force in subject.each(CoordinateLimitForce):
+    for force in subject.find_instances(CoordinateLimitForce):
         coordinate = subject.tree.resolve(Use(force, force, spec, force.coordinate)).target
         if not isinstance(coordinate, Coordinate) or "range" not in coordinate.model_fields_set:
             continue

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 from osimlite.base.text import find_nearest, join_words
 from osimlite.io.document.source import Source
-from osimlite.lint.axes import axes_refused, made_up_paths
-from osimlite.lint.fixes import replaced
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
-from osimlite.lint.subject import Subject, once
-from osimlite.lint.words import a, called, closest, nearest_name
+from osimlite.lint.axes import find_made_up_paths, refuses_axes
+from osimlite.lint.fixes import replace_text
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.subject import Subject, cached_per_subject
+from osimlite.lint.words import describe_object, find_nearest_name, pick_closest, with_article
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.frames import Frame
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from osimlite.schema.custom_joint import CustomJoint
 
 
-@rule("OSIM301", "unresolved-reference", severity=ERROR, mends="both")
-def unresolved_reference(subject: Subject, report: FindingSink) -> None:
+@rule("OSIM301", "unresolved-reference", severity=ERROR, fixes="both")
+def report_unresolved_reference(subject: Subject, report: FindingCollector) -> None:
     """A component names another component that does not exist.
 
-    Follows every reference by OpenSim's own rule for that property and reports those that lead
-    nowhere, with the force, joint or other component that holds them and the nearest name that
-    exists.
+    Follows every reference by OpenSim's own rule for that property and reports unresolved
+    references, with the force, joint or other component that contains them and the find_nearest existing
+    name.
 
-    OpenSim refuses the model when it is connected, and its message names neither the line nor, for
-    a contact, the force. A group that names a missing member loses it in silence.
+    OpenSim rejects the model when it is connected, and its message names neither the line nor, for
+    a contact, the force. A group loses a missing member without a message.
 
     ```xml
       <HuntCrossleyForce::ContactParameters>
@@ -41,51 +41,58 @@ def unresolved_reference(subject: Subject, report: FindingSink) -> None:
       </HuntCrossleyForce::ContactParameters>
     ```
     """
-    for broken in _broken(subject, "missing"):
+    for broken in _select_broken(subject, "missing"):
         use = broken.use
         text = broken.text
-        message = f"{_names(subject, use)} '{text}', but there is no such {use.reference.target}"
+        message = (
+            f"{_format_subject(subject, use)} '{text}', but there is no such {use.reference.target}"
+        )
         if broken.hint == "comma":
-            message += "; the words of a list are separated by blanks, without commas"
+            message += "; separate the names by blanks, without commas"
         elif broken.hint == "illegal":
-            message += "; a path has no white space and none of \\ * +"
-        _report(subject, report, broken, message)
+            message += "; a path must not contain white space, \\, * or +"
+        _report_broken(subject, report, broken, message)
 
 
-@rule("OSIM302", "reference-to-wrong-type", severity=ERROR, mends="unsafe")
-def reference_to_wrong_type(subject: Subject, report: FindingSink) -> None:
+@rule("OSIM302", "reference-to-wrong-type", severity=ERROR, fixes="unsafe")
+def report_reference_to_wrong_type(subject: Subject, report: FindingCollector) -> None:
     """A reference leads to a component of a class that the property cannot use.
 
-    Reports references to something that exists and is of another kind: a joint as the parent frame,
-    a body where a contact geometry belongs.
+    Reports references to an existing component of another class: a joint as the parent frame, a
+    body where a contact geometry belongs.
 
-    OpenSim says that the component does not exist, and refuses the model.
+    OpenSim says that the component does not exist, and rejects the model.
 
     ```xml
     - <Marker name="asis"> <socket_parent_frame>/jointset/hip</socket_parent_frame> </Marker>
     + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     ```
     """
-    for broken in _broken(subject, "wrong-type"):
+    for broken in _select_broken(subject, "wrong-type"):
         other = broken.other
         assert other is not None
         kind = other.class_name if isinstance(other, Unknown) else type(other).tag
-        message = f"{_names(subject, broken.use)} '{broken.text}', which is {a(kind)}, not {a(broken.use.reference.target)}"
+        message = (
+            f"{_format_subject(subject, broken.use)} '{broken.text}', which is "
+            f"{with_article(kind)}, not {with_article(broken.use.reference.target)}"
+        )
         fixed = (
-            _contacts_on(subject, other) if broken.use.reference.target == "ContactGeometry" else []
+            _list_contacts(subject, other)
+            if broken.use.reference.target == "ContactGeometry"
+            else []
         )
         if fixed:
             message += f"; contact geometry fixed to it: {join_words(fixed)}"
-        _report(subject, report, broken, message)
+        _report_broken(subject, report, broken, message)
 
 
 @rule("OSIM303", "missing-reference", severity=ERROR)
-def missing_reference(subject: Subject, report: FindingSink) -> None:
-    """A property that must name a component names none.
+def report_missing_reference(subject: Subject, report: FindingCollector) -> None:
+    """A required reference is empty.
 
     Reports sockets and names that are empty or not given.
 
-    OpenSim refuses the model when it is connected.
+    OpenSim rejects the model when it is connected.
 
     ```xml
       <Marker name="asis">
@@ -94,12 +101,12 @@ def missing_reference(subject: Subject, report: FindingSink) -> None:
       </Marker>
     ```
     """
-    for broken in _broken(subject, "empty"):
+    for broken in _select_broken(subject, "empty"):
         use = broken.use
         if use.spec.name == "name":
             report(
-                f"the name of {a(type(use.holder).tag)} is blank; it must be that of {a(use.reference.target)}; "
-                "OpenSim switches the whole probe off",
+                f"the name of {with_article(type(use.holder).tag)} is blank, expected that of "
+                f"{with_article(use.reference.target)}; OpenSim disables the whole probe",
                 use.holder,
                 attribute="name",
             )
@@ -107,22 +114,23 @@ def missing_reference(subject: Subject, report: FindingSink) -> None:
         given = use.spec.name in use.holder.model_fields_set
         state = "is empty" if given else "is not given"
         report(
-            f"{use.spec.tag} of {_holder(subject, use)} {state}; it must name {a(use.reference.target)}",
+            f"{use.spec.tag} of {_describe_holder(subject, use)} {state}, expected the name of "
+            f"{with_article(use.reference.target)}",
             use.holder,
             tag=use.spec.tag,
         )
 
 
-@rule("OSIM304", "reference-form", severity=ERROR, mends="both")
-def reference_form(subject: Subject, report: FindingSink) -> None:
-    """A component is named by its path where a bare name belongs, or by its name where a path belongs.
+@rule("OSIM304", "reference-form", severity=ERROR, fixes="both")
+def report_reference_form(subject: Subject, report: FindingCollector) -> None:
+    """A reference has the wrong form: a path instead of a name, or a name instead of a path.
 
-    Reports references that would be right in another form: a bare name in a socket, a path without
-    its leading slash, a path where OpenSim looks a bare name up, a path of the years before version
-    4 that leaves the sets out.
+    Reports references that would be correct in another form: a bare name in a socket, a path
+    without its leading slash, a path where OpenSim expects a bare name, or a path without the sets
+    as in files before version 4.
 
-    OpenSim does not search. A bare name in a socket means a child of the component itself; a path
-    in `<coordinate>` of a limit force means a coordinate with slashes in its name. It refuses the
+    OpenSim does not search. A bare name in a socket means a child of the component; a path in
+    `<coordinate>` of a limit force means a coordinate with slashes in its name. It rejects the
     model.
 
     ```xml
@@ -130,12 +138,15 @@ def reference_form(subject: Subject, report: FindingSink) -> None:
     + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     ```
     """
-    for broken in _broken(subject, "form"):
+    for broken in _select_broken(subject, "form"):
         wanted = "a bare name" if broken.suggestion and "/" not in broken.suggestion else "a path"
         if wanted == "a path" and "/" in broken.text and not broken.text.startswith("/"):
             wanted = "a path that begins with a slash"
-        message = f"{_names(subject, broken.use)} '{broken.text}'; this property wants {wanted}"
-        _report(subject, report, broken, message)
+        message = (
+            f"{_format_subject(subject, broken.use)} '{broken.text}'; this property expects "
+            f"{wanted}"
+        )
+        _report_broken(subject, report, broken, message)
     for change in subject.changes:
         if change.step == "set_levels" and subject.source is not None:
             if _is_repeated(subject.source, change.number):
@@ -147,8 +158,9 @@ def reference_form(subject: Subject, report: FindingSink) -> None:
             start = subject.source.line_start(place.line) + place.column - 1
             text = subject.source.text[start : start + place.length]
             report(
-                f"{change.where} names '{text}', as files did while version 4 was made: OpenSim 4.6 finds nothing "
-                "there and refuses the model; `osimlite upgrade` writes the path anew",
+                f"{change.where} names '{text}', as files did during the development of version "
+                "4: OpenSim 4.6 finds nothing there and rejects the model; `osimlite upgrade` "
+                "rewrites the path",
                 at=place,
             )
 
@@ -173,29 +185,29 @@ def _is_repeated(source: Source, number: int) -> bool:
     return False
 
 
-@rule("OSIM305", "reference-case", severity=ERROR, mends="safe")
-def reference_case(subject: Subject, report: FindingSink) -> None:
-    """A reference is right but for upper and lower case.
+@rule("OSIM305", "reference-case", severity=ERROR, fixes="safe")
+def report_reference_case(subject: Subject, report: FindingCollector) -> None:
+    """A reference differs from a name in letter case only.
 
-    Reports references that lead to a component once case is ignored.
+    Reports references that match a component if letter case is ignored.
 
-    Names are compared exactly; OpenSim refuses the model.
+    Names are compared exactly; OpenSim rejects the model.
 
     ```xml
     - <Marker name="asis"> <socket_parent_frame>/bodyset/Pelvis</socket_parent_frame> </Marker>
     + <Marker name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
     ```
     """
-    for broken in _broken(subject, "case"):
-        _report(
+    for broken in _select_broken(subject, "case"):
+        _report_broken(
             subject,
             report,
             broken,
-            f"{_names(subject, broken.use)} '{broken.text}'; upper and lower case count",
+            f"{_format_subject(subject, broken.use)} '{broken.text}'; names are case-sensitive",
         )
 
 
-class Broken(NamedTuple):
+class BrokenReference(NamedTuple):
     """A reference that does not work: why, what it leads to instead, and what would be right."""
 
     use: Use
@@ -206,56 +218,56 @@ class Broken(NamedTuple):
     hint: str = ""
 
 
-def _broken(subject: Subject, why: str) -> Iterator[Broken]:
+def _select_broken(subject: Subject, why: str) -> Iterator[BrokenReference]:
     """The broken references of one kind."""
-    return (broken for broken in broken_references(subject) if broken.why == why)
+    return (broken for broken in find_broken_references(subject) if broken.why == why)
 
 
-@once
-def broken_references(subject: Subject) -> list[Broken]:
+@cached_per_subject
+def find_broken_references(subject: Subject) -> list[BrokenReference]:
     """Every broken reference of the model."""
-    return list(_find(subject))
+    return list(_iterate_broken_references(subject))
 
 
-def _find(subject: Subject) -> Iterator[Broken]:
+def _iterate_broken_references(subject: Subject) -> Iterator[BrokenReference]:
     tree = subject.tree
-    for use in _uses(subject):
+    for use in _list_uses(subject):
         resolution = subject.resolution(use) if use.value != "" else tree.resolve(use)
         if resolution.failure is None:
-            if _wants_plain_path(use) and isinstance(use.value, str):
+            if _needs_plain_path(use) and isinstance(use.value, str):
                 written = tree.path_of(resolution.target) if resolution.target is not None else None
                 if use.value != written:
-                    yield Broken(use, use.value, "form", None, written)
+                    yield BrokenReference(use, use.value, "form", None, written)
             continue
         if resolution.failure != "illegal" and (
-            _overwritten(subject, use) or _made_up(subject, use)
+            _is_overwritten(subject, use) or _is_made_up(subject, use)
         ):
             continue
         text = use.text
-        if isinstance(use.value, str) and (resolution.failure == "empty" or _unassigned(use)):
+        if isinstance(use.value, str) and (resolution.failure == "empty" or _is_unassigned(use)):
             if use.reference.required and use.position is None:
-                yield Broken(use, text, "empty")
+                yield BrokenReference(use, text, "empty")
         elif use.reference.rule == "own-joint-coordinate" and is_a(use.owner, "CustomJoint"):
             # Often OpenSim makes such a coordinate up, of which another rule speaks.
-            if axes_refused(cast("CustomJoint", use.owner)):
-                yield _explained(subject, use, text, resolution)
-        elif not _undecided(subject, use, text) and not (
+            if refuses_axes(cast("CustomJoint", use.owner)):
+                yield _explain_reference(subject, use, text, resolution)
+        elif not _is_undecided(subject, use, text) and not (
             use.position == 0 and use.reference.takes(text)
         ):
-            yield _explained(subject, use, text, resolution)
+            yield _explain_reference(subject, use, text, resolution)
 
 
-def _unassigned(use: Use) -> bool:
+def _is_unassigned(use: Use) -> bool:
     """Whether the text is the word that OpenSim prints for a single name which was never given."""
     return use.value == "UNASSIGNED" and use.position is None and use.spec.name != "name"
 
 
-def _uses(subject: Subject) -> Iterator[Use]:
+def _list_uses(subject: Subject) -> Iterator[Use]:
     """Every reference, but those that lead nowhere by their nature (files, columns, outputs)."""
     for use in subject.uses:
         if use.reference.rule not in ("file", "column", "input", "positional", "point-index"):
             yield use
-    # An optional reference that OpenSim insists on all the same is not among the uses when it is
+    # An optional reference that OpenSim insists on anyway is not among the uses when it is
     # left out.
     for cls, items in subject.by_class.items():
         for spec in reference_specs(cls):
@@ -265,54 +277,56 @@ def _uses(subject: Subject) -> Iterator[Use]:
                         yield Use(item, subject.owner(item), spec, "")
 
 
-def _explained(subject: Subject, use: Use, text: str, resolution: Resolution) -> Broken:
+def _explain_reference(
+    subject: Subject, use: Use, text: str, resolution: Resolution
+) -> BrokenReference:
     tree, reference = subject.tree, use.reference
     stripped = text.strip(",;")
     if stripped != text and tree.lookup(reference, stripped, use.owner).target is not None:
-        return Broken(use, text, "missing", None, stripped, "comma")
-    right = _right_words(subject, use)
+        return BrokenReference(use, text, "missing", None, stripped, "comma")
+    right = _list_right_words(subject, use)
     last = text.rstrip("/").rpartition("/")[2]
     same_name = [word for word in right if word.rpartition("/")[2] == last]
-    if same_name and resolution.failure != "wrong-type" and _same_place(text, same_name):
-        return Broken(
+    if same_name and resolution.failure != "wrong-type" and _differs_in_form(text, same_name):
+        return BrokenReference(
             use,
             text,
             "form",
             None,
-            closest(text, same_name),
+            pick_closest(text, same_name),
             "" if len(same_name) == 1 else "several",
         )
-    other = resolution.found or _elsewhere(subject, use, text)
+    other = resolution.found or _find_elsewhere(subject, use, text)
     if other is not None and is_a(other, reference.target):
         # A coordinate, but of another joint.
         other = None
     if other is not None and not same_name:
-        return Broken(use, text, "wrong-type", other, find_nearest(text, right, cutoff=75))
+        return BrokenReference(use, text, "wrong-type", other, find_nearest(text, right, cutoff=75))
     if same_name and resolution.failure == "wrong-type":
         if other is not None and text.startswith("/"):
-            return Broken(use, text, "wrong-type", other, closest(text, same_name))
-        return Broken(
+            return BrokenReference(use, text, "wrong-type", other, pick_closest(text, same_name))
+        return BrokenReference(
             use,
             text,
             "form",
             None,
-            closest(text, same_name),
+            pick_closest(text, same_name),
             "" if len(same_name) == 1 else "several",
         )
     lowered = [word for word in right if word.lower() == text.lower()]
     if lowered:
-        return Broken(use, text, "case", None, lowered[0])
+        return BrokenReference(use, text, "case", None, lowered[0])
     hint = "illegal" if resolution.failure == "illegal" else ""
     # Nothing is meant twice in one list.
     named = getattr(use.holder, use.spec.name)
     free = right if isinstance(named, str) else sorted(set(right).difference(named or ()))
-    return Broken(use, text, "missing", None, nearest_name(text, free), hint)
+    return BrokenReference(use, text, "missing", None, find_nearest_name(text, free), hint)
 
 
-def _right_words(subject: Subject, use: Use) -> list[str]:
+def _list_right_words(subject: Subject, use: Use) -> list[str]:
     """Every text that would be right; the same for all references of one kind in one component."""
     known = cast(
-        "dict[tuple[str, str, int], list[str]]", subject.kept.setdefault("right words", {})
+        "dict[tuple[str, str, int], list[str]]", subject.cache.setdefault("right words", {})
     )
     key = (use.reference.rule, use.reference.target, id(use.owner))
     if key not in known and use.reference.rule == "set-member":
@@ -325,14 +339,14 @@ def _right_words(subject: Subject, use: Use) -> list[str]:
     return known[key]
 
 
-def _same_place(text: str, candidates: list[str]) -> bool:
+def _differs_in_form(text: str, candidates: list[str]) -> bool:
     """Whether the text differs from a right one in form alone: parts of the path are left out or added."""
     if "/" not in text.strip("/") or any("/" not in word for word in candidates):
         return True
     return any(word.strip("/") == text.strip("/") for word in candidates)
 
 
-def _elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
+def _find_elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
     """A component of another class that goes by this name or path."""
     tree = subject.tree
     at_path = tree.by_path.get(normalised("/" + text) or "")
@@ -345,16 +359,16 @@ def _elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
     )
 
 
-def _wants_plain_path(use: Use) -> bool:
+def _needs_plain_path(use: Use) -> bool:
     """Whether OpenSim compares the text itself: a PrescribedController finds its functions by the path as it stands."""
     return type(use.owner).__name__ == "PrescribedController" and use.spec.tag == "socket_actuators"
 
 
-def _made_up(subject: Subject, use: Use) -> bool:
+def _is_made_up(subject: Subject, use: Use) -> bool:
     """Whether a reference leads to a coordinate that OpenSim makes up, of which another rule speaks."""
     if use.reference.target != "Coordinate" or use.reference.rule == "own-joint-coordinate":
         return False
-    paths = made_up_paths(subject)
+    paths = find_made_up_paths(subject)
     if not paths or not isinstance(use.value, str):
         return False
     if use.reference.rule == "coordinate-name":
@@ -363,16 +377,16 @@ def _made_up(subject: Subject, use: Use) -> bool:
     return normalised(base + use.value) in paths
 
 
-def _overwritten(subject: Subject, use: Use) -> bool:
+def _is_overwritten(subject: Subject, use: Use) -> bool:
     """Whether OpenSim sets this reference itself: the frame of the geometry that a frame draws."""
     return (
         isinstance(use.holder, Geometry)
         and use.spec.tag == "socket_frame"
-        and _drawn_by_frame(subject, use.holder)
+        and _is_drawn_by_frame(subject, use.holder)
     )
 
 
-def _drawn_by_frame(subject: Subject, geometry: Geometry) -> bool:
+def _is_drawn_by_frame(subject: Subject, geometry: Geometry) -> bool:
     parent = subject.tree.parent_of(geometry)
     if not isinstance(parent, Frame):
         return False
@@ -381,7 +395,7 @@ def _drawn_by_frame(subject: Subject, geometry: Geometry) -> bool:
     )
 
 
-def _undecided(subject: Subject, use: Use, text: str) -> bool:
+def _is_undecided(subject: Subject, use: Use, text: str) -> bool:
     """Whether the reference may lead into an object of a class that is not known."""
     if not subject.has_unknown:
         return False
@@ -399,16 +413,16 @@ def _undecided(subject: Subject, use: Use, text: str) -> bool:
     return False
 
 
-def _names(subject: Subject, use: Use) -> str:
+def _format_subject(subject: Subject, use: Use) -> str:
     """``HuntCrossleyForce 'foot': geometry names``."""
-    return f"{_holder(subject, use)}: {use.spec.tag} names"
+    return f"{_describe_holder(subject, use)}: {use.spec.tag} names"
 
 
-def _holder(subject: Subject, use: Use) -> str:
-    return called(use.holder) if use.holder.name else subject.called(use.holder)
+def _describe_holder(subject: Subject, use: Use) -> str:
+    return describe_object(use.holder) if use.holder.name else subject.describe(use.holder)
 
 
-def _contacts_on(subject: Subject, frame: Object) -> list[str]:
+def _list_contacts(subject: Subject, frame: Object) -> list[str]:
     """Names of the contact geometry that is fixed to a frame."""
     return [
         use.owner.name
@@ -417,16 +431,18 @@ def _contacts_on(subject: Subject, frame: Object) -> list[str]:
     ]
 
 
-def _report(subject: Subject, report: FindingSink, broken: Broken, message: str) -> None:
+def _report_broken(
+    subject: Subject, report: FindingCollector, broken: BrokenReference, message: str
+) -> None:
     use = broken.use
     value = getattr(use.holder, use.spec.name)
     before = value[: use.position] if isinstance(value, tuple) and use.position else ()
     nth = sum(1 for word in before if word == broken.text)
-    # OpenSim drops what a group names wrongly and goes on.
+    # OpenSim drops what a group names wrongly and continues.
     severity = WARNING if use.reference.rule == "set-member" else None
     by_name = use.spec.name == "name"
     if by_name:
-        message += "; OpenSim switches the whole probe off"
+        message += "; OpenSim disables the whole probe"
     place = (
         None
         if by_name
@@ -450,5 +466,5 @@ def _report(subject: Subject, report: FindingSink, broken: Broken, message: str)
         nth=nth,
         suggestion=broken.suggestion,
         severity=severity,
-        fix=replaced(subject.source, place, broken.suggestion, safe=certain),
+        fix=replace_text(subject.source, place, broken.suggestion, safe=certain),
     )

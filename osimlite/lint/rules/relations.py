@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 from osimlite.base.text import format_count
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
-from osimlite.lint.rules.domains import outside
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.rules.domains import find_outside_domain
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity
+from osimlite.lint.words import describe_object, format_quantity
 from osimlite.mechanics.laws.muscle_curves import (
     active_force_length,
     fiber_compressive_force_cos_pennation,
@@ -39,15 +39,15 @@ from osimlite.schema.tree import is_a
 
 
 @rule("OSIM209", "contradicting-values", severity=ERROR)
-def contradicting_values(subject: Subject, report: FindingSink) -> None:
+def report_contradicting_values(subject: Subject, report: FindingCollector) -> None:
     """Numbers of one object contradict each other.
 
-    Reports curves of muscles whose numbers make no curve, what a class of muscles does not have or
-    cannot compute with (`ignore_tendon_compliance` of a Thelen2003Muscle, a `minimum_activation` of
-    1, `optimal_force` beside `max_isometric_force`), a torus without a hole, and a path given by
+    Reports curves of muscles whose numbers do not define a curve, settings that a class of muscles
+    does not support (`ignore_tendon_compliance` of a Thelen2003Muscle, a `minimum_activation` of 1,
+    `optimal_force` beside `max_isometric_force`), a torus without a hole, and a path given by
     functions that do not take its coordinates.
 
-    OpenSim refuses the model, and its message names neither the muscle nor the property.
+    OpenSim rejects the model, and its message names neither the muscle nor the property.
 
     ```xml
       <WrapObjectSet name="wrapobjectset">
@@ -58,7 +58,7 @@ def contradicting_values(subject: Subject, report: FindingSink) -> None:
       </WrapObjectSet>
     ```
     """
-    strange = {id(item) for item, *_ in outside(subject)}
+    strange = {id(item) for item, *_ in find_outside_domain(subject)}
     for cls, items in subject.by_class.items():
         relation = next(
             (_RELATIONS[base.__name__] for base in cls.__mro__ if base.__name__ in _RELATIONS), None
@@ -69,18 +69,18 @@ def contradicting_values(subject: Subject, report: FindingSink) -> None:
                 for tag, message in (
                     relation(item, owner) if relation is not None else item.contradictions()
                 ):
-                    of = "" if item.name and item is owner else f" of {called(owner)}"
-                    report(f"{called(item)}{of}: {message}: {REFUSED}", item, tag=tag)
+                    of = "" if item.name and item is owner else f" of {describe_object(owner)}"
+                    report(f"{describe_object(item)}{of}: {message}: {REFUSED}", item, tag=tag)
 
 
 @rule("OSIM510", "controls-swapped", severity=WARNING)
-def controls_swapped(subject: Subject, report: FindingSink) -> None:
-    """The least control of an actuator is above its largest.
+def report_controls_swapped(subject: Subject, report: FindingCollector) -> None:
+    """The minimum control of an actuator exceeds its maximum.
 
     Reports actuators and muscles whose `min_control` is larger than their `max_control`.
 
-    No control is allowed. OpenSim simulates the model all the same; static optimization, computed
-    muscle control and optimal control take the two as bounds and fail.
+    No control is allowed. OpenSim simulates the model anyway; static optimization, computed muscle
+    control and optimal control use them as bounds and fail.
 
     ```xml
       <CoordinateActuator name="motor">
@@ -90,12 +90,13 @@ def controls_swapped(subject: Subject, report: FindingSink) -> None:
       </CoordinateActuator>
     ```
     """
-    for actuator in subject.named("ScalarActuator"):
+    for actuator in subject.find_by_class("ScalarActuator"):
         low, high = actuator.min_control, actuator.max_control
         if low > high:
             given = "min_control" if "min_control" in actuator.model_fields_set else "max_control"
             report(
-                f"min_control of {called(actuator)}, {quantity(low)}, is above its max_control, {quantity(high)}",
+                f"min_control of {describe_object(actuator)}, {format_quantity(low)}, is above "
+                f"its max_control, {format_quantity(high)}",
                 actuator,
                 tag=given,
             )
@@ -105,7 +106,7 @@ _Relation = Callable[[Any, Any], Iterator[Contradiction]]
 """Gives the contradictions of an object, from it and the component that it belongs to."""
 
 
-def _curve(make: Callable[..., object]) -> _Relation:
+def _make_curve_relation(make: Callable[..., object]) -> _Relation:
     """The contradiction of a curve of a muscle; `make` takes the properties of the curve and raises what is wrong."""
 
     def contradiction(curve: Any, owner: Any) -> Iterator[Contradiction]:
@@ -123,7 +124,7 @@ def _curve(make: Callable[..., object]) -> _Relation:
     return contradiction
 
 
-def _function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]:
+def _check_function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]:
     coordinates = path.coordinate_paths
     if not coordinates:
         yield None, "coordinate_paths is empty"
@@ -137,7 +138,7 @@ def _function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]:
     functions += [("moment_arm_functions", arm, count) for arm in arms]
     functions.append(("lengthening_speed_function", path.lengthening_speed_function, 2 * count))
     for tag, function, wanted in functions:
-        result = _arguments(function)
+        result = _count_arguments(function)
         if result is not None and result != wanted:
             yield (
                 tag,
@@ -145,20 +146,22 @@ def _function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]:
             )
 
 
-def _arguments(function: Any) -> int | None:
+def _count_arguments(function: Any) -> int | None:
     """How many arguments OpenSim says that a function takes; None where that is not known."""
     if isinstance(function, MultiplierFunction):
-        return _arguments(function.function)
+        return _count_arguments(function.function)
     if isinstance(function, MultivariatePolynomialFunction):
         return function.dimension
     if isinstance(function, LinearFunction):
         return len(function.coefficients) - 1
     if isinstance(function, ExpressionBasedFunction):
         return len(function.variables)
-    return 0 if isinstance(function, Constant) else 1 if isinstance(function, _OF_ONE) else None
+    return (
+        0 if isinstance(function, Constant) else 1 if isinstance(function, _ONE_VARIABLE) else None
+    )
 
 
-_OF_ONE = (
+_ONE_VARIABLE = (
     PiecewiseConstantFunction,
     PiecewiseLinearFunction,
     PolynomialFunction,
@@ -169,12 +172,14 @@ _OF_ONE = (
 )
 
 _RELATIONS: Final[dict[str, _Relation]] = {
-    "ActiveForceLengthCurve": _curve(active_force_length),
-    "FiberCompressiveForceCosPennationCurve": _curve(fiber_compressive_force_cos_pennation),
-    "FiberCompressiveForceLengthCurve": _curve(fiber_compressive_force_length),
-    "FiberForceLengthCurve": _curve(fiber_force_length),
-    "ForceVelocityCurve": _curve(force_velocity),
-    "FunctionBasedPath": _function_based_path,
-    "TendonForceLengthCurve": _curve(tendon_force_length),
+    "ActiveForceLengthCurve": _make_curve_relation(active_force_length),
+    "FiberCompressiveForceCosPennationCurve": _make_curve_relation(
+        fiber_compressive_force_cos_pennation
+    ),
+    "FiberCompressiveForceLengthCurve": _make_curve_relation(fiber_compressive_force_length),
+    "FiberForceLengthCurve": _make_curve_relation(fiber_force_length),
+    "ForceVelocityCurve": _make_curve_relation(force_velocity),
+    "FunctionBasedPath": _check_function_based_path,
+    "TendonForceLengthCurve": _make_curve_relation(tendon_force_length),
 }
-"""What OpenSim 4.6 refuses of classes whose arithmetic is not in their declaration."""
+"""What OpenSim 4.6 rejects of classes whose arithmetic is not in their declaration."""

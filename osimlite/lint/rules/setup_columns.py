@@ -6,26 +6,25 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.base.text import join_words
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
-from osimlite.lint.setup import Setup, content_of, members
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.setup import Setup, get_content_type, select_members
 from osimlite.lint.table import Table
-from osimlite.lint.words import meant, nearest_name
+from osimlite.lint.words import find_nearest_name, suggest_names
 from osimlite.schema.states import variables
 from osimlite.schema.tree import is_a
 
 
 @rule("OSIM842", "missing-column", severity=WARNING, about="document")
-def missing_column(setup: Setup, report: FindingSink) -> None:
-    """A table of coordinates lacks coordinates of the model, or has none of them.
+def report_missing_column(setup: Setup, report: FindingCollector) -> None:
+    """A table of coordinates lacks columns for coordinates of the model.
 
     Compares the columns of a table of coordinates with the coordinates of the model: OpenSim's
-    inverse dynamics takes plain names alone, analyses and `osimlite run` take paths too. A task
-    whose value is to come from a file needs its column there, and a table of states one for every
+    inverse dynamics accepts plain names only, analyses and `osimlite run` accept paths too. A task
+    whose value comes from a file needs a column there, and a table of states needs one for every
     state of the model.
 
-    OpenSim gives a coordinate without a column its default value, in analyses 0, without a word or
-    with a line in the
-    log: the motion is another one.
+    OpenSim gives a coordinate without a column its default value, in analyses 0, without a message
+    or with a line in the log: the motion is wrong.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -35,8 +34,8 @@ def missing_column(setup: Setup, report: FindingSink) -> None:
       </InverseDynamicsTool>
     ```
     """
-    for item, tag, table in motions(setup):
-        names = setup.names_of("Coordinate")
+    for item, tag, table in find_motions(setup):
+        names = setup.list_names("Coordinate")
         if not names:
             continue
         plain = is_a(item, "InverseDynamicsTool")
@@ -49,27 +48,28 @@ def missing_column(setup: Setup, report: FindingSink) -> None:
         lacking = sorted(name for name in names - columns if not setup.is_bound(name))
         if not names & columns and names & _find_names_in_paths(table):
             report(
-                f"'{getattr(item, tag)}' names the coordinates by paths: OpenSim's inverse dynamics does not know "
-                "these, and computes the moments of the default pose; osimlite knows them",
+                f"'{getattr(item, tag)}' names the coordinates by paths: OpenSim's inverse "
+                "dynamics does not recognise these and computes the moments of the default pose; "
+                "osimlite accepts them",
                 item,
                 tag=tag,
             )
         elif not names & columns:
             report(
-                f"'{getattr(item, tag)}' has no column of a coordinate of the model",
+                f"'{getattr(item, tag)}' has no column for any coordinate of the model",
                 item,
                 tag=tag,
                 severity=ERROR,
             )
         elif lacking:
             report(
-                f"'{getattr(item, tag)}' has no column {join_words(map(repr, lacking))}: OpenSim takes "
-                f"{'0' if is_a(item, 'AbstractTool') else 'the default value'}{meant(lacking, columns - names)}",
+                f"'{getattr(item, tag)}' has no column {join_words(map(repr, lacking))}: OpenSim uses "
+                f"{'0' if is_a(item, 'AbstractTool') else 'the default value'}{suggest_names(lacking, columns - names)}",
                 item,
                 tag=tag,
             )
-    for item in setup.named("AbstractTool"):
-        states = setup.table(getattr(item, "states_file", ""))
+    for item in setup.find_by_class("AbstractTool"):
+        states = setup.read_table(getattr(item, "states_file", ""))
         unknown = (
             [column for column in states.columns if not _is_state(setup, column)]
             if states is not None
@@ -78,35 +78,38 @@ def missing_column(setup: Setup, report: FindingSink) -> None:
         if unknown and setup.tree is not None:
             report(
                 f"the model has no state {join_words(map(repr, unknown))} of '{item.states_file}': "
-                "OpenSim leaves the column out",
+                "OpenSim ignores the column",
                 item,
                 tag="states_file",
             )
-        lacking = _lacking_states(setup, states) if states is not None and states.labels else []
+        lacking = (
+            _find_missing_states(setup, states) if states is not None and states.labels else []
+        )
         if lacking:
             report(
-                f"'{item.states_file}' has no column for {join_words(lacking)}: OpenSim takes the default value",
+                f"'{item.states_file}' has no column for {join_words(lacking)}: OpenSim uses the "
+                "default value",
                 item,
                 tag="states_file",
             )
-    for user in setup.having("ik_task_set"):
-        for task in members(user.ik_task_set, "IKCoordinateTask"):
+    for user in setup.find_having("ik_task_set"):
+        for task in select_members(user.ik_task_set, "IKCoordinateTask"):
             if task.apply and task.value_type == "from_file":
-                values = setup.table(user.coordinate_file)
+                values = setup.read_table(user.coordinate_file)
                 if not user.coordinate_file.strip() or user.coordinate_file == "Unassigned":
                     report(
-                        f"no coordinate_file is there for '{task.name}': OpenSim refuses it",
+                        f"coordinate_file is not given for '{task.name}': OpenSim rejects it",
                         task,
                         tag="value_type",
                         severity=ERROR,
                     )
                 elif values is not None and values.labels and task.name not in values.columns:
                     report(
-                        f"'{user.coordinate_file}' has no column '{task.name}': OpenSim refuses it",
+                        f"'{user.coordinate_file}' has no column '{task.name}': OpenSim rejects it",
                         task,
                         attribute="name",
                         severity=ERROR,
-                        suggestion=nearest_name(task.name, values.columns),
+                        suggestion=find_nearest_name(task.name, values.columns),
                     )
 
 
@@ -129,7 +132,7 @@ def _is_state(setup: Setup, column: str) -> bool:
     return column.partition(".")[0].removesuffix("_u") in setup.tree.by_name
 
 
-def _lacking_states(setup: Setup, table: Table) -> list[str]:
+def _find_missing_states(setup: Setup, table: Table) -> list[str]:
     """The states of the model that no label of a table names: by its path, the end of it, or in the old way."""
     columns = set(table.columns)
     ends = {"/".join(column.split("/")[-2:]) for column in columns}
@@ -142,9 +145,9 @@ def _lacking_states(setup: Setup, table: Table) -> list[str]:
     return lacking
 
 
-def motions(setup: Setup) -> Iterator[tuple[Any, str, Table]]:
+def find_motions(setup: Setup) -> Iterator[tuple[Any, str, Table]]:
     """Every tool that is given a motion as coordinates, with the property and the table."""
-    for item, spec, name, _ in setup.named_files("file"):
-        table = setup.table(name) if content_of(spec) == "motion" else None
+    for item, spec, name, _ in setup.find_named_files("file"):
+        table = setup.read_table(name) if get_content_type(spec) == "motion" else None
         if table is not None and table.labels and not table.is_markers:
             yield item, spec.tag, table

@@ -5,9 +5,16 @@ from __future__ import annotations
 import os
 
 from osimlite.lint.project_files import is_table
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
-from osimlite.lint.setup import UNGIVEN, Naming, Setup, content_of, is_given, motion_of
-from osimlite.lint.words import a, called
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.setup import (
+    NO_FILE_CONSEQUENCE,
+    FileReference,
+    Setup,
+    find_motion_file,
+    get_content_type,
+    is_given,
+)
+from osimlite.lint.words import describe_object, with_article
 from osimlite.schema.specs import file_specs
 from osimlite.schema.tree import is_a
 
@@ -22,17 +29,17 @@ _SHARED = {
 """Settings that should be those of all tools that are given the same motion."""
 
 
-@rule("OSIM821", "missing-input", severity=ERROR, mends="safe", about="document")
-def missing_input(setup: Setup, report: FindingSink) -> None:
-    """A file that a setup reads is not there, or is not named.
+@rule("OSIM821", "missing-input", severity=ERROR, fixes="safe", about="document")
+def report_missing_input(setup: Setup, report: FindingCollector) -> None:
+    """A file that a setup reads is missing or not named.
 
-    Looks for every file that a setup reads where OpenSim does: beside the setup, if OpenSim is
-    started there. What another setup of the project writes need not be there yet. Points out names
-    in other letter case and names with backslashes, which only Windows understands.
+    Searches every file that a setup reads where OpenSim does: beside the setup, if OpenSim is
+    started there. Files that another setup of the project writes need not exist yet. Reports names
+    in the wrong letter case and names with backslashes, which only Windows accepts.
 
-    OpenSim refuses the setup; where the model is missing, inverse kinematics crashes. A missing
-    file of controls is told in the log only, and the tool runs without controls. A setup that names
-    no file is a warning: it may be meant for a program that gives it one.
+    OpenSim rejects the setup; where the model is missing, inverse kinematics crashes. A missing
+    file of controls is only logged, and the tool runs without controls. A setup that names no file
+    is a warning: a program may supply one.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -43,28 +50,29 @@ def missing_input(setup: Setup, report: FindingSink) -> None:
       </InverseDynamicsTool>
     ```
     """
-    for naming in setup.named_files("file"):
-        if os.path.isfile(naming.path) or setup.writer_of(naming.path):
+    for naming in setup.find_named_files("file"):
+        if os.path.isfile(naming.path) or setup.find_writer(naming.path):
             continue
         slashed = naming.name.replace("\\", "/")
-        is_meant = slashed != naming.name and os.path.isfile(setup.place(slashed))
-        twin = slashed if is_meant else _in_other_case(naming)
-        why = "; a backslash separates no folders but on Windows" if "\\" in naming.name else ""
+        is_meant = slashed != naming.name and os.path.isfile(setup.resolve_path(slashed))
+        twin = slashed if is_meant else _find_other_case(naming)
+        why = "; backslashes separate folders on Windows only" if "\\" in naming.name else ""
         goes_on = is_a(naming.item, "ControlSetController")
-        fate = "OpenSim goes on without" if goes_on else "OpenSim refuses the setup"
+        fate = "OpenSim continues without it" if goes_on else "OpenSim rejects the setup"
         report(
-            f"the file '{naming.name}' of {called(naming.item)} is not there{why}: {fate}",
+            f"the file '{naming.name}' of {describe_object(naming.item)} does not exist{why}: "
+            f"{fate}",
             naming.item,
             tag=naming.spec.tag,
             word=naming.name if naming.spec.tag == "force_set_files" else None,
             suggestion=twin,
             certain=True,
         )
-    for maker in setup.having("marker_set_file"):
+    for maker in setup.find_having("marker_set_file"):
         if "marker_set_file" in maker.model_fields_set and not maker.marker_set_file.strip():
             report(
-                f"marker_set_file of {called(maker)} is empty, and OpenSim refuses the setup; leave it out, or write "
-                "Unassigned",
+                f"marker_set_file of {describe_object(maker)} is empty: OpenSim rejects the "
+                "setup; leave it out, or write Unassigned",
                 maker,
                 tag="marker_set_file",
                 suggestion="Unassigned",
@@ -73,7 +81,7 @@ def missing_input(setup: Setup, report: FindingSink) -> None:
         for spec in file_specs(type(item), "file"):
             if spec.reference.required and not is_given(getattr(item, spec.name)):
                 report(
-                    f"{called(item)} names no {spec.tag}: {UNGIVEN}",
+                    f"{describe_object(item)} names no {spec.tag}: {NO_FILE_CONSEQUENCE}",
                     item,
                     tag=spec.tag,
                     severity=WARNING,
@@ -83,7 +91,11 @@ def missing_input(setup: Setup, report: FindingSink) -> None:
             and item is not setup.top
             and not (item.model.filepath or getattr(item.model.model, "_index", None))
         ):
-            report(f"{called(item)} has no model: {UNGIVEN}", item, severity=WARNING)
+            report(
+                f"{describe_object(item)} has no model: {NO_FILE_CONSEQUENCE}",
+                item,
+                severity=WARNING,
+            )
         if is_a(item, "AnalyzeTool"):
             given = [
                 tag for tag in ("states_file", "coordinates_file") if is_given(getattr(item, tag))
@@ -95,16 +107,16 @@ def missing_input(setup: Setup, report: FindingSink) -> None:
                     else "neither states nor coordinates"
                 )
                 severity = ERROR if given else WARNING
-                fate = "OpenSim refuses it" if given else UNGIVEN
+                fate = "OpenSim rejects it" if given else NO_FILE_CONSEQUENCE
                 report(
-                    f"{called(item)} names {what}: {fate}",
+                    f"{describe_object(item)} names {what}: {fate}",
                     item,
                     tag="coordinates_file",
                     severity=severity,
                 )
 
 
-def _in_other_case(naming: Naming) -> str | None:
+def _find_other_case(naming: FileReference) -> str | None:
     folder, last = os.path.split(naming.path)
     try:
         twin = next(
@@ -121,13 +133,13 @@ def _in_other_case(naming: Naming) -> str | None:
 
 
 @rule("OSIM822", "input-of-another-kind", severity=ERROR, about="document")
-def input_of_another_kind(setup: Setup, report: FindingSink) -> None:
-    """A file that a setup reads holds something else than is needed.
+def report_input_of_another_kind(setup: Setup, report: FindingCollector) -> None:
+    """A file that a setup reads has the wrong content.
 
-    Compares the ending of a table, and the class at the top of a document, with what the property
-    needs: a set of forces is no set of external loads.
+    Compares the suffix of a table, and the class at the top of a document, with the property: a
+    ForceSet is not ExternalLoads.
 
-    OpenSim refuses the file.
+    OpenSim rejects the file.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -137,36 +149,38 @@ def input_of_another_kind(setup: Setup, report: FindingSink) -> None:
       </InverseDynamicsTool>
     ```
     """
-    for naming in setup.named_files("file"):
+    for naming in setup.find_named_files("file"):
         if not os.path.isfile(naming.path):
             continue
-        wanted, _, either = content_of(naming.spec).partition(" or ")
+        wanted, _, either = get_content_type(naming.spec).partition(" or ")
         if either == "table" and is_table(naming.name):
             continue
         if wanted in _ENDINGS:
             if not naming.name.lower().endswith(_ENDINGS[wanted]):
                 report(
-                    f"{naming.spec.tag} of {called(naming.item)} must be a table ({', '.join(_ENDINGS[wanted])})",
+                    f"{naming.spec.tag} of {describe_object(naming.item)} must be a table "
+                    f"({', '.join(_ENDINGS[wanted])})",
                     naming.item,
                     tag=naming.spec.tag,
                 )
         elif wanted[:1].isupper():
-            top = None if is_table(naming.name) else setup.document(naming.name)
-            held = "a table" if top is None else a(type(top).__name__)
+            top = None if is_table(naming.name) else setup.read_document(naming.name)
+            held = "a table" if top is None else with_article(type(top).__name__)
             if is_table(naming.name) or (top is not None and not is_a(top, wanted)):
                 report(
-                    f"{naming.spec.tag} of {called(naming.item)} must hold a {wanted}, '{naming.name}' holds {held}",
+                    f"{naming.spec.tag} of {describe_object(naming.item)}: expected a {wanted}, "
+                    f"but '{naming.name}' holds {held}",
                     naming.item,
                     tag=naming.spec.tag,
                 )
 
 
-@rule("OSIM823", "lost-output", severity=WARNING, mends="both", about="document")
-def lost_output(setup: Setup, report: FindingSink) -> None:
-    """Results would be lost, or land in another place.
+@rule("OSIM823", "lost-output", severity=WARNING, fixes="both", about="document")
+def report_lost_output(setup: Setup, report: FindingCollector) -> None:
+    """Results would be lost or written elsewhere.
 
-    Looks at the folder for results, of which OpenSim makes the last part only, at folders of output
-    files that are not there, and at output files without a name.
+    Checks the folder for results, of which OpenSim creates only the last part, missing folders of
+    output files, and output files without a name.
 
     The tool runs to its end and its results are lost, with a line in the log at most.
 
@@ -181,29 +195,31 @@ def lost_output(setup: Setup, report: FindingSink) -> None:
     """
     if setup.folder is None:
         return
-    for naming in setup.named_files("output-folder"):
+    for naming in setup.find_named_files("output-folder"):
         above = os.path.dirname(os.path.abspath(os.path.join(setup.folder, naming.name)))
         if not os.path.isdir(above):
             report(
-                f"of '{naming.name}' OpenSim makes the last folder only: its results are lost",
+                f"OpenSim creates only the last folder of '{naming.name}': the results are lost",
                 naming.item,
                 tag=naming.spec.tag,
             )
         elif os.path.isabs(naming.name) and not os.path.isdir(naming.name):
             report(
-                f"'{naming.name}' is not there: if OpenSim may not make it, the results are lost",
+                f"'{naming.name}' does not exist: if OpenSim cannot create it, the results are "
+                "lost",
                 naming.item,
                 tag=naming.spec.tag,
                 severity=INFO,
             )
     # A tool makes its own folder before it writes.
-    made = {os.path.normpath(naming.name) for naming in setup.named_files("output-folder")}
-    for naming in setup.named_files("output-file"):
+    made = {os.path.normpath(naming.name) for naming in setup.find_named_files("output-folder")}
+    for naming in setup.find_named_files("output-file"):
         folder = os.path.dirname(naming.name)
         if is_a(naming.item, "InverseDynamicsTool"):
             if folder:
                 report(
-                    f"OpenSim leaves the folder of '{naming.name}' out and writes into results_directory",
+                    f"OpenSim ignores the folder of '{naming.name}' and writes to "
+                    "results_directory",
                     naming.item,
                     tag=naming.spec.tag,
                     suggestion=os.path.basename(naming.name),
@@ -215,15 +231,15 @@ def lost_output(setup: Setup, report: FindingSink) -> None:
             and os.path.normpath(folder) not in made
         ):
             report(
-                f"the folder of '{naming.name}' is not there: OpenSim does not make it",
+                f"the folder of '{naming.name}' does not exist: OpenSim does not create it",
                 naming.item,
                 tag=naming.spec.tag,
             )
-    for tool in setup.named("InverseKinematicsTool"):
+    for tool in setup.find_by_class("InverseKinematicsTool"):
         folder, name = os.path.normpath(tool.results_directory or "."), tool.output_motion_file
         if folder != "." and name and not os.path.dirname(name):
             report(
-                f"'{name}' is written beside the setup: results_directory does not count for it",
+                f"'{name}' is written beside the setup: results_directory does not apply to it",
                 tool,
                 tag="output_motion_file",
                 severity=INFO,
@@ -233,21 +249,22 @@ def lost_output(setup: Setup, report: FindingSink) -> None:
         for spec in file_specs(type(item), "output-file"):
             if spec.reference.required and not getattr(item, spec.name).strip():
                 report(
-                    f"{called(item)} names no {spec.tag}: its results get no proper file",
+                    f"{describe_object(item)} names no {spec.tag}: its results get no proper file "
+                    "name",
                     item,
                     tag=spec.tag,
                 )
 
 
 @rule("OSIM824", "tools-differ", severity=INFO, about="document")
-def tools_differ(setup: Setup, report: FindingSink) -> None:
-    """A tool leaves out what another tool takes into account for the same motion.
+def report_tools_differ(setup: Setup, report: FindingCollector) -> None:
+    """A tool ignores loads or a filter that another tool applies to the same motion.
 
-    Compares a tool with all others in its folder that are given the same file of coordinates:
-    whether they have measured loads, and whether they filter the motion.
+    Compares a tool with all others in its folder that read the same file of coordinates: whether
+    they apply measured loads, and whether they filter the motion.
 
-    Joint moments without the ground, or muscle forces from a motion that is not filtered, are
-    results like any others, and do not fit those of the other tool.
+    Joint moments without ground reactions, or muscle forces from an unfiltered motion, look like
+    valid results, but do not match those of the other tool.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -258,7 +275,11 @@ def tools_differ(setup: Setup, report: FindingSink) -> None:
       </InverseDynamicsTool>
     ```
     """
-    if setup.tool is None or setup.tool[1] is not setup.top or not (mine := motion_of(*setup.tool)):
+    if (
+        setup.tool is None
+        or setup.tool[1] is not setup.top
+        or not (mine := find_motion_file(*setup.tool))
+    ):
         return
     here = os.path.realpath(setup.tool[0])
     told: set[str] = set()
@@ -267,7 +288,7 @@ def tools_differ(setup: Setup, report: FindingSink) -> None:
         if (
             place == here
             or os.path.dirname(place) != os.path.dirname(here)
-            or motion_of(file, other) != mine
+            or find_motion_file(file, other) != mine
         ):
             continue
         for tag, what in _SHARED.items():
@@ -275,18 +296,19 @@ def tools_differ(setup: Setup, report: FindingSink) -> None:
             if (
                 one is not None
                 and two is not None
-                and _says(two)
-                and not _says(one)
+                and _is_set(two)
+                and not _is_set(one)
                 and tag not in told
             ):
                 told.add(tag)
                 report(
-                    f"'{os.path.basename(file)}' {what.format(two)} for the same motion, this tool does not",
+                    f"'{os.path.basename(file)}' {what.format(two)} for the same motion, but this "
+                    "tool does not",
                     setup.top,
                     tag=tag,
                 )
 
 
-def _says(value: str | float) -> bool:
+def _is_set(value: str | float) -> bool:
     """Whether a setting is not left at nothing."""
     return is_given(value) if isinstance(value, str) else value > 0.0

@@ -8,9 +8,9 @@ from typing import Any
 
 from osimlite.base.text import join_words
 from osimlite.lint.checked import Where
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.setup import Setup
-from osimlite.lint.words import called, nearest_name
+from osimlite.lint.words import describe_object, find_nearest_name
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Reference
 from osimlite.schema.specs import reference_specs
@@ -21,23 +21,25 @@ _KINDS = ("actuator", "body", "coordinate", "frame", "joint", "marker", "muscle"
 """What the rules of references are about that look a name up in one place of the model; their names begin with it."""
 _PATHS = ("model-path", "state-path", "pattern")
 """The other rules that lead from a setup into the model, whatever their target is."""
-_FATES = {"refused": ("OpenSim refuses it", None), "left out": ("OpenSim leaves it out", WARNING)}
+_CONSEQUENCES = {
+    "refused": ("OpenSim rejects it", None),
+    "left out": ("OpenSim ignores it", WARNING),
+}
 _PLACES = {"Marker": "/markerset", "Force": "/forceset", "Controller": "/controllerset"}
 """Where in the model stands what a tool adds to it; relative paths start there."""
 
 
-@rule("OSIM831", "unknown-name", severity=ERROR, mends="both", about="document")
-def unknown_name(setup: Setup, report: FindingSink) -> None:
-    """A setup names what the model of its tool does not have.
+@rule("OSIM831", "unknown-name", severity=ERROR, fixes="both", about="document")
+def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
+    """A setup refers to something that the model of its tool does not have.
 
     Looks up every marker, coordinate, body, joint, muscle and actuator that a setup, or a set that
     a setup reads, names in the model of the tool, with the sets of forces and markers that the tool
-    adds to it. In studies of Moco also states, controls and outputs, by their paths or by patterns
-    of them.
+    adds to it. In Moco studies also states, controls and outputs, by their paths or by patterns.
 
-    Most tools refuse the setup, some crash. Tasks of markers, scale factors of bodies, muscles of
-    an analysis that are not there are left out without a word, and so are patterns that nothing
-    matches (warnings).
+    Most tools reject the setup, some crash. Missing markers of tasks, bodies of scale factors and
+    muscles of an analysis are ignored without a message, and so are patterns without a match
+    (warnings).
 
     ```setup
       <AnalyzeTool name="analyze">
@@ -53,7 +55,12 @@ def unknown_name(setup: Setup, report: FindingSink) -> None:
     tree = setup.tree
     if tree is None:
         return
-    off = {id(part) for goal in setup.named("MocoGoal") if not goal.enabled for part in goal.walk()}
+    off = {
+        id(part)
+        for goal in setup.find_by_class("MocoGoal")
+        if not goal.enabled
+        for part in goal.walk()
+    }
 
     def counts(item: Any) -> bool:
         return id(item) not in off and vars(item).get("on", True) and vars(item).get("apply", True)
@@ -61,12 +68,12 @@ def unknown_name(setup: Setup, report: FindingSink) -> None:
     for cls, items in setup.by_class.items():
         for spec in reference_specs(cls):
             kind = spec.reference
-            what = _what(kind) if kind.required and kind.shape != "list" else None
+            what = _get_kind(kind) if kind.required and kind.shape != "list" else None
             for item in items if what else ():
                 if getattr(item, spec.name) in ("", None) and counts(item):
-                    fate, severity = _FATES[kind.fate]
+                    fate, severity = _CONSEQUENCES[kind.fate]
                     report(
-                        f"{called(item)} names no {what}: {fate}",
+                        f"{describe_object(item)} names no {what}: {fate}",
                         item,
                         tag=spec.tag,
                         severity=severity,
@@ -78,11 +85,14 @@ def unknown_name(setup: Setup, report: FindingSink) -> None:
         if rule in _PATHS:
             return set(variables(tree, what))
         if what == "Actuator":
-            return {*variables(tree, what), *(f"/forceset/{name}" for name in setup.names_of(what))}
+            return {
+                *variables(tree, what),
+                *(f"/forceset/{name}" for name in setup.list_names(what)),
+            }
         return (
             set()
             if what == "component"
-            else setup.names_of({"frame": "Body"}.get(what, what.capitalize()))
+            else setup.list_names({"frame": "Body"}.get(what, what.capitalize()))
         )
 
     for use in setup.uses:
@@ -91,45 +101,49 @@ def unknown_name(setup: Setup, report: FindingSink) -> None:
             continue
         if not counts(item):
             continue
-        what, text, target = _looked_up(setup, tree, use, text)
+        what, text, target = _look_up_text(setup, tree, use, text)
         if what is None or target is not None:
             continue
         names = known(what, kind.rule)
-        if text in names or not unknown.isdisjoint(text.split("/")) or _is_made(setup, text):
+        if (
+            text in names
+            or not unknown.isdisjoint(text.split("/"))
+            or _is_made_by_operators(setup, text)
+        ):
             continue
         # Of names in the older <actuator_list> only those are missed that are to have a function
         # each.
         is_lost = (
             kind.rule == "socket" and what == "actuator" and not is_a(item, "PrescribedController")
         )
-        fate, severity = _FATES["left out" if is_lost else kind.fate]
-        more = "; it is written in small letters" if text.lower() in kind.words else ""
+        fate, severity = _CONSEQUENCES["left out" if is_lost else kind.fate]
+        more = "; write it in lower case" if text.lower() in kind.words else ""
         where: Where = {"tag": use.spec.tag, "word": text}
         if use.spec.tag == "@name":
             where = {"attribute": "name"}
             names = names.difference(other.name for other in setup.by_class[type(item)])
         report(
-            f"the model has no {what} '{text}', which {called(item)} names: {fate}{more}",
+            f"the model has no {what} '{text}', which {describe_object(item)} names: {fate}{more}",
             item,
             **where,
             severity=severity,
-            suggestion=text.lower() if more else nearest_name(text, sorted(names)),
+            suggestion=text.lower() if more else find_nearest_name(text, sorted(names)),
         )
     if setup.tool is not None and is_a(setup.tool[1], "AbstractTool"):
-        _look_up_controls(setup, setup.tool[1], setup.names_of("Actuator") | unknown, report)
+        _look_up_controls(setup, setup.tool[1], setup.list_names("Actuator") | unknown, report)
 
 
-def _what(kind: Reference) -> str | None:
+def _get_kind(kind: Reference) -> str | None:
     """What a text of this kind names in the model, None of what it does not look for there."""
     by_rule = (what for what in _KINDS if kind.rule.startswith(what))
     return kind.target if kind.rule in _PATHS else next(by_rule, None)
 
 
-def _looked_up(
+def _look_up_text(
     setup: Setup, tree: Tree, use: Use, text: str
 ) -> tuple[str | None, str, Component | None]:
     """What a text should name, if that is in the model, the text as it is looked up, and what it leads to."""
-    item, kind, what = use.holder, use.reference, _what(use.reference)
+    item, kind, what = use.holder, use.reference, _get_kind(use.reference)
     if kind.rule == "socket" and kind.target == "Actuator" and setup.upgraded:
         # A name, that OpenSim looks for everywhere.
         return "actuator", text.rpartition("/")[2], None
@@ -147,64 +161,67 @@ def _looked_up(
     return what, text, target or (tree.walk(text, "", "Frame").target if what == "frame" else None)
 
 
-def _look_up_controls(setup: Setup, tool: Object, plain: set[str], report: FindingSink) -> None:
+def _look_up_controls(
+    setup: Setup, tool: Object, plain: set[str], report: FindingCollector
+) -> None:
     """Tell controls, and columns of controls, that are those of no actuator."""
     if not plain:
         return
     # Of tools that follow a motion these are bounds, and go by the whole name.
     follows = hasattr(tool, "desired_kinematics_file")
-    fate, severity = _FATES["left out" if follows else "refused"]
+    fate, severity = _CONSEQUENCES["left out" if follows else "refused"]
     actuators = {f"{name}.excitation" for name in plain} | (set() if follows else plain)
-    controls = list(setup.named("Control"))
+    controls = list(setup.find_by_class("Control"))
     free = sorted(actuators.difference(control.name for control in controls))
     for control in controls:
         if control.name not in actuators:
             report(
-                f"the model has no actuator for {called(control)}: {fate}",
+                f"the model has no actuator for {describe_object(control)}: {fate}",
                 control,
                 attribute="name",
                 severity=severity,
-                suggestion=nearest_name(control.name, free),
+                suggestion=find_nearest_name(control.name, free),
             )
         elif not follows and getattr(control, "x_nodes", None) == []:
-            report(f"{called(control)} has no nodes: OpenSim fails", control, tag="x_nodes")
+            report(
+                f"{describe_object(control)} has no nodes: OpenSim fails", control, tag="x_nodes"
+            )
         elif follows and not control.is_model_control:
             report(
-                f"{called(control)} bounds no control of the model: OpenSim fails",
+                f"{describe_object(control)} bounds no control of the model: OpenSim fails",
                 control,
                 tag="is_model_control",
             )
-    for controller, table in setup.with_tables(
-        setup.named("ControlSetController"), "controls_file"
+    for controller, table in setup.iterate_with_tables(
+        setup.find_by_class("ControlSetController"), "controls_file"
     ):
         if lost := [column for column in table.columns if column not in actuators]:
             report(
                 f"the model has no actuator for the columns {join_words(map(repr, lost))} of "
-                f"'{controller.controls_file}': OpenSim refuses it",
+                f"'{controller.controls_file}': OpenSim rejects it",
                 controller,
                 tag="controls_file",
             )
 
 
-def _is_made(setup: Setup, text: str) -> bool:
+def _is_made_by_operators(setup: Setup, text: str) -> bool:
     """Whether the operators that a study lets loose on its model may make what has this path."""
-    makes = {type(operator).__name__ for operator in setup.named("ModelOperator")}
+    makes = {type(operator).__name__ for operator in setup.find_by_class("ModelOperator")}
     return ("ModOpAddReserves" in makes and "/reserve_" in text) or (
         "ModOpReplaceMusclesWithDeGrooteFregly2016" in makes
         and text.endswith("/normalized_tendon_force")
     )
 
 
-@rule("OSIM832", "excluded-force", severity=WARNING, mends="unsafe", about="document")
-def excluded_force(setup: Setup, report: FindingSink) -> None:
-    """Inverse dynamics is told to leave out a force that there is not.
+@rule("OSIM832", "excluded-force", severity=WARNING, fixes="unsafe", about="document")
+def report_excluded_force(setup: Setup, report: FindingCollector) -> None:
+    """Inverse dynamics excludes a force that does not exist.
 
     Compares `forces_to_exclude` with the words OpenSim knows (ALL, ACTUATORS, MUSCLES), the groups
-    of the model's forces, and, where there is no group, with the names of the forces: of a model
-    with groups OpenSim looks at groups alone. An empty list is pointed out where the model has
-    muscles.
+    of the model's forces, and, if there is no group, with the names of the forces: in a model with
+    groups OpenSim looks at groups only. An empty list is reported if the model has muscles.
 
-    The force takes part: moments of the joints are without what the passive muscles give.
+    The force is included: joint moments then lack the contribution of the passive muscles.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -221,10 +238,10 @@ def excluded_force(setup: Setup, report: FindingSink) -> None:
     forces = tree.model.force_set
     groups = [group.name for group in forces.groups]
     names = [force.name for force in forces.objects]
-    for tool in setup.named("InverseDynamicsTool"):
+    for tool in setup.find_by_class("InverseDynamicsTool"):
         if not tool.forces_to_exclude and any(is_a(force, "Muscle") for force in forces.objects):
             report(
-                f"{called(tool)} leaves out no force: muscles take part",
+                f"{describe_object(tool)} excludes no force: muscles are included",
                 tool,
                 tag="forces_to_exclude",
             )
@@ -236,14 +253,14 @@ def excluded_force(setup: Setup, report: FindingSink) -> None:
             or word in (groups or names)
         ):
             continue
-        why = "; the model has groups, and of forces with groups OpenSim looks at the groups alone"
+        why = "; the model has groups, and OpenSim then looks at groups only"
         report(
-            f"the model has no force or group of forces '{word}'{why if word in names else ''}: OpenSim leaves "
-            "nothing out for it",
+            f"the model has no force or group of forces '{word}'{why if word in names else ''}: "
+            "OpenSim excludes nothing for it",
             use.holder,
             tag="forces_to_exclude",
             word=word,
-            suggestion=nearest_name(
+            suggestion=find_nearest_name(
                 word, [*use.reference.words, *groups, *([] if groups else names)]
             ),
         )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from osimlite.lint.registry import ERROR, FindingSink, rule
-from osimlite.lint.setup import UNGIVEN, Setup, is_given, members
-from osimlite.lint.words import called, nearest_name
+from osimlite.lint.registry import ERROR, FindingCollector, rule
+from osimlite.lint.setup import NO_FILE_CONSEQUENCE, Setup, is_given, select_members
+from osimlite.lint.words import describe_object, find_nearest_name
 
 _TOOL = """```setup
 <ScaleTool name="scale">
@@ -33,53 +33,53 @@ _LINES = {"mass": 2, "scaler": 5, "pairs": 8, "axes": 11, "placer": 17}
 """Lines of the tool that examples stand for."""
 
 
-def _frame(number: int) -> str:
+def _make_frame(number: int) -> str:
     lines = _TOOL.split("\n")
     lines[number] = " " * (len(lines[number]) - len(lines[number].lstrip())) + "{}"
     return "\n".join(lines)
 
 
-_FRAMES = {name: _frame(number) for name, number in _LINES.items()}
+_FRAMES = {name: _make_frame(number) for name, number in _LINES.items()}
 
 
 _FAULTS = """\
-01 mass-not-scaled, warning, in mass: The mass to scale to is not positive. OpenSim leaves the mass as it is.
+01 mass-not-scaled, warning, in mass: The target mass is not positive. OpenSim does not change the mass.
 - <mass>0</mass>
 + <mass>70</mass>
-02 model-not-scaled, warning, in scaler: The model scaler does not apply. The model is not scaled.
+02 model-not-scaled, warning, in scaler: The model scaler is disabled. The model is not scaled.
 - <apply>false</apply>
   <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
-03 unknown-scaling, error, mends unsafe, in scaler: The scaling order has a word for no way of scaling. OpenSim knows
-measurements and manualScale, and refuses others.
+03 unknown-scaling, error, fix unsafe, in scaler: The scaling order has an unknown word. OpenSim knows
+measurements and manualScale, and rejects others.
 - <scaling_order>measurement</scaling_order> <marker_file>leg.trc</marker_file>
 + <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
-04 manual-scale-overwritten, warning, in scaler: Measurements come after what is scaled by hand. They overwrite it.
+04 manual-scale-overwritten, warning, in scaler: Measurements come after manual scaling. They overwrite it.
 - <scaling_order>manualScale measurements</scaling_order> <marker_file>leg.trc</marker_file>
 + <scaling_order>measurements manualScale</scaling_order> <marker_file>leg.trc</marker_file>
-05 measured-without-markers, warning, in scaler: A scaler measures and is given no markers. Nothing is measured.
+05 measured-without-markers, warning, in scaler: A scaler uses measurements without marker data. Nothing is measured.
 - <scaling_order>measurements</scaling_order>
 + <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
 06 measurement-without-pair, warning, in pairs: A measurement has no pair of markers. It measures nothing.
 + <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
-07 marker-pair-count, error, in pairs: A pair has other than two markers. OpenSim crashes.
+07 marker-pair-count, error, in pairs: A pair does not have two markers. OpenSim crashes.
 - <MarkerPair> <markers>asis</markers> </MarkerPair>
 + <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
-08 marker-paired-with-itself, warning, in pairs: Both markers of a pair are the same. The measurement is left out.
+08 marker-paired-with-itself, warning, in pairs: Both markers of a pair are the same. OpenSim ignores the measurement.
 - <MarkerPair> <markers>asis asis</markers> </MarkerPair>
 + <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
-09 unknown-scale-axis, error, mends safe, in axes: A body is scaled along what is no axis. OpenSim leaves out what is
-not X, Y or Z, without a word, and the body keeps its size.
+09 unknown-scale-axis, error, fix safe, in axes: A body is scaled along an unknown axis. OpenSim ignores what is
+not X, Y or Z, without a message, and the body keeps its size.
 - <BodyScale name="thigh"> <axes>X y</axes> </BodyScale>
 + <BodyScale name="thigh"> <axes>X Y</axes> </BodyScale>
-10 markers-not-placed, warning, in placer: The marker placer does not apply. The tool says that it failed.
+10 markers-not-placed, warning, in placer: The marker placer is disabled. The tool reports a failure.
 - <apply>false</apply>
   <marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range>
   <output_model_file>placed.osim</output_model_file>
-11 placed-model-not-written, warning, in placer: The model with its markers placed is not written. All that the tool did
+11 placed-model-not-written, warning, in placer: The model with placed markers is not written. The result of the tool
 is lost.
   <marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range>
 + <output_model_file>placed.osim</output_model_file>
-12 static-times, error, in placer: The times of the static trial are none to average over, or the trial has a single
+12 static-times, error, in placer: The time range of the static trial is empty, or the trial has a single
 frame. OpenSim fails; repeat the frame at a later time.
   <marker_file>leg.trc</marker_file> <output_model_file>placed.osim</output_model_file>
 - <time_range>0.5 0.5</time_range>
@@ -88,92 +88,93 @@ frame. OpenSim fails; repeat the frame at a later time.
 
 
 @rule("OSIM853", "scale-setting", severity=ERROR, about="document", faults=_FAULTS, frames=_FRAMES)
-def scale_setting(setup: Setup, report: FindingSink) -> None:
+def report_scale_setting(setup: Setup, report: FindingCollector) -> None:
     """A setting of the scale tool has no effect, or makes it fail.
 
-    Looks at the mass, the order of scaling, measurements, axes, steps that are left out, and times
-    that are averaged.
+    Checks the mass, the order of scaling, measurements, axes, skipped steps, and averaged times.
 
-    A measurement with one marker makes OpenSim crash. What it does not know in `axes` it leaves out
-    without a word, and the body keeps its size.
+    A measurement with one marker makes OpenSim crash. It ignores unknown words in `axes` without a
+    message, and the body keeps its size.
     """
-    for tool in setup.named("ScaleTool"):
+    for tool in setup.find_by_class("ScaleTool"):
         scaler = tool.model_scaler
         if tool.mass == 0.0 or (
             tool.mass < 0.0 and scaler.apply and scaler.preserve_mass_distribution
         ):
             report(
-                f"a mass of {tool.mass:g}: OpenSim leaves the mass as it is",
+                f"a mass of {tool.mass:g}: OpenSim does not change the mass",
                 tool,
                 tag="mass",
                 fault="mass-not-scaled",
             )
-    for scaler in setup.named("ModelScaler"):
+    for scaler in setup.find_by_class("ModelScaler"):
         if not scaler.apply:
             report("the model is not scaled", scaler, tag="apply", fault="model-not-scaled")
             continue
         for word in scaler.scaling_order:
             if word not in ("measurements", "manualScale"):
                 report(
-                    f"'{word}' is no way of scaling: OpenSim refuses it",
+                    f"'{word}' is not a scaling method: OpenSim rejects it",
                     scaler,
                     tag="scaling_order",
                     word=word,
-                    suggestion=nearest_name(word, ["measurements", "manualScale"]),
+                    suggestion=find_nearest_name(word, ["measurements", "manualScale"]),
                     fault="unknown-scaling",
                 )
         measures = "measurements" in scaler.scaling_order
         if scaler.scaling_order[:1] == ("manualScale",) and measures:
             report(
-                "measurements come last and overwrite what is scaled by hand",
+                "measurements come last and overwrite the manual scale factors",
                 scaler,
                 tag="scaling_order",
                 fault="manual-scale-overwritten",
             )
         if measures and scaler.measurement_set.objects and not is_given(scaler.marker_file):
             report(
-                f"{called(scaler)} measures, and names no marker_file: {UNGIVEN}",
+                f"{describe_object(scaler)} uses measurements, but names no marker_file: "
+                f"{NO_FILE_CONSEQUENCE}",
                 scaler,
                 tag="marker_file",
                 fault="measured-without-markers",
             )
-    for measurement in setup.named("Measurement"):
+    for measurement in setup.find_by_class("Measurement"):
         if not measurement.apply:
             continue
-        pairs = members(measurement.marker_pair_set, "MarkerPair")
+        pairs = select_members(measurement.marker_pair_set, "MarkerPair")
         if not pairs:
             report(
-                f"{called(measurement)} has no pair of markers: it measures nothing",
+                f"{describe_object(measurement)} has no pair of markers: it measures nothing",
                 measurement,
                 fault="measurement-without-pair",
             )
         for pair in pairs:
             if len(pair.markers) != 2:
                 report(
-                    f"a pair has two markers, this one {len(pair.markers)}: OpenSim crashes",
+                    f"expected two markers in a pair, found {len(pair.markers)}: OpenSim crashes",
                     pair,
                     tag="markers",
                     fault="marker-pair-count",
                 )
             elif pair.markers[0] == pair.markers[1]:
                 report(
-                    f"both markers of a pair are '{pair.markers[0]}': OpenSim leaves {called(measurement)} out",
+                    f"both markers of a pair are '{pair.markers[0]}': OpenSim ignores "
+                    f"{describe_object(measurement)}",
                     pair,
                     tag="markers",
                     fault="marker-paired-with-itself",
                 )
-    for scale in setup.named("BodyScale"):
+    for scale in setup.find_by_class("BodyScale"):
         for axis in scale.axes:
             if axis not in ("X", "Y", "Z"):
                 report(
-                    f"'{axis}' is none of the axes X, Y and Z: OpenSim leaves it out",
+                    f"expected an axis X, Y or Z, found '{axis}': OpenSim ignores it",
                     scale,
                     tag="axes",
                     word=axis,
                     suggestion=axis.upper() if axis.upper() in ("X", "Y", "Z") else None,
                     fault="unknown-scale-axis",
                 )
-    for placer in setup.named("MarkerPlacer"):
+    for placer in setup.find_by_class("MarkerPlacer"):
         if not placer.apply:
             report(
                 "the markers are not placed, and the tool says that it failed",
@@ -190,7 +191,8 @@ def scale_setting(setup: Setup, report: FindingSink) -> None:
             )
         if placer.apply and placer.time_range and not placer.time_range[0] < placer.time_range[-1]:
             report(
-                f"times from {placer.time_range[0]:g} to {placer.time_range[-1]:g} s cannot be averaged: OpenSim fails",
+                f"times from {placer.time_range[0]:g} to {placer.time_range[-1]:g} s cannot be "
+                "averaged: OpenSim fails",
                 placer,
                 tag="time_range",
                 fault="static-times",
@@ -199,9 +201,9 @@ def scale_setting(setup: Setup, report: FindingSink) -> None:
             _check_static_times(setup, placer, report)
 
 
-def _check_static_times(setup: Setup, placer: Any, report: FindingSink) -> None:
+def _check_static_times(setup: Setup, placer: Any, report: FindingCollector) -> None:
     """Report a static trial with one frame or none within the time range of the marker placer."""
-    table = setup.table(placer.marker_file)
+    table = setup.read_table(placer.marker_file)
     if table is None or table.span is None or not table.is_markers:
         return
     first, last = max(placer.time_range[0], table.span[0]), min(placer.time_range[1], table.span[1])
@@ -209,16 +211,16 @@ def _check_static_times(setup: Setup, placer: Any, report: FindingSink) -> None:
         return
     if table.span[0] == table.span[1]:
         report(
-            f"'{placer.marker_file}' has one frame, at {table.span[0]:g} s, and OpenSim averages over a range of "
-            "times: it fails; repeat the row at a later time",
+            f"'{placer.marker_file}' has one frame, at {table.span[0]:g} s, but OpenSim averages "
+            "over a range of times and fails; repeat the row at a later time",
             placer,
             tag="marker_file",
             fault="static-times",
         )
     else:
         report(
-            f"'{placer.marker_file}' goes from {table.span[0]:g} to {table.span[1]:g} s, of which the times of the "
-            "tool hold no two: OpenSim fails",
+            f"'{placer.marker_file}' covers {table.span[0]:g} to {table.span[1]:g} s, and fewer "
+            "than two frames are in the time range of the tool: OpenSim fails",
             placer,
             tag="time_range",
             fault="static-times",

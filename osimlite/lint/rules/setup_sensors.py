@@ -6,33 +6,33 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.base.text import join_words
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.setup import Setup
 from osimlite.lint.table import Table
-from osimlite.lint.words import called, meant, nearest_name
+from osimlite.lint.words import describe_object, find_nearest_name, suggest_names
 
 
-def _orientations(setup: Setup) -> Iterator[tuple[Any, str, str, Table]]:
+def _find_orientations(setup: Setup) -> Iterator[tuple[Any, str, str, Table]]:
     """Every tool that reads orientations: the property, what the names of sensors add to those of frames, the table."""
     for kind, tag, ending in (
         ("IMUInverseKinematicsTool", "orientations_file", ""),
         ("IMUPlacer", "orientation_file_for_calibration", "_imu"),
     ):
-        for item, table in setup.with_tables(setup.named(kind), tag):
+        for item, table in setup.iterate_with_tables(setup.find_by_class(kind), tag):
             yield item, tag, ending, table
 
 
 @rule("OSIM848", "sensor-without-frame", severity=WARNING, about="document")
-def sensor_without_frame(setup: Setup, report: FindingSink) -> None:
-    """A measured sensor has no frame in the model, or a sensor that a tool names was not measured.
+def report_sensor_without_frame(setup: Setup, report: FindingCollector) -> None:
+    """A measured sensor has no frame in the model, or a named sensor was not measured.
 
     Compares the columns of measured orientations with the frames of the model: inverse kinematics
-    takes those that are called as a frame is, the placer of sensors those that are called as a
-    frame with the ending `_imu`. Looks for the sensors that the tool names among the columns. The
-    table must be one of quaternions.
+    uses columns with the name of a frame, the IMUPlacer those with the name of a frame and the
+    suffix `_imu`. Looks up the sensors that the tool names among the columns. The table must
+    contain quaternions.
 
-    OpenSim leaves out sensors without a frame, with no more than the number of those that are left;
-    if none is left, it refuses the table.
+    OpenSim ignores sensors without a frame, and only logs the number of the others; if none is
+    left, it rejects the table.
 
     ```setup
       <IMUPlacer name="placer">
@@ -45,13 +45,13 @@ def sensor_without_frame(setup: Setup, report: FindingSink) -> None:
       </IMUPlacer>
     ```
     """
-    for item, tag, ending, table in _orientations(setup):
+    for item, tag, ending, table in _find_orientations(setup):
         file = getattr(item, tag)
         # OpenSim takes any key that has this in it.
         held = [entry.value.text for key, entry in table.entries.items() if "DataType" in key]
         if held[:1] != ["Quaternion"]:
             report(
-                f"'{file}' must say DataType=Quaternion: OpenSim refuses it",
+                f"'{file}' must have DataType=Quaternion: OpenSim rejects it",
                 item,
                 tag=tag,
                 severity=ERROR,
@@ -59,36 +59,38 @@ def sensor_without_frame(setup: Setup, report: FindingSink) -> None:
         base = getattr(item, "base_imu_label", "")
         if base and base not in table.columns:
             report(
-                f"'{file}' has no sensor '{base}': OpenSim refuses the setup",
+                f"'{file}' has no sensor '{base}': OpenSim rejects the setup",
                 item,
                 tag="base_imu_label",
                 severity=ERROR,
-                suggestion=nearest_name(base, table.columns),
+                suggestion=find_nearest_name(base, table.columns),
             )
         for weight in getattr(getattr(item, "orientation_weights", None), "objects", ()):
             if weight.name not in table.columns:
                 report(
-                    f"'{file}' has no sensor '{weight.name}': {called(weight)} is the weight of none",
+                    f"'{file}' has no sensor '{weight.name}': {describe_object(weight)} has no "
+                    "effect",
                     weight,
                     attribute="name",
-                    suggestion=nearest_name(weight.name, table.columns),
+                    suggestion=find_nearest_name(weight.name, table.columns),
                 )
-        frames = {name + ending for name in setup.names_of("PhysicalFrame")}
+        frames = {name + ending for name in setup.list_names("PhysicalFrame")}
         lost = [column for column in table.columns if column not in frames]
         if not frames:
             continue
         if len(lost) == len(table.columns):
-            wanted = f", as '{min(frames)}' is" if ending else ""
+            wanted = f", such as '{min(frames)}'" if ending else ""
             report(
-                f"no column of '{file}' is called as a frame of the model{wanted}: OpenSim refuses it",
+                f"no column of '{file}' has the name of a frame of the model{wanted}: OpenSim "
+                "rejects it",
                 item,
                 tag=tag,
                 severity=ERROR,
             )
         elif lost:
             report(
-                f"the model has no frame for {join_words(map(repr, lost))} of '{file}': OpenSim leaves them out"
-                f"{meant(lost, frames)}",
+                f"the model has no frame for {join_words(map(repr, lost))} of '{file}': OpenSim "
+                f"ignores them{suggest_names(lost, frames)}",
                 item,
                 tag=tag,
             )

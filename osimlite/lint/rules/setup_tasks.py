@@ -7,23 +7,23 @@ from collections import Counter
 from typing import Any
 
 from osimlite.base.text import join_words
-from osimlite.lint.posture import angles_of
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
-from osimlite.lint.setup import Setup, members
-from osimlite.lint.words import called
+from osimlite.lint.posture import find_angles
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.setup import Setup, select_members
+from osimlite.lint.words import describe_object
 from osimlite.schema.tree import is_a
 
 
 @rule("OSIM851", "task-weight", severity=ERROR, about="document")
-def task_weight(setup: Setup, report: FindingSink) -> None:
-    """The weights of tasks make no sense.
+def report_task_weight(setup: Setup, report: FindingCollector) -> None:
+    """The weights of tasks are invalid.
 
-    Looks for weights that are negative or no number, for tasks without weight (their default is 0),
-    for markers and coordinates that have two tasks, and for sets of which no task applies.
+    Checks for negative weights, for tasks without weight (the default is 0), for markers and
+    coordinates with two tasks, and for sets in which no task applies.
 
-    OpenSim refuses negative weights. A task without weight is not tracked, but counted in the
-    error; a weight of 0 that is given may be meant so, and is an information. If no task applies,
-    all markers count the same.
+    OpenSim rejects negative weights. A task without weight is not tracked, but counted in the
+    error; an explicit weight of 0 may be intended, and is an info. If no task applies, all markers
+    have equal weight.
 
     ```setup
       <IKTaskSet name="tasks">
@@ -32,11 +32,11 @@ def task_weight(setup: Setup, report: FindingSink) -> None:
       </IKTaskSet>
     ```
     """
-    for tasks in setup.named("IKTaskSet"):
-        applied = [task for task in members(tasks, "IKTask") if task.apply]
+    for tasks in setup.find_by_class("IKTaskSet"):
+        applied = [task for task in select_members(tasks, "IKTask") if task.apply]
         if tasks.objects and not applied:
             report(
-                "no task of this set applies: OpenSim takes all markers, each with the weight 1",
+                "no task of this set applies: OpenSim uses all markers, each with the weight 1",
                 tasks,
                 severity=WARNING,
             )
@@ -45,22 +45,22 @@ def task_weight(setup: Setup, report: FindingSink) -> None:
             seen[type(task).__name__, task.name] += 1
             if seen[type(task).__name__, task.name] == 2:
                 report(
-                    f"'{task.name}' has a task already: one of them counts",
+                    f"'{task.name}' has two tasks: only one of them counts",
                     task,
                     attribute="name",
                     severity=WARNING,
                 )
             if task.weight < 0:
                 report(
-                    f"the weight of {called(task)} is {task.weight:g}: OpenSim refuses it",
+                    f"the weight of {describe_object(task)} is {task.weight:g}: OpenSim rejects it",
                     task,
                     tag="weight",
                 )
             elif task.weight == 0:
                 given = setup.element_of(task, "weight") is not None
-                what = "weighs 0" if given else "has no weight, and the default is 0"
+                what = "has the weight 0" if given else "has no weight, and the default is 0"
                 report(
-                    f"{called(task)} {what}: it is not tracked",
+                    f"{describe_object(task)} {what}: it is not tracked",
                     task,
                     tag="weight",
                     severity=INFO if given else WARNING,
@@ -71,7 +71,8 @@ def task_weight(setup: Setup, report: FindingSink) -> None:
                 and abs(task.value) > 6.3
             ):
                 report(
-                    f"the value of {called(task)} is {task.value:g}, and is in radians or metres",
+                    f"the value of {describe_object(task)} is {task.value:g}, expected radians or "
+                    "metres",
                     task,
                     tag="value",
                     severity=WARNING,
@@ -79,14 +80,14 @@ def task_weight(setup: Setup, report: FindingSink) -> None:
 
 
 @rule("OSIM854", "unreachable-task", severity=WARNING, about="document")
-def unreachable_task(setup: Setup, report: FindingSink) -> None:
-    """A coordinate that is to be fitted cannot move, or cannot reach its value.
+def report_unreachable_task(setup: Setup, report: FindingCollector) -> None:
+    """A coordinate of a task cannot move, or cannot reach its value.
 
-    Looks for tasks of locked coordinates, for values of which most are outside the range of a
+    Checks for tasks of locked coordinates, for tasks with most values outside the range of a
     clamped coordinate, and for locked coordinates that move in the file of values.
 
-    Inverse kinematics keeps a locked coordinate where the model has it, and a clamped one in its
-    range, without a word: knees stay straight, and other joints bend in their place.
+    Inverse kinematics keeps a locked coordinate at its default, and a clamped one in its range,
+    without a message: knees stay straight, and other joints bend instead.
 
     ```setup
       <InverseKinematicsTool name="ik">
@@ -107,9 +108,9 @@ def unreachable_task(setup: Setup, report: FindingSink) -> None:
     ```
     """
     coordinates: dict[str, Any] = {} if setup.tree is None else setup.tree.of_class("Coordinate")
-    angles = angles_of(setup)
-    for user in setup.having("ik_task_set", "coordinate_file"):
-        table = setup.table(user.coordinate_file)
+    angles = find_angles(setup)
+    for user in setup.find_having("ik_task_set", "coordinate_file"):
+        table = setup.read_table(user.coordinate_file)
         given: dict[str, list[float]] = {}
         for index, column in enumerate(table.columns if table is not None else (), 1):
             # Whatever the header says, this file is taken to be in degrees.
@@ -129,14 +130,14 @@ def unreachable_task(setup: Setup, report: FindingSink) -> None:
             outside = sum(not low - 0.01 <= value <= high + 0.01 for value in values)
             if coordinate.locked:
                 report(
-                    f"{called(coordinate)} is locked: the task moves nothing",
+                    f"{describe_object(coordinate)} is locked: the task has no effect",
                     task,
                     attribute="name",
                 )
             elif coordinate.clamped and 2 * outside > len(values):
                 report(
-                    f"most values for {called(coordinate)} are outside the range from {low:.4g} to {high:.4g} that it "
-                    "is clamped to",
+                    f"most values for {describe_object(coordinate)} are outside the range from "
+                    f"{low:.4g} to {high:.4g} that it is clamped to",
                     task,
                     attribute="name",
                 )
@@ -150,8 +151,8 @@ def unreachable_task(setup: Setup, report: FindingSink) -> None:
         ]
         if still:
             report(
-                f"{join_words(still)} {'is' if len(still) == 1 else 'are'} locked in the model, and moves in "
-                f"'{user.coordinate_file}'",
+                f"{join_words(still)} {'is' if len(still) == 1 else 'are'} locked in the model, and "
+                f"moves in '{user.coordinate_file}'",
                 user,
                 tag="coordinate_file",
             )

@@ -8,19 +8,19 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.io.tables.headers import MarkerHeader
-from osimlite.lint.posture import angles_of, coordinate_of
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
-from osimlite.lint.rules.setup_columns import motions
-from osimlite.lint.setup import Setup, is_given, members
+from osimlite.lint.posture import coordinate_name, find_angles
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.rules.setup_columns import find_motions
+from osimlite.lint.setup import Setup, is_given, select_members
 from osimlite.lint.table import Table
-from osimlite.lint.words import called
+from osimlite.lint.words import describe_object
 from osimlite.schema.base import Object
 from osimlite.schema.specs import field_specs
 from osimlite.schema.tree import is_a
 
 _FIRST_STATES = 0.03
 """For how long computed muscle control runs to find the states of muscles at the start, s."""
-_SEVERAL = 4
+_MIN_JOINTS = 4
 """So many joints do not all stay straight."""
 _USUAL_WINDOW = 0.01
 """The time over which its controls are found, if nothing is said, s."""
@@ -35,40 +35,41 @@ _FRAMES = {
     "any": _WHOLE.format("InverseDynamicsTool", "<time_range>0 0.05</time_range>"),
     "control": _WHOLE.format(
         "CMCTool",
-        "<desired_kinematics_file>leg.mot</desired_kinematics_file> <task_set_file>tasks.xml</task_set_file>",
+        "<desired_kinematics_file>leg.mot</desired_kinematics_file> "
+        "<task_set_file>tasks.xml</task_set_file>",
     ),
 }
 
 
 _FAULTS = """\
-01 time-count, error, in dynamics: A range of times has other than two. With less the tool fails, of more OpenSim takes
+01 time-count, error, in dynamics: A time range does not have two times. With fewer the tool fails, of more OpenSim uses
 the first two.
 - <time_range>0</time_range>
 + <time_range>0 0.5</time_range>
-02 few-rows, error, in any: A motion has less than six rows. OpenSim lays a spline through six at least.
+02 few-rows, error, in any: A motion has fewer than six rows. OpenSim needs at least six for its spline.
 - <coordinates_file>short.mot</coordinates_file>
 + <coordinates_file>leg.mot</coordinates_file>
-03 impossible-times, error, in dynamics: A tool or an analysis ends before it begins, or at no number. It fails, or goes
-by other times.
+03 impossible-times, error, in dynamics: A time range of a tool or an analysis is reversed or not a number. It fails, or
+uses other times.
 - <time_range>0.5 0</time_range>
 + <time_range>0 0.5</time_range>
-04 too-short-for-control, error, in control: Computed muscle control has too little time. It needs 0.03 s for the first
+04 too-short-for-control, error, in control: The time range of computed muscle control is too short. It needs 0.03 s for the first
 states, and one window.
 - <initial_time>0</initial_time> <final_time>0.02</final_time>
 + <initial_time>0</initial_time> <final_time>0.5</final_time>
-05 no-data-at-times, error, in dynamics: A tool runs wholly before or after its data. It fails or crashes.
+05 no-data-at-times, error, in dynamics: A tool runs completely before or after its data. It fails or crashes.
 - <time_range>5 6</time_range>
 + <time_range>0 0.5</time_range>
-06 stops-at-default, warning, in ik: A tool is given no end and its data go on. Inverse kinematics stops at 2 s: OpenSim
-4.6 means to take all there is, and does not.
+06 stops-at-default, warning, in ik: A tool has no end time and its data continue. Inverse kinematics stops at 2 s: OpenSim
+4.6 intends to use all data, but does not.
 - <marker_file>slow.trc</marker_file>
 + <marker_file>slow.trc</marker_file> <time_range>0 2.5</time_range>
-07 data-end-early, warning, in dynamics: The data end before the tool does. Some tools stop there without a word, others
-go on as a spline does.
+07 data-end-early, warning, in dynamics: The data end before the tool does. Some tools stop there without a message, others
+extrapolate a spline.
 - <time_range>0 9</time_range>
 + <time_range>0 0.5</time_range>
-08 data-begin-late, warning, in dynamics: The data begin after the tool does. Some tools begin there without a word,
-others before, as a spline does.
+08 data-begin-late, warning, in dynamics: The data begin after the tool does. Some tools begin there without a message,
+others extrapolate a spline.
 - <time_range>-1 0.5</time_range>
 + <time_range>0 0.5</time_range>
 """
@@ -78,46 +79,47 @@ others before, as a spline does.
     "OSIM844", "time-outside-data", severity=WARNING, about="document", faults=_FAULTS,
     frames={name: f"```setup\n{frame}\n```" for name, frame in _FRAMES.items()},
 )  # fmt: skip
-def time_outside_data(setup: Setup, report: FindingSink) -> None:
-    """A tool runs over times that its data do not have, or that make no sense.
+def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
+    """The time range of a tool is invalid or outside its data.
 
     Compares the times of a tool with those of the tables that it reads: markers, coordinates,
-    sensors. Computed muscle control needs 0.03 s and the time of one window.
+    sensors. Computed muscle control needs 0.03 s plus one window.
 
-    Inverse kinematics cuts the times to the data without a word. Without a time range it stops at 2
-    s: OpenSim 4.6 means to take all there is, and does not. Loads that end before the motion go on
-    as their spline leaves them. Times in the wrong order, or wholly outside the data (an error),
-    make the tools fail or crash.
+    Inverse kinematics cuts the times to the data without a message. Without a time range it stops
+    at 2 s: OpenSim 4.6 intends to use all data, but does not. Loads that end before the motion are
+    extrapolated by their spline. With times in the wrong order, or completely outside the data (an
+    error), the tools fail or crash.
     """
-    for item in setup.having("time_range"):
+    for item in setup.find_having("time_range"):
         count = len(item.time_range)
         if count != 2 and getattr(item, "apply", True):
             fate, severity = ("fails", ERROR) if count < 2 else ("takes the first two", WARNING)
             report(
-                f"a range has two times, this one {count}: OpenSim {fate}",
+                f"expected two times in a range, found {count}: OpenSim {fate}",
                 item,
                 tag="time_range",
                 severity=severity,
                 fault="time-count",
             )
-    for item, tag, motion in motions(setup):
+    for item, tag, motion in find_motions(setup):
         if 0 < motion.rows.count < 6:
             report(
-                f"'{getattr(item, tag)}' has {motion.rows.count} rows: OpenSim lays a spline through six at least",
+                f"'{getattr(item, tag)}' has {motion.rows.count} rows: OpenSim needs at least six "
+                "for its spline",
                 item,
                 tag=tag,
                 fault="few-rows",
             )
-    for item, tags, first, last in _ranges(setup):
+    for item, tags, first, last in _find_time_ranges(setup):
         if any(number != number for number in (first, last)):
             fate, severity = (
                 ("takes all times", WARNING)
                 if is_a(item, "IMUInverseKinematicsTool")
-                else ("refuses it", ERROR)
+                else ("rejects it", ERROR)
             )
             tag = tags[0] if first != first else tags[-1]
             report(
-                f"a time of {called(item)} is no number: OpenSim {fate}",
+                f"a time of {describe_object(item)} is not a number: OpenSim {fate}",
                 item,
                 tag=tag,
                 severity=severity,
@@ -129,13 +131,14 @@ def time_outside_data(setup: Setup, report: FindingSink) -> None:
         ):
             # Nobody knows which of the two is wrong.
             fate, severity = (
-                ("goes by the tool's times", WARNING)
+                ("uses the times of the tool", WARNING)
                 if is_a(item, "Analysis")
                 else ("fails", ERROR)
             )
             for tag in tags:
                 report(
-                    f"{called(item)} begins at {first:g} s and ends at {last:g} s: OpenSim {fate}",
+                    f"{describe_object(item)} begins at {first:g} s and ends at {last:g} s: "
+                    f"OpenSim {fate}",
                     item,
                     tag=tag,
                     severity=severity,
@@ -145,21 +148,24 @@ def time_outside_data(setup: Setup, report: FindingSink) -> None:
         window = getattr(item, "cmc_time_window", math.nan)
         if last - first < _FIRST_STATES + window:
             report(
-                f"{called(item)} runs for {last - first:.4g} s and needs {_FIRST_STATES + window:g} s for its first "
-                "controls: OpenSim fails",
+                f"{describe_object(item)} runs for {last - first:.4g} s and needs "
+                f"{_FIRST_STATES + window:g} s for its first controls: OpenSim fails",
                 item,
                 tag="cmc_time_window" if window > _USUAL_WINDOW else tags[-1],
                 fault="too-short-for-control",
             )
-        for name, kind in _data_of(item):
-            table = setup.table(name)
-            span = table.span if table is not None and not table.rows.of("order", "time") else None
+        for name, kind in _list_tables(item):
+            table = setup.read_table(name)
+            span = (
+                table.span if table is not None and not table.rows.select("order", "time") else None
+            )
             if table is None or span is None:
                 continue
             slack = max(table.step, 1e-9) * 1.01
             if first > span[1] + slack or last < span[0] - slack:
                 report(
-                    f"{called(item)} runs from {first:g} to {last:g} s, '{name}' has {span[0]:g} to {span[1]:g} s",
+                    f"{describe_object(item)} runs from {first:g} to {last:g} s, but '{name}' "
+                    f"covers {span[0]:g} to {span[1]:g} s",
                     item,
                     tag=tags[0] if first > span[1] else tags[-1],
                     fault="no-data-at-times",
@@ -167,13 +173,13 @@ def time_outside_data(setup: Setup, report: FindingSink) -> None:
                 continue
             specs = field_specs(type(item))
             said = [
-                setup.element_of(item, tag) is not None and not setup.noted(item, specs[tag])
+                setup.element_of(item, tag) is not None and not setup.has_note(item, specs[tag])
                 for tag in tags
             ]
             if not said[-1] and last < span[1] - slack:
                 report(
-                    f"{called(item)} has no {tags[-1]}: OpenSim stops at {last:g} s, and '{name}' goes on to "
-                    f"{span[1]:g} s",
+                    f"{describe_object(item)} has no {tags[-1]}: OpenSim stops at {last:g} s, but "
+                    f"'{name}' continues to {span[1]:g} s",
                     item,
                     tag=tags[-1],
                     fault="stops-at-default",
@@ -194,20 +200,20 @@ def time_outside_data(setup: Setup, report: FindingSink) -> None:
                 )
 
 
-def _ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, float]]:
-    for item in setup.having("time_range"):
+def _find_time_ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], float, float]]:
+    for item in setup.find_having("time_range"):
         if len(item.time_range) > 1 and getattr(item, "apply", True):
             yield item, ("time_range",), *item.time_range[:2]
-    for item in setup.having("initial_time", "final_time"):
+    for item in setup.find_having("initial_time", "final_time"):
         # Without times of their own Moco's tools take those of the data.
         if item.initial_time is not None and item.final_time is not None:
             yield item, ("initial_time", "final_time"), item.initial_time, item.final_time
-    for item in setup.named("Analysis"):
+    for item in setup.find_by_class("Analysis"):
         if item.start_time > item.end_time:
             yield item, ("start_time", "end_time"), item.start_time, item.end_time
 
 
-def _data_of(item: Any) -> Iterator[tuple[str, str]]:
+def _list_tables(item: Any) -> Iterator[tuple[str, str]]:
     """The tables that a tool reads over its times, with what happens where they end."""
     for tag in (
         "marker_file",
@@ -220,19 +226,21 @@ def _data_of(item: Any) -> Iterator[tuple[str, str]]:
             continue
         yield (
             getattr(item, tag, ""),
-            ": OpenSim takes what there is" if tag in ("marker_file", "orientations_file") else "",
+            ": OpenSim uses the available data"
+            if tag in ("marker_file", "orientations_file")
+            else "",
         )
 
 
 @rule("OSIM845", "loads-end-early", severity=WARNING, about="document")
-def loads_end_early(setup: Setup, report: FindingSink) -> None:
-    """Measured loads do not last as long as the run of the tool.
+def report_loads_end_early(setup: Setup, report: FindingCollector) -> None:
+    """Measured loads end before the run of the tool.
 
     Compares the times of the data of external loads with those of the tool, or of the motion that
-    the tool is given.
+    the tool reads.
 
-    Before the first and after the last row OpenSim goes straight on, without a word: forces grow to
-    thousands of newtons.
+    Before the first and after the last row OpenSim extrapolates linearly without a message: forces
+    grow to thousands of newtons.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -244,18 +252,18 @@ def loads_end_early(setup: Setup, report: FindingSink) -> None:
       </InverseDynamicsTool>
     ```
     """
-    for item, _, first, last in _ranges(setup):
-        loads: Any = setup.document(getattr(item, "external_loads_file", ""))
+    for item, _, first, last in _find_time_ranges(setup):
+        loads: Any = setup.read_document(getattr(item, "external_loads_file", ""))
         if loads is None or not hasattr(loads, "datafile"):
             continue
         beside = os.path.join(os.path.dirname(item.external_loads_file), loads.datafile)
-        table = setup.table(loads.datafile) or setup.table(beside)
-        span = table.span if table is not None and not table.rows.of("order", "time") else None
+        table = setup.read_table(loads.datafile) or setup.read_table(beside)
+        span = table.span if table is not None and not table.rows.select("order", "time") else None
         if table is None or span is None:
             continue
         for tag in ("coordinates_file", "states_file", "desired_kinematics_file"):
             name = getattr(item, tag, "")
-            motion = setup.table(name)
+            motion = setup.read_table(name)
             if motion is not None and motion.span is not None:
                 first, last = max(first, motion.span[0]), min(last, motion.span[1])
             elif is_given(name):
@@ -266,21 +274,21 @@ def loads_end_early(setup: Setup, report: FindingSink) -> None:
             math.isfinite(first) and first < span[0] - slack
         ):
             report(
-                f"the loads are measured from {span[0]:g} to {span[1]:g} s, the tool runs from {first:g} to {last:g} s",
+                f"the loads are measured from {span[0]:g} to {span[1]:g} s, but the tool runs "
+                f"from {first:g} to {last:g} s",
                 item,
                 tag="external_loads_file",
             )
 
 
 @rule("OSIM846", "filter-frequency", severity=WARNING, about="document")
-def filter_frequency(setup: Setup, report: FindingSink) -> None:
-    """A filter does not fit how often the data were measured.
+def report_filter_frequency(setup: Setup, report: FindingCollector) -> None:
+    """A filter does not fit the sampling rate of the data.
 
-    Compares the cut-off frequency with half the frequency of the rows, and points out a cut-off of
-    0.
+    Compares the cut-off frequency with half the sampling rate, and reports a cut-off of 0.
 
-    A filter above half the sampling frequency cannot be made: OpenSim takes another one. With 0,
-    nothing is left of the motion.
+    A filter above half the sampling rate is impossible: OpenSim uses another one. With 0, nothing
+    is left of the motion.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -291,29 +299,30 @@ def filter_frequency(setup: Setup, report: FindingSink) -> None:
       </InverseDynamicsTool>
     ```
     """
-    for item, tag, table in motions(setup):
+    for item, tag, table in find_motions(setup):
         for filter_tag in ("lowpass_cutoff_frequency_for_coordinates", "lowpass_cutoff_frequency"):
             cutoff = getattr(item, filter_tag, -1.0)
             if cutoff == 0.0:
-                report(f"{called(item)} filters the motion at 0 Hz", item, tag=filter_tag)
+                report(f"{describe_object(item)} filters the motion at 0 Hz", item, tag=filter_tag)
             elif table.step > 0.0 and cutoff > 0.5 / table.step:
                 report(
-                    f"{called(item)} filters at {cutoff:g} Hz, and '{getattr(item, tag)}' has {1.0 / table.step:.4g} "
-                    f"rows a second, of which {0.5 / table.step:.4g} Hz is the highest that can be filtered",
+                    f"{describe_object(item)} filters at {cutoff:g} Hz, and "
+                    f"'{getattr(item, tag)}' has {1.0 / table.step:.4g} rows a second, of which "
+                    f"{0.5 / table.step:.4g} Hz is the highest that can be filtered",
                     item,
                     tag=filter_tag,
                 )
 
 
 @rule("OSIM847", "motion-in-degrees", severity=WARNING, about="document")
-def motion_in_degrees(setup: Setup, report: FindingSink) -> None:
-    """Angles of a motion are in degrees, and OpenSim takes them for radians, or the other way round.
+def report_motion_in_degrees(setup: Setup, report: FindingCollector) -> None:
+    """Angles of a motion are in degrees and OpenSim reads them as radians, or vice versa.
 
-    Looks at the columns of rotational coordinates of a motion without `inDegrees=yes`: an angle of
-    more than 10 is no angle in radians that a joint takes. Of a motion that says so, the largest
-    angle of many joints is more than 3 degrees.
+    Looks at the columns of rotational coordinates of a motion without `inDegrees=yes`: no joint has
+    an angle of more than 10 radians. In a motion with `inDegrees=yes`, the largest angle of many
+    joints is more than 3 degrees.
 
-    Joint moments of hundreds of thousands, without a word.
+    Joint moments become hundreds of thousands of newton metres, without a message.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -323,54 +332,56 @@ def motion_in_degrees(setup: Setup, report: FindingSink) -> None:
       </InverseDynamicsTool>
     ```
     """
-    for item, tag, table in motions(setup):
+    for item, tag, table in find_motions(setup):
         header = table.header
         if isinstance(header, MarkerHeader) or setup.tree is None:
             continue
-        angles = angles_of(setup)
+        angles = find_angles(setup)
         places = [
             place
             for place, column in enumerate(table.columns, 1)
-            if coordinate_of(column) in angles
+            if coordinate_name(column) in angles
         ]
-        largest, place = _largest(table, places)
+        largest, place = _find_largest(table, places)
         label = table.labels[place].text
-        if header.in_degrees and 0.0 < largest < math.pi and len(places) >= _SEVERAL:
+        if header.in_degrees and 0.0 < largest < math.pi and len(places) >= _MIN_JOINTS:
             report(
-                f"'{getattr(item, tag)}' has inDegrees=yes, and its largest angle is {largest:.3g}: is it in radians?",
+                f"'{getattr(item, tag)}' has inDegrees=yes, and its largest angle is "
+                f"{largest:.3g}: is it in radians?",
                 item,
                 tag=tag,
             )
         elif largest > 10.0 and not header.in_degrees:
             report(
-                f"'{getattr(item, tag)}' does not say inDegrees=yes, and '{label}' is {largest:.4g} in it: OpenSim "
-                "takes it for radians",
+                f"'{getattr(item, tag)}' does not say inDegrees=yes, and '{label}' is "
+                f"{largest:.4g} in it: OpenSim takes it for radians",
                 item,
                 tag=tag,
                 severity=ERROR,
             )
-    for user, values in setup.with_tables(
-        setup.having("ik_task_set", "coordinate_file"), "coordinate_file"
+    for user, values in setup.iterate_with_tables(
+        setup.find_having("ik_task_set", "coordinate_file"), "coordinate_file"
     ):
         if isinstance(values.header, MarkerHeader) or values.header.in_degrees:
             continue
-        tasks = members(user.ik_task_set, "IKCoordinateTask")
+        tasks = select_members(user.ik_task_set, "IKCoordinateTask")
         read = {
             task.name for task in tasks if task.apply and task.value_type == "from_file"
-        } & angles_of(setup)
-        largest, place = _largest(
+        } & find_angles(setup)
+        largest, place = _find_largest(
             values, [k for k, column in enumerate(values.columns, 1) if column in read]
         )
         if 0.0 < largest < math.pi:
             report(
-                f"'{user.coordinate_file}' does not say inDegrees=yes, and '{values.labels[place].text}' is at most "
-                f"{largest:.3g} in it: inverse kinematics takes it for degrees, whatever the header says",
+                f"'{user.coordinate_file}' does not say inDegrees=yes, and "
+                f"'{values.labels[place].text}' is at most {largest:.3g} in it: inverse "
+                "kinematics takes it for degrees, whatever the header says",
                 user,
                 tag="coordinate_file",
             )
 
 
-def _largest(table: Table, places: list[int]) -> tuple[float, int]:
+def _find_largest(table: Table, places: list[int]) -> tuple[float, int]:
     """The largest number in some columns, and in which it is; zeros if there is none."""
     numbers = (
         (abs(sample[place]), place)

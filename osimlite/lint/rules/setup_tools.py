@@ -8,25 +8,25 @@ from collections.abc import Callable
 from typing import Any
 
 from osimlite.base.text import join_words
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
-from osimlite.lint.setup import Setup, is_given, members
-from osimlite.lint.words import called, nearest_name
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.setup import Setup, is_given, select_members
+from osimlite.lint.words import describe_object, find_nearest_name
 from osimlite.schema.tree import is_a
 
 _SETTINGS: tuple[tuple[str, str, str, Callable[[Any], bool], str], ...] = (
     ("pose-accuracy", "InverseKinematicsToolBase", "accuracy", lambda value: 0.01 < value < math.inf,
-     "the accuracy is {:g}: poses are hardly fitted at all"),
+     "the accuracy is {:g}: poses are barely fitted"),
     ("pose-accuracy", "InverseKinematicsToolBase", "accuracy", lambda value: value == 0.0,
      "an accuracy of 0 is never reached"),
     ("few-integrator-steps", "AbstractTool", "maximum_number_of_integrator_steps", lambda value: value < 10,
      "the run ends after {} steps"),
-    ("step-interval", "Analysis", "step_interval", lambda value: value < 1, "a step interval of {}"),
+    ("step-interval", "Analysis", "step_interval", lambda value: value < 1, "step_interval is {}, expected 1 or more"),
     ("unnamed-point", "PointKinematics", "point_name", lambda value: not value.strip(),
-     "results of a point without a name get no proper file"),
+     "results of a point without a name get no proper file name"),
     ("without-model-forces", "StaticOptimization", "use_model_force_set", lambda value: not value,
      "without the forces of the model OpenSim crashes"),
     ("activation-exponent", "StaticOptimization", "activation_exponent", lambda value: not value > 1.0,
-     "an exponent of {:g} leaves nothing to be made small"),
+     "with an exponent of {:g} the sum of activations has no unique minimum"),
     ("few-optimizer-iterations", "StaticOptimization", "optimizer_max_iterations", lambda value: value < 10,
      "the optimizer stops after {} iterations"),
     ("loose-optimizer-convergence", "StaticOptimization", "optimizer_convergence_criterion", lambda value: value > 0.05,
@@ -35,17 +35,17 @@ _SETTINGS: tuple[tuple[str, str, str, Callable[[Any], bool], str], ...] = (
 """By fault the class and the property, whether its value is none to work with, and what is said of it then."""
 
 
-def _tool(kind: str, *lines: str, model: str = "leg.osim") -> str:
+def _make_tool_example(kind: str, *lines: str, model: str = "leg.osim") -> str:
     inside = "".join(f"    {line}\n" for line in (f"<model_file>{model}</model_file>", *lines))
     return f'```setup\n<{kind} name="run">\n{inside}</{kind}>\n```'
 
 
-def _analysis(start: str, end: str = "", model: str = "leg.osim") -> str:
+def _make_analysis_example(start: str, end: str = "", model: str = "leg.osim") -> str:
     inside = f"{start}\n                {{}}\n            {end}" if end else "{}"
     objects = f"        <objects>\n            {inside}\n        </objects>"
     analyses = f'<AnalysisSet name="analyses">\n{objects}\n    </AnalysisSet>'
     settled = "<solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>"
-    return _tool(
+    return _make_tool_example(
         "AnalyzeTool",
         "<coordinates_file>leg.mot</coordinates_file>",
         settled,
@@ -60,18 +60,22 @@ _TRACKING = (
 )  # fmt: skip
 _MARKERS = "<marker_file>leg.trc</marker_file>", "<output_motion_file>ik.mot</output_motion_file>"
 FRAMES = {
-    "ik": _tool("InverseKinematicsTool", "{}", *_MARKERS),
-    "forward": _tool("ForwardTool", "{}"),
-    "rra": _tool("RRATool", *_TRACKING, "{}", model="muscle.osim"),
-    "analyze": _tool("AnalyzeTool", "<coordinates_file>leg.mot</coordinates_file>", "{}"),
-    "analyses": _analysis("", model="muscle.osim"),
-    "optimization": _analysis('<StaticOptimization name="optimization">', "</StaticOptimization>"),
-    "kinematics": _analysis('<Kinematics name="kinematics">', "</Kinematics>"),
-    "point": _analysis(
+    "ik": _make_tool_example("InverseKinematicsTool", "{}", *_MARKERS),
+    "forward": _make_tool_example("ForwardTool", "{}"),
+    "rra": _make_tool_example("RRATool", *_TRACKING, "{}", model="muscle.osim"),
+    "analyze": _make_tool_example(
+        "AnalyzeTool", "<coordinates_file>leg.mot</coordinates_file>", "{}"
+    ),
+    "analyses": _make_analysis_example("", model="muscle.osim"),
+    "optimization": _make_analysis_example(
+        '<StaticOptimization name="optimization">', "</StaticOptimization>"
+    ),
+    "kinematics": _make_analysis_example('<Kinematics name="kinematics">', "</Kinematics>"),
+    "point": _make_analysis_example(
         '<PointKinematics name="point"> <body_name>shank</body_name>', "</PointKinematics>"
     ),
-    "muscles": _analysis('<MuscleAnalysis name="muscles">', "</MuscleAnalysis>"),
-    "reaction": _analysis(
+    "muscles": _make_analysis_example('<MuscleAnalysis name="muscles">', "</MuscleAnalysis>"),
+    "reaction": _make_analysis_example(
         '<JointReaction name="loads"> <joint_names>hip knee</joint_names>', "</JointReaction>"
     ),
     "forces": '```setup\n<ForceSet name="forces">\n    <objects>\n        {}\n    </objects>\n</ForceSet>\n```',
@@ -80,44 +84,44 @@ FRAMES = {
 
 
 _FAULTS = """\
-01 pose-accuracy, warning, in ik: The accuracy of inverse kinematics is above 0.01, or 0. Poses are hardly fitted, or
+01 pose-accuracy, warning, in ik: The accuracy of inverse kinematics is above 0.01, or 0. Poses are barely fitted, or
 the search does not end.
 - <accuracy>0.5</accuracy>
 + <accuracy>1e-5</accuracy>
-02 few-integrator-steps, warning, in forward: A tool may take less than 10 steps. The run ends before its time.
+02 few-integrator-steps, warning, in forward: A tool may take fewer than 10 steps. The run ends early.
 - <maximum_number_of_integrator_steps>5</maximum_number_of_integrator_steps>
 + <maximum_number_of_integrator_steps>5000</maximum_number_of_integrator_steps>
-03 step-interval, warning, in kinematics: A step interval is below 1. It says after how many steps there is a row.
+03 step-interval, warning, in kinematics: A step interval is below 1. It is the number of steps between two rows.
 - <step_interval>0</step_interval>
 + <step_interval>1</step_interval>
-04 unnamed-point, warning, in point: The kinematics of a point are asked for without a name of it. The files of the
-results are called by that name.
+04 unnamed-point, warning, in point: A PointKinematics analysis has no name for its point. The files of the
+results are named after it.
 - <point_name></point_name>
 + <point_name>heel</point_name>
-05 without-model-forces, error, in optimization: The forces of the model are to be left out. OpenSim crashes.
+05 without-model-forces, error, in optimization: The forces of the model are excluded. OpenSim crashes.
 - <use_model_force_set>false</use_model_force_set>
 + <use_model_force_set>true</use_model_force_set>
-06 activation-exponent, warning, in optimization: The exponent of activations is 1 or less. Their sum is then no measure
-that has one smallest value.
+06 activation-exponent, warning, in optimization: The exponent of activations is 1 or less. The sum of activations then has no
+unique minimum.
 - <activation_exponent>1</activation_exponent>
 + <activation_exponent>2</activation_exponent>
-07 few-optimizer-iterations, warning, in optimization: The optimizer has under 10 iterations. It stops too early.
+07 few-optimizer-iterations, warning, in optimization: The optimizer may use fewer than 10 iterations. It stops too early.
 - <optimizer_max_iterations>5</optimizer_max_iterations>
 + <optimizer_max_iterations>100</optimizer_max_iterations>
-08 loose-optimizer-convergence, warning, in optimization: The optimizer may stop far from its goal. With a criterion
-above 0.05 activations stay as they come.
+08 loose-optimizer-convergence, warning, in optimization: The optimizer may stop far from the optimum. With a criterion
+above 0.05 activations are hardly optimized.
 - <optimizer_convergence_criterion>0.5</optimizer_convergence_criterion>
 + <optimizer_convergence_criterion>1e-4</optimizer_convergence_criterion>
 09 integrator-error-tolerance, error, in forward: The error tolerance of the integrator is not positive. It is never
-met, and OpenSim runs for ever.
+met, and OpenSim runs forever.
 - <integrator_error_tolerance>0</integrator_error_tolerance>
 + <integrator_error_tolerance>1e-5</integrator_error_tolerance>
-10 no-residual-forces, error, in rra: Residual reduction is given no forces. It controls what force_set_files have, and
+10 no-residual-forces, error, in rra: Residual reduction has no forces. It controls the forces of force_set_files, and
 fails without them.
   <replace_force_set>true</replace_force_set>
 + <force_set_files>residuals.xml</force_set_files>
-11 replaced-forces, warning, in analyze: The forces of the model are replaced. Its muscles are gone, and what is
-computed is that of another model.
+11 replaced-forces, warning, in analyze: The forces of the model are replaced. Its muscles are missing, and the results
+belong to another model.
 - <replace_force_set>true</replace_force_set>
 + <replace_force_set>false</replace_force_set>
   <AnalysisSet name="analyses"> <objects> <Kinematics name="kinematics"/> </objects> </AnalysisSet>
@@ -125,14 +129,14 @@ computed is that of another model.
   <force_set_files>residuals.xml</force_set_files>
 - <replace_force_set>false</replace_force_set>
 + <replace_force_set>true</replace_force_set>
-13 no-adjusted-body, error, in rra: A center of mass is to be moved, of no body. OpenSim refuses the setup.
+13 no-adjusted-body, error, in rra: A center of mass is adjusted without a body. OpenSim rejects the setup.
   <force_set_files>residuals.xml</force_set_files> <replace_force_set>true</replace_force_set>
   <adjust_com_to_reduce_residuals>true</adjust_com_to_reduce_residuals>
   <output_model_file>adjusted.osim</output_model_file>
 + <adjusted_com_body>thigh</adjusted_com_body>
-14 no-analysis, error, in analyze: An analyze tool has no analysis. OpenSim refuses it.
+14 no-analysis, error, in analyze: An analyze tool has no analysis. OpenSim rejects it.
 + <AnalysisSet name="analyses"> <objects> <Kinematics name="kinematics"/> </objects> </AnalysisSet>
-15 analysis-off, info, in kinematics: An analysis is off. It writes nothing.
+15 analysis-off, info, in kinematics: An analysis is disabled. It writes nothing.
 - <on>false</on>
 16 analyses-of-one-name, warning, in analyses: Two analyses have one name. They write to the same files.
 - <Kinematics name="run"/> <Kinematics name="run"/>
@@ -144,31 +148,31 @@ optimization fails without residual actuators.
 18 nothing-analyzed, warning, in kinematics: An analysis names no body or coordinate. Nothing is written.
 - <coordinates></coordinates>
 + <coordinates>all</coordinates>
-19 fibers-not-in-equilibrium, warning, in analyze: Muscles are analyzed at coordinates without equilibrium. Fibers stay
-at their default lengths, of which the coordinates tell nothing.
+19 fibers-not-in-equilibrium, warning, in analyze: Muscles are analyzed along coordinates without equilibrium. Fibers stay
+at their default lengths, independent of the coordinates.
   <AnalysisSet name="analyses"> <objects> <MuscleAnalysis name="muscles"/> </objects> </AnalysisSet>
 - <solve_for_equilibrium_for_auxiliary_states>false</solve_for_equilibrium_for_auxiliary_states>
 + <solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>
 20 no-moment-arm-coordinate, error, in muscles: A muscle analysis names no coordinate for moment arms. OpenSim fails.
 - <moment_arm_coordinate_list></moment_arm_coordinate_list>
 + <moment_arm_coordinate_list>all</moment_arm_coordinate_list>
-21 reaction-on-neither, error, mends unsafe, in reaction: A joint reaction is asked for on neither child nor parent.
-OpenSim knows these two words only, and refuses others.
+21 reaction-on-neither, error, fix unsafe, in reaction: A joint reaction is requested on neither child nor parent.
+OpenSim knows these two words only, and rejects others.
 - <apply_on_bodies>childs</apply_on_bodies>
 + <apply_on_bodies>child</apply_on_bodies>
 22 reaction-count, error, in reaction: Joints and the bodies that their reactions act on differ in number. OpenSim takes
-none, one for all, or one for each, and refuses else.
+none, one for all, or one for each, and rejects other numbers.
 - <apply_on_bodies>child parent child</apply_on_bodies>
 + <apply_on_bodies>child parent</apply_on_bodies>
-23 force-of-one-name, warning, in forces: A force that a tool adds is called as one of the model. It takes the place of
+23 force-of-one-name, warning, in forces: A force that a tool adds has the name of a force of the model. It replaces
 that.
 - <CoordinateActuator name="knee_limit"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
 + <CoordinateActuator name="reserve"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
-24 force-off, info, in forces: A force of a set is off. It does not act.
+24 force-off, info, in forces: A force of a set is disabled. It does not act.
   <CoordinateActuator name="reserve">
 - <appliesForce>false</appliesForce>
   <coordinate>knee_angle</coordinate> </CoordinateActuator>
-25 controller-off, info, in forward: A controller of a tool is off. What it would drive has no control.
+25 controller-off, info, in forward: A controller of a tool is disabled. Its actuators have no control.
   <ControllerSet name="controllers"> <objects>
 - <ControlSetController name="controls"> <enabled>false</enabled> </ControlSetController>
   </objects> </ControllerSet>
@@ -176,23 +180,24 @@ that.
 
 
 @rule("OSIM852", "tool-setting", severity=ERROR, about="document", faults=_FAULTS, frames=FRAMES)
-def tool_setting(setup: Setup, report: FindingSink) -> None:
-    """A tool has a setting with which it cannot work.
+def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
+    """A tool has a setting that makes it fail or has no effect.
 
-    Looks at accuracies and tolerances, steps, analyses, forces that are left out or replaced, and
-    what is off.
+    Checks accuracies and tolerances, steps, analyses, excluded or replaced forces, and disabled
+    parts.
 
-    Some make OpenSim crash or run for ever, some give other results without a word.
+    Some make OpenSim crash or run forever, some give wrong results without a message.
     """
     for fault, of_class, tag, is_wrong, told in _SETTINGS:
-        for item in setup.named(of_class):
+        for item in setup.find_by_class(of_class):
             value = getattr(item, tag)
             if is_wrong(value):
                 report(told.format(value), item, fault=fault, tag=tag)
-    for tool in setup.named("AbstractTool"):
+    for tool in setup.find_by_class("AbstractTool"):
         if not (tool.integrator_error_tolerance > 0.0 or is_a(tool, "AnalyzeTool")):
             report(
-                f"an error tolerance of {tool.integrator_error_tolerance:g} is never met: OpenSim runs for ever",
+                f"an error tolerance of {tool.integrator_error_tolerance:g} is never met: OpenSim "
+                "runs for ever",
                 tool,
                 tag="integrator_error_tolerance",
                 severity=None if is_a(tool, "ForwardTool") else WARNING,
@@ -200,7 +205,8 @@ def tool_setting(setup: Setup, report: FindingSink) -> None:
             )
         if is_a(tool, "RRATool") and not tool.force_set_files:
             report(
-                f"{called(tool)} is given no forces that it could control: OpenSim fails",
+                f"{describe_object(tool)} has no forces to control: OpenSim fails; name them in "
+                "force_set_files",
                 tool,
                 tag="force_set_files",
                 fault="no-residual-forces",
@@ -212,10 +218,10 @@ def tool_setting(setup: Setup, report: FindingSink) -> None:
                 tag="replace_force_set",
                 fault="replaced-forces",
             )
-        if is_a(tool, "RRATool") and not tool.replace_force_set and setup.names_of("Muscle"):
+        if is_a(tool, "RRATool") and not tool.replace_force_set and setup.list_names("Muscle"):
             report(
-                "the muscles of the model are left in it, and OpenSim crashes: the forces of force_set_files are to "
-                "replace them",
+                "the muscles stay in the model, and OpenSim crashes: the forces of "
+                "force_set_files must replace them",
                 tool,
                 tag="replace_force_set",
                 fault="muscles-left-in-model",
@@ -226,50 +232,56 @@ def tool_setting(setup: Setup, report: FindingSink) -> None:
             and not str(tool.adjusted_com_body).strip()
         ):
             report(
-                f"{called(tool)} is to move a center of mass, and adjusted_com_body names no body: OpenSim refuses it",
+                f"{describe_object(tool)} must move a center of mass, but adjusted_com_body names "
+                "no body: OpenSim rejects it",
                 tool,
                 tag="adjusted_com_body",
                 fault="no-adjusted-body",
             )
         if is_a(tool, "AnalyzeTool") and not tool.analysis_set.objects:
-            report(f"{called(tool)} has no analysis: OpenSim refuses it", tool, fault="no-analysis")
-    names = Counter(item.name for item in setup.named("Analysis"))
-    for analysis in setup.named("Analysis"):
+            report(
+                f"{describe_object(tool)} has no analysis: OpenSim rejects it",
+                tool,
+                fault="no-analysis",
+            )
+    names = Counter(item.name for item in setup.find_by_class("Analysis"))
+    for analysis in setup.find_by_class("Analysis"):
         if not analysis.on:
-            report(f"{called(analysis)} is off", analysis, tag="on", fault="analysis-off")
+            report(f"{describe_object(analysis)} is off", analysis, tag="on", fault="analysis-off")
         if names[analysis.name] > 1:
             names[analysis.name] = 0
             report(
-                f"two analyses are called '{analysis.name}', and write to the same files",
+                f"two analyses are named '{analysis.name}' and write to the same files",
                 analysis,
                 attribute="name",
                 fault="analyses-of-one-name",
             )
         if is_a(analysis, "StaticOptimization"):
-            carrying = _carried_by_none(setup)
+            carrying = _find_unactuated_coordinates(setup)
             if carrying:
                 report(
-                    f"no actuator moves {join_words(carrying)}: without residual actuators the optimizer fails",
+                    f"no actuator moves {join_words(carrying)}: without residual actuators the "
+                    "optimizer fails",
                     analysis,
                     fault="unactuated-root",
                 )
         for tag, what in (("bodies", "body"), ("coordinates", "coordinate")):
             if getattr(analysis, tag, None) == ():
                 report(
-                    f"{called(analysis)} names no {what}: nothing is written",
+                    f"{describe_object(analysis)} names no {what}: nothing is written",
                     analysis,
                     tag=tag,
                     fault="nothing-analyzed",
                 )
         if is_a(analysis, "MuscleAnalysis") and analysis.on:
-            for tool in setup.named("AnalyzeTool"):
+            for tool in setup.find_by_class("AnalyzeTool"):
                 if (
                     is_given(tool.coordinates_file)
                     and not tool.solve_for_equilibrium_for_auxiliary_states
                 ):
                     report(
-                        "coordinates tell nothing of fibers, which stay at their default lengths: "
-                        "solve_for_equilibrium_for_auxiliary_states is false",
+                        "coordinates do not determine fiber lengths, which stay at their "
+                        "defaults: solve_for_equilibrium_for_auxiliary_states is false",
                         tool,
                         tag="solve_for_equilibrium_for_auxiliary_states",
                         fault="fibers-not-in-equilibrium",
@@ -280,7 +292,7 @@ def tool_setting(setup: Setup, report: FindingSink) -> None:
             and not analysis.moment_arm_coordinate_list
         ):
             report(
-                "no coordinate for moment arms: OpenSim fails",
+                "no coordinate is given for moment arms: OpenSim fails",
                 analysis,
                 tag="moment_arm_coordinate_list",
                 fault="no-moment-arm-coordinate",
@@ -289,16 +301,17 @@ def tool_setting(setup: Setup, report: FindingSink) -> None:
             for word in analysis.apply_on_bodies:
                 if word.lower() not in ("child", "parent"):
                     report(
-                        f"'{word}' is neither child nor parent: OpenSim refuses it",
+                        f"'{word}' is neither child nor parent: OpenSim rejects it",
                         analysis,
                         tag="apply_on_bodies",
                         word=word,
-                        suggestion=nearest_name(word, ["child", "parent"]),
+                        suggestion=find_nearest_name(word, ["child", "parent"]),
                         fault="reaction-on-neither",
                     )
             if len(analysis.apply_on_bodies) not in (0, 1, len(analysis.joint_names)):
                 report(
-                    f"{len(analysis.apply_on_bodies)} words for {len(analysis.joint_names)} joints: OpenSim refuses it",
+                    f"{len(analysis.apply_on_bodies)} words for {len(analysis.joint_names)} "
+                    "joints: OpenSim rejects it",
                     analysis,
                     tag="apply_on_bodies",
                     fault="reaction-count",
@@ -306,35 +319,45 @@ def tool_setting(setup: Setup, report: FindingSink) -> None:
     user = setup.tool[1] if setup.tool is not None else None
     if setup.tree is not None and getattr(user, "replace_force_set", True) is False:
         present = {force.name for force in setup.tree.model.force_set.objects}
-        for force in (force for forces in setup.named("ForceSet") for force in forces.objects):
+        for force in (
+            force for forces in setup.find_by_class("ForceSet") for force in forces.objects
+        ):
             if force.name in present:
                 report(
-                    f"the model has a force '{force.name}' already, whose place this one takes",
+                    f"the model has a force '{force.name}', which this one replaces",
                     force,
                     attribute="name",
                     fault="force-of-one-name",
                 )
-    for forces in setup.named("ForceSet"):
-        for force in members(forces, "Force"):
+    for forces in setup.find_by_class("ForceSet"):
+        for force in select_members(forces, "Force"):
             if not force.appliesForce:
                 report(
-                    f"{called(force)} does not act", force, tag="appliesForce", fault="force-off"
+                    f"{describe_object(force)} does not act",
+                    force,
+                    tag="appliesForce",
+                    fault="force-off",
                 )
-    for controller in setup.named("Controller") if setup.tool is not None else ():
+    for controller in setup.find_by_class("Controller") if setup.tool is not None else ():
         if not controller.enabled:
             report(
-                f"{called(controller)} is off", controller, tag="enabled", fault="controller-off"
+                f"{describe_object(controller)} is off",
+                controller,
+                tag="enabled",
+                fault="controller-off",
             )
 
 
-def _carried_by_none(setup: Setup) -> list[str]:
+def _find_unactuated_coordinates(setup: Setup) -> list[str]:
     """The free coordinates of joints to ground, if nothing but paths between bodies acts in the model."""
     if setup.tree is None or not setup.tree.of_class("Actuator"):
         return []
-    files = setup.having("force_set_files")
-    if any(len(tool.force_set_files) > len(setup.added) for tool in files):
+    files = setup.find_having("force_set_files")
+    if any(len(tool.force_set_files) > len(setup.added_sets) for tool in files):
         return []
-    added = [force for _, top in setup.added for force in top.walk() if is_a(force, "Actuator")]
+    added = [
+        force for _, top in setup.added_sets for force in top.walk() if is_a(force, "Actuator")
+    ]
     if any(
         not is_a(force, "PathActuator")
         for force in (*setup.tree.of_class("Actuator").values(), *added)

@@ -9,36 +9,36 @@ from typing import Any
 
 from osimlite.base.text import join_words
 from osimlite.io.tables.headers import METRES
-from osimlite.lint.placement import on_base
-from osimlite.lint.posture import marker_places, model_subject
-from osimlite.lint.registry import WARNING, FindingSink, rule
-from osimlite.lint.rules.setup_markers import cells_of, rows_between
-from osimlite.lint.setup import Setup, members
+from osimlite.lint.placement import locate_frame
+from osimlite.lint.posture import locate_markers, make_model_subject
+from osimlite.lint.registry import WARNING, FindingCollector, rule
+from osimlite.lint.rules.setup_markers import iterate_rows_between, list_marker_cells
+from osimlite.lint.setup import Setup, select_members
 from osimlite.lint.table import Table
 from osimlite.schema.frames import Ground
 from osimlite.schema.tree import is_a
 
-_ALIKE = 0.3, 3.0
+_SIZE_RATIOS = 0.3, 3.0
 """Between these, the size of a body that was measured over that of the model can be believed."""
-_ROWS = 50
+_MAX_ROWS = 50
 """How many rows of markers are looked at."""
-_FEWEST = 3
+_MIN_MARKERS = 3
 """Markers that must be in both data and model."""
-_SLIGHT = 0.02
+_MAX_SLIGHT_SHARE = 0.02
 """Loads that are never more than this part of the weight of the model are doubted."""
-_WEIGHTS = 0.2, 10.0
+_WEIGHT_RANGE = 0.2, 10.0
 """In newtons, the largest load of a trial is between these parts of the weight of the model."""
 
 
 @rule("OSIM857", "marker-size", severity=WARNING, about="document")
-def marker_size(setup: Setup, report: FindingSink) -> None:
-    """The measured markers are spread over another size than those of the model.
+def report_marker_size(setup: Setup, report: FindingCollector) -> None:
+    """The measured markers have a different spread from those of the model.
 
     Compares the box around the markers of a frame, in the units that the file declares, with the
     box around the same markers of the model in its default pose. If these differ by more than a
-    factor of three, and in other units they would not, the rule names these units.
+    factor of three, and in other units they would not, the rule suggests these units.
 
-    OpenSim reads centimetres that are declared as millimetres without a word: inverse kinematics
+    OpenSim reads centimetres that are declared as millimetres without a message: inverse kinematics
     ends with errors of decimetres, and a scaled model has a tenth of the size.
 
     ```setup
@@ -51,55 +51,58 @@ def marker_size(setup: Setup, report: FindingSink) -> None:
       </InverseKinematicsTool>
     ```
     """
-    users = setup.having("marker_file", "time_range")
-    for user, table in setup.with_tables(users, "marker_file"):
+    users = setup.find_having("marker_file", "time_range")
+    for user, table in setup.iterate_with_tables(users, "marker_file"):
         units = table.entries.get("Units")
         unit = METRES.get(units.value.text) if units is not None else None
         if setup.tree is None or not table.is_markers or unit is None or units is None:
             continue
         if not getattr(user, "apply", True):
             continue
-        places, columns = marker_places(setup), dict(cells_of(table))
+        places, columns = locate_markers(setup), dict(list_marker_cells(table))
         names = [name for name in columns if name in places]
         sizes = []
-        for row in islice(rows_between(table, user.time_range), _ROWS):
+        for row in islice(iterate_rows_between(table, user.time_range), _MAX_ROWS):
             seen = {name: row[columns[name]] for name in names}
             seen = {
                 name: cells
                 for name, cells in seen.items()
                 if not any(map(math.isnan, cells)) and any(cells)
             }
-            if len(seen) >= _FEWEST and (own := _size([places[name] for name in seen])):
-                sizes.append(_size([*seen.values()]) / own)
+            if len(seen) >= _MIN_MARKERS and (
+                own := _measure_size([places[name] for name in seen])
+            ):
+                sizes.append(_measure_size([*seen.values()]) / own)
         if not sizes:
             continue
         ratio = sorted(sizes)[len(sizes) // 2]
-        low, high = _ALIKE
+        low, high = _SIZE_RATIOS
         better = [name for name in ("m", "cm", "mm") if low <= ratio * METRES[name] <= high]
         if better and not low <= ratio * unit <= high:
             report(
-                f"the markers of '{user.marker_file}' are spread over {ratio * unit:.3g} of the size that they have in "
-                f"the model if the units are '{units.value.text}', as the file says: are they in {better[0]}?",
+                f"the markers of '{user.marker_file}' are spread over {ratio * unit:.3g} of the "
+                f"size that they have in the model if the units are '{units.value.text}', as the "
+                f"file says: are they in {better[0]}?",
                 user,
                 tag="marker_file",
             )
 
 
-def _size(points: Sequence[Sequence[float]]) -> float:
+def _measure_size(points: Sequence[Sequence[float]]) -> float:
     """The diagonal of the box around points."""
     return math.hypot(*(max(axis) - min(axis) for axis in zip(*points, strict=True)))
 
 
 @rule("OSIM858", "load-units", severity=WARNING, about="document")
-def load_units(setup: Setup, report: FindingSink) -> None:
+def report_load_units(setup: Setup, report: FindingCollector) -> None:
     """Measured loads are too small for the model, as if they were in kilonewtons.
 
     Adds up the sizes of all measured forces in each row, and compares the largest sum with the
-    weight of the model. If it is less than 2 % of that, and a thousand times as much would be right
-    for forces of the ground, the rule reports it.
+    weight of the model. Reports the loads if the sum is less than 2 % of the weight, and a thousand
+    times as much would be plausible for ground reactions.
 
-    OpenSim takes all forces for newtons, whatever the header of the file says: the residual forces
-    of inverse dynamics are then the whole weight.
+    OpenSim reads all forces in newtons, whatever the header of the file says: the residual forces
+    of inverse dynamics then equal the whole weight.
 
     ```setup
       <ExternalLoads name="loads">
@@ -120,21 +123,21 @@ def load_units(setup: Setup, report: FindingSink) -> None:
     model: Any = setup.tree.model
     mass = sum(body.mass for body in setup.tree.members("/bodyset", "Body").values())
     weight = mass * math.hypot(*model.gravity)
-    for loads, table in setup.with_tables(setup.named("ExternalLoads"), "datafile"):
-        largest = _largest_load(
-            [force for force in members(loads, "ExternalForce") if force.appliesForce], table
+    for loads, table in setup.iterate_with_tables(setup.find_by_class("ExternalLoads"), "datafile"):
+        largest = _find_largest_load(
+            [force for force in select_members(loads, "ExternalForce") if force.appliesForce], table
         )
-        low, high = _WEIGHTS
-        if 0.0 < largest < _SLIGHT * weight and low <= 1000.0 * largest / weight <= high:
+        low, high = _WEIGHT_RANGE
+        if 0.0 < largest < _MAX_SLIGHT_SHARE * weight and low <= 1000.0 * largest / weight <= high:
             report(
-                f"the forces of '{loads.datafile}' are never larger than {largest:.3g} N together, and the model "
-                f"weighs {weight:.0f} N: are they in kilonewtons?",
+                f"the forces of '{loads.datafile}' are never larger than {largest:.3g} N "
+                f"together, and the model weighs {weight:.0f} N: are they in kilonewtons?",
                 loads,
                 tag="datafile",
             )
 
 
-def _largest_load(forces: Sequence[Any], table: Table) -> float:
+def _find_largest_load(forces: Sequence[Any], table: Table) -> float:
     """The largest sum, N, of the sizes of some forces in a row of their table."""
     prefixes = [str(force.force_identifier) for force in forces if force.force_identifier]
     places = [
@@ -151,14 +154,14 @@ def _largest_load(forces: Sequence[Any], table: Table) -> float:
 
 
 @rule("OSIM859", "ground-twice", severity=WARNING, about="document")
-def ground_twice(setup: Setup, report: FindingSink) -> None:
-    """A contact of the model and a measured load both push a body from the ground.
+def report_ground_twice(setup: Setup, report: FindingCollector) -> None:
+    """A contact force of the model and a measured load act on the same body.
 
     Looks for measured forces on bodies that have contact surfaces, and for contact forces of the
     model between such a surface and one that is fixed to ground, which the tool does not exclude.
 
-    OpenSim lets both act: the ground pushes twice, and the residual forces are as large as the
-    weight. Exclude the contact forces by `forces_to_exclude`, or switch them off in the model.
+    OpenSim applies both: the ground reaction counts twice, and the residual forces are as large as
+    the weight. Exclude the contact forces with `forces_to_exclude`, or disable them in the model.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -173,21 +176,21 @@ def ground_twice(setup: Setup, report: FindingSink) -> None:
     """
     if setup.tree is None:
         return
-    for tool in setup.having("external_loads_file"):
+    for tool in setup.find_having("external_loads_file"):
         # A goal that tracks measured contact forces compares the loads and does not apply them.
         if getattr(tool, "replace_force_set", False) or is_a(tool, "MocoGoal"):
             continue
-        loads: Any = setup.document(tool.external_loads_file)
+        loads: Any = setup.read_document(tool.external_loads_file)
         if loads is None or not is_a(loads, "ExternalLoads"):
             continue
         loaded = {
             str(force.applied_to_body).rpartition("/")[2]
-            for force in members(loads, "ExternalForce")
+            for force in select_members(loads, "ExternalForce")
             if force.appliesForce
         }
         twice = [
             (force, body)
-            for force, bodies in _ground_contacts(setup)
+            for force, bodies in _find_ground_contacts(setup)
             if not _is_excluded(setup, tool, force)
             for body in sorted(bodies & loaded)
         ]
@@ -198,23 +201,24 @@ def ground_twice(setup: Setup, report: FindingSink) -> None:
                 "forces_to_exclude" if hasattr(tool, "forces_to_exclude") else "external_loads_file"
             )
             report(
-                f"{names} of the model and the loads of '{tool.external_loads_file}' both push {bodies} from the "
-                "ground: exclude the contact forces, or the ground counts twice",
+                f"{names} of the model and the loads of '{tool.external_loads_file}' both push "
+                f"{bodies} from the ground: exclude the contact forces, or the ground counts twice",
                 tool,
                 tag=tag,
             )
 
 
-def _ground_contacts(setup: Setup) -> Iterator[tuple[Any, set[str]]]:
+def _find_ground_contacts(setup: Setup) -> Iterator[tuple[Any, set[str]]]:
     """Every force of the model that acts between surfaces on ground and on bodies, with the names of these bodies."""
-    subject = model_subject(setup)
-    for force in subject.named("Force"):
+    subject = make_model_subject(setup)
+    for force in subject.find_by_class("Force"):
         if not force.appliesForce:
             continue
         bases = [
             base[0]
-            for surface in _surfaces(setup, force)
-            if (base := on_base(subject, subject.target_of(surface, "socket_frame"))) is not None
+            for surface in _find_surfaces(setup, force)
+            if (base := locate_frame(subject, subject.target_of(surface, "socket_frame")))
+            is not None
         ]
         if any(isinstance(base, Ground) for base in bases):
             names = {str(base.name) for base in bases if not isinstance(base, Ground)}
@@ -222,9 +226,9 @@ def _ground_contacts(setup: Setup) -> Iterator[tuple[Any, set[str]]]:
                 yield force, names
 
 
-def _surfaces(setup: Setup, force: Any) -> Iterator[Any]:
+def _find_surfaces(setup: Setup, force: Any) -> Iterator[Any]:
     """The contact surfaces that a force names."""
-    subject = model_subject(setup)
+    subject = make_model_subject(setup)
     for use in subject.uses:
         if use.owner is force:
             target = subject.resolution(use).target

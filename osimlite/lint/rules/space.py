@@ -8,11 +8,11 @@ from functools import cache
 from itertools import combinations
 
 from osimlite.base.text import join_words
-from osimlite.lint.placement import Pose, default_poses, fixed, on_base
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, Threshold, rule
-from osimlite.lint.skeleton import base_of
+from osimlite.lint.placement import FramePose, compute_default_poses, locate_frame, make_offset
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, Threshold, rule
+from osimlite.lint.skeleton import find_base
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity
+from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.base import Component, Object
 from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
 from osimlite.schema.fields import Value
@@ -27,15 +27,14 @@ POINTS = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_p
 
 
 @rule("OSIM411", "degenerate-frame", severity=ERROR)
-def degenerate_frame(subject: Subject, report: FindingSink) -> None:
-    """The points of a frame do not make a frame.
+def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
+    """The points of a frame do not define a frame.
 
-    Reports frames laid through stations of which two of the three that give the axes are in the
-    same place, or which are fixed to different bodies; and offset frames that are fixed to
-    themselves, or to each other in a circle.
+    Reports StationDefinedFrames with two of the three stations that define the axes at the same
+    location, or with stations on different bodies; and offset frames that are fixed to themselves,
+    or to each other in a cycle.
 
-    OpenSim refuses the model. It never comes to an end with several frames on each other to which a
-    joint leads.
+    OpenSim rejects the model. It hangs if a joint refers to one of several frames in a cycle.
 
     ```xml
       <ComponentSet>
@@ -58,7 +57,7 @@ def degenerate_frame(subject: Subject, report: FindingSink) -> None:
     ```
     """
     followed: set[int] = set()
-    for offset in subject.each(PhysicalOffsetFrame):
+    for offset in subject.find_instances(PhysicalOffsetFrame):
         way: dict[int, PhysicalOffsetFrame] = {}
         here: Component | None = offset
         while isinstance(here, PhysicalOffsetFrame) and id(here) not in followed:
@@ -67,28 +66,29 @@ def degenerate_frame(subject: Subject, report: FindingSink) -> None:
             here = subject.target_of(here, "socket_parent")
         # The way ends on itself: what it passed since it was here first is the circle.
         circle = list(way.values())[list(way).index(id(here)) :] if id(here) in way else []
-        consequence = _fate_of_circle(subject, circle) if circle else ""
+        consequence = _describe_circle(subject, circle) if circle else ""
         for link in circle:
-            report(f"{called(link)} is fixed to {consequence}", link, tag="socket_parent")
-    laid = list(subject.each(StationDefinedFrame))
-    circles = _on_circles(subject, laid)
+            report(f"{describe_object(link)} is fixed to {consequence}", link, tag="socket_parent")
+    laid = list(subject.find_instances(StationDefinedFrame))
+    circles = _find_circles(subject, laid)
     for frame in laid:
         if id(frame) in circles:
             report(
-                f"{called(frame)} is laid through a point on itself: OpenSim never comes to an end",
+                f"{describe_object(frame)} is defined through a point that is fixed to it: "
+                "OpenSim hangs",
                 frame,
             )
             continue
         points = [subject.target_of(frame, tag) for tag in POINTS]
         stations = [point for point in points if isinstance(point, Station)]
         places = [
-            on_base(subject, subject.target_of(station, "socket_parent_frame"))
+            locate_frame(subject, subject.target_of(station, "socket_parent_frame"))
             for station in stations
         ]
         if len(stations) < 4:
             continue
         fixed_to = [
-            base_of(subject, subject.target_of(station, "socket_parent_frame"))
+            find_base(subject, subject.target_of(station, "socket_parent_frame"))
             for station in stations
         ]
         stray = next(
@@ -97,44 +97,45 @@ def degenerate_frame(subject: Subject, report: FindingSink) -> None:
         )
         if fixed_to[0] is not None and stray is not None:
             report(
-                f"{called(stations[stray])} of {called(frame)} is fixed to {called(fixed_to[stray] or frame)}, "
-                f"{called(stations[0])} to {called(fixed_to[0])}: OpenSim refuses the model",
+                f"{describe_object(stations[stray])} of {describe_object(frame)} is fixed to "
+                f"{describe_object(fixed_to[stray] or frame)}, {describe_object(stations[0])} to "
+                f"{describe_object(fixed_to[0])}: OpenSim rejects the model",
                 frame,
                 tag=POINTS[stray],
             )
             continue
         spots = [
-            place[1].of(station.location) if place else None
+            place[1].transform_point(station.location) if place else None
             for place, station in zip(places, stations, strict=True)
         ]
         for one, other in combinations(range(3), 2):
             if spots[one] is not None and spots[one] == spots[other]:
                 report(
-                    f"{POINTS[one]} and {POINTS[other]} of {called(frame)} are in the same place: OpenSim refuses "
-                    "the model",
+                    f"{POINTS[one]} and {POINTS[other]} of {describe_object(frame)} are at the "
+                    "same location: OpenSim rejects the model",
                     frame,
                     tag=POINTS[other],
                 )
                 break
 
 
-def _fate_of_circle(subject: Subject, circle: Sequence[PhysicalOffsetFrame]) -> str:
+def _describe_circle(subject: Subject, circle: Sequence[PhysicalOffsetFrame]) -> str:
     """Return what frames in a circle are fixed to, and what OpenSim 4.6 does (measured)."""
     if len(circle) == 1:
-        return "itself: OpenSim refuses the model"
+        return "itself: OpenSim rejects the model"
     names = join_words([f"'{frame.name}'" for frame in circle])
     through = f"itself, through {names}"
     members = {id(frame) for frame in circle}
-    for joint in subject.each(Joint):
+    for joint in subject.find_instances(Joint):
         for tag in ("socket_parent_frame", "socket_child_frame"):
             frame = subject.target_of(joint, tag)
             seen: set[int] = set()
             while isinstance(frame, PhysicalOffsetFrame) and id(frame) not in seen:
                 if id(frame) in members:
-                    return f"{through}: OpenSim never comes to an end"
+                    return f"{through}: OpenSim hangs"
                 seen.add(id(frame))
                 frame = subject.target_of(frame, "socket_parent")
-    return f"{through}: OpenSim refuses the model"
+    return f"{through}: OpenSim rejects the model"
 
 
 DEPTH = Threshold("contact-depth", 1e-3, "m", "surfaces may start this deep inside each other")
@@ -145,17 +146,16 @@ LENGTH = Threshold("largest-length", 10.0, "m", "nothing on a body is longer")
 
 
 @rule("OSIM521", "starts-in-contact", severity=INFO, thresholds=(DEPTH, DEPTH_SHARE))
-def starts_in_contact(subject: Subject, report: FindingSink) -> None:
+def report_starts_in_contact(subject: Subject, report: FindingCollector) -> None:
     """Contact surfaces are inside each other in the default pose.
 
-    Puts the model in its default pose and reports balls that start inside a half-space or another
-    ball of their contact force, by more than 1 mm and a tenth of the radius. It is a warning if the
-    middle of the ball is inside. Only bodies whose place plain arithmetic tells are looked at:
-    those that hang on joints made of plain rotations and translations, or on custom joints without
-    a GCVSpline. Meshes and other shapes are left out.
+    Poses the model at its defaults and reports spheres that start inside a half-space or another
+    sphere of their contact force, by more than 1 mm and a tenth of the radius. It is a warning if
+    the centre of the sphere is inside. Only bodies on joints of plain rotations and translations,
+    or on custom joints without a GCVSpline, are checked. Meshes and other shapes are not.
 
-    The contact pushes with full force from the first instant: the model is thrown up, and the
-    integrator takes tiny steps. Often the floor or a default value is in the wrong place.
+    The contact acts with full force from the start: the model is thrown up, and the integrator
+    takes tiny steps. Often the position of the floor or a default value is wrong.
 
     ```xml
       <ContactSphere name="heel">
@@ -165,19 +165,21 @@ def starts_in_contact(subject: Subject, report: FindingSink) -> None:
     ```
     """
     deep, share = subject.config.value_of(DEPTH), subject.config.value_of(DEPTH_SHARE)
-    for force, surfaces in _contact_groups(subject):
+    for force, surfaces in _find_contact_groups(subject):
         for one, other in combinations(surfaces, 2):
             ball, against = (one, other) if isinstance(one, ContactSphere) else (other, one)
             if not isinstance(ball, ContactSphere):
                 continue
-            depth = _depth(subject, ball, against)
+            depth = _compute_depth(subject, ball, against)
             if depth is None or not depth > max(deep, share * ball.radius):
                 continue
             sunk = isinstance(against, ContactHalfSpace) and depth > ball.radius
             report(
-                f"{called(ball)} starts {quantity(1000 * depth, 'mm')} deep in {called(against)} of {called(force)}"
+                f"{describe_object(ball)} starts {format_quantity(1000 * depth, 'mm')} deep in "
+                f"{describe_object(against)} of {describe_object(force)}"
                 + (
-                    f"; its middle is inside, its radius is {quantity(1000 * ball.radius, 'mm')}"
+                    "; its middle is inside, its radius is "
+                    f"{format_quantity(1000 * ball.radius, 'mm')}"
                     if sunk
                     else ""
                 ),
@@ -188,14 +190,14 @@ def starts_in_contact(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM522", "lengths-in-millimetres", severity=WARNING, thresholds=(LENGTH,))
-def lengths_in_millimetres(subject: Subject, report: FindingSink) -> None:
+def report_lengths_in_millimetres(subject: Subject, report: FindingCollector) -> None:
     """A length on a body is longer than ten metres.
 
-    Reports lengths and places, given in the frame of a body, beyond 10 m. What is fixed to ground
-    may be far away, and prescribed or infinite values are not looked at.
+    Reports lengths and positions in the frame of a body beyond 10 m. Objects fixed to ground may be
+    far away, and prescribed or infinite values are not checked.
 
-    OpenSim works in metres. A place in millimetres is a thousand times too far out, and what is
-    fixed there has a lever arm to match.
+    OpenSim works in metres. A position in millimetres is a thousand times too far away, and so is
+    the lever arm.
 
     ```xml
       <Marker name="asis">
@@ -206,7 +208,7 @@ def lengths_in_millimetres(subject: Subject, report: FindingSink) -> None:
     """
     longest = subject.config.value_of(LENGTH)
     for cls, items in subject.by_class.items():
-        specs = _lengths(cls)
+        specs = _list_lengths(cls)
         for item in items if specs else ():
             for spec in specs:
                 value = item.__dict__[spec.name]
@@ -220,13 +222,14 @@ def lengths_in_millimetres(subject: Subject, report: FindingSink) -> None:
                 # Almost all are small; with NaN among them no comparison need be true.
                 if not numbers or (-longest <= min(numbers) and max(numbers) <= longest):
                     continue
-                if not any(longest < abs(number) < math.inf for number in numbers) or not _on_body(
-                    subject, item
-                ):
+                if not any(
+                    longest < abs(number) < math.inf for number in numbers
+                ) or not _is_on_body(subject, item):
                     continue
                 better = " ".join(f"{number / 1000:.6g}" for number in numbers)
                 report(
-                    f"{subject.titled(item, spec)} is {quantity(value, 'm')}; in millimetres?",
+                    f"{subject.describe_property(item, spec)} is {format_quantity(value, 'm')}; "
+                    "is it in millimetres?",
                     item,
                     tag=spec.tag,
                     suggestion=better,
@@ -234,7 +237,7 @@ def lengths_in_millimetres(subject: Subject, report: FindingSink) -> None:
 
 
 @cache
-def _lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
+def _list_lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
     """The properties of a class that are lengths or places, in metres."""
     return tuple(
         spec
@@ -244,15 +247,14 @@ def _lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
 
 
 @rule("OSIM415", "no-direction", severity=ERROR)
-def no_direction(subject: Subject, report: FindingSink) -> None:
-    """A direction has no length.
+def report_no_direction(subject: Subject, report: FindingCollector) -> None:
+    """A direction vector is zero.
 
-    Reports lines, axes and directions of constraints and actuators that are 0 0 0. The line of a
-    PointOnLineConstraint is so if nobody gives it. Of an actuator with `appliesForce` false it is a
-    warning.
+    Reports lines, axes and directions of constraints and actuators that are 0 0 0. The default line
+    of a PointOnLineConstraint is zero. For an actuator with `appliesForce` false it is a warning.
 
-    OpenSim makes NaN of a direction without length, whatever the force: every acceleration is NaN,
-    without a message.
+    OpenSim normalises the direction to NaN, whatever the force: every acceleration is NaN, without
+    a message.
 
     ```xml
       <PointActuator name="push">
@@ -266,21 +268,22 @@ def no_direction(subject: Subject, report: FindingSink) -> None:
         ("PointActuator", "direction"),
         ("TorqueActuator", "axis"),
     ):
-        for item in subject.named(cls):
+        for item in subject.find_by_class(cls):
             if not any(getattr(item, tag)):
                 is_off = not getattr(item, "appliesForce", True)
                 fate = (
                     "it does not act" if is_off else "accelerations become NaN, without a message"
                 )
                 report(
-                    f"{subject.titled(item, type(item).field_specs()[tag])} is 0 0 0: {fate}",
+                    f"{subject.describe_property(item, type(item).field_specs()[tag])} is 0 0 0: "
+                    f"{fate}",
                     item,
                     tag=tag,
                     severity=WARNING if is_off else None,
                 )
 
 
-def _on_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
+def _find_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
     """Ids of what one comes back to from itself, by the points of frames and the frames that these are on.
 
     R. Tarjan's strongly connected components (1972), each looked at once.
@@ -299,7 +302,7 @@ def _on_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
                 number[here] = lowest[here] = len(number)
                 path.append(entering)
                 open_ids.add(here)
-                pending.append((entering, _below(subject, entering)))
+                pending.append((entering, _list_supports(subject, entering)))
             owner, below = pending[-1]
             entering = next(
                 (item for item in below if id(item) not in number or id(item) in open_ids), None
@@ -322,7 +325,7 @@ def _on_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
     return result
 
 
-def _below(subject: Subject, item: Component) -> Iterator[Component]:
+def _list_supports(subject: Subject, item: Component) -> Iterator[Component]:
     """What a frame or a station rests on."""
     for tag in (*POINTS, "socket_parent_frame", "socket_parent"):
         target = subject.target_of(item, tag)
@@ -330,14 +333,14 @@ def _below(subject: Subject, item: Component) -> Iterator[Component]:
             yield target
 
 
-def _on_body(subject: Subject, item: Object) -> bool:
+def _is_on_body(subject: Subject, item: Object) -> bool:
     """Whether an object is fixed to bodies, so that nothing about it can be ten metres long."""
     owner: Component | None = subject.owner(item)
     if isinstance(owner, Body):
         return True
     for tag in ("socket_parent_frame", "socket_parent", "socket_frame"):
         if owner is not None and tag in type(owner).field_specs():
-            return isinstance(base_of(subject, subject.target_of(owner, tag)), Body)
+            return isinstance(find_base(subject, subject.target_of(owner, tag)), Body)
     # No muscle, ligament or spring along a path is as long either.
     if owner is not None and any(is_a(owner, cls) for cls in ("Muscle", "Ligament", "PathSpring")):
         return True
@@ -348,12 +351,12 @@ def _on_body(subject: Subject, item: Object) -> bool:
     return above is not None
 
 
-def _contact_groups(subject: Subject) -> Iterator[tuple[Component, list[ContactGeometry]]]:
+def _find_contact_groups(subject: Subject) -> Iterator[tuple[Component, list[ContactGeometry]]]:
     """The surfaces that each contact force sets against each other."""
     forces = {
         id(force)
         for kind in ("HuntCrossleyForce", "SmoothSphereHalfSpaceForce")
-        for force in subject.named(kind)
+        for force in subject.find_by_class(kind)
     }
     groups: dict[int, tuple[Component, list[ContactGeometry]]] = {}
     for use in subject.uses if forces else ():
@@ -366,24 +369,28 @@ def _contact_groups(subject: Subject) -> Iterator[tuple[Component, list[ContactG
     yield from groups.values()
 
 
-def _depth(subject: Subject, ball: ContactSphere, other: ContactGeometry) -> float | None:
+def _compute_depth(subject: Subject, ball: ContactSphere, other: ContactGeometry) -> float | None:
     """How deep a ball is in another surface (m), negative if they are apart; None if nobody can tell."""
-    inner, outer = _in_ground(subject, ball), _in_ground(subject, other)
+    inner, outer = _locate_surface(subject, ball), _locate_surface(subject, other)
     if inner is None or outer is None or inner[0] is outer[0]:
         return None
     centre = inner[1].position
     if isinstance(other, ContactHalfSpace):
         # It fills the side of its frame where x is positive.
-        return outer[1].inverse().of(centre)[0] + ball.radius
+        return outer[1].inverse().transform_point(centre)[0] + ball.radius
     if isinstance(other, ContactSphere):
         return ball.radius + other.radius - math.dist(centre, outer[1].position)
     return None
 
 
-def _in_ground(subject: Subject, surface: ContactGeometry) -> tuple[Component, Pose] | None:
+def _locate_surface(
+    subject: Subject, surface: ContactGeometry
+) -> tuple[Component, FramePose] | None:
     """The body a surface is fixed to, and where the surface is in ground."""
-    place = on_base(subject, subject.target_of(surface, "socket_frame"))
-    pose = default_poses(subject).get(id(place[0])) if place is not None else None
+    place = locate_frame(subject, subject.target_of(surface, "socket_frame"))
+    pose = compute_default_poses(subject).get(id(place[0])) if place is not None else None
     if place is None or pose is None:
         return None
-    return place[0], pose.then(place[1]).then(fixed(surface.orientation, surface.location))
+    return place[0], pose.compose(place[1]).compose(
+        make_offset(surface.orientation, surface.location)
+    )

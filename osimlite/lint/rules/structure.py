@@ -12,12 +12,12 @@ from osimlite.io.document.lexical import reads_as
 from osimlite.io.document.notes import Note
 from osimlite.io.document.source import Source
 from osimlite.lint.diagnostic import Fix, Severity
-from osimlite.lint.fixes import as_comment, renamed, without_element
+from osimlite.lint.fixes import comment_out, remove_element, rename_tag
 from osimlite.lint.old_tags import Successor, is_comment, reason_unused, successor
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
-from osimlite.lint.rules.classes import part_for, set_for, wrapper_for
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.rules.classes import find_part, find_set, find_wrapper
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import a, called, shown
+from osimlite.lint.words import describe_object, format_value, with_article
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.model import CURRENT_VERSION, Model
@@ -25,21 +25,20 @@ from osimlite.schema.registry import classes_mentioning
 from osimlite.schema.specs import FieldSpec, field_specs
 
 
-@rule("OSIM101", "unknown-tag", severity=ERROR, mends="both")
-def unknown_tag(subject: Subject, report: FindingSink) -> None:
-    """An element is no property of the object it stands in.
+@rule("OSIM101", "unknown-tag", severity=ERROR, fixes="both")
+def report_unknown_tag(subject: Subject, report: FindingCollector) -> None:
+    """An element is not a property of its object.
 
-    Reports child elements that their class does not have: misspelt, in the wrong case, of another
-    class, or of another version. Names the nearest right tag.
+    Reports child elements that the class does not have: misspelt, in the wrong case, of another
+    class, or of another version. Suggests the nearest correct tag.
 
-    OpenSim drops such an element without a word and keeps the default. A misspelt `<stiffness>` of
-    a contact is 0, and the motion becomes NaN; a misspelt `<ForceSet>` is a model without forces. A
-    setup may hold what older versions
-    understood: that is a warning, or an information if the element is empty or switches off what is
-    off anyway. A misspelt element that says what the default is anyway is a warning too, as is one
-    that no version has read, such as the `<location>` of a MovingPathPoint. A `<Comment>` is an
-    information. Of several elements of one tag the first is reported, with the number of the
-    others.
+    OpenSim ignores such an element without a message and keeps the default. With a misspelt
+    `<stiffness>` a contact stiffness is 0, and the motion becomes NaN; with a misspelt `<ForceSet>`
+    a model has no forces. In setups, properties of older versions are a warning, or an info if the
+    element is empty or disables something that is disabled anyway. A misspelt element with the
+    default value is a warning too, as is one that no version reads, such as the `<location>` of a
+    MovingPathPoint. A `<Comment>` is an info. Of several elements with one tag the first is
+    reported, with the number of the others.
 
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
@@ -48,9 +47,9 @@ def unknown_tag(subject: Subject, report: FindingSink) -> None:
       </Body>
     ```
     """
-    groups: dict[tuple[object, ...], list[_Unknown]] = {}
+    groups: dict[tuple[object, ...], list[_UnknownTag]] = {}
     for note, owner in subject.notes_of("unknown-tag"):
-        if wrapper_for(note, owner) is not None or part_for(note, owner) is not None:
+        if find_wrapper(note, owner) is not None or find_part(note, owner) is not None:
             continue
         old = successor(type(owner), note.word)
         if old is not None:
@@ -72,7 +71,7 @@ def unknown_tag(subject: Subject, report: FindingSink) -> None:
         )
 
 
-class _Unknown(NamedTuple):
+class _UnknownTag(NamedTuple):
     """An element that is no property, and what is reported of it."""
 
     note: Note
@@ -83,44 +82,50 @@ class _Unknown(NamedTuple):
     fix: Fix | None = None
 
 
-def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _Unknown:
+def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTag:
     """Return what is reported of an element that no version has as a property."""
     reason = reason_unused(type(owner), note.word)
     if reason is not None:
-        fix = without_element(subject.source, note.number)
-        message = f"<{note.word}> of {called(owner)} is read by no version of OpenSim: {reason}; delete it"
-        return _Unknown(note, owner, message, WARNING, fix=fix)
+        fix = remove_element(subject.source, note.number)
+        message = (
+            f"<{note.word}> of {describe_object(owner)} is read by no version of OpenSim: "
+            f"{reason}; delete it"
+        )
+        return _UnknownTag(note, owner, message, WARNING, fix=fix)
     if is_comment(note.word):
-        message = f"<{note.word}> in {called(owner)} is a comment written as an element; OpenSim ignores it"
-        return _Unknown(note, owner, message, INFO, fix=as_comment(subject.source, note.number))
+        message = (
+            f"<{note.word}> in {describe_object(owner)} is a comment written as an element; "
+            "OpenSim ignores it"
+        )
+        return _UnknownTag(note, owner, message, INFO, fix=comment_out(subject.source, note.number))
     specs = field_specs(type(owner))
     suggestion = find_nearest(_FORMER.get(note.word, note.word), specs, cutoff=70)
     if suggestion is not None and not _can_hold(subject, note, specs[suggestion]):
         suggestion = None
-    message = f"{called(owner)} has no property <{note.word}>; OpenSim ignores it"
+    message = f"{describe_object(owner)} has no property <{note.word}>; OpenSim ignores it"
     if suggestion is not None:
-        kept = _default_of(specs[suggestion])
+        kept = _format_default(specs[suggestion])
         message += (
             f" and keeps the default of {suggestion}{kept}"
-            if suggestion not in _present(owner)
+            if suggestion not in _list_given(owner)
             else ""
         )
     elif note.value is not None:
-        message += f": {a(note.word)} cannot stand in {a(type(owner).tag)}"
-        home = set_for(note.value)
+        message += f": {with_article(note.word)} cannot stand in {with_article(type(owner).tag)}"
+        home = find_set(note.value)
         message += f"; it belongs in the {home}" if home and isinstance(owner, Model) else ""
     else:
         homes = list_homes(note.word, type(owner))
         message += f": it is a property of {join_words(homes, most=3)}" if homes else ""
     same = suggestion is not None and suggestion.lower() == note.word.lower()
-    free = suggestion is not None and suggestion not in _present(owner)
-    fix = renamed(subject.source, note.number, suggestion, safe=same) if free else None
+    free = suggestion is not None and suggestion not in _list_given(owner)
+    fix = rename_tag(subject.source, note.number, suggestion, safe=same) if free else None
     severity = ERROR
     if not free and subject.model is None:
-        severity = INFO if _asks_for_nothing(subject, note.number) else WARNING
+        severity = INFO if _is_switched_off(subject, note.number) else WARNING
     elif free and suggestion is not None and _is_default(subject, note.number, specs[suggestion]):
         severity = WARNING
-    return _Unknown(note, owner, message, severity, suggestion, fix)
+    return _UnknownTag(note, owner, message, severity, suggestion, fix)
 
 
 def _can_hold(subject: Subject, note: Note, spec: FieldSpec) -> bool:
@@ -128,7 +133,7 @@ def _can_hold(subject: Subject, note: Note, spec: FieldSpec) -> bool:
     if subject.source is None:
         return True
     children = subject.source.children(note.number)
-    has_text = bool(_inside(subject, note.number).strip()) and not children
+    has_text = bool(_get_inner_text(subject, note.number).strip()) and not children
     if isinstance(spec.kind, Held):
         return not has_text
     return not children
@@ -142,61 +147,64 @@ def _merge_fixes(fixes: Sequence[Fix | None]) -> Fix | None:
     return Fix(tuple(edit for fix in known for edit in fix.edits), all(fix.safe for fix in known))
 
 
-def _inside(subject: Subject, number: int) -> str:
+def _get_inner_text(subject: Subject, number: int) -> str:
     assert subject.source is not None
     span = subject.source.spans[number]
     return subject.source.text[span.tag_end : span.inner_end]
 
 
-def _asks_for_nothing(subject: Subject, number: int) -> bool:
+def _is_switched_off(subject: Subject, number: int) -> bool:
     """Whether an element is empty, or says no more than that something is off."""
-    return _OFF.fullmatch(_inside(subject, number)) is not None
+    return _OFF.fullmatch(_get_inner_text(subject, number)) is not None
 
 
 def _is_default(subject: Subject, number: int, spec: FieldSpec) -> bool:
     """Whether an element says what its property is anyway, so that it does not matter that OpenSim ignores it."""
-    text = _inside(subject, number)
+    text = _get_inner_text(subject, number)
     if isinstance(spec.kind, Held):
         return spec.kind.form == "list" and not text.strip()
     return reads_as(text, spec.kind, spec.default)
 
 
-def _is_said_again(subject: Subject, owner: Object, number: int) -> bool:
+def _repeats_first(subject: Subject, owner: Object, number: int) -> bool:
     """Whether an element holds the same as the first of its tag in the same object."""
     assert subject.source is not None and owner._index is not None
     spans, end = subject.source.spans, 0
     for first in range(owner._index + 1, number):
         if spans[first].start >= end:
             if spans[first].tag == spans[number].tag:
-                return _inside(subject, first).split() == _inside(subject, number).split()
+                return (
+                    _get_inner_text(subject, first).split()
+                    == _get_inner_text(subject, number).split()
+                )
             end = spans[first].end
     return False
 
 
 def _report_old(
-    subject: Subject, report: FindingSink, note: Note, owner: Object, old: Successor
+    subject: Subject, report: FindingCollector, note: Note, owner: Object, old: Successor
 ) -> None:
     """Say that a tag is one of an older format."""
     instead = f"write <{old.tag}>" if old.tag is not None else ""
     words = "; " + ", ".join(part for part in (instead, old.hint) if part)
     version = subject.version or CURRENT_VERSION
     report(
-        f"<{note.word}> of {called(owner)} belongs to files before version {old.since}; in one of version {version} "
-        f"OpenSim ignores it{words}",
+        f"<{note.word}> of {describe_object(owner)} belongs to files before version {old.since}; "
+        f"in one of version {version} OpenSim ignores it{words}",
         owner,
         number=note.number,
         suggestion=old.tag,
     )
 
 
-@rule("OSIM104", "duplicate-tag", severity=ERROR, mends="safe")
-def duplicate_tag(subject: Subject, report: FindingSink) -> None:
+@rule("OSIM104", "duplicate-tag", severity=ERROR, fixes="safe")
+def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
     """A property is given twice.
 
     Reports every element after the first of the same property in one object.
 
-    OpenSim takes the first and ignores the rest, while a reader expects the last one to hold. One
-    that says the same as the first is a warning.
+    OpenSim uses the first and ignores the rest, while readers expect the last one to count. A
+    repetition with the same content is a warning.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <mass>9</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -206,34 +214,35 @@ def duplicate_tag(subject: Subject, report: FindingSink) -> None:
     for note, owner in subject.notes_of("duplicate-tag"):
         assert note.spec is not None
         value = getattr(owner, note.spec.name)
-        taken = "" if isinstance(note.spec.kind, Held) else f", {shown(value)},"
+        taken = "" if isinstance(note.spec.kind, Held) else f", {format_value(value)},"
         if note.word != note.spec.tag:
             report(
-                f"<{note.spec.tag}> of {called(owner)} holds one object; OpenSim takes the first and ignores this "
-                f"{note.word}",
+                f"<{note.spec.tag}> of {describe_object(owner)} holds one object; OpenSim takes "
+                f"the first and ignores this {note.word}",
                 owner,
                 number=note.number,
-                fix=without_element(subject.source, note.number),
+                fix=remove_element(subject.source, note.number),
             )
             continue
         report(
-            f"{called(owner)} has <{note.word}> more than once; OpenSim takes the first{taken} and ignores this one",
+            f"{describe_object(owner)} has <{note.word}> more than once; OpenSim takes the "
+            f"first{taken} and ignores this one",
             owner,
             number=note.number,
-            fix=without_element(subject.source, note.number),
-            severity=WARNING if _is_said_again(subject, owner, note.number) else None,
+            fix=remove_element(subject.source, note.number),
+            severity=WARNING if _repeats_first(subject, owner, note.number) else None,
         )
 
 
 @rule("OSIM107", "element-in-value", severity=ERROR)
-def element_in_value(subject: Subject, report: FindingSink) -> None:
-    """A value has an element inside.
+def report_element_in_value(subject: Subject, report: FindingCollector) -> None:
+    """A value contains an element.
 
-    Reports elements inside a number, a switch, a text or a reference, and comments, instructions
-    and CDATA sections in the middle of one. A comment before or after it does no harm. A CDATA
-    section must be all of a value, and have no white space around a name or a number.
+    Reports elements inside a number, a switch, a text or a reference, and comments, processing
+    instructions and CDATA sections in the middle of one. A comment before or after it is harmless.
+    A CDATA section must contain the whole value, without white space around a name or a number.
 
-    OpenSim refuses to load the file.
+    OpenSim rejects the file.
 
     ```xml
     - <Body name="thigh"> <mass><value>8</value></mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -243,35 +252,37 @@ def element_in_value(subject: Subject, report: FindingSink) -> None:
     for note, owner in subject.notes_of("child-in-value"):
         assert note.spec is not None
         if note.word == "!--":
-            what = _interrupting(subject, note.number)
+            what = _describe_interruption(subject, note.number)
             if not what:
                 continue
             report(
-                f"there is {what} in the middle of {subject.titled(owner, note.spec)}: OpenSim refuses the file",
+                f"there is {what} in the middle of {subject.describe_property(owner, note.spec)}: "
+                "OpenSim rejects the file",
                 owner,
                 number=note.number,
             )
             continue
         report(
-            f"<{note.spec.tag}> of {called(owner)} is a value and cannot hold <{note.word}>: OpenSim refuses the file",
+            f"<{note.spec.tag}> of {describe_object(owner)} is a value and cannot hold "
+            f"<{note.word}>: OpenSim rejects the file",
             owner,
             number=note.number,
         )
     source = subject.source
     if source is not None and "<![CDATA[" in source.text:
-        for number in _holders_of_cdata(source):
+        for number in _find_cdata_elements(source):
             _report_cdata(subject, source, number, report)
 
 
-def _interrupting(subject: Subject, number: int) -> str:
+def _describe_interruption(subject: Subject, number: int) -> str:
     """Return what stands in the middle of a value; nothing if it is a CDATA section, which is reported apart."""
-    inside = _inside(subject, number)
+    inside = _get_inner_text(subject, number)
     if "<![CDATA[" in inside:
         return ""
     return "a comment" if "<!--" in inside else "a processing instruction"
 
 
-def _holders_of_cdata(source: Source) -> Iterator[int]:
+def _find_cdata_elements(source: Source) -> Iterator[int]:
     """Yield the elements without children that hold a CDATA section."""
     holders: set[int] = set()
     starts = [span.start for span in source.spans]
@@ -285,9 +296,9 @@ def _holders_of_cdata(source: Source) -> Iterator[int]:
     yield from sorted(holders)
 
 
-def _report_cdata(subject: Subject, source: Source, number: int, report: FindingSink) -> None:
+def _report_cdata(subject: Subject, source: Source, number: int, report: FindingCollector) -> None:
     """Report a value that OpenSim does not read as it is meant, since it stands in a CDATA section."""
-    spec = _property_of(subject, source, number)
+    spec = _find_property(subject, source, number)
     if spec is None:
         return
     span = source.spans[number]
@@ -296,11 +307,12 @@ def _report_cdata(subject: Subject, source: Source, number: int, report: Finding
     sections = _SECTION.findall(inside)
     place = source.position(span.tag_end + inside.index("<![CDATA["), len("<![CDATA["))
     if len(texts) + len(sections) > 1:
-        report("a CDATA section is only a part of this value: OpenSim refuses the file", at=place)
+        report("a CDATA section is only a part of this value: OpenSim rejects the file", at=place)
     elif sections and not texts and sections[0] != sections[0].strip():
         if isinstance(spec.kind, Reference) and spec.kind.shape != "list":
             report(
-                "OpenSim takes the white space in this CDATA section for a part of the name, and refuses the model",
+                "OpenSim takes the white space in this CDATA section for a part of the name, and "
+                "rejects the model",
                 at=place,
             )
         elif (
@@ -309,13 +321,13 @@ def _report_cdata(subject: Subject, source: Source, number: int, report: Finding
             and spec.kind.scalar != "string"
         ):
             report(
-                "OpenSim does not read a value with white space around it in a CDATA section: it keeps the default, "
-                "or refuses the model",
+                "OpenSim does not read a value with white space around it in a CDATA section: it "
+                "keeps the default, or rejects the model",
                 at=place,
             )
 
 
-def _property_of(subject: Subject, source: Source, number: int) -> FieldSpec | None:
+def _find_property(subject: Subject, source: Source, number: int) -> FieldSpec | None:
     """Return the property that OpenSim reads from an element; None if it reads none."""
     span = source.spans[number]
     above = next(
@@ -341,7 +353,7 @@ _FORMER = {"enable_controller": "enabled"}
 """Names that properties had in early releases; OpenSim brings them up to date in no file."""
 
 
-def _present(owner: Object) -> set[str]:
+def _list_given(owner: Object) -> set[str]:
     return {
         spec.tag
         for spec in field_specs(type(owner)).values()
@@ -349,10 +361,10 @@ def _present(owner: Object) -> set[str]:
     }
 
 
-def _default_of(spec: FieldSpec) -> str:
+def _format_default(spec: FieldSpec) -> str:
     if isinstance(spec.kind, Held) or spec.default in ("", (), None):
         return ""
-    return f" ({shown(spec.default)})"
+    return f" ({format_value(spec.default)})"
 
 
 def list_homes(tag: str, owner: type[Object]) -> list[str]:

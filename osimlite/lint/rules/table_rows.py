@@ -8,18 +8,17 @@ from itertools import pairwise
 from osimlite.base.text import format_count
 from osimlite.io.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.table import Table
 
 
 @rule("OSIM805", "no-rows", severity=ERROR, about="table")
-def no_rows(table: Table, report: FindingSink) -> None:
+def report_no_rows(table: Table, report: FindingCollector) -> None:
     """A table has no rows.
 
     Reports tables without any row.
 
-    OpenSim refuses a storage file without rows; of a marker file it looks for the first row for
-    ever.
+    OpenSim rejects a storage file without rows; for a marker file it hangs.
 
     ```sto
       knee
@@ -38,20 +37,20 @@ def no_rows(table: Table, report: FindingSink) -> None:
         and not table.rows.count
         and not table.rows.faults
     ):
-        fate = "looks for one for ever" if table.is_markers else "refuses the table"
+        fate = "hangs" if table.is_markers else "rejects the table"
         report(f"there are no rows: OpenSim {fate}", at=Position(table.header.label_line, 1))
 
 
-@rule("OSIM806", "ragged-row", severity=ERROR, mends="safe", about="table")
-def ragged_row(table: Table, report: FindingSink) -> None:
-    """A row of a table is no row of numbers, or has too many or too few.
+@rule("OSIM806", "ragged-row", severity=ERROR, fixes="safe", about="table")
+def report_ragged_row(table: Table, report: FindingCollector) -> None:
+    """A row of a table has the wrong number of cells.
 
-    Compares the cells of each row with the labels, and points out lines between the rows that are
-    blank or remarks.
+    Compares the cells of each row with the labels, and reports blank lines and comments between the
+    rows.
 
-    OpenSim's older reader goes on in the next line for what a row lacks: from there on all numbers
-    are in wrong columns. The newer one refuses the file. In marker files and tables of version 2
-    and 3 a blank line ends the table, and the rows behind it are lost without a word.
+    OpenSim's older reader takes missing cells from the next line: from there on all numbers are in
+    the wrong columns. The newer reader rejects the file. In marker files and tables of version 2
+    and 3 a blank line ends the table, and the rows after it are lost without a message.
 
     ```sto
       knee
@@ -67,33 +66,37 @@ def ragged_row(table: Table, report: FindingSink) -> None:
     ```
     """
     rows = table.rows
-    for fault in rows.of("row", "comment", "blank"):
+    for fault in rows.select("row", "comment", "blank"):
         at = Position(fault.line, fault.column, fault.length)
         if fault.kind == "row":
             fix = (
-                _without_last_tabs(table, rows.cells)
+                _remove_last_tabs(table, rows.cells)
                 if table.is_markers and fault.number > rows.cells
                 else None
             )
             has = format_count(fault.number, "cell")
             report(
-                f"the row has {has} and needs {rows.cells}{fault.text}{fault.more()}",
+                f"the row has {has} and needs {rows.cells}{fault.text}{fault.describe_rest()}",
                 at=at,
                 fix=fix,
             )
         elif fault.kind == "comment":
-            report(f"OpenSim knows no remarks among the rows{fault.more('line')}", at=at)
+            report(
+                f"OpenSim does not allow comments among the rows{fault.describe_rest('line')}",
+                at=at,
+            )
         elif rows.count and fault.line <= rows.line_of(rows.count - 1):
             if table.is_markers or table.is_strict:
                 lost = rows.line_of(rows.count - 1) - fault.line
                 report(
-                    f"a blank line ends the table for OpenSim: {format_count(lost, 'row')} behind it are lost",
+                    f"a blank line ends the table for OpenSim: {format_count(lost, 'row')} after it "
+                    "are lost",
                     at=at,
-                    fix=_without_blank_lines(table, fault.line),
+                    fix=_remove_blank_lines(table, fault.line),
                 )
             else:
                 report(
-                    f"there is a blank line among the rows{fault.more('line')}",
+                    f"there is a blank line among the rows{fault.describe_rest('line')}",
                     at=at,
                     severity=INFO,
                 )
@@ -103,8 +106,8 @@ _LAST_TABS = re.compile(rb"\t+(?=\r?(\n|\Z))")
 _BLANK_LINES = re.compile(rb"^[ \t\r]*\n(?:[ \t\r\n]*\n)?(?=[^\n]*\S)", re.MULTILINE)
 
 
-def _without_last_tabs(table: Table, width: int) -> Fix | None:
-    """The mend that takes out what ends rows of markers beyond their cells; None if that is more than tabs."""
+def _remove_last_tabs(table: Table, width: int) -> Fix | None:
+    """The fix that takes out what ends rows of markers beyond their cells; None if that is more than tabs."""
     edits = []
     for match in _LAST_TABS.finditer(table.data, table.line_start(table.header.label_line + 2)):
         start = table.data.rfind(b"\n", 0, match.start()) + 1
@@ -114,23 +117,23 @@ def _without_last_tabs(table: Table, width: int) -> Fix | None:
     return Fix(tuple(edits)) if edits else None
 
 
-def _without_blank_lines(table: Table, first: int) -> Fix:
-    """The mend that takes out blank lines between rows, from a line on."""
+def _remove_blank_lines(table: Table, first: int) -> Fix:
+    """The fix that takes out blank lines between rows, from a line on."""
     result = _BLANK_LINES.finditer(table.data, table.line_start(first))
     return Fix(tuple(Edit(*match.span(), "") for match in result))
 
 
 @rule("OSIM807", "not-a-number", severity=ERROR, about="table")
-def not_a_number(table: Table, report: FindingSink) -> None:
-    """A cell of a table is no number.
+def report_not_a_number(table: Table, report: FindingCollector) -> None:
+    """A cell of a table is not a number.
 
-    Finds words, NaN, infinity, decimal commas and whatever else is no number: once for each column,
-    with the number of rows in which it is so. In marker files a marker that was not seen has three
-    empty cells, or NaN in all three.
+    Reports words, NaN, infinity, decimal commas and other cells that are not numbers: once for each
+    column, with the number of rows. In marker files a missing marker has three empty cells, or NaN
+    in all three.
 
     At the first such cell OpenSim's older reader (version 1 or none) stops: the cell becomes 0, the
-    rest of its row is that of the row before, and all later rows are lost, without a word. The
-    newer one takes NaN for it (a warning).
+    rest of its row repeats the row before, and all later rows are lost, without a message. The
+    newer reader reads NaN (a warning).
 
     ```sto
       knee
@@ -145,20 +148,23 @@ def not_a_number(table: Table, report: FindingSink) -> None:
     ```
     """
     end = table.rows.line_of(table.rows.count - 1) if table.rows.count else 0
-    for fault in table.rows.of("cell", "time"):
+    for fault in table.rows.select("cell", "time"):
         label = table.label_of(fault.number)
         if fault.kind == "time" and (table.is_markers or table.is_strict):
-            fate = "a row without a time is none"
+            fate = "a row needs a time"
         elif table.is_markers:
-            fate = "OpenSim takes the marker for one that it did not see"
+            fate = "OpenSim treats the marker as not seen"
         elif table.is_strict:
-            fate = "OpenSim takes it for NaN"
+            fate = "OpenSim reads it as NaN"
         else:
             lost = max(0, end - fault.line)
-            fate = f"OpenSim takes it for 0 and loses the rest of the table without a word, {format_count(lost, 'row')}"
-        what = f"'{fault.text}' is no number" if fault.text else "there is no number"
+            fate = (
+                f"OpenSim reads 0 and loses the rest of the table, {format_count(lost, 'row')}, without "
+                "a message"
+            )
+        what = f"'{fault.text}' is not a number" if fault.text else "the number is missing"
         report(
-            f"{what} (column '{label}'): {fate}{fault.more()}",
+            f"{what} (column '{label}'): {fate}{fault.describe_rest()}",
             at=Position(fault.line, fault.column, max(1, fault.length)),
             severity=WARNING
             if fault.kind == "cell" and (table.is_markers or table.is_strict)
@@ -167,15 +173,15 @@ def not_a_number(table: Table, report: FindingSink) -> None:
 
 
 @rule("OSIM808", "time-order", severity=ERROR, about="table")
-def time_order(table: Table, report: FindingSink) -> None:
+def report_time_order(table: Table, report: FindingCollector) -> None:
     """A time of a table is not after the one before it.
 
-    Finds rows with the time of the row before, and rows that go back in time.
+    Reports rows with the time of the row before, and rows that go back in time.
 
-    Of two rows with one time OpenSim keeps the second, without a word; where time goes back the
-    rows before are lost, or the tool stops. A marker file is refused for either. One time twice in
-    a storage file is a warning, and in the last row an information: so OpenSim ends some of its
-    results.
+    Of two rows with one time OpenSim keeps the second, without a message; where time goes back the
+    rows before are lost, or the tool stops. OpenSim rejects a marker file with either. A repeated
+    time in a storage file is a warning, and in the last row an info: OpenSim ends some of its
+    results so.
 
     ```sto
       knee
@@ -194,29 +200,28 @@ def time_order(table: Table, report: FindingSink) -> None:
         return
     # OpenSim itself writes the last row of some results twice.
     last = table.rows.line_of(table.rows.count - 1) if table.rows.count else None
-    for fault in table.rows.of("order"):
+    for fault in table.rows.select("order"):
         time, before = fault.text.split()
         what = (
             f"goes back from {before} to {time}"
             if fault.number
-            else f"{time} is that of the row before, too"
+            else f"{time} repeats that of the row before"
         )
         severity = (
             None if fault.number or table.is_markers else INFO if fault.line == last else WARNING
         )
         at = Position(fault.line, fault.column, fault.length)
-        report(f"the time {what}{fault.more()}", at=at, severity=severity)
+        report(f"the time {what}{fault.describe_rest()}", at=at, severity=severity)
 
 
 @rule("OSIM809", "time-gap", severity=WARNING, about="table")
-def time_gap(table: Table, report: FindingSink) -> None:
-    """Rows are missing in a table of even times.
+def report_time_gap(table: Table, report: FindingCollector) -> None:
+    """Rows are missing in a table with a constant time step.
 
-    Finds steps that are at least half as long again as the usual one, in tables in which nearly all
-    steps are alike.
+    Reports time steps at least 1.5 times the usual step, in tables with nearly constant steps.
 
-    Rows were lost. OpenSim draws a spline through the gap; with a filter it does so at the smallest
-    step.
+    Rows were lost. OpenSim interpolates the gap with a spline; with a filter it resamples at the
+    smallest step.
 
     ```sto
       knee
@@ -236,7 +241,7 @@ def time_gap(table: Table, report: FindingSink) -> None:
     """
     rows = table.rows
     moments = rows.times
-    if rows.count < 6 or rows.of("order", "time", "row") or table.step <= 0:
+    if rows.count < 6 or rows.select("order", "time", "row") or table.step <= 0:
         return
     longest = 1.5 * table.step
     steps = [after - before for before, after in pairwise(moments)]
@@ -254,6 +259,7 @@ def time_gap(table: Table, report: FindingSink) -> None:
                 else ""
             )
             report(
-                f"from one row to the next {steps[row - 1]:.6g} s pass, usually {table.step:.6g} s{lost}",
-                at=table.time_at(rows.line_of(row)),
+                f"from one row to the next {steps[row - 1]:.6g} s pass, usually {table.step:.6g} "
+                f"s{lost}",
+                at=table.locate_time(rows.line_of(row)),
             )

@@ -9,7 +9,7 @@ from osimlite.base.text import find_nearest, format_count
 from osimlite.io.document.source import Position
 from osimlite.io.tables.headers import COUNTS, MARKER_KEYS, SUFFIXES, Entry, MarkerHeader
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.table import Table
 
 _WHOLE = re.compile(r"\+?[0-9]+")
@@ -17,16 +17,17 @@ _TO_THE_END = 1_000_000
 """As many characters as stand in no line."""
 
 
-@rule("OSIM801", "table-header", severity=ERROR, mends="safe", about="table")
-def table_header(table: Table, report: FindingSink) -> None:
-    """The header of a table is not as OpenSim needs it.
+@rule("OSIM801", "table-header", severity=ERROR, fixes="safe", about="table")
+def report_table_header(table: Table, report: FindingCollector) -> None:
+    """The header of a table is invalid.
 
-    Looks for the line `endheader` of a storage file, in small letters, and for `nRows` and
-    `nColumns` where the older reader takes the file (version 1 or none). A marker file must start
-    with `PathFileType`, without a byte order mark, and name all eight keys of its second line in
-    their order, each with a value.
+    Checks the line `endheader` of a storage file, in lower case, and `nRows` and `nColumns` where
+    the older reader reads the file (version 1 or none). A marker file must start with
+    `PathFileType`, without a byte-order mark, and have all eight keys in its second line in order,
+    each with a value.
 
-    OpenSim refuses the file; of a storage file it says no more than that an index is out of bounds.
+    OpenSim rejects the file; for a storage file its message says only that an index is out of
+    bounds.
 
     ```sto
       knee
@@ -42,13 +43,13 @@ def table_header(table: Table, report: FindingSink) -> None:
     """
     start, header = Position(1, 1), table.header
     if not table.data or table.data.isspace():
-        report("the file is empty: OpenSim refuses it", at=start)
+        report("the file is empty: OpenSim rejects it", at=start)
     elif isinstance(header, MarkerHeader):
-        _marker_header(table, header, report)
+        _check_marker_header(table, header, report)
     elif header.end.text != "endheader":
         words = table.data[:100].lstrip()
         if words.startswith(b"PathFileType"):
-            report("these are markers over time; a file of them is called .trc", at=start)
+            report("this is marker data; the name of its file must end with .trc", at=start)
         elif header.end.at.line == 1:
             ends = (
                 "; its lines end with CR alone"
@@ -56,20 +57,21 @@ def table_header(table: Table, report: FindingSink) -> None:
                 else ""
             )
             report(
-                f"there is no line 'endheader' in this file, so it is no storage file: OpenSim refuses it{ends}",
+                f"expected a line 'endheader', found none: OpenSim rejects this storage file{ends}",
                 at=start,
             )
         elif header.end.text:
             report(
-                "the header must end with 'endheader' in small letters: OpenSim takes all that follows for header",
+                "the header must end with 'endheader' in lower case: OpenSim reads all that "
+                "follows as header",
                 at=header.end.at,
                 suggestion="endheader",
             )
         else:
             report(
-                "no line 'endheader' stands before the labels: OpenSim refuses the table",
+                "the line 'endheader' before the labels is missing: OpenSim rejects the table",
                 at=header.end.at,
-                fix=table.inserting(header.label_line, "endheader"),
+                fix=table.insert_line(header.label_line, "endheader"),
             )
     elif not table.is_strict:
         for key, count in (("nRows", table.rows.count), ("nColumns", len(table.labels))):
@@ -78,12 +80,12 @@ def table_header(table: Table, report: FindingSink) -> None:
                 entry = table.entries[near] if near else None
                 at = entry.key.at if entry else header.end.at
                 fix = (
-                    _saying(table, entry, key, count)
+                    _set_count(table, entry, key, count)
                     if entry
-                    else table.inserting(at.line, f"{key}={count}")
+                    else table.insert_line(at.line, f"{key}={count}")
                 )
                 report(
-                    f"the header does not say '{key}': OpenSim refuses the table",
+                    f"the header lacks '{key}': OpenSim rejects the table",
                     at=at,
                     suggestion=near and key,
                     fix=fix,
@@ -92,16 +94,16 @@ def table_header(table: Table, report: FindingSink) -> None:
                 )
 
 
-def _saying(table: Table, entry: Entry, key: str, count: int) -> Fix | None:
-    """The mend that makes a line of a header say a count: the key alone if a value is there."""
+def _set_count(table: Table, entry: Entry, key: str, count: int) -> Fix | None:
+    """The fix that makes a line of a header say a count: the key alone if a value is there."""
     if entry.value.text:
-        return table.replacing(entry.key.at, None, key, certain=True)
-    return table.replacing(
+        return table.make_replacement(entry.key.at, None, key, certain=True)
+    return table.make_replacement(
         entry.key.at._replace(length=_TO_THE_END), None, f"{key}={count}", certain=True
     )
 
 
-def _marker_header(table: Table, header: MarkerHeader, report: FindingSink) -> None:
+def _check_marker_header(table: Table, header: MarkerHeader, report: FindingCollector) -> None:
     if not table.data.startswith(b"PathFileType"):
         mark = table.data.startswith(b"\xef\xbb\xbf")
         why = (
@@ -110,14 +112,15 @@ def _marker_header(table: Table, header: MarkerHeader, report: FindingSink) -> N
             else "must start with PathFileType"
         )
         report(
-            f"a marker file {why}: OpenSim refuses it",
+            f"a marker file {why}: OpenSim rejects it",
             at=Position(1, 1),
             fix=Fix((Edit(0, 3, ""),)) if mark else None,
         )
     if len(header.lines) < 4:
         ends = ": its lines end with CR alone" if b"\r" in table.data else ""
         report(
-            f"a marker file has five lines before its rows, this has {len(header.lines)}{ends}",
+            "expected five lines before the rows of a marker file, found "
+            f"{len(header.lines)}{ends}",
             at=Position(1, 1),
         )
         return
@@ -126,7 +129,7 @@ def _marker_header(table: Table, header: MarkerHeader, report: FindingSink) -> N
         if key.text != right:
             meant = right if len(keys) == len(MARKER_KEYS) else None
             report(
-                f"the header says '{key.text}' where OpenSim wants '{right}'",
+                f"expected '{right}' in the header, found '{key.text}'",
                 at=key.at,
                 suggestion=meant,
                 certain=True,
@@ -135,12 +138,13 @@ def _marker_header(table: Table, header: MarkerHeader, report: FindingSink) -> N
     else:
         if len(keys) < len(MARKER_KEYS):
             report(
-                f"the header does not say '{MARKER_KEYS[len(keys)]}': OpenSim refuses the file",
+                f"the header lacks '{MARKER_KEYS[len(keys)]}': OpenSim rejects the file",
                 at=Position(2, 1),
             )
         elif len(values) != len(keys):
             report(
-                f"there are {len(values)} values of the {len(keys)} keys above them: OpenSim refuses the file",
+                f"found {len(values)} values for the {len(keys)} keys above them: OpenSim rejects "
+                "the file",
                 at=Position(3, 1),
             )
     fifth = header.lines[4] if len(header.lines) > 4 else b""
@@ -153,28 +157,30 @@ def _marker_header(table: Table, header: MarkerHeader, report: FindingSink) -> N
         line = "\t\t" + "\t".join(wanted)
         fix = None
         if len(subscripts) == len(wanted) and all(word[:1] in "XYZ" for word in subscripts):
-            fix = table.replacing(Position(5, 1, len(fifth.rstrip())), None, line, certain=True)
+            fix = table.make_replacement(
+                Position(5, 1, len(fifth.rstrip())), None, line, certain=True
+            )
         elif (fifth[:1].isdigit() or not fifth.strip()) and [word.text for word in values[3:4]] == [
             str(count)
         ]:
-            fix = table.inserting(5, line)
+            fix = table.insert_line(5, line)
         report(
-            f"the fifth line must say '{wanted[wrong]}' here: OpenSim refuses the file",
+            f"expected '{wanted[wrong]}' here in the fifth line: OpenSim rejects the file",
             at=place,
             fix=fix,
         )
 
 
-@rule("OSIM802", "table-count", severity=ERROR, mends="safe", about="table")
-def table_count(table: Table, report: FindingSink) -> None:
-    """A count in the header of a table is not that of the table.
+@rule("OSIM802", "table-count", severity=ERROR, fixes="safe", about="table")
+def report_table_count(table: Table, report: FindingCollector) -> None:
+    """A count in the header of a table is wrong.
 
-    Compares `nRows` and `nColumns`, or `NumFrames` and `NumMarkers`, with the rows and the labels
-    that there are.
+    Compares `nRows` and `nColumns`, or `NumFrames` and `NumMarkers`, with the actual rows and
+    labels.
 
-    Of a storage file of version 1 OpenSim reads as many rows as the header says, and takes numbers
-    by `nColumns` from one line to the next. A marker file with another number of labels is refused.
-    Where OpenSim does not look at a count, it is a warning.
+    From a storage file of version 1 OpenSim reads as many rows as the header says, and fills rows
+    of `nColumns` numbers across lines. It rejects a marker file with another number of labels.
+    Where OpenSim ignores a count, it is a warning.
 
     ```sto
       knee
@@ -198,7 +204,7 @@ def table_count(table: Table, report: FindingSink) -> None:
     else:
         known = WARNING if table.is_strict else ERROR
         counts = (("nRows", rows.count, "rows", known), ("nColumns", labels, "labels", known))
-    odd_rows = rows.of("row", "blank", "comment")
+    odd_rows = rows.select("row", "blank", "comment")
     for key, count, what, severity in counts:
         entry = table.entries.get(key)
         if entry is None or (what in ("rows", "frames") and (odd_rows or not count)):
@@ -211,11 +217,11 @@ def table_count(table: Table, report: FindingSink) -> None:
         if severity is ERROR and what == "rows" and number == number:
             lost = count - number
             severity, fate = (
-                (ERROR, f": OpenSim leaves out the last {lost:g}") if lost > 0 else (WARNING, "")
+                (ERROR, f": OpenSim ignores the last {lost:g}") if lost > 0 else (WARNING, "")
             )
         elif severity is ERROR:
             fate = (
-                ": OpenSim refuses the file"
+                ": OpenSim rejects the file"
                 if table.is_markers
                 else ": OpenSim puts numbers into the wrong columns"
             )
@@ -223,25 +229,25 @@ def table_count(table: Table, report: FindingSink) -> None:
         in_rows = {"nColumns": rows.cells, "NumMarkers": (rows.cells - 2) // 3}.get(key, count)
         is_right = not odd_rows and rows.count > 0 and in_rows == count
         report(
-            f"'{entry.key.text}' is '{said}', and there are {count} {what}{fate}",
+            f"'{entry.key.text}' is '{said}', but there are {count} {what}{fate}",
             at=entry.value.at,
             severity=severity,
             suggestion=str(count) if is_right else None,
             certain=True,
-            fix=_saying(table, entry, key, count) if is_right and not said else None,
+            fix=_set_count(table, entry, key, count) if is_right and not said else None,
         )
 
 
-@rule("OSIM803", "table-setting", severity=ERROR, mends="safe", about="table")
-def table_setting(table: Table, report: FindingSink) -> None:
-    """A setting in the header of a table has a value that OpenSim does not know.
+@rule("OSIM803", "table-setting", severity=ERROR, fixes="safe", about="table")
+def report_table_setting(table: Table, report: FindingCollector) -> None:
+    """A setting in the header of a table has an unknown value.
 
-    Looks at `inDegrees`, which is `yes` or `no`, at the letters that keys are written in, at
-    `version`, `DataType`, and of marker files at `Units` (m, cm, mm) and `DataRate`, which is
-    compared with the times (for information).
+    Checks `inDegrees`, which is `yes` or `no`, the letter case of keys, `version`, `DataType`, and
+    in marker files `Units` (m, cm, mm) and `DataRate`, which is compared with the times (for
+    information).
 
-    For OpenSim `inDegrees=true` is no: the angles are taken for radians without a word. Unknown
-    units make it refuse the file.
+    OpenSim reads `inDegrees=true` as no: it takes the angles as radians without a message. It
+    rejects a file with unknown units.
 
     ```sto
       knee
@@ -269,7 +275,7 @@ def table_setting(table: Table, report: FindingSink) -> None:
             }
             right = near.get(units.value.text.lower().rstrip("s"), units.value.text.lower())
             report(
-                f"OpenSim does not know the units '{units.value.text}' and refuses the file",
+                f"unknown units '{units.value.text}': OpenSim rejects the file",
                 at=units.value.at,
                 suggestion=right if right in ("m", "mm", "cm") else None,
                 certain=True,
@@ -277,7 +283,7 @@ def table_setting(table: Table, report: FindingSink) -> None:
         rate = entries.get("DataRate")
         if rate is not None and not _is_positive(rate.value.text):
             report(
-                f"'DataRate' is '{rate.value.text}' and no frequency",
+                f"'DataRate' is '{rate.value.text}', expected a frequency",
                 at=rate.value.at,
                 severity=WARNING,
             )
@@ -287,7 +293,8 @@ def table_setting(table: Table, report: FindingSink) -> None:
             and not 0.9 < float(rate.value.text) * table.step < 1.1
         ):
             report(
-                f"'DataRate' is '{rate.value.text}', and by the times of the frames it is {1 / table.step:.6g}",
+                f"'DataRate' is '{rate.value.text}', but the times of the frames give "
+                f"{1 / table.step:.6g}",
                 at=rate.value.at,
                 severity=INFO,
             )
@@ -301,7 +308,7 @@ def table_setting(table: Table, report: FindingSink) -> None:
             # Without a version a table is read as one of version 1.
             severity = WARNING if right == "version" else None
             report(
-                f"OpenSim does not know '{key}' and leaves it out",
+                f"OpenSim does not know '{key}' and ignores it",
                 at=entry.key.at,
                 suggestion=right,
                 severity=severity,
@@ -313,28 +320,29 @@ def table_setting(table: Table, report: FindingSink) -> None:
         )
         harmless = meant == "no"
         report(
-            f"'inDegrees' is 'yes' or 'no'; of '{degrees.value.text}' OpenSim makes no: it takes angles for radians",
+            f"'inDegrees' must be 'yes' or 'no', found '{degrees.value.text}': OpenSim reads no, "
+            "and takes the angles for radians",
             at=degrees.value.at,
             suggestion=meant,
             certain=True,
             severity=WARNING if harmless else None,
         )
-    _cells(table, report)
+    _check_cell_type(table, report)
     version = entries.get("version")
     if version is not None and not version.value.text.isdecimal():
         report(
-            f"the version is a whole number, not '{version.value.text}'",
+            f"expected a whole number as version, found '{version.value.text}'",
             at=version.value.at,
             severity=WARNING,
         )
 
 
-def _cells(table: Table, report: FindingSink) -> None:
+def _check_cell_type(table: Table, report: FindingCollector) -> None:
     """What the newer reader of storage files makes of the type of the cells, and of blanks around keys."""
     kind = table.entries.get("DataType")
     if kind is not None and kind.value.text and kind.value.text not in SUFFIXES:
         report(
-            f"OpenSim knows no tables of '{kind.value.text}', and refuses the file",
+            f"unknown DataType '{kind.value.text}': OpenSim rejects the file",
             at=kind.value.at,
             suggestion=find_nearest(kind.value.text, SUFFIXES),
             severity=None if table.is_strict else WARNING,
@@ -345,7 +353,8 @@ def _cells(table: Table, report: FindingSink) -> None:
         ]
         if key != "version" and "=" in behind and not behind.startswith(f"={entry.value.text}"):
             report(
-                f"OpenSim's newer reader takes the blanks beside '=' for parts of '{key}' and of its value",
+                f"OpenSim's newer reader reads the blanks beside '=' as parts of '{key}' and of "
+                "its value",
                 at=entry.key.at,
                 severity=ERROR if key == "DataType" else WARNING,
             )
@@ -380,21 +389,21 @@ _FRAMES = {
 
 
 _FAULTS = """\
-01 frame-and-time-label, error, mends safe, in markers: The columns of frame and time are called otherwise. OpenSim
-refuses the file.
+01 frame-and-time-label, error, fix safe, in markers: The columns of frame and time have wrong labels. OpenSim
+rejects the file.
 - Frame#→Times→asis→→→knee
 + Frame#→Time→asis→→→knee
-02 marker-label, error, in markers: A marker has no label, or one with a blank. Without one OpenSim refuses the file,
-with a blank it is the name of no marker of a model.
+02 marker-label, error, in markers: A marker has no label, or a label with a blank. Without a label OpenSim rejects the file,
+with a blank it matches no marker of a model.
 - Frame#→Time→l asis→→→knee
 + Frame#→Time→asis→→→knee
-03 no-labels, error, in header: A table ends before its labels. OpenSim refuses the file.
+03 no-labels, error, in header: A table ends before its labels. OpenSim rejects the file.
   endheader
 + time→hip→knee
 + 0.0→0.5→0.1
 + 0.1→0.6→0.1
 04 commas-between-labels, error, in start: Commas separate the columns of a storage file. OpenSim knows tabs and blanks
-only, and refuses it.
+only, and rejects it.
 - nColumns=1
 + nColumns=3
   endheader
@@ -404,43 +413,43 @@ only, and refuses it.
 + time→hip→knee
 + 0.0→0.5→0.1
 + 0.1→0.6→0.1
-05 no-time-column, error, mends safe, in old: The first column of a storage file is not called time. OpenSim refuses the
+05 no-time-column, error, fix safe, in old: The first column of a storage file is not labelled time. OpenSim rejects the
 table.
 - Time→hip→knee
 + time→hip→knee
-06 time-not-first, error, in old: The time is not in the first column. OpenSim takes what stands there for the time.
+06 time-not-first, error, in old: The time is not in the first column. OpenSim reads the first column as the time.
 - hip→time→knee
 + time→hip→knee
 07 blanks-between-labels, warning, in newer: Blanks separate the labels of a table of version 2 or 3. Newer tools of
-OpenSim's refuse it.
+OpenSim's reject it.
 - time hip knee
 + time→hip→knee
-08 label-twice, warning, in old: Two columns have one label. By its name OpenSim finds the first one only; of markers it
-refuses the file.
+08 label-twice, warning, in old: Two columns have one label. OpenSim finds only the first by its label; for markers it
+rejects the file.
 - time→knee→knee
 + time→hip→knee
 """
 
 
 @rule("OSIM804", "column-label", severity=ERROR, about="table", faults=_FAULTS, frames=_FRAMES)
-def column_label(table: Table, report: FindingSink) -> None:
-    """A label of a table is missing, stands there twice, or is not as OpenSim needs it.
+def report_column_label(table: Table, report: FindingCollector) -> None:
+    """A label of a table is missing, repeated or invalid.
 
-    The first column of a storage file is `time`, in small letters. Every column has a label of its
-    own. Labels of markers have no blanks, every marker has one, and the time and the frame before
-    them are called `Time` and `Frame#`. In a storage file of version 2 or 3 tabs separate the
-    labels (a warning).
+    The first column of a storage file must be `time`, in lower case. Every column needs a unique
+    label. Labels of markers must not contain blanks, every marker needs one, and the columns of
+    frame and time must be labelled `Frame#` and `Time`. In a storage file of version 2 or 3 tabs
+    must separate the labels (a warning).
 
-    Without a column `time` OpenSim refuses the table. Of two columns with one label it finds the
-    first (a warning), and takes no loads from them; of two markers with one name it refuses the
-    file. A blank makes two labels of one, so that all that follow name the wrong columns.
+    Without a column `time` OpenSim rejects the table. Of two columns with one label it finds the
+    first (a warning), and reads no loads from them; it rejects a file with two markers of one name.
+    A blank splits a label in two, so all following labels name the wrong columns.
     """
     labels, header = table.labels, table.header
     if isinstance(header, MarkerHeader):
         for word, right in zip(header.words(4), ("Frame#", "Time"), strict=False):
             if word.text != right:
                 report(
-                    f"the label '{word.text}' must be '{right}': OpenSim refuses the file",
+                    f"expected the label '{right}', found '{word.text}': OpenSim rejects the file",
                     at=word.at,
                     suggestion=find_nearest(word.text, [right], cutoff=60),
                     certain=True,
@@ -450,14 +459,15 @@ def column_label(table: Table, report: FindingSink) -> None:
         empty = [index for index in range(2, len(cells) - 2, 3) if not cells[index].strip()]
         if empty and len(labels) < len(cells[2:]) // 3:
             report(
-                "a marker has no label: OpenSim refuses the file",
+                "a marker has no label: OpenSim rejects the file",
                 at=Position(4, len("\t".join(cells[: empty[0]])) + 2),
                 fault="marker-label",
             )
         for label in labels:
             if " " in label.text:
                 report(
-                    f"the marker '{label.text}' has a blank in its name, which no marker of a model has",
+                    f"the marker '{label.text}' has a blank in its name: no marker of a model can "
+                    "have this name",
                     at=label.at,
                     fault="marker-label",
                 )
@@ -470,13 +480,14 @@ def column_label(table: Table, report: FindingSink) -> None:
         near = "time" if first.lower() in ("time", "t", "times", "time(s)") else None
         if "," in first:
             report(
-                "tabs or blanks separate the columns of a storage file, not commas: OpenSim refuses it",
+                "tabs or blanks separate the columns of a storage file, not commas: OpenSim "
+                "rejects it",
                 at=at,
                 fault="commas-between-labels",
             )
         elif all(label.text not in ("time", "range") for label in labels):
             report(
-                f"the first column is '{first}': OpenSim needs one called 'time'",
+                f"the first column is '{first}', expected 'time'",
                 at=at,
                 suggestion=near,
                 certain=True,
@@ -484,13 +495,14 @@ def column_label(table: Table, report: FindingSink) -> None:
             )
         else:
             report(
-                f"the first column is '{first}': OpenSim takes it for the time",
+                f"the first column is '{first}': OpenSim reads it as the time",
                 at=at,
                 fault="time-not-first",
             )
     elif header.is_strict and labels[1:] and not header.has_tabs:
         report(
-            f"blanks separate the columns of a table of version {header.form}: OpenSim's newer tools refuse it",
+            f"blanks separate the columns of a table of version {header.form}: OpenSim's newer "
+            "tools reject it",
             at=labels[1].at,
             fault="blanks-between-labels",
         )
@@ -499,7 +511,7 @@ def column_label(table: Table, report: FindingSink) -> None:
         places.setdefault(label.text, []).append(label.at)
     for name, (_, *again) in places.items():
         if again:
-            fate = "refuses the file" if table.is_markers else "does not find this one by its name"
+            fate = "rejects the file" if table.is_markers else "does not find this one by its name"
             more = (
                 f"; there are {format_count(len(again) - 1, 'more column')} of this name"
                 if again[1:]
@@ -507,7 +519,7 @@ def column_label(table: Table, report: FindingSink) -> None:
             )
             severity = ERROR if table.is_markers else None
             report(
-                f"a column is called '{name}' already: OpenSim {fate}{more}",
+                f"another column has the label '{name}': OpenSim {fate}{more}",
                 at=again[0],
                 severity=severity,
                 fault="label-twice",

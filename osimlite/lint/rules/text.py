@@ -7,8 +7,8 @@ from typing import Final
 
 from osimlite.errors import NotWellFormedError, VersionError
 from osimlite.io.document.source import Source
-from osimlite.lint.fixes import renamed
-from osimlite.lint.registry import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.fixes import rename_tag
+from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.schema.model import CURRENT_VERSION
 
@@ -34,14 +34,14 @@ _LATE: Final = (
 
 
 @rule("OSIM001", "syntax-error", severity=ERROR)
-def syntax_error(subject: Subject, report: FindingSink) -> None:
+def report_syntax_error(subject: Subject, report: FindingCollector) -> None:
     """The text is not well-formed XML.
 
-    Reports where the XML parser gave up: a tag that is not closed, a stray `<` or `&`, a file that
-    was cut off.
+    Reports where the XML parser stops: a tag that is not closed, a stray `<` or `&`, a truncated
+    file.
 
-    OpenSim cannot load the file. The tags and values before the place are still checked; what
-    follows is not, since nobody can tell which element it belongs to, nor are references, which may
+    OpenSim cannot load the file. The tags and values before the error are still checked; the rest
+    is not, since it is unknown which element it belongs to, and references are not, since they may
     lead there.
 
     ```xml
@@ -49,36 +49,36 @@ def syntax_error(subject: Subject, report: FindingSink) -> None:
     + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
-    if subject.source is None or _conflicts(subject.source):
+    if subject.source is None or _find_conflicts(subject.source):
         return
     for fault in subject.faults:
         if isinstance(fault, NotWellFormedError):
-            _found_at(
+            _report_at(
                 subject.source,
                 report,
-                f"{fault.message}; {_checked(subject)}",
+                f"{fault.message}; {_describe_extent(subject)}",
                 fault.line,
                 fault.column,
             )
 
 
-def _checked(subject: Subject) -> str:
+def _describe_extent(subject: Subject) -> str:
     """How far a text with a syntax error was checked."""
     if subject.model is None or subject.sure_until is None or subject.sure_until < 2:
-        return "until this is mended, nothing else is checked"
-    return f"until this is mended, only tags and values above line {subject.sure_until} are checked"
+        return "nothing else is checked until this is fixed"
+    return f"until this is fixed, only tags and values above line {subject.sure_until} are checked"
 
 
 @rule("OSIM010", "unused-ignore", severity=INFO)
-def unused_ignore(subject: Subject, report: FindingSink) -> None:
-    """A comment ignores what is not there.
+def report_unused_ignore(subject: Subject, report: FindingCollector) -> None:
+    """A comment ignores a finding that does not exist.
 
-    Reports `<!-- osimlite: ignore CODE -->` for each code of which nothing is found in its place.
-    Such a comment speaks of its own line, or alone on a line of the element that follows, or before
-    the root element of the whole file. A line `osimlite: ignore CODE` in the header of a table
-    speaks of the whole table.
+    Reports `<!-- osimlite: ignore CODE -->` for each code without a finding in its scope. The scope
+    of such a comment is its line; alone on a line, the element that follows; before the root
+    element, the whole file. A line `osimlite: ignore CODE` in the header of a table applies to the
+    whole table.
 
-    The fault was mended and the comment was forgotten; it would hide the next one.
+    The problem was fixed and the comment remained; it would hide the next problem.
 
     ```xml
       <Body name="thigh">
@@ -92,15 +92,15 @@ def unused_ignore(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM002", "encoding", severity=WARNING)
-def encoding(subject: Subject, report: FindingSink) -> None:
+def report_encoding(subject: Subject, report: FindingCollector) -> None:
     """The bytes are not in the encoding that the file declares.
 
-    Reports the first byte that is no UTF-8 (or whatever the XML declaration says). The file is then
-    read as Windows text (cp1252). A file in UTF-16 or UTF-32 is an error.
+    Reports the first byte that is not UTF-8 (or the encoding of the XML declaration). osimlite then
+    reads the file as Windows text (cp1252). A file in UTF-16 or UTF-32 is an error.
 
-    OpenSim copies the bytes unseen, but every other XML reader refuses the file, and names with
-    accents differ between programs. Of two bytes for a letter it understands none, and cannot load
-    the file. Save it as UTF-8.
+    OpenSim copies the bytes unchanged, but every other XML reader rejects the file, and names with
+    accents differ between programs. OpenSim cannot load a file with two bytes per letter. Save it
+    as UTF-8.
 
     ```document
     - <?xml version="1.0" encoding="US-ASCII" ?>
@@ -126,7 +126,8 @@ def encoding(subject: Subject, report: FindingSink) -> None:
     except UnicodeDecodeError as error:
         before = source.data[: error.start].decode(name).removeprefix("\ufeff")
         report(
-            f"byte 0x{source.data[error.start]:02X} is not {name}; the text is read as {source.encoding}",
+            f"byte 0x{source.data[error.start]:02X} is not {name}; the text is read as "
+            f"{source.encoding}",
             at=source.position(len(before)),
         )
     except LookupError:
@@ -136,17 +137,17 @@ def encoding(subject: Subject, report: FindingSink) -> None:
         )
 
 
-@rule("OSIM003", "not-a-model", severity=ERROR, mends="unsafe")
-def not_a_model(subject: Subject, report: FindingSink) -> None:
-    """The document is XML, but no OpenSim model.
+@rule("OSIM003", "not-a-model", severity=ERROR, fixes="unsafe")
+def report_not_a_model(subject: Subject, report: FindingCollector) -> None:
+    """The document is XML, but not an OpenSim model.
 
-    Reports a root element other than `<OpenSimDocument>`, with the right spelling where that is
-    known, and a document that holds something else than a `<Model>`. In a folder, XML is OpenSim's
-    if its root is nearly called so, or if it holds a class of OpenSim with its properties; other
-    XML is passed over and counted. What is no ordinary file (a pipe, a device) is reported, too,
-    and a file of more than 100 MB, or what the setting `largest-file` allows: neither is read.
+    Reports a root element other than `<OpenSimDocument>`, with the correct spelling if it is known,
+    and a document without a `<Model>`. In a folder, XML counts as OpenSim's if its root has nearly
+    that name, or if it contains a class of OpenSim with its properties; other XML is skipped and
+    counted. Special files (a pipe, a device), and files larger than 100 MB or the setting
+    `largest-file`, are reported and not read.
 
-    OpenSim fails with a message about a missing node, or makes an empty model without a word.
+    OpenSim fails with a message about a missing node, or creates an empty model without a message.
 
     ```document
     - <OpenSimDokument Version="40600">
@@ -163,24 +164,23 @@ def not_a_model(subject: Subject, report: FindingSink) -> None:
             continue
         message = fault.message.removesuffix(f"; did you mean '{fault.meant}'?")
         if fault.meant is None or not subject.source.well_formed:
-            _found_at(subject.source, report, message, fault.line, fault.column)
+            _report_at(subject.source, report, message, fault.line, fault.column)
             continue
         root = subject.source.of_tag(0)
         number = int((root.line, root.column) != (fault.line, fault.column))
-        fix = renamed(subject.source, number, fault.meant, safe=False)
+        fix = rename_tag(subject.source, number, fault.meant, safe=False)
         report(message, at=subject.source.of_tag(number), suggestion=fault.meant, fix=fix)
 
 
 @rule("OSIM004", "document-version", severity=ERROR)
-def document_version(subject: Subject, report: FindingSink) -> None:
-    """The document has no version, or none that is read.
+def report_document_version(subject: Subject, report: FindingCollector) -> None:
+    """The document has no version or an unsupported one.
 
-    Reports a `Version` that is missing, no whole number, too old to be read here, newer than
-    OpenSim 4.6 writes, or older than a socket in the document that OpenSim takes in newer ones
-    only.
+    Reports a `Version` that is missing, not a whole number, too old for osimlite, newer than that
+    of OpenSim 4.6, or too old for a socket in the document.
 
-    OpenSim reads each file by the rules of its version. Without one it fails; from a version it
-    does not know it silently takes what it happens to understand (a warning).
+    OpenSim reads each file by the rules of its version. Without a version it fails; from an unknown
+    version it reads what it understands, without a message (a warning).
 
     ```document
     - <OpenSimDocument>
@@ -199,33 +199,34 @@ def document_version(subject: Subject, report: FindingSink) -> None:
     has_root = bool(spans) and spans[0].tag != "Model"
     late = ""
     if subject.version is not None and subject.version < _SOCKETS:
-        late = _late_socket(subject.source)
+        late = _find_late_socket(subject.source)
     if not has_root and late:
         report(
-            f"the <Model> does not stand in an <OpenSimDocument>: OpenSim takes it for version {subject.version} and "
-            f'refuses it; put it into <OpenSimDocument Version="{CURRENT_VERSION}">, as `osimlite upgrade` does',
+            "the <Model> is not inside an <OpenSimDocument>: OpenSim reads it as version "
+            f"{subject.version} and "
+            f'rejects it; put it into <OpenSimDocument Version="{CURRENT_VERSION}">, as `osimlite upgrade` does',
             number=0,
         )
         return
     if subject.version is not None and subject.version < _OLDEST_FOR_OPENSIM:
         advice = "; `osimlite upgrade` writes the model in the current format" if not late else ""
         report(
-            f"version {subject.version} is too old for OpenSim 4.6, which refuses it{advice}",
+            f"version {subject.version} is too old for OpenSim 4.6, which rejects it{advice}",
             number=0,
             attribute="Version",
         )
     if late:
         report(
-            f"the document says version {subject.version} and holds {late}, which came later: OpenSim reads it by "
-            "the rules of the old format and does not find it",
+            f"the document says version {subject.version} and holds {late}, which came later: "
+            "OpenSim reads it by the rules of the old format and does not find it",
             number=0,
             attribute="Version",
             suggestion=str(CURRENT_VERSION),
         )
     if subject.version is not None and subject.version > CURRENT_VERSION:
         report(
-            f"version {subject.version} is newer than {CURRENT_VERSION}, the format of OpenSim 4.6: "
-            "what was added since is passed over in silence",
+            f"version {subject.version} is newer than {CURRENT_VERSION}, the format of OpenSim "
+            "4.6: OpenSim ignores newer content without a message",
             number=0,
             attribute="Version",
             severity=WARNING,
@@ -233,7 +234,7 @@ def document_version(subject: Subject, report: FindingSink) -> None:
         )
 
 
-def _late_socket(source: Source) -> str:
+def _find_late_socket(source: Source) -> str:
     """The first socket that is not read in an old document, as ``<socket> in <Class>``; empty if there is none."""
     if not _SOCKET.search(source.text):
         return ""
@@ -248,8 +249,8 @@ def _late_socket(source: Source) -> str:
 
 
 @rule("OSIM005", "merge-conflict", severity=ERROR)
-def merge_conflict(subject: Subject, report: FindingSink) -> None:
-    """The file holds the marks of a merge that was not finished.
+def report_merge_conflict(subject: Subject, report: FindingCollector) -> None:
+    """The file contains merge conflict markers.
 
     Reports every line that begins with seven `<` or seven `>`.
 
@@ -265,20 +266,21 @@ def merge_conflict(subject: Subject, report: FindingSink) -> None:
     ```
     """
     if subject.source is not None:
-        for start, end in _conflicts(subject.source):
+        for start, end in _find_conflicts(subject.source):
             report(
-                "unfinished merge: keep one side and take the marks out",
+                "unfinished merge: keep one side and delete the conflict markers",
                 at=subject.source.position(start, end - start),
             )
 
 
 @rule("OSIM006", "duplicate-attribute", severity=ERROR)
-def duplicate_attribute(subject: Subject, report: FindingSink) -> None:
+def report_duplicate_attribute(subject: Subject, report: FindingCollector) -> None:
     """An element has the same attribute twice.
 
     Reports two attributes with the same name.
 
-    It is not XML. OpenSim takes the last one without a word; every other reader refuses the file.
+    It is not valid XML. OpenSim uses the last one without a message; every other reader rejects the
+    file.
 
     ```xml
     - <Marker name="hip" name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -288,18 +290,18 @@ def duplicate_attribute(subject: Subject, report: FindingSink) -> None:
     for note in subject.notes:
         if note.kind == "duplicate-attribute":
             report(
-                f"the attribute '{note.word}' stands here twice; OpenSim takes the last one",
+                f"the attribute '{note.word}' is given twice; OpenSim uses the last one",
                 at=subject.attribute_name(note.number, note.word),
             )
 
 
 @rule("OSIM007", "second-object", severity=ERROR)
-def second_object(subject: Subject, report: FindingSink) -> None:
-    """The document holds more than one object.
+def report_second_object(subject: Subject, report: FindingCollector) -> None:
+    """The document contains more than one object.
 
     Reports every element of the document after the first.
 
-    OpenSim reads the first object and passes over the others in silence.
+    OpenSim reads the first object and ignores the others without a message.
 
     ```document
       <OpenSimDocument Version="40600">
@@ -311,12 +313,12 @@ def second_object(subject: Subject, report: FindingSink) -> None:
     for note in subject.notes:
         if note.kind == "second-object":
             report(
-                f"OpenSim reads one object of a document and ignores this <{note.word}>",
+                f"OpenSim reads only the first object of a document and ignores this <{note.word}>",
                 number=note.number,
             )
 
 
-def _conflicts(source: Source) -> list[tuple[int, int]]:
+def _find_conflicts(source: Source) -> list[tuple[int, int]]:
     # In well-formed XML only a comment can hold the first marker, and it then holds the last one
     # too.
     if source.well_formed and not (source.remarks and ">>>>>>>" in source.text):
@@ -326,13 +328,13 @@ def _conflicts(source: Source) -> list[tuple[int, int]]:
     return [match.span() for match in _CONFLICT.finditer(source.text)]
 
 
-def _found_at(
-    source: Source, report: FindingSink, message: str, line: int | None, column: int | None
+def _report_at(
+    source: Source, report: FindingCollector, message: str, line: int | None, column: int | None
 ) -> None:
-    report(message, at=source.position(_offset(source, line, column)))
+    report(message, at=source.position(_compute_offset(source, line, column)))
 
 
-def _offset(source: Source, line: int | None, column: int | None) -> int:
+def _compute_offset(source: Source, line: int | None, column: int | None) -> int:
     """The character at a line and column, no further than the end of that line."""
     line = line or 1
     lines = source.lines

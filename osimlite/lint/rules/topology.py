@@ -6,10 +6,16 @@ from collections import Counter
 from collections.abc import Iterator
 
 from osimlite.base.text import join_words
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
-from osimlite.lint.skeleton import Link, Skeleton, growth, has_unknown_joints, skeleton
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.skeleton import (
+    JointLink,
+    Skeleton,
+    build_skeleton,
+    grow_tree,
+    has_unknown_joints,
+)
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called
+from osimlite.lint.words import describe_object
 from osimlite.schema.base import Component, Object
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import Body
@@ -17,14 +23,14 @@ from osimlite.schema.joints import FreeJoint, Joint, WeldJoint
 
 
 @rule("OSIM401", "unconnected-body", severity=ERROR)
-def unconnected_body(subject: Subject, report: FindingSink) -> None:
+def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
     """A body is not connected to ground.
 
     Reports bodies that no chain of joints connects to ground.
 
-    OpenSim adds a free joint to ground, and the body falls freely, which the file does not say (a
-    warning). If it has no mass, OpenSim refuses the model; so it does, or crashes, if an offset
-    frame or a joint is on a body that comes before the last such joint in the tree.
+    OpenSim adds a free joint to ground, and the body falls freely (a warning). If it has no mass,
+    OpenSim rejects the model; it also rejects the model, or crashes, if an offset frame or a joint
+    is on a body before the last such joint in the tree.
 
     ```xml
       <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>
@@ -38,7 +44,7 @@ def unconnected_body(subject: Subject, report: FindingSink) -> None:
     + </FreeJoint>
     ```
     """
-    bones = skeleton(subject)
+    bones = build_skeleton(subject)
     if not bones.complete or has_unknown_joints(subject):
         return
     groups = _Groups()
@@ -46,20 +52,23 @@ def unconnected_body(subject: Subject, report: FindingSink) -> None:
         groups.join(link.parent_base, link.child_base)
     loose: dict[int, list[Body]] = {}
     for body in bones.bodies:
-        if groups.of(body) != groups.of(bones.ground):
-            loose.setdefault(groups.of(body), []).append(body)
+        if groups.find_root(body) != groups.find_root(bones.ground):
+            loose.setdefault(groups.find_root(body), []).append(body)
     if not loose:
         return
     massless = any(not any(body.mass for body in group) for group in loose.values())
-    fails = massless or growth(subject).fails
+    fails = massless or grow_tree(subject).fails
     for body, *others in loose.values():
-        message = f"no joint connects {called(body)}"
+        message = f"no joint connects {describe_object(body)}"
         if others:
             names = join_words((f"'{other.name}'" for other in others), most=3)
-            message = f"{called(body)} is not connected to ground, nor {names}, which joints connect with it"
-        elif bones.of(body):
-            message = f"{called(body)} is not connected to ground, only with itself"
-        fate = "adds a FreeJoint to ground" if not fails else "refuses the model"
+            message = (
+                f"{describe_object(body)} is not connected to ground, nor {names}, which joints "
+                "connect with it"
+            )
+        elif bones.find_joints(body):
+            message = f"{describe_object(body)} is not connected to ground, only with itself"
+        fate = "adds a FreeJoint to ground" if not fails else "rejects the model"
         report(
             f"{message}; OpenSim {fate}",
             body,
@@ -69,16 +78,16 @@ def unconnected_body(subject: Subject, report: FindingSink) -> None:
 
 
 @rule("OSIM403", "closed-loop", severity=ERROR)
-def closed_loop(subject: Subject, report: FindingSink) -> None:
+def report_closed_loop(subject: Subject, report: FindingCollector) -> None:
     """Joints form a closed loop.
 
-    Reports each joint that connects bodies which earlier joints have connected already.
+    Reports each joint that connects bodies that earlier joints already connect.
 
     OpenSim cuts the loop: it splits a body and welds the halves with a constraint. That adds
-    coordinates and multipliers that the file does not mention, and the halves together have another
-    mass or inertia than the body, so the model moves otherwise than it says even where the loop
-    closes. Where it does not close in the default pose, or the joint is a CustomJoint, OpenSim
-    refuses the model. Say what is meant with a constraint.
+    coordinates and multipliers that are not in the file, and the halves together have a different
+    mass or inertia from the body, so the model moves differently even where the loop closes. Where
+    it does not close in the default pose, or the joint is a CustomJoint, OpenSim rejects the model.
+    Use a constraint instead.
 
     ```xml
     - <WeldJoint name="strut">
@@ -91,35 +100,38 @@ def closed_loop(subject: Subject, report: FindingSink) -> None:
     + </ConstantDistanceConstraint>
     ```
     """
-    bones = skeleton(subject)
-    pairs = Counter(map(_ends, bones.links))
-    for link in growth(subject).loops:
-        if pairs[_ends(link)] == 1 and link.child_base is not None:
+    bones = build_skeleton(subject)
+    pairs = Counter(map(_make_pair, bones.links))
+    for link in grow_tree(subject).loops:
+        if pairs[_make_pair(link)] == 1 and link.child_base is not None:
             others = (
                 other.joint
                 for other in bones.links
                 if other is not link and other.child_base is link.child_base
             )
             before = next(others, None)
-            other = f", which {called(before)} has placed already" if before is not None else ""
+            other = (
+                f", which {describe_object(before)} already places" if before is not None else ""
+            )
             report(
-                f"{called(link.joint)} closes a loop at {called(link.child_base)}{other}; {_fate_of_loop(bones, link)}",
+                f"{describe_object(link.joint)} closes a loop at "
+                f"{describe_object(link.child_base)}{other}; {_describe_loop(bones, link)}",
                 link.joint,
                 tag="socket_child_frame",
             )
 
 
 @rule("OSIM404", "parallel-joints", severity=ERROR)
-def parallel_joints(subject: Subject, report: FindingSink) -> None:
+def report_parallel_joints(subject: Subject, report: FindingCollector) -> None:
     """Two joints connect the same two bodies.
 
     Reports the second joint between one pair of bodies.
 
     OpenSim splits the child, lets each joint carry one half, and welds the halves with a
-    constraint: more coordinates than move, and inertias that the file does not say. Of a WeldJoint
-    it makes a constraint, of a FreeJoint nothing, but counts the child's mass twice. It refuses the
-    model if the second joint is a CustomJoint, if its child is ground, or if it is a WeldJoint or a
-    FreeJoint to ground.
+    constraint: more coordinates than the mechanism needs, and inertias that are not in the file. It
+    replaces a second WeldJoint by a constraint. It ignores a second FreeJoint but counts the mass
+    of the child twice. It rejects the model if the second joint is a CustomJoint, if its child is
+    ground, or if it is a WeldJoint or a FreeJoint to ground.
 
     ```xml
     - <PinJoint name="hip_again">
@@ -133,29 +145,30 @@ def parallel_joints(subject: Subject, report: FindingSink) -> None:
       </PinJoint>
     ```
     """
-    bones = skeleton(subject)
+    bones = build_skeleton(subject)
     first: dict[frozenset[int], Joint] = {}
-    loops = growth(subject).loops
+    loops = grow_tree(subject).loops
     for link in bones.links:
         if link not in loops:
-            first.setdefault(_ends(link), link.joint)
+            first.setdefault(_make_pair(link), link.joint)
     for link in loops:
-        if (before := first.setdefault(_ends(link), link.joint)) is not link.joint:
+        if (before := first.setdefault(_make_pair(link), link.joint)) is not link.joint:
             report(
-                f"{called(link.joint)} connects the same two bodies as {called(before)}; {_fate_of_loop(bones, link)}",
+                f"{describe_object(link.joint)} connects the same two bodies as "
+                f"{describe_object(before)}; {_describe_loop(bones, link)}",
                 link.joint,
                 attribute="name",
             )
 
 
 @rule("OSIM407", "massless-leaf", severity=ERROR)
-def massless_leaf(subject: Subject, report: FindingSink) -> None:
+def report_massless_leaf(subject: Subject, report: FindingCollector) -> None:
     """A body without mass is the last of its chain.
 
     Reports bodies of mass 0 that move and carry nothing with mass.
 
-    A force on such a body would accelerate it without bounds: the mass matrix is singular, and
-    OpenSim refuses the model, or (at a CustomJoint) computes NaN. Between two bodies with mass, or
+    A force on such a body gives it an infinite acceleration: the mass matrix is singular, and
+    OpenSim rejects the model, or (at a CustomJoint) computes NaN. Between two bodies with mass, or
     welded to one, a massless body is fine.
 
     ```xml
@@ -163,40 +176,40 @@ def massless_leaf(subject: Subject, report: FindingSink) -> None:
     + <Body name="shank"> <mass>3</mass> <inertia>0.05 0.05 0.005 0 0 0</inertia> </Body>
     ```
     """
-    bones = skeleton(subject)
+    bones = build_skeleton(subject)
     if not bones.complete or has_unknown_joints(subject):
         return
-    for body, members, joint in _massless_leaves(bones):
+    for body, members, joint in _find_massless_leaves(bones):
         welded = (
             f" with the bodies welded to it ({join_words(item.name for item in members)})"
             if members
             else ""
         )
-        fate = "computes NaN" if isinstance(joint, CustomJoint) else "refuses the model"
+        fate = "computes NaN" if isinstance(joint, CustomJoint) else "rejects the model"
         report(
-            f"{called(body)}{welded} is massless and the end of its chain: OpenSim {fate}",
+            f"{describe_object(body)}{welded} is massless and the end of its chain: OpenSim {fate}",
             body,
             tag="mass",
         )
 
 
-def _ends(link: Link) -> frozenset[int]:
+def _make_pair(link: JointLink) -> frozenset[int]:
     return frozenset((id(link.parent_base), id(link.child_base)))
 
 
-def _fate_of_loop(bones: Skeleton, link: Link) -> str:
+def _describe_loop(bones: Skeleton, link: JointLink) -> str:
     """What OpenSim makes of a joint between bodies that other joints connect already."""
     kind = type(link.joint)
     to_ground = link.parent_base is bones.ground and issubclass(kind, WeldJoint | FreeJoint)
     if to_ground or link.child_base is bones.ground or issubclass(kind, CustomJoint):
-        return "OpenSim refuses the model"
+        return "OpenSim rejects the model"
     if issubclass(kind, WeldJoint):
-        return "OpenSim makes a constraint of it, and counts the mass of the child twice"
+        return "OpenSim replaces it by a constraint, and counts the mass of the child twice"
     if issubclass(kind, FreeJoint):
-        return "OpenSim counts the mass of the child twice, and the second moves apart from all that is connected"
+        return "OpenSim counts the mass of the child twice, and the copy moves independently"
     return (
-        "OpenSim splits the child, gives the halves another inertia, and welds them with a constraint; or refuses the "
-        "model where they do not meet in the default pose"
+        "OpenSim splits the child, gives the halves another inertia, and welds them with a "
+        "constraint; or rejects the model where they do not meet in the default pose"
     )
 
 
@@ -206,7 +219,7 @@ class _Groups:
     def __init__(self) -> None:
         self._up: dict[int, int] = {}
 
-    def of(self, item: Object) -> int:
+    def find_root(self, item: Object) -> int:
         key = id(item)
         while self._up.get(key, key) != key:
             key = self._up[key]
@@ -214,10 +227,10 @@ class _Groups:
 
     def join(self, one: Object | None, other: Object | None) -> None:
         if one is not None and other is not None:
-            self._up[self.of(one)] = self.of(other)
+            self._up[self.find_root(one)] = self.find_root(other)
 
 
-def _massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body], Joint]]:
+def _find_massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body], Joint]]:
     """Each rigid group of bodies that has no mass and hangs on one moving joint: its bodies, and the joint."""
     groups = _Groups()
     for link in bones.links:
@@ -225,7 +238,7 @@ def _massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body], Joint]
             groups.join(link.parent_base, link.child_base)
     members: dict[int, list[Component]] = {}
     for base in (bones.ground, *bones.bodies):
-        members.setdefault(groups.of(base), []).append(base)
+        members.setdefault(groups.find_root(base), []).append(base)
     for key, group in members.items():
         bodies = [base for base in group if isinstance(base, Body)]
         if len(bodies) != len(group) or any(body.mass != 0 for body in bodies):
@@ -235,7 +248,11 @@ def _massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body], Joint]
             for link in bones.links
             if not isinstance(link.joint, WeldJoint)
             and key
-            in {groups.of(base) for base in (link.parent_base, link.child_base) if base is not None}
+            in {
+                groups.find_root(base)
+                for base in (link.parent_base, link.child_base)
+                if base is not None
+            }
         ]
         if len(moving) == 1:
             yield bodies[0], bodies[1:], moving[0].joint

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from osimlite.lint.registry import WARNING, FindingSink, Threshold, rule
-from osimlite.lint.trial import CHECKLIST, HICKS, OPENSIM, OURS, TRIAL, Trial
+from osimlite.lint.registry import WARNING, FindingCollector, Threshold, rule
+from osimlite.lint.trial import CHECKLIST, HICKS, OPENSIM, OSIMLITE, TRIAL, Trial
 
 _BOTH = f"{OPENSIM}; {HICKS}"
 FORCE_SHARE = Threshold(
@@ -50,26 +50,29 @@ PASSIVE_BAD = Threshold("passive-force-bad", 100.0, "%", "and from which on that
     "OSIM911", "residual-force", severity=WARNING, about=TRIAL,
     thresholds=(FORCE_SHARE, FORCE_GOOD, FORCE_BAD, FORCE_RMS_GOOD, FORCE_RMS_BAD),
 )  # fmt: skip
-def residual_force(trial: Trial, report: FindingSink) -> None:
-    """A force that nothing gives a body in life pushes the model.
+def report_residual_force(trial: Trial, report: FindingCollector) -> None:
+    """A residual force is large.
 
-    Looks at the forces at the joint to ground: those of inverse dynamics, and of the residual
-    actuators of RRA, CMC and StaticOptimization. A peak of up to 10 N is good and one of more than
-    25 N bad, a root mean square up to 5 N and more than 10 N (the table in OpenSim's best
+    Checks the forces at the joint to ground, ideally zero: those of inverse dynamics, and of the
+    residual actuators of RRA, CMC and StaticOptimization. A peak of up to 10 N is good and one of
+    more than 25 N bad, a root mean square up to 5 N and more than 10 N (the table in OpenSim's best
     practices, https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686); Hicks
     and others advise peaks of at most 5 % of the largest external force (2015, Is my model good
     enough?, https://doi.org/10.1115/1.4029304). A peak that is within one of both limits is okay.
     Residuals of inverse dynamics count as an info where RRA or CMC follow.
 
-    Motion, masses and measured loads contradict each other. Whatever makes up for it pushes in the
-    place of muscles.
+    Motion, masses and measured loads contradict each other. The residual force compensates for it
+    instead of the muscles.
 
     ```trial
     - peak of FY of RRA: 61 N, with loads of 850 N
     + peak of FY of RRA: 8.1 N, with loads of 850 N
     ```
     """
-    advice = "look at mass and mass centres, the filter, and that loads and motion have the same times and feet"
+    advice = (
+        "look at mass and mass centres, the filter, and that loads and motion have the same times "
+        "and feet"
+    )
     trial.judge(report, [FORCE_GOOD, FORCE_SHARE, FORCE_BAD], _BOTH, advice, "peak")
     trial.judge(report, [FORCE_RMS_GOOD, FORCE_RMS_BAD], OPENSIM, advice, "rms")
 
@@ -78,11 +81,12 @@ def residual_force(trial: Trial, report: FindingSink) -> None:
     "OSIM912", "residual-moment", severity=WARNING, about=TRIAL,
     thresholds=(MOMENT_SHARE, MOMENT_GOOD, MOMENT_BAD, MOMENT_RMS_GOOD, MOMENT_RMS_BAD),
 )  # fmt: skip
-def residual_moment(trial: Trial, report: FindingSink) -> None:
-    """A moment that nothing gives a body in life turns the model.
+def report_residual_moment(trial: Trial, report: FindingCollector) -> None:
+    """A residual moment is large.
 
-    As residual-force. A peak of up to 50 N m is good and one of more than 75 N m bad, a root mean
-    square up to 30 N m and more than 50 N m (the table in OpenSim's best practices,
+    Checks the moments at the joint to ground, as residual-force checks the forces. A peak of up to
+    50 N m is good and one of more than 75 N m bad, a root mean square up to 30 N m and more than 50
+    N m (the table in OpenSim's best practices,
     https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686); Hicks and others
     advise at most 1 % of the largest external force times the height of the mass centre (2015, Is
     my model good enough?, https://doi.org/10.1115/1.4029304), which is much less: what is within
@@ -108,25 +112,28 @@ def residual_moment(trial: Trial, report: FindingSink) -> None:
     thresholds=(RESERVE_GOOD, RESERVE_BAD),
     about=TRIAL,
 )
-def reserve_moment(trial: Trial, report: FindingSink) -> None:
-    """Reserve actuators do what muscles cannot.
+def report_reserve_moment(trial: Trial, report: FindingCollector) -> None:
+    """Reserve actuators replace muscles.
 
     Compares the reserve actuators of CMC and StaticOptimization, of coordinates that muscles cross,
-    with the moments that the motion takes there, peak with peak and root mean square with root mean
-    square: up to 5 % is good (Hicks and others 2015, Is my model good enough?,
+    with the joint moments of the motion, peak with peak and root mean square with root mean square:
+    up to 5 % is good (Hicks and others 2015, Is my model good enough?,
     https://doi.org/10.1115/1.4029304), and more than 10 % is bad (OpenSim's checklist,
     https://simtk-confluence.stanford.edu:8443/plugins/viewsource/viewpagesrc.action?pageId=3376337).
-    What is below 1 N m is not looked at.
+    Moments below 1 N m are not checked.
 
-    The muscles are too weak for the motion, or their paths are wrong; the forces of all muscles
-    there are too small.
+    The muscles are too weak for the motion, or their paths are wrong; the forces of all muscles at
+    this joint are too small.
 
     ```trial
     - peak of the reserve of 'ankle_angle_r', of its joint moment: 34 %
     + peak of the reserve of 'ankle_angle_r', of its joint moment: 2 %
     ```
     """
-    advice = "look at strength and paths of the muscles there, at passive forces of those against them, and at the moment"
+    advice = (
+        "look at strength and paths of the muscles there, at passive forces of those against "
+        "them, and at the moment"
+    )
     for kind in ("peak", "rms"):
         trial.judge(report, [RESERVE_GOOD, RESERVE_BAD], f"{HICKS}; {CHECKLIST}", advice, kind)
 
@@ -138,10 +145,10 @@ def reserve_moment(trial: Trial, report: FindingSink) -> None:
     thresholds=(ERROR_GOOD, ERROR_BAD, ERROR_RMS_BAD),
     about=TRIAL,
 )
-def tracking_error(trial: Trial, report: FindingSink) -> None:
-    """RRA or CMC misses the motion that it was to follow.
+def report_tracking_error(trial: Trial, report: FindingCollector) -> None:
+    """RRA or CMC does not follow its motion.
 
-    Looks at the errors that both tools write (`_pErr.sto`): up to 2 degrees or 2 cm are good, more
+    Checks the errors that both tools write (`_pErr.sto`): up to 2 degrees or 2 cm are good, more
     than 5 are bad, of the root mean square of a translation more than 4 cm (the table in OpenSim's
     best practices, https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686).
 
@@ -159,23 +166,26 @@ def tracking_error(trial: Trial, report: FindingSink) -> None:
 
 
 @rule("OSIM915", "full-activation", severity=WARNING, thresholds=(FULL_GOOD, FULL_BAD), about=TRIAL)
-def full_activation(trial: Trial, report: FindingSink) -> None:
-    """A muscle is fully active for long.
+def report_full_activation(trial: Trial, report: FindingCollector) -> None:
+    """A muscle is fully active for a long time.
 
-    Looks in the activations of StaticOptimization and CMC for muscles of 0.99 and more.
+    Checks the activations of StaticOptimization and CMC for values of 0.99 and more.
 
-    A muscle that cannot give more leaves the rest to others and to reserve actuators; in daily life
-    none is fully active for long. OpenSim's best practices
-    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) ask to compare
-    activations with measured ones, and give no limit: this one is ours.
+    Other muscles and reserve actuators must replace a saturated muscle; in daily life no muscle is
+    fully active for long. OpenSim's best practices
+    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) recomfix to compare
+    activations with measurements, and give no limit: this limit is osimlite's.
 
     ```trial
     - share of the time that 'tib_ant_r' is fully active: 40 %
     + share of the time that 'tib_ant_r' is fully active: 0 %
     ```
     """
-    advice = "look at its max_isometric_force, its fibers' length in this pose, and at muscles that pull against it"
-    trial.judge(report, [FULL_GOOD, FULL_BAD], OURS, advice, "share")
+    advice = (
+        "look at its max_isometric_force, its fibers' length in this pose, and at muscles that "
+        "pull against it"
+    )
+    trial.judge(report, [FULL_GOOD, FULL_BAD], OSIMLITE, advice, "share")
 
 
 @rule(
@@ -185,22 +195,25 @@ def full_activation(trial: Trial, report: FindingSink) -> None:
     thresholds=(PASSIVE_GOOD, PASSIVE_BAD),
     about=TRIAL,
 )
-def passive_force(trial: Trial, report: FindingSink) -> None:
-    """The passive fibers of a muscle pull hard.
+def report_passive_force(trial: Trial, report: FindingCollector) -> None:
+    """The passive force of a muscle is large.
 
     Computes the passive forces of the muscles along the states of CMC, or along the motion of a
     StaticOptimization with fibers in equilibrium, and compares them with `max_isometric_force`.
     OpenSim's best practices
-    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) ask to look at them
-    and give no limit: this one is ours.
+    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) recomfix to check
+    them and give no limit: this limit is osimlite's.
 
-    Nothing controls passive forces. Muscles on the other side have to pull against them, which
-    nobody's do; static optimization leaves them out, and is wrong by them.
+    Passive forces are not controlled. Antagonists must pull against them, which real muscles do
+    not; static optimization ignores them, and is wrong by them.
 
     ```trial
     - peak of the passive force of 'rect_fem_r', of its strength: 130 %
     + peak of the passive force of 'rect_fem_r', of its strength: 12 %
     ```
     """
-    advice = "its fibers are too long in this pose: look at tendon_slack_length, optimal_fiber_length and its path"
-    trial.judge(report, [PASSIVE_GOOD, PASSIVE_BAD], OURS, advice, "peak")
+    advice = (
+        "its fibers are too long in this pose: look at tendon_slack_length, optimal_fiber_length "
+        "and its path"
+    )
+    trial.judge(report, [PASSIVE_GOOD, PASSIVE_BAD], OSIMLITE, advice, "peak")

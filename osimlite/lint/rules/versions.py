@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from osimlite.lint.history import NEWEST, later_than, new_properties
-from osimlite.lint.registry import ERROR, INFO, FindingSink, rule
+from osimlite.lint.history import NEWEST, find_new_properties, load_later_changes
+from osimlite.lint.registry import ERROR, INFO, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import a, called
+from osimlite.lint.words import describe_object, with_article
 from osimlite.schema.base import Object
 from osimlite.schema.model import CURRENT_VERSION
 from osimlite.schema.specs import FieldSpec
 
 
 @rule("OSIM113", "newer-class", severity=ERROR)
-def newer_class(subject: Subject, report: FindingSink) -> None:
-    """OpenSim has a class or a property only after the version that is aimed at.
+def report_newer_class(subject: Subject, report: FindingCollector) -> None:
+    """A class or a property is newer than the target version of OpenSim.
 
     Reports objects of classes, and properties, that OpenSim has only after 4.6, or after the
     version that the setting `target-version`, or the option `--target-version`, names: one of 4.0
-    to 4.6. Says which version has them first, and what a property was called before. Properties
-    that say no more than the default are told for information, and so is a number of the format
-    that is too new: no OpenSim refuses a file for it.
+    to 4.6. Reports the first version that has them, and the earlier name of a property. Properties
+    with their default value are reported for information, and so is a format number that is too
+    new: no version of OpenSim rejects a file for it.
 
-    In a set (bodies, joints, forces ...) OpenSim refuses to load an object of an unknown class;
-    elsewhere it leaves the object out. Unknown properties it drops without a word. The number of
-    the format hardly tells: from 4.0 to 4.4 and from 4.5.1 to 4.6 it is the same.
+    In a set (bodies, joints, forces ...) OpenSim rejects an object of an unknown class; elsewhere
+    it leaves the object out. It ignores unknown properties without a message. The format number
+    does not distinguish them: it is the same from 4.0 to 4.4 and from 4.5.1 to 4.6.
 
     ```xml
     - <CoordinateLinearStopForce name="stop">
@@ -35,11 +35,12 @@ def newer_class(subject: Subject, report: FindingSink) -> None:
     ```
     """
     target = subject.config.target_version or NEWEST
-    later = later_than(target)
+    later = load_later_changes(target)
     # What is newer than all is told by OSIM004.
     if subject.source is not None and later.format < (subject.version or 0) <= CURRENT_VERSION:
         report(
-            f"the file has the format {subject.version}, OpenSim {target} writes {later.format} and takes it for that",
+            f"the file has the format {subject.version}, OpenSim {target} writes {later.format} "
+            "and reads the file as such",
             number=0,
             attribute="Version",
             severity=INFO,
@@ -51,18 +52,20 @@ def newer_class(subject: Subject, report: FindingSink) -> None:
                 # What is there by default stands in no file.
                 if subject.source is None or item._index is not None:
                     report(
-                        f"{called(item)}: OpenSim has {a(cls.tag)} from version {first} on; {target} refuses it",
+                        f"{describe_object(item)}: OpenSim has {with_article(cls.tag)} since "
+                        f"version {first}; {target} rejects it",
                         item,
                     )
             continue
-        for spec, version, before in new_properties(cls, target):
+        for spec, version, before in find_new_properties(cls, target):
             was = f"; before it was called {before}" if before else ""
             for item in items:
                 if not _is_given(subject, item, spec):
                     continue
                 is_default = spec.factory is None and getattr(item, spec.name) == spec.default
                 report(
-                    f"{called(item)}: OpenSim has {spec.tag} from version {version} on; {target} drops it{was}",
+                    f"{describe_object(item)}: OpenSim has {spec.tag} since version {version}; "
+                    f"{target} ignores it{was}",
                     item,
                     tag=spec.tag,
                     severity=INFO if is_default else None,

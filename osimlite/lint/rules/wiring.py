@@ -6,10 +6,10 @@ import re
 from typing import NamedTuple
 
 from osimlite.base.text import find_nearest, format_count
-from osimlite.lint.fixes import replaced
-from osimlite.lint.registry import ERROR, FindingSink, rule
+from osimlite.lint.fixes import replace_text
+from osimlite.lint.registry import ERROR, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import a, called
+from osimlite.lint.words import describe_object, with_article
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
@@ -18,14 +18,14 @@ from osimlite.schema.tree import Use, normalised
 
 
 @rule("OSIM331", "control-function-count", severity=ERROR)
-def control_function_count(subject: Subject, report: FindingSink) -> None:
-    """A prescribed controller has not one function for each of its actuators.
+def report_control_function_count(subject: Subject, report: FindingCollector) -> None:
+    """A prescribed controller has a different number of functions and actuators.
 
     Compares the number of control functions with the number of actuators. Controllers that read
-    their controls from a file are left out.
+    their controls from a file are not checked.
 
-    The first function drives the first actuator, and so on; names play no part. OpenSim refuses the
-    model where the numbers differ.
+    The first function drives the first actuator, and so on; names do not matter. OpenSim rejects
+    the model where the numbers differ.
 
     ```xml
       <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
@@ -38,7 +38,7 @@ def control_function_count(subject: Subject, report: FindingSink) -> None:
       </PrescribedController>
     ```
     """
-    for controller in subject.named("PrescribedController"):
+    for controller in subject.find_by_class("PrescribedController"):
         if isinstance(controller.ControlFunctions, Unknown):
             continue
         functions, actuators = (
@@ -54,21 +54,21 @@ def control_function_count(subject: Subject, report: FindingSink) -> None:
             )
         if controller.controls_file is None and functions != actuators:
             report(
-                f"{called(controller)} has {format_count(functions, 'control function')} for "
-                f"{format_count(actuators, 'actuator')}: OpenSim refuses the model",
+                f"{describe_object(controller)} has {format_count(functions, 'control function')} for "
+                f"{format_count(actuators, 'actuator')}: OpenSim rejects the model",
                 controller.ControlFunctions if functions else controller,
             )
 
 
-@rule("OSIM332", "broken-input", severity=ERROR, mends="unsafe")
-def broken_input(subject: Subject, report: FindingSink) -> None:
-    """An input names an output that does not exist.
+@rule("OSIM332", "broken-input", severity=ERROR, fixes="unsafe")
+def report_broken_input(subject: Subject, report: FindingCollector) -> None:
+    """An input refers to an output that does not exist.
 
     Follows the inputs of reporters, controllers and geometry: the path of a component, a bar, and
     one of its outputs of the type that the input takes.
 
-    OpenSim refuses the model when it is connected. Paths are absolute or begin at the component
-    with the input. It also refuses an input of a geometry that a frame draws.
+    OpenSim rejects the model when it is connected. Paths are absolute or relative to the component
+    with the input. OpenSim also rejects an input of a geometry that a frame draws.
 
     ```xml
       <components>
@@ -82,28 +82,28 @@ def broken_input(subject: Subject, report: FindingSink) -> None:
     for use in subject.uses:
         if use.reference.rule != "input" or not isinstance(use.value, str) or not use.value:
             continue
-        fault = _fault_of(subject, use, use.value)
+        fault = _describe_input_fault(subject, use, use.value)
         if fault is None:
             continue
         value = getattr(use.holder, use.spec.name)
         nth = value[: use.position].count(use.value) if isinstance(value, tuple) else 0
         place = subject.position(use.holder, tag=use.spec.tag, word=use.value, nth=nth)
         report(
-            f"{called(use.holder)}: {use.spec.tag} names '{use.value}'{fault.message}",
+            f"{describe_object(use.holder)}: {use.spec.tag} names '{use.value}'{fault.message}",
             use.holder,
             at=place,
             suggestion=fault.suggestion,
-            fix=replaced(subject.source, place, fault.suggestion, safe=False),
+            fix=replace_text(subject.source, place, fault.suggestion, safe=False),
         )
 
 
 @rule("OSIM333", "connected-twice", severity=ERROR)
-def connected_twice(subject: Subject, report: FindingSink) -> None:
+def report_connected_twice(subject: Subject, report: FindingCollector) -> None:
     """A list of sockets names the same component twice.
 
     Reports every mention of an actuator after the first in the list of one controller.
 
-    OpenSim refuses the model when it is connected.
+    OpenSim rejects the model when it is connected.
 
     ```xml
       <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
@@ -128,7 +128,8 @@ def connected_twice(subject: Subject, report: FindingSink) -> None:
         known = seen.setdefault((id(use.holder), use.spec.tag), [])
         if any(other is target for other, _ in known):
             report(
-                f"{called(use.holder)} lists {called(target)} again: OpenSim refuses the model",
+                f"{describe_object(use.holder)} lists {describe_object(target)} again: OpenSim "
+                "rejects the model",
                 use.holder,
                 tag=use.spec.tag,
                 word=text,
@@ -137,7 +138,7 @@ def connected_twice(subject: Subject, report: FindingSink) -> None:
         known.append((target, text))
 
 
-class _Fault(NamedTuple):
+class _InputFault(NamedTuple):
     """What is wrong with the text of an input, and a text that would be right."""
 
     message: str
@@ -151,10 +152,10 @@ _INPUT = re.compile(
 )
 
 
-def _fault_of(subject: Subject, use: Use, text: str) -> _Fault | None:
+def _describe_input_fault(subject: Subject, use: Use, text: str) -> _InputFault | None:
     match = _INPUT.fullmatch(text)
     if match is None or match["path"] is None:
-        return _Fault("; an input wants the path of a component, a bar and an output")
+        return _InputFault("; expected the path of a component, a bar and an output")
     tree, path = subject.tree, match["path"]
     base = tree.path_of(use.owner) or "/"
     whole = normalised(path if path.startswith("/") else f"{base}/{path}")
@@ -165,7 +166,7 @@ def _fault_of(subject: Subject, use: Use, text: str) -> _Fault | None:
         right = find_nearest(
             path, [known for known, item in tree.by_path.items() if outputs_of(type(item))]
         )
-        return _Fault(
+        return _InputFault(
             f", but there is no component '{path}'", text.replace(path, right, 1) if right else None
         )
     if isinstance(component, Unknown):
@@ -178,23 +179,26 @@ def _fault_of(subject: Subject, use: Use, text: str) -> _Fault | None:
             match["output"], [name for name, output in outputs.items() if output.type == kind]
         )
         suggestion = None if right is None else f"{path}|{right}" + text[match.end("output") :]
-        return _Fault(f", but {called(component)} has no output '{match['output']}'", suggestion)
+        return _InputFault(
+            f", but {describe_object(component)} has no output '{match['output']}'", suggestion
+        )
     if known.type != kind:
-        return _Fault(f", which is {_a_type(known.type)}, not {_a_type(kind)}")
+        return _InputFault(f", which is {_describe_type(known.type)}, not {_describe_type(kind)}")
     if match["channel"] and not known.channels:
-        return _Fault(f", but that output has no channel '{match['channel']}'")
+        return _InputFault(f", but that output has no channel '{match['channel']}'")
     parent = tree.parent_of(use.owner)
     if isinstance(use.owner, Geometry) and isinstance(parent, Frame):
         held = any(item is use.owner for item in parent.subcomponents)
         return (
             None
             if held
-            else _Fault(
-                f"; {called(parent)} draws it and moves it already: OpenSim refuses the model"
+            else _InputFault(
+                f"; {describe_object(parent)} draws it and moves it already: OpenSim rejects the "
+                "model"
             )
         )
     return None
 
 
-def _a_type(kind: str) -> str:
-    return "a number" if kind == "double" else a(kind)
+def _describe_type(kind: str) -> str:
+    return "a number" if kind == "double" else with_article(kind)

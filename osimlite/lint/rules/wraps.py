@@ -5,31 +5,31 @@ from __future__ import annotations
 import math
 
 from osimlite.base.text import format_count
-from osimlite.lint.placement import Pose, fixed, on_base
-from osimlite.lint.registry import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.placement import FramePose, locate_frame, make_offset
+from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import called
+from osimlite.lint.words import describe_object
 from osimlite.mechanics.laws.vectors import Vector
 from osimlite.schema.base import Component
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint, PathWrap
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere
 
 
-def _wraps(path: GeometryPath) -> list[PathWrap]:
+def _list_wraps(path: GeometryPath) -> list[PathWrap]:
     # What has no business there has a finding of its own.
     return [wrap for wrap in path.path_wrap_set.objects if isinstance(wrap, PathWrap)]
 
 
 @rule("OSIM616", "swallowed-point", severity=WARNING)
-def swallowed_point(subject: Subject, report: FindingSink) -> None:
+def report_swallowed_point(subject: Subject, report: FindingCollector) -> None:
     """A point of a path lies inside a surface that the path wraps around.
 
-    Reports points fixed to the body of a cylinder (which has no ends here), a sphere or an
-    ellipsoid, and inside it, within the `range` of the wrap.
+    Reports points that are fixed to the body of a cylinder (taken as infinitely long), a sphere or
+    an ellipsoid, inside it and within the `range` of the wrap.
 
-    OpenSim lets no piece of a path wrap that begins or ends inside: the path goes straight through
-    the surface, in every pose and without a message. A point may be inside by less than a
-    millimetre, after scaling for instance.
+    OpenSim does not wrap a segment that begins or ends inside: the path goes straight through the
+    surface, in every pose and without a message. A point may be inside by less than a millimetre,
+    for example after scaling.
 
     ```xml
       <PathPoint name="band_a"> <location>0.02 0 0.02</location> </PathPoint>
@@ -37,12 +37,12 @@ def swallowed_point(subject: Subject, report: FindingSink) -> None:
     + <WrapSphere name="condyle"> <radius>0.028</radius> </WrapSphere>
     ```
     """
-    for path in subject.each(GeometryPath):
+    for path in subject.find_instances(GeometryPath):
         points = path.path_point_set.objects
-        for wrap in _wraps(path):
+        for wrap in _list_wraps(path):
             surface = subject.target_of(wrap, "wrap_object")
             base = (
-                _base(subject, surface)
+                _locate_wrap(subject, surface)
                 if isinstance(surface, WrapObject) and surface.active
                 else None
             )
@@ -52,47 +52,53 @@ def swallowed_point(subject: Subject, report: FindingSink) -> None:
             body, pose = base
             first, last = wrap.range
             for point in points[max(first, 1) - 1 : last if last > 0 else None]:
-                placed = on_base(subject, subject.target_of(point, "socket_parent_frame"))
+                placed = locate_frame(subject, subject.target_of(point, "socket_parent_frame"))
                 if not isinstance(point, PathPoint) or placed is None or placed[0] is not body:
                     continue
-                depth = _depth(surface, pose.inverse().of(placed[1].of(point.location)))
+                depth = _compute_depth(
+                    surface,
+                    pose.inverse().transform_point(placed[1].transform_point(point.location)),
+                )
                 if depth > 0:
                     owner = subject.tree.parent_of(path)
                     report(
-                        f"{called(point)} of {called(owner or path)} is {1000 * depth:.3g} mm inside "
-                        f"{called(surface)}: the path does not wrap between it and its neighbours",
+                        f"{describe_object(point)} of {describe_object(owner or path)} is "
+                        f"{1000 * depth:.3g} mm inside {describe_object(surface)}: the path does "
+                        "not wrap between it and its neighbours",
                         point,
                         tag="location",
                     )
 
 
 @rule("OSIM617", "wrap-range", severity=WARNING)
-def wrap_range(subject: Subject, report: FindingSink) -> None:
-    """The range of a wrap holds no piece of the path.
+def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
+    """The range of a wrap contains no segment of the path.
 
     Reports wraps whose `range` ends at the point where it begins, or before it. A range that ends
     beyond the last point is an error.
 
-    The path never wraps around the surface; where the range ends before it begins, OpenSim leaves
-    out all wraps of the path that follow as well. Beyond the last point it fails as soon as it
+    The path never wraps around the surface; where the range ends before it begins, OpenSim also
+    ignores all later wraps of the path. With a range beyond the last point it fails when it
     computes a length, and its message names no wrap; only in poses where an earlier wrap has none
-    of its conditional points it does not get there. Points count from 1, and -1 stands for either
-    end.
+    of its conditional points it does not fail. Points count from 1, and -1 stands for either end.
 
     ```xml
     - <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>2 1</range> </PathWrap>
     + <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>1 2</range> </PathWrap>
     ```
     """
-    for path in subject.each(GeometryPath):
+    for path in subject.find_instances(GeometryPath):
         points = path.path_point_set.objects
         count = len(points)
         owner, is_left, may_leave = subject.tree.parent_of(path), False, False
-        for wrap in _wraps(path):
+        for wrap in _list_wraps(path):
             first, last = wrap.range
             surface = subject.target_of(wrap, "wrap_object")
             is_off = isinstance(surface, WrapObject) and not surface.active
-            tells = f"the range of {called(wrap)} of {called(owner or path)}, {first} {last},"
+            tells = (
+                f"the range of {describe_object(wrap)} of {describe_object(owner or path)}, "
+                f"{first} {last},"
+            )
             start, end = max(first, 1), last if last > 0 else count
             if end > count and start <= end and not (is_left or is_off):
                 fate = "OpenSim fails when it computes its length"
@@ -108,12 +114,12 @@ def wrap_range(subject: Subject, report: FindingSink) -> None:
                 )
             elif start >= end or end > count:
                 others = (
-                    " and OpenSim leaves out the wraps after it"
-                    if start > end and not is_off
-                    else ""
+                    ", and OpenSim ignores the wraps after it" if start > end and not is_off else ""
                 )
                 report(
-                    f"{tells} holds no piece of the path: it never wraps{others}", wrap, tag="range"
+                    f"{tells} contains no segment of the path: it never wraps{others}",
+                    wrap,
+                    tag="range",
                 )
             is_left = is_left or (start > end and not is_off)
             held = points[start - 1 : end]
@@ -122,17 +128,17 @@ def wrap_range(subject: Subject, report: FindingSink) -> None:
             )
 
 
-def _base(subject: Subject, surface: WrapObject) -> tuple[Component, Pose] | None:
+def _locate_wrap(subject: Subject, surface: WrapObject) -> tuple[Component, FramePose] | None:
     """The body that a surface is fixed to, and where it is on it."""
     holder = subject.tree.parent_of(surface)
-    placed = on_base(subject, subject.tree.parent_of(holder) if holder is not None else None)
+    placed = locate_frame(subject, subject.tree.parent_of(holder) if holder is not None else None)
     return placed and (
         placed[0],
-        placed[1].then(fixed(surface.xyz_body_rotation, surface.translation)),
+        placed[1].compose(make_offset(surface.xyz_body_rotation, surface.translation)),
     )
 
 
-def _depth(surface: WrapObject, place: Vector) -> float:
+def _compute_depth(surface: WrapObject, place: Vector) -> float:
     """How deep a place in the frame of a surface is inside it, m; 0 where OpenSim would let a path wrap."""
     x, y, z = place
     match surface:

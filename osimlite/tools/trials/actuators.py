@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from osimlite.io.tables.storage import StoTable
-from osimlite.lint.trial import Number
+from osimlite.lint.trial import Measurement
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.actuators import (
     BodyActuator,
@@ -117,12 +117,12 @@ def measure_residuals(
             )
             yield (
                 file,
-                Number(rule, "peak", of, float(values[row]), unit, size, where, at, is_final),
+                Measurement(rule, "peak", of, float(values[row]), unit, size, where, at, is_final),
             )
             rms = float(np.sqrt(np.mean(values**2)))
             yield (
                 file,
-                Number(
+                Measurement(
                     rule, "rms", of, rms, unit, at=folder.locate_row(file, 0), is_final=is_final
                 ),
             )
@@ -183,16 +183,16 @@ def measure_reserves(
         where = f"{reserve[row]:.3g} N m at {table.times[row]:g} s, the motion takes {np.abs(moment).max():.3g} N m"
         peak = 100.0 * float(reserve[row] / np.abs(moment).max())
         at = tool.folder.locate_row(file, row)
-        yield file, Number("reserve-moment", "peak", of, peak, "%", where=where, at=at)
+        yield file, Measurement("reserve-moment", "peak", of, peak, "%", where=where, at=at)
         rms = 100.0 * float(np.sqrt(np.mean(reserve**2) / np.mean(moment**2)))
         yield (
             file,
-            Number("reserve-moment", "rms", of, rms, "%", at=tool.folder.locate_row(file, 0)),
+            Measurement("reserve-moment", "rms", of, rms, "%", at=tool.folder.locate_row(file, 0)),
         )
     if not judged:
         yield (
             file,
-            Number(
+            Measurement(
                 "reserve-moment",
                 "peak",
                 "reserves of less than 1 N m, of their joint moments",
@@ -300,14 +300,14 @@ def measure_activations(folder: TrialFolder, file: Path, muscles: Sequence[str])
             )
             yield (
                 file,
-                Number(
+                Measurement(
                     "full-activation", "share", of, share, "%", where=f"first at {time:g} s", at=at
                 ),
             )
     if not most:
         yield (
             file,
-            Number(
+            Measurement(
                 "full-activation",
                 "share",
                 "share of the time that any muscle is fully active",

@@ -11,11 +11,11 @@ from osimlite.base.records import dataclass, field
 from osimlite.base.text import join_words
 from osimlite.errors import OsimliteError
 from osimlite.io.document.source import Source
-from osimlite.lint.config import Config, checked_words
+from osimlite.lint.config import Config, parse_codes
 from osimlite.lint.diagnostic import Finding, Report
-from osimlite.lint.engine import run, subject_of
-from osimlite.lint.many import Texts, settings_of
-from osimlite.lint.trial import Number, Trial, Verdict
+from osimlite.lint.engine import load_subject, run_rules
+from osimlite.lint.many import SourceTexts, find_settings
+from osimlite.lint.trial import Measurement, Trial, TrialVerdict
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.tools.trials.actuators import (
     find_actuators,
@@ -52,13 +52,13 @@ class TrialReport(Report):
         unchecked: what could not be checked, with the reasons.
     """
 
-    verdicts: list[Verdict] = field(default_factory=list)
+    verdicts: list[TrialVerdict] = field(default_factory=list)
     unchecked: list[str] = field(default_factory=list)
 
     @property
-    def worst(self) -> list[Verdict]:
+    def worst(self) -> list[TrialVerdict]:
         """Verdict of each kind in each file that is farthest beyond its limits."""
-        result: dict[tuple[str, str, str, str], Verdict] = {}
+        result: dict[tuple[str, str, str, str], TrialVerdict] = {}
         for verdict in self.verdicts:
             key = verdict.name, verdict.file, verdict.unit, verdict.of.partition(" of ")[0]
             if key not in result or _compute_badness(verdict) > _compute_badness(result[key]):
@@ -78,7 +78,7 @@ class TrialReport(Report):
         }
 
 
-def _compute_badness(verdict: Verdict) -> float:
+def _compute_badness(verdict: TrialVerdict) -> float:
     """Return the value of a verdict relative to its limit."""
     return verdict.value / verdict.bad if verdict.bad else verdict.value
 
@@ -113,9 +113,9 @@ def check_trial(
         MissingFileError: a path does not exist.
         OsimliteError: there is no part of a trial, or no rule has a code in `select` or `ignore`.
     """
-    given = config or Config(checked_words(select), checked_words(ignore))
+    given = config or Config(parse_codes(select), parse_codes(ignore))
     folder = TrialFolder(paths or (".",), written)
-    numbers: dict[Path, list[Number]] = {}
+    numbers: dict[Path, list[Measurement]] = {}
     unchecked: dict[str, None] = {}
     looked: dict[str, None] = {}
     measures = [*_plan_measurements(folder)]
@@ -134,7 +134,7 @@ def check_trial(
             f"there is nothing of a trial here: no setup of {', '.join(SETUPS[:-1])} or {SETUPS[-1]}, and no results",
             file=", ".join(map(str, paths)),
         )
-    report = TrialReport(texts=Texts(), unchecked=[*unchecked])
+    report = TrialReport(texts=SourceTexts(), unchecked=[*unchecked])
     findings: list[Finding] = []
     for file, own in numbers.items():
         looked[str(file)] = None
@@ -142,15 +142,15 @@ def check_trial(
             str(file),
             Source.of_file(file).data,
             own,
-            settings_of(str(file)).config_for(file, given),
+            find_settings(str(file)).config_for(file, given),
         )
-        findings += run(trial).findings
+        findings += run_rules(trial).findings
         report.verdicts += trial.verdicts
     for name in _find_documents(folder):
-        own_config = settings_of(name).config_for(name, given)
-        subject = subject_of(name, own_config)
+        own_config = find_settings(name).config_for(name, given)
+        subject = load_subject(name, own_config)
         findings += [
-            item for item in run(subject, measure=False) if item.code.startswith(SETUP_RULES)
+            item for item in run_rules(subject, measure=False) if item.code.startswith(SETUP_RULES)
         ]
         looked[name] = None
     report.findings = sorted(
@@ -174,11 +174,11 @@ def _find_documents(folder: TrialFolder) -> Iterator[str]:
     yield from names
 
 
-Measurement = tuple[str, Callable[[], Numbers]]
+PlannedMeasurement = tuple[str, Callable[[], Numbers]]
 """Description of a measurement, and the function that makes it."""
 
 
-def _plan_measurements(folder: TrialFolder) -> Iterator[Measurement]:
+def _plan_measurements(folder: TrialFolder) -> Iterator[PlannedMeasurement]:
     """Yield all measurements of a trial."""
     looked: set[tuple[object, ...]] = set()
     claimed: set[Path] = set()
@@ -213,7 +213,7 @@ def _find_result(tool: TrialTool, ending: str) -> Path | None:
     return tool.find_result(f"{tool.setup.name}{ending}")
 
 
-def _plan_inputs(tool: TrialTool, looked: set[tuple[object, ...]]) -> Iterator[Measurement]:
+def _plan_inputs(tool: TrialTool, looked: set[tuple[object, ...]]) -> Iterator[PlannedMeasurement]:
     """Yield the measurements of motion and loads, once for each pair of them.
 
     Args:
@@ -256,7 +256,7 @@ def _raise_missing(error: MissingInput) -> Numbers:
 
 def _plan_tracking(
     tool: TrialTool, others: Sequence[TrialTool], claimed: set[Path]
-) -> Iterator[Measurement]:
+) -> Iterator[PlannedMeasurement]:
     """Yield the measurements of results of RRA and CMC.
 
     Args:
@@ -309,7 +309,7 @@ def _plan_tracking(
 
 def _plan_static_optimization(
     tool: TrialTool, others: Sequence[TrialTool], claimed: set[Path]
-) -> Iterator[Measurement]:
+) -> Iterator[PlannedMeasurement]:
     """Yield the measurements of results of StaticOptimization.
 
     Args:
@@ -358,7 +358,9 @@ def _measure_activations(tool: TrialTool, file: Path) -> Numbers:
     return measure_activations(tool.folder, file, find_actuators(tool).muscles)
 
 
-def _plan_results_without_setup(folder: TrialFolder, claimed: set[Path]) -> Iterator[Measurement]:
+def _plan_results_without_setup(
+    folder: TrialFolder, claimed: set[Path]
+) -> Iterator[PlannedMeasurement]:
     """Yield the measurements of results without a setup, by their names and labels."""
     has = {tool.tag for tool in folder.tools}
     if not has & {"RRATool", "CMCTool"}:

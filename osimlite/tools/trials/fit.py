@@ -17,7 +17,7 @@ from osimlite.fitting.pose_fit import PoseFit
 from osimlite.fitting.pose_layout import MarkerTarget
 from osimlite.fitting.scale_tool import compute_scaled_model
 from osimlite.io.tables.storage import both_of
-from osimlite.lint.trial import Number
+from osimlite.lint.trial import Measurement
 from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.tools.inverse_kinematics import IKMarkerTask
@@ -38,7 +38,7 @@ MIN_CHANGE = np.radians(5.0), 0.02
 """Smallest range (rad, m) of a coordinate whose accelerations are analysed."""
 MIN_PERIODS = 3.0
 """Shortest motion that is analysed, in periods of `MAX_MOVEMENT_HZ`."""
-Numbers = Iterator[tuple[Path, Number]]
+Numbers = Iterator[tuple[Path, Measurement]]
 """Measured numbers with their files."""
 
 
@@ -69,7 +69,7 @@ def measure_scale_errors(tool: TrialTool) -> Numbers:
         where = name if kind == "peak" else ""
         yield (
             tool.job.file,
-            Number("scale-marker-error", kind, of, 100.0 * float(value), "cm", where=where),
+            Measurement("scale-marker-error", kind, of, 100.0 * float(value), "cm", where=where),
         )
 
 
@@ -102,9 +102,11 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
     worst = f"most of {motion.markers[int(np.nanargmax(each))]}, {100.0 * np.nanmax(each):.3g} cm"
     yield (
         file,
-        Number("marker-error", "rms", of, rms, "cm", where=worst, at=folder.locate_row(file, 0)),
+        Measurement(
+            "marker-error", "rms", of, rms, "cm", where=worst, at=folder.locate_row(file, 0)
+        ),
     )
-    yield file, Number("marker-error", "peak", of, peak, "cm", where=where, at=at)
+    yield file, Measurement("marker-error", "peak", of, peak, "cm", where=where, at=at)
     data = tool.require_input("marker_file")
     pairs = [*_find_swapped_markers(tool, motion)]
     for one, other, frames in pairs:
@@ -113,11 +115,11 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
             f"share of frames in which the markers '{one}' and '{other}' would fit better exchanged"
         )
         where = f"from {times[0]:g} to {times[-1]:g} s"
-        yield data, Number("swapped-markers", "share", of, share, "%", where=where)
+        yield data, Measurement("swapped-markers", "share", of, share, "%", where=where)
     if not pairs:
         yield (
             data,
-            Number(
+            Measurement(
                 "swapped-markers", "share", "share of frames with markers to exchange", 0.0, "%"
             ),
         )
@@ -134,11 +136,14 @@ def measure_written_errors(folder: TrialFolder, file: Path) -> Numbers:
     of = "the errors of the markers"
     rms = float(np.sqrt(np.mean(table["marker_error_RMS"] ** 2)))
     row = int(np.argmax(table["marker_error_max"]))
-    yield file, Number("marker-error", "rms", of, 100.0 * rms, "cm", at=folder.locate_row(file, 0))
+    yield (
+        file,
+        Measurement("marker-error", "rms", of, 100.0 * rms, "cm", at=folder.locate_row(file, 0)),
+    )
     peak, where = 100.0 * float(table["marker_error_max"][row]), f"at {table.times[row]:g} s"
     yield (
         file,
-        Number(
+        Measurement(
             "marker-error", "peak", of, peak, "cm", where=where, at=folder.locate_row(file, row)
         ),
     )
@@ -262,7 +267,7 @@ def measure_ranges(tool: TrialTool, file: Path) -> Numbers:
         where, of = f"at {time:g} s, the range is {most}", f"'{info.name}' beyond its range"
         yield (
             file,
-            Number(
+            Measurement(
                 "beyond-range",
                 "peak",
                 of,
@@ -273,7 +278,10 @@ def measure_ranges(tool: TrialTool, file: Path) -> Numbers:
             ),
         )
     if not beyond:
-        yield file, Number("beyond-range", "peak", "coordinates beyond their ranges", 0.0, "deg")
+        yield (
+            file,
+            Measurement("beyond-range", "peak", "coordinates beyond their ranges", 0.0, "deg"),
+        )
 
 
 def measure_tracking_errors(folder: TrialFolder, file: Path, tool: TrialTool | None) -> Numbers:
@@ -301,10 +309,13 @@ def measure_tracking_errors(folder: TrialFolder, file: Path, tool: TrialTool | N
         where, at = f"at {table.times[row]:g} s", folder.locate_row(file, row)
         yield (
             file,
-            Number("tracking-error", "peak", of, float(column[row]), unit, where=where, at=at),
+            Measurement("tracking-error", "peak", of, float(column[row]), unit, where=where, at=at),
         )
         kind, value = "rms" if turning else "rms-translation", float(np.sqrt(np.mean(column**2)))
-        yield file, Number("tracking-error", kind, of, value, unit, at=folder.locate_row(file, 0))
+        yield (
+            file,
+            Measurement("tracking-error", kind, of, value, unit, at=folder.locate_row(file, 0)),
+        )
 
 
 def measure_filter(tool: TrialTool) -> Numbers:
@@ -324,7 +335,7 @@ def measure_filter(tool: TrialTool) -> Numbers:
             if lost > size:
                 worst, size, unit = info.name, lost, _get_display_unit(info)
         of = f"change of '{worst}' (root mean square) by the filter of {tool.cutoff:g} Hz"
-        yield tool.job.file, Number("filter-content", "change", of, size, unit)
+        yield tool.job.file, Measurement("filter-content", "change", of, size, unit)
         motion = filtered
     if _is_from_markers(file) and (share := _measure_noise(motion, first, last)) is not None:
         of = "noise: the power of the accelerations above 15 Hz, of all"
@@ -333,7 +344,10 @@ def measure_filter(tool: TrialTool) -> Numbers:
             if tool.cutoff > 0.0
             else "the motion is not filtered"
         )
-        yield tool.job.file, Number("filter-content", "noise", of, 100.0 * share, "%", side=how)
+        yield (
+            tool.job.file,
+            Measurement("filter-content", "noise", of, 100.0 * share, "%", side=how),
+        )
 
 
 def _is_from_markers(file: Path) -> bool:

@@ -17,7 +17,7 @@ from osimlite.io.document.cache import read_object, top_at
 from osimlite.io.document.reader import read_any
 from osimlite.io.document.source import Position, Source
 from osimlite.io.tables.storage import StoTable, read_sto
-from osimlite.lint.project_files import begins_as_ours
+from osimlite.lint.project_files import is_opensim_file
 from osimlite.lint.table import Table
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -84,7 +84,7 @@ class TrialFolder:
                     if (
                         path.is_dir()
                         and file.suffix.lower() == ".xml"
-                        and begins_as_ours(str(file))
+                        and is_opensim_file(str(file))
                     ):
                         setups.setdefault(os.path.realpath(file), file)
             if not path.is_dir():
@@ -181,7 +181,7 @@ class TrialFolder:
         table = self.compute_once(
             ("text", file), lambda: Table(Source.of_file(file).data, str(file))
         )
-        return table.time_at(table.rows.line_of(row))
+        return table.locate_time(table.rows.line_of(row))
 
     def locate_time(self, file: Path, time: float) -> Position:
         """Return the position, in the file of a table, of the row that is nearest to a time."""

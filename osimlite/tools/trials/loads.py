@@ -11,9 +11,9 @@ import numpy as np
 from osimlite.errors import OsimliteError
 from osimlite.io.tables.storage import StoTable
 from osimlite.lint.config import Config
-from osimlite.lint.engine import subject_of
-from osimlite.lint.setup import Setup, members
-from osimlite.lint.trial import Number
+from osimlite.lint.engine import load_subject
+from osimlite.lint.setup import Setup, select_members
+from osimlite.lint.trial import Measurement
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.prescribed import ExternalForce
 from osimlite.simulation.recorded_motion import RecordedMotion
@@ -61,7 +61,7 @@ def read_loads(tool: TrialTool) -> tuple[Path, StoTable, list[MeasuredLoad]]:
     """
     file = tool.require_input(LOADS)
     document, table = tool.folder.read_loads(file)
-    return file, table, list(_select_loads(members(document, "ExternalForce"), table))
+    return file, table, list(_select_loads(select_members(document, "ExternalForce"), table))
 
 
 def _select_loads(items: Sequence[ExternalForce], table: StoTable) -> Iterator[MeasuredLoad]:
@@ -112,7 +112,7 @@ def measure_feet(tool: TrialTool) -> Numbers:
     """Yield the share of the time in which each load is nearer to another foot than to its own."""
     file, table, loads = read_loads(tool)
     motion = tool.motion
-    setup = subject_of(str(file), Config())
+    setup = load_subject(str(file), Config())
     bodies = [str(load.item.applied_to_body).rpartition("/")[2] for load in loads]
     known = {body.name.rpartition("/")[2] for body in motion.mechanism.bodies}
     for load, own in zip(loads, bodies, strict=True):
@@ -130,13 +130,18 @@ def measure_feet(tool: TrialTool) -> Numbers:
         at = None
         if isinstance(setup, Setup):
             item = next(
-                (item for item in setup.named("ExternalForce") if item.name == load.item.name), None
+                (
+                    item
+                    for item in setup.find_by_class("ExternalForce")
+                    if item.name == load.item.name
+                ),
+                None,
             )
             at = setup.position(item, tag="applied_to_body") if item is not None else None
         share = 100.0 * float(wrong.mean())
         yield (
             file,
-            Number("swapped-feet", "share", of, share, "%", at=at, side=side if share else ""),
+            Measurement("swapped-feet", "share", of, share, "%", at=at, side=side if share else ""),
         )
 
 
@@ -213,7 +218,7 @@ def measure_weight(tool: TrialTool) -> Numbers:
     of = f"the difference of the mass of the model, {mass:.4g} kg, from {carried:.4g} kg on the plates"
     where = f"mean from {first:.4g} to {last:.4g} s"
     value = 100.0 * abs(mass / carried - 1.0) if carried > 0.0 else float("inf")
-    yield tool.model_file, Number("measured-weight", "difference", of, value, "%", where=where)
+    yield tool.model_file, Measurement("measured-weight", "difference", of, value, "%", where=where)
 
 
 def _compute_rising_speed(motion: RecordedMotion, time: float, up: Array) -> float:

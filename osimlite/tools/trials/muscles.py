@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.io.tables.storage import StoTable
-from osimlite.lint.trial import Number
+from osimlite.lint.trial import Measurement
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.tools.analyses import MuscleAnalysis
 from osimlite.schema.tools.dynamics import AnalyzeTool
@@ -47,11 +47,11 @@ def measure_passive_forces(tool: TrialTool, states: Path | None) -> Numbers:
             at = tool.folder.locate_time(file, time)
             of = f"the passive force of '{name}', of its strength"
             where = f"{column[row]:.4g} N at {time:g} s"
-            yield file, Number("passive-force", "peak", of, share, "%", where=where, at=at)
+            yield file, Measurement("passive-force", "peak", of, share, "%", where=where, at=at)
     if not told:
         yield (
             file,
-            Number(
+            Measurement(
                 "passive-force",
                 "peak",
                 "the passive force of any muscle, of its strength",

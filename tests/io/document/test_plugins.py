@@ -15,7 +15,7 @@ from osimlite.io.document.plugins import classes_in
 from osimlite.io.document.source import Source
 from osimlite.lint import Config, validate
 from osimlite.lint.many import check_files
-from osimlite.lint.settings import settings_for
+from osimlite.lint.settings import load_settings
 from osimlite.schema.base import Unknown
 from osimlite.schema.registry import MODULES, class_for, further_classes
 from osimlite.schema.specs import field_specs
@@ -112,7 +112,7 @@ def test_settings_and_option_name_files_and_the_cache_knows_them(folder, capsys)
     Path("classes.json").write_text(CLASSES[0].replace('"coefficient"', '"factor"'))
     assert {each.code for each in check_files(["sub/m.osim"], Config())} == {"OSIM101"}
     (folder / "osimlite.toml").rename(folder / "sub" / "classes.toml")
-    settings_for.cache_clear()
+    load_settings.cache_clear()
     Path("classes.json").write_text(CLASSES[0])
     assert validate_paths(["sub"], classes=["classes.json"]) == 0
     assert validate_paths(["sub"]) == 1
