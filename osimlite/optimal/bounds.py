@@ -60,8 +60,8 @@ def _intersect(inner: Range, outer: Range) -> Range:
 
 def read_range(bounds: Any) -> Range | None:
     """Return the range of a ``MocoBounds`` or of a list of one or two numbers; None if it is empty."""
-    given = tuple(getattr(bounds, "bounds", bounds))
-    return None if not given else (float(given[0]), float(given[-1]))
+    limits = tuple(getattr(bounds, "bounds", bounds))
+    return None if not limits else (float(limits[0]), float(limits[-1]))
 
 
 class _VariableInfos:
@@ -108,12 +108,12 @@ def find_control_bounds(
     result = {}
     for name in names:
         actuator = components.get(name)
-        own = (
+        limits = (
             (actuator.min_control, actuator.max_control)
             if isinstance(actuator, ScalarActuator)
             else FREE
         )
-        result[name] = infos.bounds(name, own)
+        result[name] = infos.bounds(name, limits)
     return result
 
 

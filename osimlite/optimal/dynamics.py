@@ -109,16 +109,16 @@ class Dynamics:
         Returns:
             Names of the errors, and the errors (k, 1).
         """
-        problem, own = self.problem, self.problem.constraint_names
+        problem, labels = self.problem, self.problem.constraint_names
         if not problem.has_constraints or not (is_mesh or problem.uses_projection):
             return [], casadi.SX(0, 1)
         position, velocity, _, _ = self._evaluate_constraints(point)
         acceleration = self._evaluate_constraints(point.before_projection)[2]
         if not is_mesh:
-            return [f"{name}dd" for name in own], acceleration
+            return [f"{name}dd" for name in labels], acceleration
         if not problem.solver.enforce_constraint_derivatives:
-            return own, position
-        names = [*own, *(f"{name}d" for name in own), *(f"{name}dd" for name in own)]
+            return labels, position
+        names = [*labels, *(f"{name}d" for name in labels), *(f"{name}dd" for name in labels)]
         return names, casadi.vertcat(position, velocity, acceleration)
 
     def make_joint_load(self, path: str, side: str, frame: str) -> Callable[[Point], Formula]:
@@ -161,10 +161,10 @@ class Dynamics:
 
     def _evaluate_constraints(self, point: Point) -> Sequence[Formula]:
         """Return the errors of positions, speeds and accelerations, and the Jacobian G of the constraints."""
-        found: Sequence[Formula] = self.functions.constraints(
+        result: Sequence[Formula] = self.functions.constraints(
             point.t, point.x, point.rates, point.p
         )
-        return found
+        return result
 
     def compute_projection_errors(self, point: Point) -> tuple[list[str], Formula]:
         """Compute the errors of projected values and speeds: ``x - projections - Gᵀ slacks``.

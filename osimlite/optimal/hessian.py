@@ -63,11 +63,16 @@ class Hessian:
         """
         program, direct = self.program, len(self.program.end_columns)
         totals = program._compute_rows(w)[program._row_count :]
-        given = program._end_arguments(w, totals)
-        own, at_ends = multipliers[: program._row_count], multipliers[program._row_count :]
-        cost, wanted = (part.T for part in program._end_slope(*given))
-        of_integrals = factor * cost.ravel()[direct:] + at_ends @ wanted[:, direct:]
-        row_multipliers = program._b.multiply_transpose(np.concatenate([own, of_integrals]))
+        end_arguments = program._end_arguments(w, totals)
+        multipliers_of_points, at_ends = (
+            multipliers[: program._row_count],
+            multipliers[program._row_count :],
+        )
+        cost, end_slopes = (part.T for part in program._end_slope(*end_arguments))
+        of_integrals = factor * cost.ravel()[direct:] + at_ends @ end_slopes[:, direct:]
+        row_multipliers = program._b.multiply_transpose(
+            np.concatenate([multipliers_of_points, of_integrals])
+        )
         parts = []
         for group, first in zip(program.groups, program._offsets, strict=False):
             count = group.rows * len(group.numbers)
@@ -77,7 +82,7 @@ class Hessian:
                 )[0].ravel()
             )
         # The Hessian is symmetric, so that its upper triangle is enough.
-        (ends,) = program._end_curvature(*given, np.array(factor), at_ends)
+        (ends,) = program._end_curvature(*end_arguments, np.array(factor), at_ends)
         parts.append(ends[self._ends])
         if self._mixed:
             integrals = program._compute_slopes(w)[3]

@@ -55,8 +55,8 @@ def build_inverse_problem(
     Raises:
         OsimliteError: the settings or their files are invalid.
     """
-    asked = StudyContext(file, folder)
-    model = process_model(tool.model, asked.folder)
+    context = StudyContext(file, folder)
+    model = process_model(tool.model, context.folder)
     solver = MocoCasADiSolver(
         name="solver",
         multibody_dynamics_mode="implicit",
@@ -84,8 +84,8 @@ def build_inverse_problem(
         phase.goals.append(
             MocoSumSquaredStateGoal(name="activation_effort", pattern=".*activation$")
         )
-    table, motion = _read_kinematics(asked, tool, model)
-    set_time_range(asked, tool, [table], study)
+    table, motion = _read_kinematics(context, tool, model)
+    set_time_range(context, tool, [table], study)
     if more is not None:
         more(study)
     problem = Problem(study, file, folder, motion=motion, scaled=scaled)
@@ -94,7 +94,7 @@ def build_inverse_problem(
         for label in table.columns:
             if label not in known:
                 near = suggest_name(label, known)
-                raise asked.invalid_error(
+                raise context.invalid_error(
                     tool,
                     f"'{label}' is not a state{near}; set kinematics_allow_extra_columns to ignore it",
                 )
@@ -141,10 +141,10 @@ def solve_inverse_problem(
         tell: function that is called with the progress after each iteration.
         refine: as for :func:`osimlite.moco.solve`.
     """
-    given: PrescribedMotion = problem.functions
+    motion: PrescribedMotion = problem.functions
     solution = solve_program(Program(problem), None, tell, refine)
     trajectory = solution.trajectory
-    states = given.tabulate_states(trajectory.times)
+    states = motion.tabulate_states(trajectory.times)
     names = trajectory.names | {"states": (*trajectory.names["states"], *states)}
     return replace(
         solution, trajectory=replace(trajectory, columns=states | trajectory.columns, names=names)
@@ -152,7 +152,7 @@ def solve_inverse_problem(
 
 
 def _read_kinematics(
-    asked: StudyContext, tool: MocoInverse, model: Model
+    context: StudyContext, tool: MocoInverse, model: Model
 ) -> tuple[StoTable, Callable[[Array], Array]]:
     """Read the kinematics of a MocoInverse.
 
@@ -167,15 +167,17 @@ def _read_kinematics(
     # OpenSim accepts names of coordinates, and old names of states, as paths of states.
     processor = tool.kinematics.copy_deep()
     processor.operators.append(TabOpUseAbsoluteStateNames())
-    table = process_table(asked, tool.kinematics, processor, states, mechanism)
-    own = [name for name in names if name in table.columns]
-    if not own:
-        raise asked.invalid_error(
+    table = process_table(context, tool.kinematics, processor, states, mechanism)
+    tracked = [name for name in names if name in table.columns]
+    if not tracked:
+        raise context.invalid_error(
             tool, "kinematics has no column such as " + (names[0] if names else "a coordinate")
         )
-    check_columns(table, own)
+    check_columns(table, tracked)
     values = np.tile([info.default_value for info in infos], (len(table.times), 1))
-    values[:, [names.index(name) for name in own]] = np.column_stack([table[name] for name in own])
+    values[:, [names.index(name) for name in tracked]] = np.column_stack(
+        [table[name] for name in tracked]
+    )
     poses = np.array(
         [mechanism.assemble(q, t) for t, q in zip(table.times.tolist(), values, strict=True)]
     )

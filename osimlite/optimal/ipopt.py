@@ -111,8 +111,8 @@ def find_violations(
     result = []
     for row in np.argsort(-size)[:most]:
         if size[row] > 0.0:
-            place = program.times[row]
-            time = None if np.isnan(place) else float(w[0] + place * (w[1] - w[0]))
+            fraction = program.times[row]
+            time = None if np.isnan(fraction) else float(w[0] + fraction * (w[1] - w[0]))
             result.append(Violation(program.labels[row], time, float(size[row])))
     return result
 
@@ -160,7 +160,7 @@ def run_ipopt(
     solver = casadi.nlpsol("moco", "ipopt", search.objective, options)
     lower, upper = program.layout.lower, program.layout.upper
     with search.stop_on_interrupt():
-        found = solver(
+        solution = solver(
             x0=search.scale(np.clip(guess, lower, upper)),
             lbx=search.scale(lower),
             ubx=search.scale(upper),
@@ -169,9 +169,9 @@ def run_ipopt(
         )
     took, stats = time.perf_counter() - before, solver.stats()
     status = stats["return_status"]
-    if not np.isfinite(np.array(found["f"])).all() or status == "Invalid_Number_Detected":
+    if not np.isfinite(np.array(solution["f"])).all() or status == "Invalid_Number_Detected":
         raise SimulationError(_describe_invalid_number(program, guess))
-    w = search.unscale(np.array(found["x"]).ravel())
+    w = search.unscale(np.array(solution["x"]).ravel())
     if not stats["success"] and search.best is not None:
         w = search.best
     return SolverResult(w, status, bool(stats["success"]), int(stats["iter_count"]), took)
@@ -216,12 +216,12 @@ def _make_options(program: Program) -> dict[str, Any]:
         both = ("", "dual_inf_", "compl_inf_")
         # Newton's method converges so fast at the end that it would stop where the barrier still costs
         # up to 1e-2 of the objective.
-        wanted = (
+        strict = (
             min(tolerance, max(EXACT_TOLERANCE_FACTOR * tolerance, MIN_TOLERANCE))
             if is_exact
             else tolerance
         )
-        options |= {f"{each}tol": wanted for each in both} | {
+        options |= {f"{each}tol": strict for each in both} | {
             f"acceptable_{each}tol": tolerance for each in both
         }
     if (tolerance := settings.optim_constraint_tolerance) != -1.0:
@@ -258,17 +258,17 @@ class _ArrayCallback(casadi.Callback):  # type: ignore[misc]
     def get_n_out(self) -> int:
         return len(self._outputs)
 
-    def get_name_in(self, place: int) -> str:
-        return [*self._inputs][place]
+    def get_name_in(self, index: int) -> str:
+        return [*self._inputs][index]
 
-    def get_name_out(self, place: int) -> str:
-        return [*self._outputs][place]
+    def get_name_out(self, index: int) -> str:
+        return [*self._outputs][index]
 
-    def get_sparsity_in(self, place: int) -> Any:
-        return [*self._inputs.values()][place]
+    def get_sparsity_in(self, index: int) -> Any:
+        return [*self._inputs.values()][index]
 
-    def get_sparsity_out(self, place: int) -> Any:
-        return [*self._outputs.values()][place]
+    def get_sparsity_out(self, index: int) -> Any:
+        return [*self._outputs.values()][index]
 
     def has_eval_buffer(self) -> bool:
         return True
@@ -278,9 +278,9 @@ class _ArrayCallback(casadi.Callback):  # type: ignore[misc]
         arrays = [
             np.zeros(0) if item is None else np.frombuffer(item, dtype=float) for item in given
         ]
-        for place, result in zip(results, self._law(*arrays), strict=True):
-            if place is not None:
-                np.frombuffer(place, dtype=float)[:] = result
+        for buffer, result in zip(results, self._law(*arrays), strict=True):
+            if buffer is not None:
+                np.frombuffer(buffer, dtype=float)[:] = result
         return 0
 
 
@@ -307,26 +307,26 @@ class _SearchCallbacks:
         columns = np.array(program.jacobian_sparsity.get_triplet()[1], dtype=int)
         self._column_factors = self.factors[columns]
         width, rows = len(program.layout.lower), len(program.labels)
-        given = {"x": _make_dense_column(width), "p": casadi.Sparsity(0, 0)}
+        inputs = {"x": _make_dense_column(width), "p": casadi.Sparsity(0, 0)}
         sizes = {"f": 1, "x": width, "lam_x": width, "g": rows, "lam_g": rows}
         scalar, across = casadi.Sparsity.scalar(), casadi.Sparsity.dense(width, 1)
         # Ipopt evaluates objective and constraints at one x by separate calls.
         self._values_at = cache_last(lambda x: program.compute_values(self.unscale(x)))
         self._slopes_at = cache_last(lambda x: program.compute_slopes(self.unscale(x)))
         self.objective = _ArrayCallback(
-            "nlp", given, {"f": scalar, "g": _make_dense_column(rows)}, self._values
+            "nlp", inputs, {"f": scalar, "g": _make_dense_column(rows)}, self._values
         )
         self.gradient = _ArrayCallback(
-            "nlp_grad_f", given, {"f": scalar, "grad_f_x": across}, self._gradient
+            "nlp_grad_f", inputs, {"f": scalar, "grad_f_x": across}, self._gradient
         )
         self.jacobian = _ArrayCallback(
             "nlp_jac_g",
-            given,
+            inputs,
             {"g": _make_dense_column(rows), "jac_g_x": program.jacobian_sparsity},
             self._jacobian,
         )
-        found = [casadi.nlpsol_out(place) for place in range(casadi.nlpsol_n_out())]
-        outputs = {name: _make_dense_column(sizes.get(name, 0)) for name in found}
+        result_names = [casadi.nlpsol_out(index) for index in range(casadi.nlpsol_n_out())]
+        outputs = {name: _make_dense_column(sizes.get(name, 0)) for name in result_names}
         self.record_iteration = _ArrayCallback(
             "record_iteration", outputs, {"stops": scalar}, self._record_iteration
         )
@@ -353,13 +353,13 @@ class _SearchCallbacks:
     def _record_iteration(self, x: Array, f: Array, rows: Array, *_: Array) -> tuple[Any, ...]:
         """Keep the best iterate, report the progress, and tell Ipopt whether to stop."""
         objective = float(f[0])
-        found = find_violations(self.program, self.unscale(x), rows, most=1)
-        size = found[0].size if found else 0.0
+        worst = find_violations(self.program, self.unscale(x), rows, most=1)
+        size = worst[0].size if worst else 0.0
         rank = (size, np.inf) if size > FEASIBILITY_TOLERANCE else (0.0, objective)
         if rank < self._best:
             self.best, self._best = self.unscale(x), rank
         if self.report is not None:
-            self.report(Progress(self.count, objective, found[0] if found else None))
+            self.report(Progress(self.count, objective, worst[0] if worst else None))
         self.count += 1
         return (1.0 if self.stops else 0.0,)
 
@@ -386,9 +386,9 @@ def _make_hessian_callback(program: Program, search: _SearchCallbacks) -> Any:
     """Return the CasADi function of the scaled Hessian of the Lagrangian."""
     hessian = Hessian(program)
     first, second = (
-        search.factors[np.array(places, dtype=int)] for places in hessian.sparsity.get_triplet()
+        search.factors[np.array(indices, dtype=int)] for indices in hessian.sparsity.get_triplet()
     )
-    given = {
+    inputs = {
         "x": _make_dense_column(len(program.layout.lower)),
         "p": casadi.Sparsity(0, 0),
         "lam_f": casadi.Sparsity.scalar(),
@@ -402,4 +402,4 @@ def _make_hessian_callback(program: Program, search: _SearchCallbacks) -> Any:
             * second,
         )
 
-    return _ArrayCallback("nlp_hess_l", given, {"hess_gamma_x_x": hessian.sparsity}, law)
+    return _ArrayCallback("nlp_hess_l", inputs, {"hess_gamma_x_x": hessian.sparsity}, law)

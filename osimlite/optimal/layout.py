@@ -85,23 +85,23 @@ class Layout:
         size, end = self.shared, len(grid.fractions) - 1
         lows, highs = [np.array(lower)], [np.array(upper)]
         limits = {
-            kind: np.array([[b.within, b.first, b.last] for b in own])
-            for kind, own in self.bounds.items()
+            kind: np.array([[b.within, b.first, b.last] for b in items])
+            for kind, items in self.bounds.items()
         }
         for point in range(len(grid.fractions)):
             first = size
-            for kind, own in limits.items():
-                if len(own) and self.has_kind(kind, point):
-                    ends = own[:, 1 if point == 0 else 2 if point == end else 0]
+            for kind, items in limits.items():
+                if len(items) and self.has_kind(kind, point):
+                    ends = items[:, 1 if point == 0 else 2 if point == end else 0]
                     lows.append(ends[:, 0])
                     highs.append(ends[:, 1])
-                    self.indices[kind][point] = np.arange(size, size + len(own))
-                    size += len(own)
+                    self.indices[kind][point] = np.arange(size, size + len(items))
+                    size += len(items)
             self.point_indices.append(np.arange(first, size))
         self.lower, self.upper = np.concatenate(lows), np.concatenate(highs)
-        for place in np.flatnonzero(~(self.lower <= self.upper))[:1]:
-            span = f"from {self.lower[place]:g} to {self.upper[place]:g}"
-            message = f"all bounds of '{self.describe_variable(place)}' exclude each other ({span})"
+        for index in np.flatnonzero(~(self.lower <= self.upper))[:1]:
+            span = f"from {self.lower[index]:g} to {self.upper[index]:g}"
+            message = f"all bounds of '{self.describe_variable(index)}' exclude each other ({span})"
             raise problem.invalid_error(problem.phase, message)
 
     def has_kind(self, kind: str, point: int) -> bool:
@@ -129,8 +129,8 @@ class Layout:
         for kind in VARIABLE_KINDS:
             for column, item in zip(self.indices[kind].T, self.bounds[kind], strict=True):
                 pairs.append((column[column >= 0], item.within))
-        for places, (low, high) in pairs:
-            scale[places], shift[places] = compute_scaling(low, high)
+        for indices, (low, high) in pairs:
+            scale[indices], shift[indices] = compute_scaling(low, high)
         return scale, shift
 
     def make_guess(self) -> Array:
@@ -149,21 +149,21 @@ class Layout:
             for number, name in enumerate(self.names[kind]):
                 column = trajectory.columns.get(name.removesuffix(PROJECTION_SUFFIX))
                 if column is not None:
-                    places = self.indices[kind][:, number]
-                    result[places[places >= 0]] = _resample(times, column, at)[places >= 0]
+                    indices = self.indices[kind][:, number]
+                    result[indices[indices >= 0]] = _resample(times, column, at)[indices >= 0]
         for number, name in enumerate(self.problem.parameters):
             if name in trajectory.parameters:
                 result[2 + number] = trajectory.parameters[name]
         return result
 
-    def describe_variable(self, place: int) -> str:
+    def describe_variable(self, index: int) -> str:
         """Return the name of a variable."""
-        if place < self.shared:
-            return ["initial time", "final time", *self.problem.parameters][place]
+        if index < self.shared:
+            return ["initial time", "final time", *self.problem.parameters][index]
         for kind in VARIABLE_KINDS:
-            found = np.argwhere(self.indices[kind] == place)
-            if len(found):
-                return self.names[kind][found[0][1]]
+            matches = np.argwhere(self.indices[kind] == index)
+            if len(matches):
+                return self.names[kind][matches[0][1]]
         return ""
 
 

@@ -36,23 +36,23 @@ class BufferedFunction:
             if array.size:
                 self._buffer.set_res(k, array.reshape(-1).data)
 
-    def __call__(self, *given: Array) -> list[Array]:
+    def __call__(self, *values: Array) -> list[Array]:
         """Return the results; the rows of arguments and results are the columns of CasADi's matrices."""
-        for own, array in zip(self._inputs, given, strict=True):
-            own[:] = array.reshape(-1)
+        for buffer, array in zip(self._inputs, values, strict=True):
+            buffer[:] = array.reshape(-1)
         self._run()
         return [array.copy() for array in self._results]
 
 
 def cache_last(law: Callable[[Array], Any]) -> Callable[[Array], Any]:
     """Return a function that caches its result for the last array it was called with."""
-    kept: Any = None
+    cached: Any = None
 
     def result(x: Array) -> Any:
-        nonlocal kept
-        if kept is None or not np.array_equal(kept[0], x):
-            kept = x.copy(), law(x)
-        return kept[1]
+        nonlocal cached
+        if cached is None or not np.array_equal(cached[0], x):
+            cached = x.copy(), law(x)
+        return cached[1]
 
     return result
 
@@ -78,10 +78,10 @@ class PointFormula:
         names, residuals = problem.dynamics.compute_residuals(point)
         rows, labels, limits = [residuals], [*names], [(0.0, 0.0)] * len(names)
         if is_mesh or problem.solver.enforce_path_constraint_mesh_interior_points:
-            for own in problem.path_rows:
-                rows.append(own.formula(point))
-                labels += own.labels
-                limits += own.limits
+            for constraint in problem.path_rows:
+                rows.append(constraint.formula(point))
+                labels += constraint.labels
+                limits += constraint.limits
         names, errors = problem.dynamics.compute_constraint_errors(point, is_mesh)
         rows.append(errors)
         labels += names
@@ -132,10 +132,10 @@ class PointFormula:
         self.value = self._make_function("F", self._inputs, self._column)
         self.slope = self._make_function("J", self._inputs, casadi.vertcat(*jacobian.nonzeros()))
 
-    def _make_function(self, name: str, given: list[Any], column: Any) -> Any:
+    def _make_function(self, name: str, arguments: list[Any], column: Any) -> Any:
         """Return a CasADi function in whose formula the solutions replace the symbols of the linear equations."""
         return casadi.Function(
-            name, given, [casadi.substitute(column, self._implicit, self._implicit_value)]
+            name, arguments, [casadi.substitute(column, self._implicit, self._implicit_value)]
         )
 
     @cached_property
@@ -153,9 +153,13 @@ class PointFormula:
         if self._implicit.numel():
             # With these multipliers of the equations (adjoint variables) the first derivative of the
             # sum by their solution vanishes, so that its second derivatives do not enter.
-            found = casadi.ldl_solve(-self._slope_by_implicit.T @ multipliers, *self._factors)
-            along = casadi.vertcat(SX.eye(self._variables.numel()), self._implicit_slope)
-            hessian = casadi.substitute(along.T @ hessian @ along, adjoints, found)
+            adjoint_values = casadi.ldl_solve(
+                -self._slope_by_implicit.T @ multipliers, *self._factors
+            )
+            directions = casadi.vertcat(SX.eye(self._variables.numel()), self._implicit_slope)
+            hessian = casadi.substitute(
+                directions.T @ hessian @ directions, adjoints, adjoint_values
+            )
         hessian = casadi.triu(hessian)
         function = self._make_function(
             "H", [*self._inputs, multipliers], casadi.vertcat(*hessian.nonzeros())
@@ -195,8 +199,8 @@ class PointGroup:
             fractions: fractions of the motion (n,), from 0 to 1.
             z: variables of the points (n, ...).
         """
-        given = program._arguments_at(w, fractions, z)
-        return BufferedFunction(self.formula.value.map(len(fractions)))(*given)[0]
+        arguments = program._arguments_at(w, fractions, z)
+        return BufferedFunction(self.formula.value.map(len(fractions)))(*arguments)[0]
 
     def make_hessian(self) -> None:
         """Make the function of the second derivatives, which a quasi-Newton search never needs."""

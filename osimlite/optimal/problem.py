@@ -125,7 +125,7 @@ class Problem(StudyContext):
             for parameter in self.phase.parameters
         }
         self.functions: Any = self._make_functions(
-            [path for own in paths.values() for path in own], motion
+            [path for owned in paths.values() for path in owned], motion
         )
         if not self.functions.states:
             raise self.invalid_error(self.phase, "the model has no states")
@@ -133,7 +133,7 @@ class Problem(StudyContext):
             parameter.name: read_range(parameter.moco_bounds) or FREE
             for parameter in self.phase.parameters
         }
-        self.parameter_owners = [place for place, own in enumerate(paths.values()) for _ in own]
+        self.parameter_owners = [index for index, owned in enumerate(paths.values()) for _ in owned]
         self._add_scale_factors()
         # OpenSim has no controls of actuators that do not act.
         acting = [name for name in self.functions.controls if self._is_acting(name)]
@@ -183,14 +183,14 @@ class Problem(StudyContext):
         Raises:
             DocumentError: a weight is for an unknown name.
         """
-        own = {weight.name: weight.weight for weight in by_name.objects}
-        for name in own:
+        weight_by_name = {weight.name: weight.weight for weight in by_name.objects}
+        for name in weight_by_name:
             self.check_name(part, name, names, what)
-        found = dict.fromkeys(names, 1.0)
+        result = dict.fromkeys(names, 1.0)
         for weight in by_pattern.objects if by_pattern is not None else ():
             matches = self.compile_pattern(weight, weight.name)
-            found |= {name: weight.weight for name in names if matches(name)}
-        return [*(found | own).values()]
+            result |= {name: weight.weight for name in names if matches(name)}
+        return [*(result | weight_by_name).values()]
 
     def add_time_function(self, values: Callable[[Array], Array], label: str = "") -> TimeFunction:
         """Add a function of time for formulas at points (``point.evaluate(function)``).
@@ -235,12 +235,12 @@ class Problem(StudyContext):
         """Remove an enabled PositionMotion from the model and return its motion; None if there is none."""
         for part in list(self.model.components(PositionMotion)):
             if part.default_enabled:
-                place = part.path
+                path = part.path
                 motion = read_position_motion(part, self.model)
                 self.model.remove(part)
                 if isinstance(motion, str):
                     raise self.invalid_error(
-                        self.phase, f"PositionMotion '{place}' has no function for '{motion}'"
+                        self.phase, f"PositionMotion '{path}' has no function for '{motion}'"
                     )
                 return motion
         return None
@@ -293,7 +293,7 @@ class Problem(StudyContext):
 
     def _make_solver_costs(self) -> Iterator[tuple[MocoGoal, GoalTerms]]:
         """Yield the costs that settings of the solver add, named as in Moco."""
-        solver, first = (
+        solver, acceleration_count = (
             self.solver,
             len(self.functions.coordinates) if self.dynamics.is_implicit else 0,
         )
@@ -301,7 +301,7 @@ class Problem(StudyContext):
             raise self.invalid_error(
                 solver, "minimize_lagrange_multipliers requires a model with constraints"
             )
-        for name, wanted, weight, part, bounds in (
+        for name, is_active, weight, part, bounds in (
             (
                 "multipliers",
                 solver.minimize_lagrange_multipliers,
@@ -313,7 +313,7 @@ class Problem(StudyContext):
                 "accelerations",
                 solver.minimize_implicit_multibody_accelerations and self.dynamics.is_implicit,
                 solver.implicit_multibody_accelerations_weight,
-                slice(None, first),
+                slice(None, acceleration_count),
                 solver.implicit_multibody_acceleration_bounds,
             ),
             (
@@ -321,11 +321,11 @@ class Problem(StudyContext):
                 solver.minimize_implicit_auxiliary_derivatives
                 and bool(self.dynamics.tendons.names),
                 solver.implicit_auxiliary_derivatives_weight,
-                slice(first, None),
+                slice(acceleration_count, None),
                 solver.implicit_auxiliary_derivative_bounds,
             ),
         ):
-            if wanted:
+            if is_active:
                 # Moco's costs are squares of the scaled variables.
                 by = (
                     compute_scaling(*(read_range(bounds) or FREE))
@@ -479,8 +479,8 @@ class Problem(StudyContext):
         """Names of the velocity corrections; with projection those of values and speeds in turn, as in Moco."""
         if self.uses_projection:
             return [f"mu_{name}{end}" for name in self.constraint_names for end in ("", "_dot")]
-        wanted = self.has_constraints and self.solver.enforce_constraint_derivatives
-        return [f"gamma_{name}" for name in self.constraint_names] if wanted else []
+        is_corrected = self.has_constraints and self.solver.enforce_constraint_derivatives
+        return [f"gamma_{name}" for name in self.constraint_names] if is_corrected else []
 
 
 def _squared_projection_distance(point: Point) -> Formula:
@@ -505,7 +505,7 @@ def _number_equations(model: Model, count: int) -> Iterable[tuple[int, int]]:
     sizes = {"WeldConstraint": 6, "PointConstraint": 3}
     rows: list[tuple[int, int]] = []
     constraints: Mapping[str, Any] = {part.path: part for part in model.constraint_set.objects}
-    kept = [part for part in constraints.values() if part.isEnforced]
-    for number, part in enumerate(kept):
+    enforced = [part for part in constraints.values() if part.isEnforced]
+    for number, part in enumerate(enforced):
         rows += [(number, row) for row in range(sizes.get(type(part).tag, 1))]
     return rows if len(rows) == count else [(row, 0) for row in range(count)]

@@ -72,7 +72,7 @@ class Program:
         self._map_ends()
 
     # --------------------------------------------------------------------------------------------- formulas
-    def point(self, s: Any, z: Any, place: Any, known: Any, number: int) -> Point:
+    def point(self, s: Any, z: Any, fraction: Any, known: Any, number: int) -> Point:
         """Return the formulas at a point of the grid, which hold for all points with the same variables.
 
         Args:
@@ -90,7 +90,7 @@ class Program:
         parameters = [s[2 + owner] for owner in self.problem.parameter_owners]
         u = SX(len(self.problem.functions.controls), 1)
         u[[*map(self.problem.functions.controls.index, self.problem.controls)]] = parts["controls"]
-        t = s[0] + place * (s[1] - s[0])
+        t = s[0] + fraction * (s[1] - s[0])
         return Point(
             problem=self.problem,
             t=casadi.vertcat(t, *(series.expand(t, known) for series in self.problem.loads)),
@@ -123,8 +123,8 @@ class Program:
         self.end_labels: list[str] = []
         limits: list[tuple[float, float]] = []
         for goal, terms in problem.goals:
-            has = [k for k, pair in enumerate(self.integrals) if pair[0] is goal]
-            ends = Endpoints(start, end, totals[has[0]] if has else None)
+            indices = [k for k, pair in enumerate(self.integrals) if pair[0] is goal]
+            ends = Endpoints(start, end, totals[indices[0]] if indices else None)
             value = SX(terms.value(ends))
             if (goal.mode or terms.modes[0]) == "cost":
                 value = value**2 if terms.modes[0] != "cost" else value
@@ -140,30 +140,30 @@ class Program:
             self.end_labels += [
                 goal.name if count == 1 else f"{goal.name} {k}" for k in range(count)
             ]
-        given = [s, z0, z1, totals, *known]
+        arguments = [s, z0, z1, totals, *known]
         cost = casadi.densify(casadi.vertcat(*costs)) if costs else SX.zeros(0, 1)
-        wanted = casadi.densify(casadi.vertcat(*rows)) if rows else SX.zeros(0, 1)
+        end_rows = casadi.densify(casadi.vertcat(*rows)) if rows else SX.zeros(0, 1)
         for symbol, equations in start.linear_systems + end.linear_systems:
             factors = casadi.ldl(casadi.jacobian(equations, symbol))
             solution = casadi.ldl_solve(-casadi.substitute(equations, symbol, 0), *factors)
-            cost, wanted = casadi.substitute([cost, wanted], [symbol], [solution])
+            cost, end_rows = casadi.substitute([cost, end_rows], [symbol], [solution])
         both = casadi.vertcat(s, z0, z1, totals)
-        total, multipliers = casadi.sum1(cost), SX.sym("multipliers", wanted.numel())
+        total, multipliers = casadi.sum1(cost), SX.sym("multipliers", end_rows.numel())
         factor = SX.sym("factor")
         self.end_columns = np.concatenate(
             [np.arange(size), layout.point_indices[0], layout.point_indices[last]]
         )
-        lagrangian = factor * total + casadi.dot(multipliers, wanted)
-        self._end_value = BufferedFunction(casadi.Function("E", given, [cost, wanted]))
-        slopes = [casadi.densify(casadi.jacobian(each, both)) for each in (total, wanted)]
-        self._end_slope = BufferedFunction(casadi.Function("dE", given, slopes))
+        lagrangian = factor * total + casadi.dot(multipliers, end_rows)
+        self._end_value = BufferedFunction(casadi.Function("E", arguments, [cost, end_rows]))
+        slopes = [casadi.densify(casadi.jacobian(each, both)) for each in (total, end_rows)]
+        self._end_slope = BufferedFunction(casadi.Function("dE", arguments, slopes))
         self._end_pattern = np.array(
-            casadi.DM(casadi.jacobian(wanted, both).sparsity(), 1.0).full(), dtype=bool
+            casadi.DM(casadi.jacobian(end_rows, both).sparsity(), 1.0).full(), dtype=bool
         )
         hessian = casadi.hessian(lagrangian, both)[0]
         self._end_hessian_pattern = np.array(casadi.DM(hessian.sparsity(), 1.0).full(), dtype=bool)
         self._end_curvature = BufferedFunction(
-            casadi.Function("HE", [*given, factor, multipliers], [casadi.densify(hessian)])
+            casadi.Function("HE", [*arguments, factor, multipliers], [casadi.densify(hessian)])
         )
         self.labels += self.end_labels
         self.times = np.append(self.times, np.full(len(self.end_labels), np.nan))
@@ -187,8 +187,8 @@ class Program:
         start_of = np.zeros(len(grid.fractions), dtype=int)
         for group, offset in zip(self.groups, self._offsets, strict=False):
             start_of[group.numbers] = offset + group.rows * np.arange(len(group.numbers))
-        a: list[tuple[Any, Any, Any]] = []
-        b: list[tuple[Any, Any, Any]] = []
+        entries_a: list[tuple[Any, Any, Any]] = []
+        entries_b: list[tuple[Any, Any, Any]] = []
         lines = (
             scheme.controls if self.problem.solver.interpolate_control_mesh_interior_points else ()
         )
@@ -198,21 +198,21 @@ class Program:
         labels += [f"{name} between nodes" for name in controls] * len(lines)
         first = len(labels) * np.arange(many)[:, None]
         for number, pair in enumerate(zip(scheme.states, scheme.rates, strict=True)):
-            rows, at = first + number * count + np.arange(count), np.arange(count)
-            for k, (own, rate) in enumerate(zip(*pair, strict=True)):
-                places, of = layout.indices["states"][points[:, k]], at
+            rows, state_range = first + number * count + np.arange(count), np.arange(count)
+            for k, (state_factor, rate_factor) in enumerate(zip(*pair, strict=True)):
+                variables, results = layout.indices["states"][points[:, k]], state_range
                 if moved and k == len(points[0]) - 1:
                     # The interval ends at the states before projection.
                     ends = layout.indices["projections"][points[:, k]]
-                    places, of = (
-                        np.hstack([ends, places[:, moved:]]),
-                        np.concatenate([count + at[:moved], at[moved:]]),
+                    variables, results = (
+                        np.hstack([ends, variables[:, moved:]]),
+                        np.concatenate([count + state_range[:moved], state_range[moved:]]),
                     )
-                if own:
-                    a.append((rows, places, np.full(rows.shape, own)))
-                if rate:
-                    each = np.broadcast_to(grid.lengths[:, None] * rate, rows.shape)
-                    b.append((rows, start_of[points[:, k]][:, None] + of, each))
+                if state_factor:
+                    entries_a.append((rows, variables, np.full(rows.shape, state_factor)))
+                if rate_factor:
+                    each = np.broadcast_to(grid.lengths[:, None] * rate_factor, rows.shape)
+                    entries_b.append((rows, start_of[points[:, k]][:, None] + results, each))
         for number, line in enumerate(lines):
             rows = (
                 first
@@ -221,7 +221,7 @@ class Program:
                 + np.arange(len(controls))
             )
             for k in np.flatnonzero(line).tolist():
-                a.append(
+                entries_a.append(
                     (rows, layout.indices["controls"][points[:, k]], np.full(rows.shape, line[k]))
                 )
         self.labels += labels * many
@@ -230,8 +230,8 @@ class Program:
         limits: list[tuple[float, float]] = [(0.0, 0.0)] * row
         for group in self.groups:
             each, size = np.arange(len(group.labels)), len(group.labels) * len(group.numbers)
-            of = start_of[group.numbers][:, None] + count + group.projected + each
-            b.append((row + np.arange(size), of, np.ones(size)))
+            results = start_of[group.numbers][:, None] + count + group.projected + each
+            entries_b.append((row + np.arange(size), results, np.ones(size)))
             self.labels += group.labels * len(group.numbers)
             times.append(np.repeat(grid.fractions[group.numbers], len(group.labels)))
             limits += group.limits * len(group.numbers)
@@ -239,9 +239,9 @@ class Program:
         self._row_count = row
         for k, (_, terms) in enumerate(self.integrals):
             for group in self.groups:
-                at = start_of[group.numbers] + group.rows - len(self.integrals) + k
-                weights = np.ones(len(at)) if terms.is_sum else grid.weights[group.numbers]
-                b.append((np.full(len(at), row + k), at, weights))
+                state_range = start_of[group.numbers] + group.rows - len(self.integrals) + k
+                weights = np.ones(len(state_range)) if terms.is_sum else grid.weights[group.numbers]
+                entries_b.append((np.full(len(state_range), row + k), state_range, weights))
         size = row + len(self.integrals)
 
         def matrix(parts: list[tuple[Any, Any, Any]], width: int) -> SparseMatrix:
@@ -251,8 +251,8 @@ class Program:
             ]
             return SparseMatrix.from_entries(found[0], found[1], found[2], (size, width))
 
-        self._a: SparseMatrix = matrix(a, len(layout.lower))
-        self._b: SparseMatrix = matrix(b, int(self._offsets[-1]))
+        self._a: SparseMatrix = matrix(entries_a, len(layout.lower))
+        self._b: SparseMatrix = matrix(entries_b, int(self._offsets[-1]))
         self.times = np.concatenate(times)
         self.lower, self.upper = (np.array([limit[k] for limit in limits]) for k in range(2))
 
@@ -269,25 +269,27 @@ class Program:
         first, second = [], []
         for group, start in zip(self.groups, self._offsets, strict=False):
             r, c, count = getattr(group, rows), getattr(group, columns), len(group.numbers)
-            places = np.hstack([np.tile(np.arange(self.layout.shared), (count, 1)), group.columns])
-            own = (
+            variables = np.hstack(
+                [np.tile(np.arange(self.layout.shared), (count, 1)), group.columns]
+            )
+            numbers = (
                 start + group.rows * np.arange(count)[:, None] + r
                 if rows == "jacobian_rows"
-                else places[:, r]
+                else variables[:, r]
             )
-            first.append(own.ravel())
-            second.append(places[:, c].ravel())
+            first.append(numbers.ravel())
+            second.append(variables[:, c].ravel())
         return np.concatenate(first), np.concatenate(second)
 
     def _map_jacobian(self) -> None:
         """Make the sparse map from the Jacobians of the points to that of A w + B F."""
         width = len(self.layout.lower)
         rows, columns = self._entries("jacobian_rows", "jacobian_columns")
-        spread, own = self._b.select_columns(rows.astype(np.int64)), self._a
+        spread, constant = self._b.select_columns(rows.astype(np.int64)), self._a
         keys = np.concatenate(
             [
                 spread.rows * np.int64(width) + columns[spread.columns],
-                own.rows * np.int64(width) + own.columns,
+                constant.rows * np.int64(width) + constant.columns,
             ]
         )
         unique, inverse = np.unique(keys, return_inverse=True)
@@ -296,7 +298,7 @@ class Program:
             inverse[:count], spread.columns, spread.values, (len(unique), len(rows))
         )
         self._jacobian_constant = np.bincount(
-            inverse[count:], weights=own.values, minlength=len(unique)
+            inverse[count:], weights=constant.values, minlength=len(unique)
         )
         self._jacobian_rows, self._jacobian_columns = unique // width, unique % width
         self._of_g = self._jacobian_rows < self._row_count
@@ -339,11 +341,11 @@ class Program:
         """Return the arguments of F for a group of points."""
         return self._arguments_at(w, self.problem.grid.fractions[group.numbers], w[group.columns])
 
-    def _arguments_at(self, w: Array, places: Array, z: Array) -> list[Array]:
+    def _arguments_at(self, w: Array, fractions: Array, z: Array) -> list[Array]:
         """Return the arguments of F at fractions of time (n,) with variables z (n, ...)."""
         s = w[: self.layout.shared]
-        times = w[0] + places * (w[1] - w[0])
-        return [np.tile(s, len(places)), z, places, self._known(times)]
+        times = w[0] + fractions * (w[1] - w[0])
+        return [np.tile(s, len(fractions)), z, fractions, self._known(times)]
 
     def _evaluate_groups(self, name: str, w: Array) -> Array:
         """Return the results of a function of all groups in one array."""
@@ -370,8 +372,8 @@ class Program:
             Parts of f in the order of `costs`, and g.
         """
         rows = self._compute_rows(w)
-        costs, wanted = self._end_value(*self._end_arguments(w, rows[self._row_count :]))
-        return costs.ravel(), np.concatenate([rows[: self._row_count], wanted.ravel()])
+        costs, end_rows = self._end_value(*self._end_arguments(w, rows[self._row_count :]))
+        return costs.ravel(), np.concatenate([rows[: self._row_count], end_rows.ravel()])
 
     def compute_slopes(self, w: Array) -> tuple[Array, Array]:
         """Compute the first derivatives.
@@ -396,14 +398,14 @@ class Program:
         width, direct = len(w), len(self.end_columns)
         numbers = self._jacobian_constant + self._jacobian_map @ self._evaluate_groups("slope", w)
         integrals = np.zeros((len(self.integrals), width))
-        of = ~self._of_g
-        integrals[self._jacobian_rows[of] - self._row_count, self._jacobian_columns[of]] = numbers[
-            of
-        ]
+        is_integral = ~self._of_g
+        integrals[
+            self._jacobian_rows[is_integral] - self._row_count, self._jacobian_columns[is_integral]
+        ] = numbers[is_integral]
         totals = self._compute_rows(w)[self._row_count :]
-        cost, wanted = (part.T for part in self._end_slope(*self._end_arguments(w, totals)))
+        cost, end_slopes = (part.T for part in self._end_slope(*self._end_arguments(w, totals)))
         gradient = cost.ravel()[direct:] @ integrals
         gradient[self.end_columns] += cost.ravel()[:direct]
-        ends = wanted[:, direct:] @ integrals
-        ends[:, self.end_columns] += wanted[:, :direct]
+        ends = end_slopes[:, direct:] @ integrals
+        ends[:, self.end_columns] += end_slopes[:, :direct]
         return gradient, ends, numbers, integrals

@@ -54,15 +54,15 @@ class Refinement:
     hessian: str = "exact"
 
     @classmethod
-    def parse(cls, given: float | str | Refinement) -> Refinement:
+    def parse(cls, value: float | str | Refinement) -> Refinement:
         """Return the settings of a tolerance, or of a text such as ``1e-3`` or ``1e-3:limited-memory``.
 
         Raises:
             SettingError: the text is invalid.
         """
-        if isinstance(given, Refinement):
-            return given
-        text, _, hessian = str(given).partition(":")
+        if isinstance(value, Refinement):
+            return value
+        text, _, hessian = str(value).partition(":")
         try:
             result = cls(float(text), hessian or "exact")
         except ValueError:
@@ -116,22 +116,24 @@ def solve_with_refinement(
         UnsupportedError: the problem has variables or settings for which no error is estimated.
     """
     check_refinable(program.problem)
-    found = search(program, guess, tell)
+    result = search(program, guess, tell)
     rounds: list[Round] = []
     while True:
-        error = estimate_errors(program, found.w)
-        cost = float(program.compute_values(found.w)[0].sum())
-        rounds.append(Round(len(error), float(error.max()), cost, found.iterations, found.duration))
+        error = estimate_errors(program, result.w)
+        cost = float(program.compute_values(result.w)[0].sum())
+        rounds.append(
+            Round(len(error), float(error.max()), cost, result.iterations, result.duration)
+        )
         mesh = split_intervals(program.problem.grid, error, refinement.tolerance)
         is_good, is_enough = (
             len(mesh) == len(error) + 1,
             len(rounds) > MAX_ROUNDS or len(mesh) > MAX_INTERVALS,
         )
-        if not found.success or is_good or is_enough:
-            return program, found, rounds
+        if not result.success or is_good or is_enough:
+            return program, result, rounds
         finer = _rebuild_program(program.problem, mesh, refinement.hessian)
-        guess, program = interpolate_solution(program, found.w, finer), finer
-        found = search(program, guess, tell, near=True)
+        guess, program = interpolate_solution(program, result.w, finer), finer
+        result = search(program, guess, tell, near=True)
 
 
 def check_refinable(problem: Problem) -> None:
@@ -164,10 +166,12 @@ def estimate_errors(program: Program, w: Array) -> Array:
     result = np.zeros(len(grid.lengths))
     of_rates = _evaluate_basis(polynomial.nodes, SAMPLE_FRACTIONS)
     starts = np.concatenate([[0.0], np.cumsum(grid.lengths)[:-1]])
-    for place, weight, row in zip(SAMPLE_FRACTIONS, SAMPLE_WEIGHTS, of_rates, strict=True):
-        values = polynomial.evaluate(np.full(len(starts), place), np.arange(len(starts)))
+    for fraction, weight, row in zip(SAMPLE_FRACTIONS, SAMPLE_WEIGHTS, of_rates, strict=True):
+        values = polynomial.evaluate(np.full(len(starts), fraction), np.arange(len(starts)))
         z = np.hstack([values[kind] for kind in VARIABLE_KINDS if kind != "slacks"])
-        actual = np.array(group.evaluate(program, w, starts + place * grid.lengths, z))[:, :count]
+        actual = np.array(group.evaluate(program, w, starts + fraction * grid.lengths, z))[
+            :, :count
+        ]
         missing = np.abs(np.einsum("j,kji->ki", row, rates) - actual)
         result += weight * grid.lengths * (missing / sizes).max(axis=1)
     return result
@@ -201,17 +205,17 @@ def interpolate_solution(program: Program, w: Array, finer: Program) -> Array:
     """
     grid, layout = program.problem.grid, finer.layout
     starts = np.concatenate([[0.0], np.cumsum(grid.lengths)[:-1]])
-    places = finer.problem.grid.fractions
-    interval = np.clip(np.searchsorted(starts, places, side="right") - 1, 0, len(starts) - 1)
+    fractions = finer.problem.grid.fractions
+    interval = np.clip(np.searchsorted(starts, fractions, side="right") - 1, 0, len(starts) - 1)
     values = _SolutionPolynomials(program, w).evaluate(
-        (places - starts[interval]) / grid.lengths[interval], interval
+        (fractions - starts[interval]) / grid.lengths[interval], interval
     )
     result = layout.make_guess()
     result[: layout.shared] = w[: layout.shared]
     for kind in VARIABLE_KINDS:
-        own = layout.indices[kind]
-        has = own >= 0
-        result[own[has]] = values[kind][has] if kind != "slacks" else 0.0
+        indices = layout.indices[kind]
+        has = indices >= 0
+        result[indices[has]] = values[kind][has] if kind != "slacks" else 0.0
     return result
 
 
@@ -248,39 +252,39 @@ class _SolutionPolynomials:
             kind: w[layout.indices[kind]][points] for kind in VARIABLE_KINDS if kind != "slacks"
         }
 
-    def evaluate(self, places: Array, intervals: Any) -> dict[str, Array]:
+    def evaluate(self, fractions: Array, intervals: Any) -> dict[str, Array]:
         """Return the variables (n, names) by kind.
 
         Args:
-            places: positions within the intervals (n,), from 0 to 1.
+            fractions: positions within the intervals (n,), from 0 to 1.
             intervals: indices of the intervals (n,).
         """
         result = {}
         for kind, values in self._values.items():
-            own = values[intervals]
+            nodal = values[intervals]
             if kind == "states":
-                through = _integrate_basis(self.nodes, places)
-                way = np.einsum("nj,njs->ns", through, self.rates[intervals])
-                result[kind] = own[:, 0] + self.grid.lengths[intervals, None] * way
+                through = _integrate_basis(self.nodes, fractions)
+                change = np.einsum("nj,njs->ns", through, self.rates[intervals])
+                result[kind] = nodal[:, 0] + self.grid.lengths[intervals, None] * change
             elif kind == "controls" and self._lines:
-                result[kind] = own[:, 0] + places[:, None] * (own[:, -1] - own[:, 0])
+                result[kind] = nodal[:, 0] + fractions[:, None] * (nodal[:, -1] - nodal[:, 0])
             else:
                 result[kind] = np.einsum(
-                    "nj,njs->ns", _evaluate_basis(self.scheme.fractions, places), own
+                    "nj,njs->ns", _evaluate_basis(self.scheme.fractions, fractions), nodal
                 )
         return result
 
 
-def _evaluate_basis(nodes: Array, places: Array) -> Array:
+def _evaluate_basis(nodes: Array, fractions: Array) -> Array:
     """Return the values (n, j) of the Lagrange polynomials of nodes (j,) at positions (n,)."""
-    return np.polynomial.polynomial.polyvander(places, len(nodes) - 1) @ _compute_coefficients(
+    return np.polynomial.polynomial.polyvander(fractions, len(nodes) - 1) @ _compute_coefficients(
         nodes
     )
 
 
-def _integrate_basis(nodes: Array, places: Array) -> Array:
+def _integrate_basis(nodes: Array, fractions: Array) -> Array:
     """Return the integrals (n, j) of the Lagrange polynomials of nodes (j,) from 0 to positions (n,)."""
-    powers = np.polynomial.polynomial.polyvander(places, len(nodes))[:, 1:] / np.arange(
+    powers = np.polynomial.polynomial.polyvander(fractions, len(nodes))[:, 1:] / np.arange(
         1, len(nodes) + 1
     )
     return powers @ _compute_coefficients(nodes)

@@ -70,11 +70,13 @@ def check_by_simulation(problem: Problem, trajectory: MocoTrajectory) -> Simulat
     if isinstance(problem.functions, PrescribedMotion):
         raise OsimliteError("the motion is prescribed")
     if trajectory.times[0] != 0.0 or trajectory.parameters:
-        what = "has parameters" if trajectory.parameters else f"begins at {trajectory.times[0]:g} s"
-        raise OsimliteError(f"the motion {what}")
+        reason = (
+            "has parameters" if trajectory.parameters else f"begins at {trajectory.times[0]:g} s"
+        )
+        raise OsimliteError(f"the motion {reason}")
     end = float(trajectory.times[-1])
     start = {name: float(trajectory.columns[name][0]) for name in trajectory.names["states"]}
-    found = simulate(
+    run = simulate(
         problem.model,
         end,
         accuracy=INTEGRATION_ACCURACY,
@@ -83,10 +85,10 @@ def check_by_simulation(problem: Problem, trajectory: MocoTrajectory) -> Simulat
         controls=trajectory.table("controls"),
         folder=problem.folder,
     )
-    columns = {info.path: found.values[:, k] for k, info in enumerate(found.mechanism.coordinates)}
+    columns = {info.path: run.values[:, k] for k, info in enumerate(run.mechanism.coordinates)}
     apart = {
         path: np.abs(
-            np.interp(trajectory.times, found.times, columns[path])
+            np.interp(trajectory.times, run.times, columns[path])
             - trajectory.columns[f"{path}/value"]
         )
         for path in problem.functions.coordinates

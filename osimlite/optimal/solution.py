@@ -161,31 +161,31 @@ def solve_program(
         else program.layout.guess_from_trajectory(guess)
     )
     if refine is None:
-        found = search(program, start, tell)
+        result = search(program, start, tell)
     else:
-        program, found, rounds = solve_with_refinement(
+        program, result, rounds = solve_with_refinement(
             program, start, Refinement.parse(refine), tell
         )
-    iterations = sum(each.iterations for each in rounds) or found.iterations
-    duration = sum(each.duration for each in rounds) or found.duration
-    costs, rows = program.compute_values(found.w)
+    iterations = sum(each.iterations for each in rounds) or result.iterations
+    duration = sum(each.duration for each in rounds) or result.duration
+    costs, rows = program.compute_values(result.w)
     terms = dict(zip(program.costs, costs.tolist(), strict=True))
     header = {
         "num_iterations": str(iterations),
         "objective": f"{costs.sum():.6f}",
         **{f"objective_{name}": f"{cost:.6f}" for name, cost in terms.items()},
         "solver_duration": f"{duration:.6f}",
-        "status": found.status,
-        "success": "true" if found.success else "false",
+        "status": result.status,
+        "success": "true" if result.success else "false",
     }
-    trajectory = MocoTrajectory.from_variables(program.layout, found.w, header)
+    trajectory = MocoTrajectory.from_variables(program.layout, result.w, header)
     return MocoSolution(
         trajectory=trajectory,
-        success=found.success,
-        status=found.status,
+        success=result.success,
+        status=result.status,
         objective=float(costs.sum()),
         terms=terms,
-        violations=find_violations(program, found.w, rows),
+        violations=find_violations(program, result.w, rows),
         iterations=iterations,
         duration=duration,
         rounds=tuple(rounds),

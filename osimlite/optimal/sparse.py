@@ -36,9 +36,11 @@ class SparseMatrix:
         """
         width = max(shape[1], 1)
         keys = np.asarray(rows, dtype=np.int64) * width + np.asarray(columns, dtype=np.int64)
-        places, inverse = np.unique(keys, return_inverse=True)
-        totals = np.bincount(inverse, np.asarray(values, dtype=float), len(places))
-        return cls(places // width, places % width, np.asarray(totals, dtype=np.float64), shape)
+        positions, inverse = np.unique(keys, return_inverse=True)
+        totals = np.bincount(inverse, np.asarray(values, dtype=float), len(positions))
+        return cls(
+            positions // width, positions % width, np.asarray(totals, dtype=np.float64), shape
+        )
 
     def __matmul__(self, vector: Array) -> Array:
         """Return the product with a vector."""
@@ -50,17 +52,17 @@ class SparseMatrix:
         products = self.values * vector[self.rows]
         return np.asarray(np.bincount(self.columns, products, self.shape[1]), dtype=np.float64)
 
-    def select_columns(self, places: NDArray[np.int64]) -> SparseMatrix:
+    def select_columns(self, indices: NDArray[np.int64]) -> SparseMatrix:
         """Return the matrix of some of the columns (c,), in their order; one may stand there several times."""
         order = np.argsort(self.columns, kind="stable")
         starts = np.searchsorted(self.columns[order], np.arange(self.shape[1] + 1))
-        counts = (starts[1:] - starts[:-1])[places]
+        counts = (starts[1:] - starts[:-1])[indices]
         # In this order the entries of each column are adjacent.
         first = np.repeat(
-            starts[:-1][places] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts
+            starts[:-1][indices] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts
         )
-        chosen = order[first + np.arange(counts.sum())]
-        columns = np.repeat(np.arange(len(places)), counts)
+        selected = order[first + np.arange(counts.sum())]
+        columns = np.repeat(np.arange(len(indices)), counts)
         return SparseMatrix.from_entries(
-            self.rows[chosen], columns, self.values[chosen], (self.shape[0], len(places))
+            self.rows[selected], columns, self.values[selected], (self.shape[0], len(indices))
         )

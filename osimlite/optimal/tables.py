@@ -50,9 +50,9 @@ def read_reference(problem: Problem, part: Object, processor: TableProcessor) ->
         UnsupportedError: an operator of the processor is not supported here.
         OsimliteError: the file cannot be read.
     """
-    given = problem.tables.get(part.name)
-    if given is not None:
-        return given
+    known_table = problem.tables.get(part.name)
+    if known_table is not None:
+        return known_table
     return process_table(
         problem, part, processor, problem.functions.states, problem.functions.mechanism
     )
@@ -124,8 +124,8 @@ def _filter_lowpass(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
     times, rows = lowpassed(times, rows, operator.cutoff_frequency)
     if operator.trim_to_original_time_range:
         slack = 1e-6 * (times[1] - times[0])
-        own = (times >= table.times[0] - slack) & (times <= table.times[-1] + slack)
-        times, rows = times[own], rows[own]
+        is_within = (times >= table.times[0] - slack) & (times <= table.times[-1] + slack)
+        times, rows = times[is_within], rows[is_within]
     return replace(table, times=times, rows=rows)
 
 
@@ -142,14 +142,16 @@ def _append_coupled_values(
             continue
         if paths[item.dependent] in table.columns and not operator.overwrite_existing_columns:
             continue
-        own = [paths[place] for place in item.independent]
-        for name in own:
+        independent = [paths[place] for place in item.independent]
+        for name in independent:
             problem.check_name(operator, name, table.columns, "column", whose="the table")
-        given = np.column_stack([table[name] for name in own])
-        kept = [k for k, name in enumerate(table.columns) if name != paths[item.dependent]]
-        values = [item.function.evaluate(row)[0] for row in given]
-        columns = (*(table.columns[k] for k in kept), paths[item.dependent])
-        table = replace(table, columns=columns, rows=np.column_stack([table.rows[:, kept], values]))
+        arguments = np.column_stack([table[name] for name in independent])
+        others = [k for k, name in enumerate(table.columns) if name != paths[item.dependent]]
+        values = [item.function.evaluate(row)[0] for row in arguments]
+        columns = (*(table.columns[k] for k in others), paths[item.dependent])
+        table = replace(
+            table, columns=columns, rows=np.column_stack([table.rows[:, others], values])
+        )
     return table
 
 
@@ -157,9 +159,9 @@ def _resolve_state_path(label: str, states: Sequence[str]) -> str:
     """Return the path of the state that an old label means; the label itself if it means none."""
     ending = f"{label[:-2]}/speed" if label.endswith("_u") else label.replace(".", "/")
     for end in (label, ending, f"{ending}/value", re.sub(r"^.*/(?=[^/]+/[^/]+$)", "", label)):
-        found = [state for state in states if state == end or state.endswith(f"/{end}")]
-        if len(found) == 1:
-            return found[0]
+        matches = [state for state in states if state == end or state.endswith(f"/{end}")]
+        if len(matches) == 1:
+            return matches[0]
     return label
 
 
@@ -200,8 +202,8 @@ def fit_splines(problem: Problem, table: StoTable, columns: list[str]) -> list[T
 
 def sample_function(function: Function, times: Array) -> Array:
     """Return value, first and second derivative (3, n) of a function of time at times (n,)."""
-    found = (function.evaluate((t,)) for t in times.tolist())
-    return np.array([(value, slope[0], curve[0][0]) for value, slope, curve in found]).T
+    results = (function.evaluate((t,)) for t in times.tolist())
+    return np.array([(value, slope[0], curve[0][0]) for value, slope, curve in results]).T
 
 
 def check_columns(table: StoTable, columns: Sequence[str]) -> None:
@@ -224,8 +226,8 @@ def check_columns(table: StoTable, columns: Sequence[str]) -> None:
 
 def _sample_column(curves: SplineCurves, number: int, times: Array) -> Array:
     """Return value and derivatives (3, n) of one column at times (n,)."""
-    found: Array = curves.evaluate(times)[:, :, number]
-    return found
+    values: Array = curves.evaluate(times)[:, :, number]
+    return values
 
 
 class SplineCurves:

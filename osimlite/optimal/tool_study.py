@@ -37,7 +37,10 @@ def make_study(tool: MocoInverse | MocoTrack, model: Model, solver: MocoCasADiSo
 
 
 def set_time_range(
-    asked: StudyContext, tool: MocoInverse | MocoTrack, tables: Sequence[StoTable], study: MocoStudy
+    context: StudyContext,
+    tool: MocoInverse | MocoTrack,
+    tables: Sequence[StoTable],
+    study: MocoStudy,
 ) -> tuple[float, float]:
     """Set bounds of time and the mesh of a study by the settings of a tool.
 
@@ -60,7 +63,7 @@ def set_time_range(
     end = last if tool.final_time is None else tool.final_time
     if not first <= start < end <= last:
         message = f"the tables cover {first:g} s to {last:g} s, not the motion from {start:g} s to {end:g} s"
-        raise asked.invalid_error(tool, message)
+        raise context.invalid_error(tool, message)
     assert isinstance(study.solver, MocoCasADiSolver)
     # For a tiny interval the quotient below would overflow.
     if (
@@ -68,7 +71,7 @@ def set_time_range(
         or (end - start) / MAX_MESH_INTERVALS > tool.mesh_interval
     ):
         message = f"mesh_interval is {tool.mesh_interval:g} s; the maximum is {MAX_MESH_INTERVALS} intervals"
-        raise asked.invalid_error(tool, message)
+        raise context.invalid_error(tool, message)
     study.solver.num_mesh_intervals = math.ceil((end - start) / tool.mesh_interval)
     if tool.clip_time_range:
         start, end = start + 1e-3, end - 1e-3

@@ -164,12 +164,12 @@ def _make_marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
 
 def _append_speeds(table: StoTable) -> StoTable:
     """Return the table with the derivatives of those coordinate values that have no speed column."""
-    ends = [
+    pairs = [
         (name, f"{name.removesuffix('/value')}/speed")
         for name in table.columns
         if name.endswith("/value")
     ]
-    missing = [(value, speed) for value, speed in ends if speed not in table.columns]
+    missing = [(value, speed) for value, speed in pairs if speed not in table.columns]
     if not missing:
         return table
     values = np.column_stack([table[value] for value, _ in missing])
@@ -180,15 +180,15 @@ def _append_speeds(table: StoTable) -> StoTable:
 
 def _find_state_weights(problem: Problem, tool: MocoTrack, table: StoTable) -> list[MocoWeight]:
     """Return the weights of the tool, and weight 0 for states that the model's constraints determine."""
-    own = {weight.name: weight.weight for weight in tool.states_weight_set.objects}
+    weight_by_name = {weight.name: weight.weight for weight in tool.states_weight_set.objects}
     result = {}
     for path in problem.functions.coordinates:
-        bound = any(
+        is_dependent = any(
             str(getattr(part, "dependent_coordinate_name", "")) == path.rpartition("/")[2]
             for part in problem.model.constraint_set.objects
             if part.isEnforced
         )
         for name in (f"{path}/value", f"{path}/speed"):
-            if name in table.columns and (name in own or bound):
-                result[name] = own.get(name, 0.0)
+            if name in table.columns and (name in weight_by_name or is_dependent):
+                result[name] = weight_by_name.get(name, 0.0)
     return [MocoWeight(name=name, weight=weight) for name, weight in result.items()]

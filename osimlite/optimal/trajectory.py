@@ -64,11 +64,11 @@ class MocoTrajectory:
         # Moco's files do not contain the states before projection.
         for kind in (kind for kind in COLUMN_KINDS if kind in layout.names):
             for number, name in enumerate(layout.names[kind]):
-                places = layout.indices[kind][:, number]
-                own = w[places[places >= 0]]
-                if len(own) < len(times):
-                    own = np.interp(times, np.linspace(times[0], times[-1], len(own)), own)
-                columns[name] = own
+                indices = layout.indices[kind][:, number]
+                values = w[indices[indices >= 0]]
+                if len(values) < len(times):
+                    values = np.interp(times, np.linspace(times[0], times[-1], len(values)), values)
+                columns[name] = values
         # Moco reads the columns of a guess by their order, not by their names.
         rank = {
             name.removesuffix("/value"): k
@@ -77,10 +77,11 @@ class MocoTrajectory:
         names = {
             kind: tuple(
                 sorted(
-                    own, key=lambda name: rank.get(re.sub("/(value|accel)$", "", name), len(rank))
+                    values,
+                    key=lambda name: rank.get(re.sub("/(value|accel)$", "", name), len(rank)),
                 )
             )
-            for kind, own in layout.names.items()
+            for kind, values in layout.names.items()
             if kind in COLUMN_KINDS
         }
         parameters = dict(
@@ -99,13 +100,13 @@ class MocoTrajectory:
         table = read_sto(path)
         if not len(table.times):
             raise DocumentError("the file has no times", file=str(path))
-        said = {f"num_{kind}": table.header.get(f"num_{kind}", "0") for kind in COLUMN_KINDS}
-        for name, word in said.items():
+        counted = {f"num_{kind}": table.header.get(f"num_{kind}", "0") for kind in COLUMN_KINDS}
+        for name, word in counted.items():
             if not word.isdecimal():
                 raise DocumentError(
                     f"the header says {name}={word}, which is not a count", file=str(path)
                 )
-        counts = [*map(int, said.values())]
+        counts = [*map(int, counted.values())]
         if not any(counts):
             counts[0] = len(table.columns)
         if sum(counts) != len(table.columns):
@@ -115,9 +116,9 @@ class MocoTrajectory:
         for kind, count in zip(COLUMN_KINDS, counts, strict=True):
             names[kind] = table.columns[first : first + count]
             first += count
-        of = {name: table.rows[:, place] for place, name in enumerate(table.columns)}
-        parameters = {name: float(of.pop(name)[0]) for name in names.pop("parameters")}
-        return cls(table.times, of, names, parameters, table.header)
+        column_by_name = {name: table.rows[:, index] for index, name in enumerate(table.columns)}
+        parameters = {name: float(column_by_name.pop(name)[0]) for name in names.pop("parameters")}
+        return cls(table.times, column_by_name, names, parameters, table.header)
 
     def table(self, kind: str = "") -> StoTable:
         """Return the table of the columns of one kind, or of all columns."""
