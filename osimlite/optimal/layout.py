@@ -82,27 +82,40 @@ class Layout:
             kind: np.full((len(grid.fractions), len(self.names[kind])), -1)
             for kind in VARIABLE_KINDS
         }
-        size, end = self.shared, len(grid.fractions) - 1
-        lows, highs = [np.array(lower)], [np.array(upper)]
+        lows = [np.array(lower)]
+        highs = [np.array(upper)]
+        size = self.shared
+        end = len(grid.fractions) - 1
         limits = {
             kind: np.array([[b.within, b.first, b.last] for b in items])
             for kind, items in self.bounds.items()
         }
         for point in range(len(grid.fractions)):
             first = size
+            # Bounds at the start and at the end replace those over the motion.
+            column = 1 if point == 0 else 2 if point == end else 0
             for kind, items in limits.items():
                 if len(items) and self.has_kind(kind, point):
-                    ends = items[:, 1 if point == 0 else 2 if point == end else 0]
-                    lows.append(ends[:, 0])
-                    highs.append(ends[:, 1])
+                    lows.append(items[:, column, 0])
+                    highs.append(items[:, column, 1])
                     self.indices[kind][point] = np.arange(size, size + len(items))
                     size += len(items)
             self.point_indices.append(np.arange(first, size))
-        self.lower, self.upper = np.concatenate(lows), np.concatenate(highs)
+        self.lower = np.concatenate(lows)
+        self.upper = np.concatenate(highs)
+        self._check_bounds()
+
+    def _check_bounds(self) -> None:
+        """Check that each variable has a value between its bounds.
+
+        Raises:
+            DocumentError: a lower bound is above the upper one, or a bound is NaN.
+        """
+        # The negation also catches NaN.
         for index in np.flatnonzero(~(self.lower <= self.upper))[:1]:
             span = f"from {self.lower[index]:g} to {self.upper[index]:g}"
             message = f"all bounds of '{self.describe_variable(index)}' exclude each other ({span})"
-            raise problem.invalid_error(problem.phase, message)
+            raise self.problem.invalid_error(self.problem.phase, message)
 
     def has_kind(self, kind: str, point: int) -> bool:
         """Return whether a point has variables of a kind.

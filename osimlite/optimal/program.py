@@ -181,80 +181,136 @@ class Program:
     # ------------------------------------------------------------------------------------------ constant parts
     def _assemble(self) -> None:
         """Assemble A and B and the labels of their rows; the rows of the integrals follow those of g."""
-        grid, layout = self.problem.grid, self.layout
-        states, controls = layout.names["states"], layout.names["controls"]
-        scheme, count = grid.scheme, len(layout.names["states"])
-        start_of = np.zeros(len(grid.fractions), dtype=int)
+        grid = self.problem.grid
+        layout = self.layout
+        # Index of the first result of F of each point in the stacked results of all groups.
+        starts = np.zeros(len(grid.fractions), dtype=int)
         for group, offset in zip(self.groups, self._offsets, strict=False):
-            start_of[group.numbers] = offset + group.rows * np.arange(len(group.numbers))
+            starts[group.numbers] = offset + group.rows * np.arange(len(group.numbers))
         entries_a: list[tuple[Any, Any, Any]] = []
         entries_b: list[tuple[Any, Any, Any]] = []
+        row = self._assemble_intervals(entries_a, entries_b, starts)
+        self._row_count = self._assemble_points(entries_b, starts, row)
+        self._assemble_integrals(entries_b, starts)
+        size = self._row_count + len(self.integrals)
+
+        def make_matrix(parts: list[tuple[Any, Any, Any]], width: int) -> SparseMatrix:
+            rows, columns, values = (
+                np.concatenate([np.ravel(part[k]) for part in parts]) if parts else np.zeros(0)
+                for k in range(3)
+            )
+            return SparseMatrix.from_entries(rows, columns, values, (size, width))
+
+        self._a: SparseMatrix = make_matrix(entries_a, len(layout.lower))
+        self._b: SparseMatrix = make_matrix(entries_b, int(self._offsets[-1]))
+
+    def _assemble_intervals(
+        self,
+        entries_a: list[tuple[Any, Any, Any]],
+        entries_b: list[tuple[Any, Any, Any]],
+        starts: Array,
+    ) -> int:
+        """Add the equations of the scheme for states and controls of each interval.
+
+        Args:
+            entries_a: rows, columns and values of A, to which entries are added.
+            entries_b: rows, columns and values of B, to which entries are added.
+            starts: index of the first result of F of each point.
+
+        Returns:
+            Number of the rows.
+        """
+        grid = self.problem.grid
+        layout = self.layout
+        scheme = grid.scheme
+        states = layout.names["states"]
+        controls = layout.names["controls"]
+        count = len(states)
+        projected = len(layout.names["projections"])
+        # Moco can make controls linear between the nodes of an interval.
         lines = (
             scheme.controls if self.problem.solver.interpolate_control_mesh_interior_points else ()
         )
-        many, moved = len(grid.lengths), len(layout.names["projections"])
-        points = np.array([grid.get_points(interval) for interval in range(many)])
+        interval_count = len(grid.lengths)
+        points = np.array([grid.get_points(interval) for interval in range(interval_count)])
         labels = [f"{name} defect" for name in states] * len(scheme.states)
         labels += [f"{name} between nodes" for name in controls] * len(lines)
-        first = len(labels) * np.arange(many)[:, None]
+        first = len(labels) * np.arange(interval_count)[:, None]
+        state_range = np.arange(count)
         for number, pair in enumerate(zip(scheme.states, scheme.rates, strict=True)):
-            rows, state_range = first + number * count + np.arange(count), np.arange(count)
+            rows = first + number * count + state_range
             for k, (state_factor, rate_factor) in enumerate(zip(*pair, strict=True)):
-                variables, results = layout.indices["states"][points[:, k]], state_range
-                if moved and k == len(points[0]) - 1:
-                    # The interval ends at the states before projection.
+                variables = layout.indices["states"][points[:, k]]
+                results = state_range
+                if projected and k == len(points[0]) - 1:
+                    # The interval ends at the states before projection, whose rates follow those of
+                    # the projected states among the results of F.
                     ends = layout.indices["projections"][points[:, k]]
-                    variables, results = (
-                        np.hstack([ends, variables[:, moved:]]),
-                        np.concatenate([count + state_range[:moved], state_range[moved:]]),
+                    variables = np.hstack([ends, variables[:, projected:]])
+                    results = np.concatenate(
+                        [count + state_range[:projected], state_range[projected:]]
                     )
                 if state_factor:
                     entries_a.append((rows, variables, np.full(rows.shape, state_factor)))
                 if rate_factor:
+                    # F contains rates times the duration of the motion; the interval is a fraction.
                     each = np.broadcast_to(grid.lengths[:, None] * rate_factor, rows.shape)
-                    entries_b.append((rows, start_of[points[:, k]][:, None] + results, each))
+                    entries_b.append((rows, starts[points[:, k]][:, None] + results, each))
         for number, line in enumerate(lines):
-            rows = (
-                first
-                + len(scheme.states) * count
-                + number * len(controls)
-                + np.arange(len(controls))
-            )
+            rows = first + len(scheme.states) * count + number * len(controls)
+            rows = rows + np.arange(len(controls))
             for k in np.flatnonzero(line).tolist():
-                entries_a.append(
-                    (rows, layout.indices["controls"][points[:, k]], np.full(rows.shape, line[k]))
-                )
-        self.labels += labels * many
+                variables = layout.indices["controls"][points[:, k]]
+                entries_a.append((rows, variables, np.full(rows.shape, line[k])))
+        # Messages give the middle of the interval as the time of a defect.
         middles = 0.5 * (grid.fractions[points[:, 0]] + grid.fractions[points[:, -1]])
-        times, row = [np.repeat(middles, len(labels))], len(labels) * many
-        limits: list[tuple[float, float]] = [(0.0, 0.0)] * row
+        self.labels += labels * interval_count
+        self.times = np.repeat(middles, len(labels))
+        self.lower = np.zeros(len(self.times))
+        self.upper = np.zeros(len(self.times))
+        return len(self.times)
+
+    def _assemble_points(
+        self, entries_b: list[tuple[Any, Any, Any]], starts: Array, row: int
+    ) -> int:
+        """Add the residuals and path constraints of each point.
+
+        Args:
+            entries_b: rows, columns and values of B, to which entries are added.
+            starts: index of the first result of F of each point.
+            row: first row.
+
+        Returns:
+            Row after the last one.
+        """
+        count = len(self.layout.names["states"])
         for group in self.groups:
-            each, size = np.arange(len(group.labels)), len(group.labels) * len(group.numbers)
-            results = start_of[group.numbers][:, None] + count + group.projected + each
+            size = len(group.labels) * len(group.numbers)
+            each = np.arange(len(group.labels))
+            # The results of F are rates, rates before projection, these rows, and integrands.
+            results = starts[group.numbers][:, None] + count + group.projected + each
             entries_b.append((row + np.arange(size), results, np.ones(size)))
+            fractions = self.problem.grid.fractions[group.numbers]
             self.labels += group.labels * len(group.numbers)
-            times.append(np.repeat(grid.fractions[group.numbers], len(group.labels)))
-            limits += group.limits * len(group.numbers)
+            self.times = np.append(self.times, np.repeat(fractions, len(group.labels)))
+            limits = group.limits * len(group.numbers)
+            self.lower = np.append(self.lower, [low for low, _ in limits])
+            self.upper = np.append(self.upper, [high for _, high in limits])
             row += size
-        self._row_count = row
+        return row
+
+    def _assemble_integrals(self, entries_b: list[tuple[Any, Any, Any]], starts: Array) -> None:
+        """Add a row for each integral: the integrands, the last results of F, times quadrature weights."""
         for k, (_, terms) in enumerate(self.integrals):
             for group in self.groups:
-                state_range = start_of[group.numbers] + group.rows - len(self.integrals) + k
-                weights = np.ones(len(state_range)) if terms.is_sum else grid.weights[group.numbers]
-                entries_b.append((np.full(len(state_range), row + k), state_range, weights))
-        size = row + len(self.integrals)
-
-        def matrix(parts: list[tuple[Any, Any, Any]], width: int) -> SparseMatrix:
-            found: list[Any] = [
-                np.concatenate([np.ravel(part[k]) for part in parts]) if parts else []
-                for k in range(3)
-            ]
-            return SparseMatrix.from_entries(found[0], found[1], found[2], (size, width))
-
-        self._a: SparseMatrix = matrix(entries_a, len(layout.lower))
-        self._b: SparseMatrix = matrix(entries_b, int(self._offsets[-1]))
-        self.times = np.concatenate(times)
-        self.lower, self.upper = (np.array([limit[k] for limit in limits]) for k in range(2))
+                results = starts[group.numbers] + group.rows - len(self.integrals) + k
+                weights = (
+                    np.ones(len(results))
+                    if terms.is_sum
+                    else self.problem.grid.weights[group.numbers]
+                )
+                rows = np.full(len(results), self._row_count + k)
+                entries_b.append((rows, results, weights))
 
     def _entries(self, rows: str, columns: str) -> tuple[Array, Array]:
         """Return rows and columns of the derivatives of all points.
